@@ -1,0 +1,45 @@
+"""The two ways things end that are not results: bad input, and a simulation that fails."""
+
+from __future__ import annotations
+
+
+class InputError(ValueError):
+    """Input a person gave cannot be used; the message is one line made for that person.
+
+    `source` is the file (or option) at fault, `key` the place in it, and the
+    message says what was found and what was expected.
+    """
+
+    def __init__(self, source: object, key: str, problem: str) -> None:
+        self.source = str(source)
+        self.key = key
+        self.problem = problem
+        where = f"{source}: {key}" if key else f"{source}"
+        super().__init__(f"{where}: {problem}")
+
+
+class SimulationFailure(RuntimeError):
+    """A simulation ended before its duration: `time` (s) says when, `reason` why."""
+
+    def __init__(self, *, time: float, reason: str) -> None:
+        self.time = time
+        self.reason = reason
+        super().__init__(f"simulation failed at t = {time:.4f} s: {reason}")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Keyword-only arguments defeat the default; failures must cross process borders.
+        return (_rebuild_failure, (type(self), self.time, self.reason))
+
+
+class Diverged(SimulationFailure):
+    """The motion left the physical range: not finite, too fast, or beyond the integrator."""
+
+
+class StepBudgetExceeded(SimulationFailure):
+    """The integrator used up its allowance of derivative evaluations."""
+
+
+def _rebuild_failure(
+    kind: type[SimulationFailure], time: float, reason: str
+) -> SimulationFailure:
+    return kind(time=time, reason=reason)

@@ -1,0 +1,264 @@
+"""The ground: normal force (Eq. 1) and reset-integrator friction (Eq. 3-5) of contact nodes.
+
+What a contact node remembers is a row of `modes`, (contacts, 5): whether it touches the
+ground, per horizontal axis its friction mode (STICK, or the sign of the direction it slips
+in), and per axis the stick point: where its bristle deflection is zero.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.kinematics import add_node_force, node_acceleration, node_motion
+
+Array = np.ndarray
+
+CONTACT, MODE, STICK_POINT, MODE_COLUMNS = 0, 1, 3, 5
+"""Columns of `modes`: contact (0 or 1), mode (x, y), stick point (x, y) in m; and their number."""
+
+STICK = 0.0
+"""The friction mode of an axis that sticks; +1 or -1 slips in that direction."""
+
+GROUND = np.dtype(
+    [
+        ("stiffness", np.float64),
+        ("damping", np.float64),
+        ("stiction_range", np.float64),
+        ("stiction_damping", np.float64),
+        ("stiction_switch", np.float64),
+        ("proportional_stiction", np.float64),
+    ]
+)
+"""The constants of Tables 1 and 2 in SI units; kernels take an array of one of these."""
+
+
+@compiled
+def normal_force(depth: float, depth_rate: float, stiffness: float, damping: float) -> float:
+    """Upward force (N) on a node `depth` (m) below the ground, sinking at `depth_rate` (m/s).
+
+    Eq. 1 with n = 1; the ground never pulls.
+    """
+    if depth <= 0.0:
+        return 0.0
+    return max(0.0, stiffness * depth + damping * depth * depth_rate)
+
+
+@compiled
+def friction_force(
+    velocity: float,
+    deflection: float,
+    mode: float,
+    stiction_range: float,
+    stiction_damping: float,
+    stiction_switch: float,
+    proportional_stiction: float,
+) -> float:
+    """Friction (N) along one horizontal axis of a node on the ground (Eq. 3-5).
+
+    `velocity` (m/s) is along the axis and `deflection` (m) from the stick point; in slip
+    the deflection is held at the stiction range, on the side the node slips to.
+    """
+    if mode == STICK:
+        bristle = proportional_stiction * abs(velocity) * (1.0 + stiction_switch) * deflection
+        return -(bristle + stiction_damping * velocity)
+    return -proportional_stiction * abs(velocity) * stiction_range * mode
+
+
+@compiled
+def next_friction_mode(
+    velocity: float, deflection: float, mode: float, stiction_range: float
+) -> float:
+    """The mode that follows `mode`: breaks free at the stiction range moving outward,
+    sticks again when the velocity changes sign."""
+    if mode == STICK:
+        if deflection >= stiction_range and velocity > 0.0:
+            return 1.0
+        if deflection <= -stiction_range and velocity < 0.0:
+            return -1.0
+        return STICK
+    return mode if mode * velocity > 0.0 else STICK
+
+
+@compiled
+def ground_forces(
+    state: Array,
+    modes: Array,
+    p_BN: Array,
+    contacts: Array,
+    ground: Array,
+    generalized_force: Array,
+    normal: Array,
+    friction: Array,
+) -> None:
+    """Forces of the ground on the bodies.
+
+    Args:
+        state: [q; v] of the bodies, 13 numbers a body.
+        modes: (contacts, MODE_COLUMNS).
+        p_BN: (nodes a body, 3), in m.
+        contacts: (contacts,), the indices of the nodes that may touch the ground.
+        ground: (1,) of dtype GROUND.
+        generalized_force: (6 bodies,), written, [t_W; f_W] at each Bo.
+        normal: (contacts,), written, in N.
+        friction: (contacts, 2), written, along x and y in N.
+    """
+    nodes_a_body = p_BN.shape[0]
+    nodes = nodes_a_body * (state.size // 13)
+    p_BN_W = np.empty((nodes, 3))
+    p_WN = np.empty((nodes, 3))
+    v_WN = np.empty((nodes, 3))
+    node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
+    law = ground[0]
+    generalized_force[:] = 0.0
+    for i in range(contacts.size):
+        node = contacts[i]
+        normal[i] = normal_force(-p_WN[node, 2], -v_WN[node, 2], law.stiffness, law.damping)
+        for axis in range(2):
+            friction[i, axis] = 0.0
+            if modes[i, CONTACT] != 0.0:
+                friction[i, axis] = friction_force(
+                    v_WN[node, axis],
+                    p_WN[node, axis] - modes[i, STICK_POINT + axis],
+                    modes[i, MODE + axis],
+                    law.stiction_range,
+                    law.stiction_damping,
+                    law.stiction_switch,
+                    law.proportional_stiction,
+                )
+        add_node_force(
+            node // nodes_a_body,
+            p_BN_W[node],
+            friction[i, 0],
+            friction[i, 1],
+            normal[i],
+            generalized_force,
+        )
+
+
+@compiled
+def update_modes(
+    state: Array, p_BN: Array, contacts: Array, ground: Array, modes: Array
+) -> None:
+    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with `state`.
+
+    A node that lands sticks where it lands; one that sticks again does so where it is
+    (the reset of the integrator). The arguments are those of `ground_forces`.
+    """
+    nodes = p_BN.shape[0] * (state.size // 13)
+    p_BN_W = np.empty((nodes, 3))
+    p_WN = np.empty((nodes, 3))
+    v_WN = np.empty((nodes, 3))
+    node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
+    stiction_range = ground[0].stiction_range
+    for i in range(contacts.size):
+        node = contacts[i]
+        touched = modes[i, CONTACT] != 0.0
+        touches = p_WN[node, 2] <= 0.0
+        modes[i, CONTACT] = 1.0 if touches else 0.0
+        for axis in range(2):
+            mode = modes[i, MODE + axis]
+            if touched and touches:
+                deflection = p_WN[node, axis] - modes[i, STICK_POINT + axis]
+                after = next_friction_mode(v_WN[node, axis], deflection, mode, stiction_range)
+            else:
+                after = STICK
+            if after == STICK and (mode != STICK or not touched):
+                modes[i, STICK_POINT + axis] = p_WN[node, axis]
+            modes[i, MODE + axis] = after
+
+
+@compiled
+def mode_margin(
+    state: Array, modes: Array, p_BN: Array, contacts: Array, ground: Array
+) -> float:
+    """Positive while no mode is due to change; crosses zero where the first one is.
+
+    The least of: height in the air, depth on the ground (m), stiction range less deflection
+    (m), speed in the direction of slip (m/s). Only its sign has a meaning.
+    """
+    nodes = p_BN.shape[0] * (state.size // 13)
+    p_BN_W = np.empty((nodes, 3))
+    p_WN = np.empty((nodes, 3))
+    v_WN = np.empty((nodes, 3))
+    node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
+    margin = math.inf
+    for i in range(contacts.size):
+        node = contacts[i]
+        if modes[i, CONTACT] == 0.0:
+            margin = min(margin, p_WN[node, 2])
+            continue
+        margin = min(margin, -p_WN[node, 2])
+        for axis in range(2):
+            mode = modes[i, MODE + axis]
+            if mode == STICK:
+                deflection = p_WN[node, axis] - modes[i, STICK_POINT + axis]
+                margin = min(margin, ground[0].stiction_range - abs(deflection))
+            else:
+                margin = min(margin, mode * v_WN[node, axis])
+    return margin
+
+
+@compiled
+def first_zero(value: float, rate: float, rate_rate: float, horizon: float) -> float:
+    """First time in (0, horizon) at which value + rate t + rate_rate t²/2 falls to zero;
+    the horizon where it does not, or where the value is not positive now."""
+    if value <= 0.0:
+        return horizon
+    discriminant = rate * rate - 2.0 * rate_rate * value
+    if discriminant < 0.0:
+        return horizon
+    # The two roots without cancellation; each may lie in the past.
+    q = -0.5 * (rate + math.copysign(math.sqrt(discriminant), rate))
+    first = horizon
+    if q > 0.0:
+        first = min(first, value / q)
+    if rate_rate * q > 0.0:
+        first = min(first, 2.0 * q / rate_rate)
+    return first
+
+
+@compiled
+def time_to_mode_change(
+    state: Array,
+    acceleration: Array,
+    modes: Array,
+    p_BN: Array,
+    contacts: Array,
+    ground: Array,
+    horizon: float,
+) -> float:
+    """Time (s) to the next mode change, extrapolating with constant node accelerations.
+
+    `acceleration` is dv/dt, 6 numbers a body; no answer exceeds `horizon` (s). The
+    other arguments are those of `ground_forces`.
+    """
+    nodes_a_body = p_BN.shape[0]
+    nodes = nodes_a_body * (state.size // 13)
+    p_BN_W = np.empty((nodes, 3))
+    p_WN = np.empty((nodes, 3))
+    v_WN = np.empty((nodes, 3))
+    node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
+    stiction_range = ground[0].stiction_range
+    time = horizon
+    for i in range(contacts.size):
+        node = contacts[i]
+        a_WN = node_acceleration(state, acceleration, node // nodes_a_body, p_BN_W[node])
+        p_z, v_z, a_z = p_WN[node, 2], v_WN[node, 2], a_WN[2]
+        if modes[i, CONTACT] == 0.0:
+            time = min(time, first_zero(p_z, v_z, a_z, horizon))
+            continue
+        time = min(time, first_zero(-p_z, -v_z, -a_z, horizon))
+        for axis in range(2):
+            velocity = v_WN[node, axis]
+            mode = modes[i, MODE + axis]
+            if mode == STICK:
+                x = p_WN[node, axis] - modes[i, STICK_POINT + axis]
+                a = a_WN[axis]
+                time = min(time, first_zero(stiction_range - x, -velocity, -a, horizon))
+                time = min(time, first_zero(stiction_range + x, velocity, a, horizon))
+            else:
+                time = min(time, first_zero(mode * velocity, mode * a_WN[axis], 0.0, horizon))
+    return time

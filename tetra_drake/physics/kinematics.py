@@ -1,0 +1,88 @@
+"""Positions and velocities of the nodes of free rigid bodies, and forces back onto the bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tetra_drake.physics.compiling import compiled
+
+Array = np.ndarray
+
+
+@compiled
+def node_motion(state: Array, p_BN: Array, p_BN_W: Array, p_WN: Array, v_WN: Array) -> None:
+    """Moves the body-fixed nodes with their bodies.
+
+    Args:
+        state: [q; v] of the bodies, 13 numbers a body.
+        p_BN: (nodes a body, 3), the same for every body, in m.
+        p_BN_W, p_WN, v_WN: (nodes, 3), written: from body origin to node expressed in
+            World (m), position (m) and velocity (m/s) in World; nodes run body by body.
+    """
+    bodies = state.size // 13
+    nodes = p_BN.shape[0]
+    for body in range(bodies):
+        q = 7 * body
+        v = 7 * bodies + 6 * body
+        w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
+        s = 2.0 / (w * w + x * x + y * y + z * z)
+        r_00, r_01, r_02 = 1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
+        r_10, r_11, r_12 = s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)
+        r_20, r_21, r_22 = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
+        w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
+        for k in range(nodes):
+            a, b, c = p_BN[k, 0], p_BN[k, 1], p_BN[k, 2]
+            p_x = r_00 * a + r_01 * b + r_02 * c
+            p_y = r_10 * a + r_11 * b + r_12 * c
+            p_z = r_20 * a + r_21 * b + r_22 * c
+            node = nodes * body + k
+            p_BN_W[node, 0] = p_x
+            p_BN_W[node, 1] = p_y
+            p_BN_W[node, 2] = p_z
+            p_WN[node, 0] = state[q + 4] + p_x
+            p_WN[node, 1] = state[q + 5] + p_y
+            p_WN[node, 2] = state[q + 6] + p_z
+            v_WN[node, 0] = state[v + 3] + w_y * p_z - w_z * p_y
+            v_WN[node, 1] = state[v + 4] + w_z * p_x - w_x * p_z
+            v_WN[node, 2] = state[v + 5] + w_x * p_y - w_y * p_x
+
+
+@compiled
+def node_acceleration(
+    state: Array, acceleration: Array, body: int, p_BN_W: Array
+) -> tuple[float, float, float]:
+    """Acceleration (m/s²) in World of the node at `p_BN_W` (3,) on `body`.
+
+    `acceleration` is dv/dt of the bodies, 6 numbers a body.
+    """
+    v = 7 * (state.size // 13) + 6 * body
+    a = 6 * body
+    w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
+    p_x, p_y, p_z = p_BN_W[0], p_BN_W[1], p_BN_W[2]
+    u_x = w_y * p_z - w_z * p_y
+    u_y = w_z * p_x - w_x * p_z
+    u_z = w_x * p_y - w_y * p_x
+    alpha_x, alpha_y, alpha_z = acceleration[a], acceleration[a + 1], acceleration[a + 2]
+    return (
+        acceleration[a + 3] + alpha_y * p_z - alpha_z * p_y + w_y * u_z - w_z * u_y,
+        acceleration[a + 4] + alpha_z * p_x - alpha_x * p_z + w_z * u_x - w_x * u_z,
+        acceleration[a + 5] + alpha_x * p_y - alpha_y * p_x + w_x * u_y - w_y * u_x,
+    )
+
+
+@compiled
+def add_node_force(
+    body: int, p_BN_W: Array, f_x: float, f_y: float, f_z: float, generalized_force: Array
+) -> None:
+    """Adds a force in World (N) at the node at `p_BN_W` (3,) on `body`.
+
+    `generalized_force` holds [t_W; f_W] at Bo, 6 numbers a body, as Drake's
+    applied_generalized_force port wants them.
+    """
+    g = 6 * body
+    generalized_force[g] += p_BN_W[1] * f_z - p_BN_W[2] * f_y
+    generalized_force[g + 1] += p_BN_W[2] * f_x - p_BN_W[0] * f_z
+    generalized_force[g + 2] += p_BN_W[0] * f_y - p_BN_W[1] * f_x
+    generalized_force[g + 3] += f_x
+    generalized_force[g + 4] += f_y
+    generalized_force[g + 5] += f_z

@@ -1,0 +1,101 @@
+"""The Matsuoka network (Eq. 7-9): 2n neurons, of which neurons 2k and 2k + 1 (counting from
+0) are the extensor and the flexor of oscillator k."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tetra_drake.physics.compiling import compiled
+
+Array = np.ndarray
+
+
+def inhibition_matrix(weights: Array, *, oscillators: int, partner_weight: float) -> Array:
+    """The (2n, 2n) matrix W of inhibition: W[i, j] of neuron i by neuron j.
+
+    `weights`, 2 n (n - 1) of them, come in the listing's order (B.2): onto each neuron in
+    turn, from the neurons of its own kind in turn. Partners inhibit each other by
+    `partner_weight`.
+    """
+    neurons = 2 * oscillators
+    matrix = np.zeros((neurons, neurons))
+    remaining = iter(np.asarray(weights, dtype=float))
+    for i in range(neurons):
+        matrix[i, i ^ 1] = partner_weight
+        for j in range(i % 2, neurons, 2):
+            if j != i:
+                matrix[i, j] = next(remaining)
+    return matrix
+
+
+@compiled
+def neuron_rates(
+    u: Array,
+    v: Array,
+    feedback: Array,
+    inhibition: Array,
+    tau_a: float,
+    tau_b: float,
+    self_inhibition_weight: float,
+    external_input: float,
+    u_rate: Array,
+    v_rate: Array,
+) -> None:
+    """Rates of the inner states u and the self-inhibitions v (Eq. 7; -u as in listing B.2).
+
+    All arrays (2n,) but `inhibition`, (2n, 2n); time constants in s; `u_rate` and
+    `v_rate` are written, in 1/s.
+    """
+    neurons = u.size
+    for i in range(neurons):
+        total = external_input + feedback[i] - u[i] - self_inhibition_weight * v[i]
+        for j in range(neurons):
+            total -= inhibition[i, j] * max(0.0, u[j])
+        u_rate[i] = total / tau_a
+        v_rate[i] = (max(0.0, u[i]) - v[i]) / tau_b
+
+
+@compiled
+def oscillator_output(u: Array, output: Array) -> None:
+    """y_extensor - y_flexor (n,) of each oscillator, y = max(0, u) (Eq. 8 and 9)."""
+    for k in range(output.size):
+        output[k] = max(0.0, u[2 * k]) - max(0.0, u[2 * k + 1])
+
+
+@compiled
+def listing_output(
+    u: Array,
+    v: Array,
+    inhibition: Array,
+    tau_a: float,
+    tau_b: float,
+    self_inhibition_weight: float,
+    external_input: float,
+    step: float,
+    output: Array,
+) -> None:
+    """The outputs (steps, n) of the network stepped as listing B.1 steps it: forward Euler.
+
+    Row i is the state after i + 1 steps of `step` (s); the listing stamps it with i steps.
+    `u` and `v`, (2n,), hold the initial state and are overwritten with the last.
+    """
+    u_rate = np.empty_like(u)
+    v_rate = np.empty_like(v)
+    feedback = np.zeros_like(u)
+    for i in range(output.shape[0]):
+        neuron_rates(
+            u,
+            v,
+            feedback,
+            inhibition,
+            tau_a,
+            tau_b,
+            self_inhibition_weight,
+            external_input,
+            u_rate,
+            v_rate,
+        )
+        for k in range(u.size):
+            u[k] += u_rate[k] * step
+            v[k] += v_rate[k] * step
+        oscillator_output(u, output[i])

@@ -1,0 +1,196 @@
+"""The robot's structure as data, and its bodies in a MultibodyPlant."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import Cylinder, Sphere
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
+
+from tetra_drake.physics.cable import CABLE, PASSIVE
+from tetra_drake.physics.kinematics import node_motion
+from tetra_drake.scenario import CableScenario, RobotScenario
+
+NODES = ("bottom_left", "bottom_right", "top", "tip")
+"""The nodes of a tetrahedron; the first three form the base triangle."""
+
+BOTTOM_LEFT, BOTTOM_RIGHT, TOP, TIP = range(4)
+BASE = (BOTTOM_LEFT, BOTTOM_RIGHT, TOP)
+STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
+
+
+@dataclass(frozen=True)
+class Structure:
+    """n tetrahedra in a row, T1 (rear) to Tn (lead), tied together by cables.
+
+    A node's index is 4 * body + its place in NODES. Lengths in m.
+    """
+
+    bodies: tuple[str, ...]
+    """The names of the bodies, "T1" to "Tn"."""
+    p_BN: np.ndarray
+    """(4, 3): the nodes in the frame of a body, whose origin is the centre of mass."""
+    p_WB: np.ndarray
+    """(n, 3): the bodies at t = 0, all with the axes of World."""
+    cables: np.ndarray
+    """(6 (n - 1),) of dtype CABLE."""
+    cable_names: tuple[str, ...]
+    """Such as "T1-T2 outer bottom_left"."""
+    contacts: np.ndarray
+    """(2 n + 1,): the indices of the nodes that the ground can touch."""
+    strut_radius: float
+    node_radius: float
+    density: float
+
+    @property
+    def signals(self) -> int:
+        """Actuation signals: one a junction."""
+        return len(self.bodies) - 1
+
+    @property
+    def node_names(self) -> tuple[str, ...]:
+        """Such as "T1 tip", by node index."""
+        return tuple(f"{body} {node}" for body in self.bodies for node in NODES)
+
+    @property
+    def initial_state(self) -> np.ndarray:
+        """(13 n,): [q; v] at t = 0, at rest."""
+        q = [np.concatenate(([1.0, 0.0, 0.0, 0.0], p_WBi)) for p_WBi in self.p_WB]
+        return np.concatenate([*q, np.zeros(6 * len(self.bodies))])
+
+
+def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
+    """The robot of thesis section 2.1 with `robot.tetrahedra` tetrahedra.
+
+    Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0; the
+    tips point forward (+x) into the next tetrahedron. Junction i joins T(i+1) and T(i+2)
+    by 3 outer cables (base node to base node), of which signal i drives the bottom two,
+    and 3 inner ones (tip to base nodes).
+    """
+    n = robot.tetrahedra
+    edge = robot.strut_length
+    circumradius = edge / math.sqrt(3.0)
+    height = edge * math.sqrt(2.0 / 3.0)
+    p_BN = np.array(
+        [
+            [-height / 4, edge / 2, -circumradius / 2],
+            [-height / 4, -edge / 2, -circumradius / 2],
+            [-height / 4, 0.0, circumradius],
+            [3 * height / 4, 0.0, 0.0],
+        ]
+    )
+    bodies = tuple(f"T{i + 1}" for i in range(n))
+    p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
+    rows, names = [], []
+    for i in range(n - 1):
+        junction = f"{bodies[i]}-{bodies[i + 1]}"
+        for node in BASE:
+            a, b = 4 * i + node, 4 * (i + 1) + node
+            signal = PASSIVE if node == TOP else i
+            rows.append((a, b, cables.outer_stiffness, cables.damping, cables.free_length, signal))
+            names.append(f"{junction} outer {NODES[node]}")
+        for node in BASE:
+            a, b = 4 * i + TIP, 4 * (i + 1) + node
+            rows.append((a, b, cables.inner_stiffness, cables.damping, cables.free_length, PASSIVE))
+            names.append(f"{junction} inner {NODES[node]}")
+    bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
+    return Structure(
+        bodies=bodies,
+        p_BN=p_BN,
+        p_WB=p_WB,
+        cables=np.array(rows, dtype=CABLE),
+        cable_names=tuple(names),
+        contacts=np.array([*bottom, 4 * (n - 1) + TIP]),
+        strut_radius=robot.strut_diameter / 2,
+        node_radius=robot.node_diameter / 2,
+        density=robot.density,
+    )
+
+
+def strut_pose(structure: Structure, strut: tuple[int, int]) -> RigidTransform:
+    """X_BS of a strut's frame: its origin in the middle, its z axis along the strut."""
+    p_BA, p_BC = structure.p_BN[strut[0]], structure.p_BN[strut[1]]
+    R_BS = RotationMatrix.MakeFromOneVector(p_BC - p_BA, 2)
+    return RigidTransform(R_BS, (p_BA + p_BC) / 2)
+
+
+def strut_inertia(structure: Structure, strut: tuple[int, int]) -> SpatialInertia:
+    """Spatial inertia of one strut, a solid cylinder, about its middle, in the strut's frame."""
+    p_AC = structure.p_BN[strut[1]] - structure.p_BN[strut[0]]
+    return SpatialInertia.SolidCylinderWithDensity(
+        density=structure.density,
+        radius=structure.strut_radius,
+        length=float(np.linalg.norm(p_AC)),
+        unit_vector=[0.0, 0.0, 1.0],
+    )
+
+
+def node_inertia(structure: Structure) -> SpatialInertia:
+    """Spatial inertia of the sphere at a node, about its centre."""
+    return SpatialInertia.SolidSphereWithDensity(
+        density=structure.density, radius=structure.node_radius
+    )
+
+
+def tetrahedron_inertia(structure: Structure) -> SpatialInertia:
+    """M_BBo_B: six struts and four spheres about the body's origin."""
+    total = SpatialInertia.Zero()
+    for strut in STRUTS:
+        X_BS = strut_pose(structure, strut)
+        M_SSo_B = strut_inertia(structure, strut).ReExpress(X_BS.rotation())
+        total += M_SSo_B.Shift(-X_BS.translation())
+    for p_BNi in structure.p_BN:
+        total += node_inertia(structure).Shift(-p_BNi)
+    # The sum is isotropic about Bo but for rounding, whose last bits would break the robot's
+    # left-right symmetry and let explicit schemes amplify that up to their accuracy.
+    unit = UnitInertia(*np.diag(total.get_unit_inertia().CopyToFullMatrix3()))
+    return SpatialInertia(total.get_mass(), np.zeros(3), unit)
+
+
+def AddTetrahedra(
+    plant: MultibodyPlant, structure: Structure, *, visuals: bool = False
+) -> list[RigidBody]:
+    """Adds the free bodies T1 ... Tn to a plant that is not finalized yet.
+
+    With `visuals`, the plant, which then must have a SceneGraph, shows struts and nodes.
+    """
+    inertia = tetrahedron_inertia(structure)
+    bodies = [plant.AddRigidBody(name, inertia) for name in structure.bodies]
+    if visuals:
+        for body in bodies:
+            _add_visuals(plant, structure, body)
+    return bodies
+
+
+_GREY, _BLUE = (0.55, 0.57, 0.6, 1.0), (0.0, 0.45, 0.7, 1.0)
+
+
+def _add_visuals(plant: MultibodyPlant, structure: Structure, body: RigidBody) -> None:
+    for strut in STRUTS:
+        length = float(np.linalg.norm(structure.p_BN[strut[1]] - structure.p_BN[strut[0]]))
+        name = f"strut_{NODES[strut[0]]}_{NODES[strut[1]]}"
+        shape = Cylinder(structure.strut_radius, length)
+        plant.RegisterVisualGeometry(body, strut_pose(structure, strut), shape, name, _GREY)
+    for name, p_BNi in zip(NODES, structure.p_BN, strict=True):
+        shape = Sphere(structure.node_radius)
+        plant.RegisterVisualGeometry(body, RigidTransform(p_BNi), shape, name, _BLUE)
+
+
+def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
+    """p_WN (nodes, 3) in m from the state (13 n,) of the bodies."""
+    return _node_motion(structure, state)[0]
+
+
+def node_velocities(structure: Structure, state: np.ndarray) -> np.ndarray:
+    """v_WN (nodes, 3) in m/s from the state (13 n,) of the bodies."""
+    return _node_motion(structure, state)[1]
+
+
+def _node_motion(structure: Structure, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    p_BN_W, p_WN, v_WN = (np.empty((4 * len(structure.bodies), 3)) for _ in range(3))
+    node_motion(state, structure.p_BN, p_BN_W, p_WN, v_WN)
+    return p_WN, v_WN

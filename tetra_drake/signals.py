@@ -1,0 +1,87 @@
+"""The actuation signals of a gait, computed before the robot is simulated.
+
+Without feedback the network does not depend on the robot, so it can be integrated alone and
+its output fed to the cables as a recording, as the thesis does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.trajectories import PiecewisePolynomial
+
+from tetra_drake.gait import Gait
+from tetra_drake.physics.oscillator import inhibition_matrix, listing_output
+from tetra_drake.scenario import CpgScenario
+from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg, initial_state
+
+_ACCURACY = 1e-7
+_KNOT_SPACING = 1e-3  # s; between knots the signal deviates from its chord by about 1e-5 N
+
+
+def listing_samples(
+    cpg: CpgScenario, gait: Gait, *, oscillators: int, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times (s) and raw y_extensor - y_flexor (samples, n) as the thesis's listing B has them.
+
+    Forward Euler; the state after i + 1 steps is stamped with the time of i steps.
+    """
+    count = round(duration / cpg.listing_step)
+    state = initial_state(cpg, oscillators)
+    output = np.empty((count, oscillators))
+    listing_output(
+        state[: 2 * oscillators].copy(),
+        state[2 * oscillators :].copy(),
+        inhibition_matrix(
+            np.array(gait.weights), oscillators=oscillators, partner_weight=cpg.partner_weight
+        ),
+        gait.tau_a,
+        gait.tau_b,
+        cpg.self_inhibition_weight,
+        cpg.external_input,
+        cpg.listing_step,
+        output,
+    )
+    return np.arange(count) * cpg.listing_step, output
+
+
+def integrate_network(
+    cpg: CpgScenario, gait: Gait, *, oscillators: int, duration: float
+) -> PiecewisePolynomial:
+    """The state (4n) of the network over time, integrated by Drake with error control."""
+    simulator = Simulator(MatsuokaCpg(cpg, gait, oscillators=oscillators))
+    integrator = ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.05)
+    integrator.set_target_accuracy(_ACCURACY)
+    simulator.Initialize()
+    integrator.StartDenseIntegration()
+    simulator.AdvanceTo(duration)
+    return integrator.StopDenseIntegration()
+
+
+def recorded_samples(
+    cpg: CpgScenario, gait: Gait, *, oscillators: int, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times (s) and raw y_extensor - y_flexor (samples, n) of the network integrated with
+    error control: knots of a piecewise linear function, with one at every kink (a neuron's
+    onset or end of firing)."""
+    states = integrate_network(cpg, gait, oscillators=oscillators, duration=duration)
+    neurons = 2 * oscillators
+    times = np.linspace(0.0, duration, round(duration / _KNOT_SPACING) + 1)
+    u = states.vector_values(times)[:neurons]
+    neuron, knot = np.nonzero(u[:, :-1] * u[:, 1:] < 0.0)
+    fraction = u[neuron, knot] / (u[neuron, knot] - u[neuron, knot + 1])
+    kinks = times[knot] + fraction * (times[knot + 1] - times[knot])
+    times = np.union1d(times, kinks)
+    y = np.maximum(0.0, states.vector_values(times)[:neurons])
+    return times, (y[0::2] - y[1::2]).T
+
+
+def signal_trajectory(
+    cpg: CpgScenario, gait: Gait, *, oscillators: int, duration: float
+) -> PiecewisePolynomial:
+    """The signals (n) in N over time, piecewise linear, from the source `cpg.signals` names."""
+    samples = listing_samples if cpg.signals == "listing" else recorded_samples
+    times, raw = samples(cpg, gait, oscillators=oscillators, duration=duration)
+    if times[-1] < duration:  # the listing's last sample is stamped one step early
+        times, raw = np.append(times, duration), np.vstack([raw, raw[-1:]])
+    return PiecewisePolynomial.FirstOrderHold(times, cpg.gain * raw.T)

@@ -1,0 +1,8 @@
+"""The LeafSystems of the diagram: ports, state and events around the laws in `physics`."""
+
+from tetra_drake.systems.cable_network import CableNetwork
+from tetra_drake.systems.ground_contact import GroundContact
+from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
+from tetra_drake.systems.start_up_timer import StartUpTimer
+
+__all__ = ["CableNetwork", "GroundContact", "MatsuokaCpg", "StartUpTimer"]

@@ -1,0 +1,76 @@
+"""All cables of the robot as a system."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from tetra_drake.physics.cable import cable_forces
+from tetra_drake.robot import Structure
+
+
+class CableNetwork(LeafSystem):
+    """The cables between the tetrahedra (thesis Eq. 6); no state.
+
+    .. pydrake_system::
+
+        name: CableNetwork
+        input_ports:
+        - state
+        - signals
+        output_ports:
+        - generalized_force
+        - tensions
+        - lengths
+
+    | port              | shape          | unit   | meaning                                  |
+    |-------------------|----------------|--------|------------------------------------------|
+    | state             | (13 n,)        | SI     | [q; v] of n free bodies, from the plant  |
+    | signals           | (n - 1,)       | N      | actuation, one a junction                |
+    | generalized_force | (6 n,)         | N m, N | [t_W; f_W] at each body's origin         |
+    | tensions          | (6 (n - 1),)   | N      | tension of each cable                    |
+    | lengths           | (6 (n - 1),)   | m      | length of each cable                     |
+
+    With `slack`, a cable that would have to push goes slack.
+    """
+
+    def __init__(self, structure: Structure, *, slack: bool) -> None:
+        super().__init__()
+        self._p_BN = structure.p_BN
+        self._cables = structure.cables
+        self._slack = slack
+        count = len(structure.cables)
+        self._tensions, self._lengths = np.empty(count), np.empty(count)
+        self._generalized_force = np.empty(6 * len(structure.bodies))
+
+        self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
+        self._signals = self.DeclareVectorInputPort("signals", structure.signals)
+        inputs = {self._state.ticket(), self._signals.ticket()}
+        self.DeclareVectorOutputPort(
+            "generalized_force", self._generalized_force.size, self._calc_force, inputs
+        )
+        self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
+        self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
+
+    def _calc(self, context: Context, generalized_force: np.ndarray) -> None:
+        cable_forces(
+            self._state.Eval(context),
+            self._signals.Eval(context),
+            self._p_BN,
+            self._cables,
+            self._slack,
+            generalized_force,
+            self._tensions,
+            self._lengths,
+        )
+
+    def _calc_force(self, context: Context, output: BasicVector) -> None:
+        self._calc(context, output.get_mutable_value())
+
+    def _calc_tensions(self, context: Context, output: BasicVector) -> None:
+        self._calc(context, self._generalized_force)
+        output.SetFromVector(self._tensions)
+
+    def _calc_lengths(self, context: Context, output: BasicVector) -> None:
+        self._calc(context, self._generalized_force)
+        output.SetFromVector(self._lengths)

@@ -1,0 +1,176 @@
+"""The ground under the robot as a system: normal force and reset-integrator friction."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiscreteValues,
+    LeafSystem,
+    WitnessFunction,
+    WitnessFunctionDirection,
+)
+
+from tetra_drake.physics.ground import (
+    GROUND,
+    MODE_COLUMNS,
+    STICK_POINT,
+    ground_forces,
+    mode_margin,
+    time_to_mode_change,
+    update_modes,
+)
+from tetra_drake.robot import Structure
+from tetra_drake.scenario import FrictionScenario, GroundScenario
+
+
+class GroundContact(LeafSystem):
+    """Normal force (thesis Eq. 1) and reset-integrator friction (Eq. 3-5) at m contact nodes.
+
+    .. pydrake_system::
+
+        name: GroundContact
+        input_ports:
+        - state
+        output_ports:
+        - generalized_force
+        - normal_forces
+        - friction_forces
+        - modes
+
+    | port              | shape   | unit   | meaning                                          |
+    |-------------------|---------|--------|--------------------------------------------------|
+    | state             | (13 n,) | SI     | [q; v] of n free bodies, from the plant          |
+    | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin                 |
+    | normal_forces     | (m,)    | N      | upward, by contact node                          |
+    | friction_forces   | (2 m,)  | N      | along x and y, by contact node                   |
+    | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along x and y |
+    |                   |         |        | (0 sticks, ±1 slips that way), by contact node   |
+
+    Discrete state: the rows of `physics.ground` (contact, modes, stick points), one a node.
+    In stick the bristle deflection is the way from the stick point, so no integrator has to
+    be reset and the system has no continuous state. The modes are frozen within a step, which
+    keeps the forces smooth there, and updated at the end of each step; Initialize() sets
+    them from the pose.
+
+    With `witness`, a witness function also makes steps end where a mode is due to change,
+    to within Drake's isolation window: 0.01 s times the accuracy set in the Context
+    (Context.SetAccuracy).
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        ground: GroundScenario,
+        friction: FrictionScenario,
+        *,
+        witness: bool = False,
+    ) -> None:
+        super().__init__()
+        self._p_BN = structure.p_BN
+        self._contacts = structure.contacts
+        self._law = ground_law(ground, friction)
+        bodies, count = len(structure.bodies), len(structure.contacts)
+        self._generalized_force = np.empty(6 * bodies)
+        self._normal, self._friction = np.empty(count), np.empty((count, 2))
+
+        self._state = self.DeclareVectorInputPort("state", 13 * bodies)
+        self.DeclareDiscreteState(MODE_COLUMNS * count)
+        self.DeclareInitializationDiscreteUpdateEvent(self._start)
+        self.DeclarePerStepDiscreteUpdateEvent(self._update)
+        self._witnesses: list[WitnessFunction] = []
+        if witness:
+            # It carries no event of its own: it ends the step, and the update follows there.
+            self._witnesses.append(
+                self.MakeWitnessFunction(
+                    "mode margin", WitnessFunctionDirection.kPositiveThenNonPositive, self._margin
+                )
+            )
+
+        sources = {self._state.ticket(), self.xd_ticket()}
+        self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
+        self.DeclareVectorOutputPort("normal_forces", count, self._calc_normal, sources)
+        self.DeclareVectorOutputPort("friction_forces", 2 * count, self._calc_friction, sources)
+        self.DeclareVectorOutputPort("modes", 3 * count, self._calc_modes, {self.xd_ticket()})
+
+    def TimeToModeChange(
+        self, context: Context, *, acceleration: np.ndarray, horizon: float
+    ) -> float:
+        """Predicted time (s) to the next mode change, at most `horizon` (s).
+
+        `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
+        """
+        return time_to_mode_change(
+            self._state.Eval(context),
+            acceleration,
+            self._rows(context),
+            self._p_BN,
+            self._contacts,
+            self._law,
+            horizon,
+        )
+
+    def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
+        """The one witness, if asked for."""
+        return self._witnesses
+
+    def _rows(self, context: Context) -> np.ndarray:
+        return context.get_discrete_state_vector().value().reshape(-1, MODE_COLUMNS)
+
+    def _start(self, context: Context, values: DiscreteValues) -> None:
+        # From "nowhere in contact", an update makes every node at or below 0 stick where it is.
+        values.set_value(np.zeros(values.value().size))
+        self._update(context, values)
+
+    def _update(self, context: Context, values: DiscreteValues) -> None:
+        rows = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
+        update_modes(self._state.Eval(context), self._p_BN, self._contacts, self._law, rows)
+
+    def _margin(self, context: Context) -> float:
+        return mode_margin(
+            self._state.Eval(context), self._rows(context), self._p_BN, self._contacts, self._law
+        )
+
+    def _calc(self, context: Context, generalized_force: np.ndarray) -> None:
+        ground_forces(
+            self._state.Eval(context),
+            self._rows(context),
+            self._p_BN,
+            self._contacts,
+            self._law,
+            generalized_force,
+            self._normal,
+            self._friction,
+        )
+
+    def _calc_force(self, context: Context, output: BasicVector) -> None:
+        self._calc(context, output.get_mutable_value())
+
+    def _calc_normal(self, context: Context, output: BasicVector) -> None:
+        self._calc(context, self._generalized_force)
+        output.SetFromVector(self._normal)
+
+    def _calc_friction(self, context: Context, output: BasicVector) -> None:
+        self._calc(context, self._generalized_force)
+        output.SetFromVector(self._friction.ravel())
+
+    def _calc_modes(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._rows(context)[:, :STICK_POINT].ravel())
+
+
+def ground_law(ground: GroundScenario, friction: FrictionScenario) -> np.ndarray:
+    """The constants of the ground's laws as `physics.ground` takes them: (1,) of dtype GROUND."""
+    return np.array(
+        [
+            (
+                ground.stiffness,
+                ground.damping,
+                friction.stiction_range,
+                friction.stiction_damping,
+                friction.stiction_switch,
+                friction.proportional_stiction,
+            )
+        ],
+        dtype=GROUND,
+    )

@@ -1,0 +1,90 @@
+"""The central pattern generator as a system."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
+
+from tetra_drake.gait import Gait
+from tetra_drake.physics.oscillator import inhibition_matrix, neuron_rates, oscillator_output
+from tetra_drake.scenario import CpgScenario
+
+
+class MatsuokaCpg(LeafSystem):
+    """A network of n Matsuoka oscillators (thesis Eq. 7-9), one a gait.
+
+    .. pydrake_system::
+
+        name: MatsuokaCpg
+        input_ports:
+        - feedback (optional)
+        output_ports:
+        - signals
+        - neurons
+
+    | port     | shape | unit | meaning                                                      |
+    |----------|-------|------|--------------------------------------------------------------|
+    | feedback | (2n,) | 1    | f of Eq. 7, by neuron; zero where nothing is connected       |
+    | signals  | (n,)  | N    | gain (y_extensor - y_flexor), by oscillator                  |
+    | neurons  | (2n,) | 1    | y = max(0, u); neurons 2k, 2k+1: extensor, flexor of the k-th |
+
+    Continuous state: u (2n,), then v (2n,), the inner states and the self-inhibitions. It
+    starts at the scenario's initial values. The signals are those of the network from t = 0
+    on; that the cables get none at first is the StartUpTimer's business.
+    """
+
+    def __init__(self, cpg: CpgScenario, gait: Gait, *, oscillators: int) -> None:
+        super().__init__()
+        neurons = 2 * oscillators
+        self._cpg = cpg
+        self._gait = gait
+        self._inhibition = inhibition_matrix(
+            np.array(gait.weights), oscillators=oscillators, partner_weight=cpg.partner_weight
+        )
+        self._no_feedback = np.zeros(neurons)
+        self._feedback = self.DeclareVectorInputPort("feedback", neurons)
+        state = self.DeclareContinuousState(BasicVector(initial_state(cpg, oscillators)))
+        tickets = {self.xc_ticket()}
+        assert state is not None
+        self.DeclareVectorOutputPort("signals", oscillators, self._calc_signals, tickets)
+        self.DeclareVectorOutputPort("neurons", neurons, self._calc_neurons, tickets)
+
+    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
+        """Eq. 7."""
+        u, v = self._split(context)
+        feedback = self._no_feedback
+        if self._feedback.HasValue(context):
+            feedback = self._feedback.Eval(context)
+        rates = np.empty(2 * u.size)
+        neuron_rates(
+            u,
+            v,
+            feedback,
+            self._inhibition,
+            self._gait.tau_a,
+            self._gait.tau_b,
+            self._cpg.self_inhibition_weight,
+            self._cpg.external_input,
+            rates[: u.size],
+            rates[u.size :],
+        )
+        derivatives.SetFromVector(rates)
+
+    def _split(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
+        state = context.get_continuous_state_vector().CopyToVector()
+        return state[: state.size // 2], state[state.size // 2 :]
+
+    def _calc_signals(self, context: Context, output: BasicVector) -> None:
+        signals = output.get_mutable_value()
+        oscillator_output(self._split(context)[0], signals)
+        signals *= self._cpg.gain
+
+    def _calc_neurons(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(np.maximum(0.0, self._split(context)[0]))
+
+
+def initial_state(cpg: CpgScenario, oscillators: int) -> np.ndarray:
+    """(4n,): u, then v, of all neurons at t = 0 (Table 4)."""
+    u = np.full(2 * oscillators, cpg.inner_state)
+    v = np.tile([cpg.extensor_self_inhibition, cpg.flexor_self_inhibition], oscillators)
+    return np.concatenate([u, v])
