@@ -167,11 +167,13 @@ def _add_work_precision(commands: argparse._SubParsersAction) -> None:
 
 
 def _work_precision(options: argparse.Namespace) -> None:
-    from tetra_drake.work_precision import measure, table
+    from tetra_drake.work_precision import HEADER, format_row, measure
 
     scenario = load_scenario(options.scenario)
     gaits = [load_gait(path, oscillators=scenario.oscillators) for path in options.gaits]
-    print(table(measure(scenario, gaits, workers=options.workers)))
+    print(HEADER)
+    for row in measure(scenario, gaits, workers=options.workers):
+        print(format_row(row, scenario.simulation.duration), flush=True)
 
 
 def _add_scenario(command: argparse.ArgumentParser) -> None:
@@ -196,7 +198,7 @@ def _add_gait(command: argparse.ArgumentParser) -> None:
     )
 
 
-DEFAULT_SEED = 0
+DEFAULT_SEED = 80
 
 
 def _seed(text: str) -> int:

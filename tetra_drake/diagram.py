@@ -118,9 +118,7 @@ def AddStartUp(builder: DiagramBuilder, scenario: Scenario, signals: OutputPort)
     return switch.get_output_port()
 
 
-def AddGround(
-    builder: DiagramBuilder, scenario: Scenario, structure: Structure
-) -> GroundContact:
+def AddGround(builder: DiagramBuilder, scenario: Scenario, structure: Structure) -> GroundContact:
     """Adds the ground under the contact nodes as "ground"."""
     witness = scenario.simulation.mode_changes == "witness"
     ground = GroundContact(structure, scenario.ground, scenario.friction, witness=witness)

@@ -39,7 +39,5 @@ class StepBudgetExceeded(SimulationFailure):
     """The integrator used up its allowance of derivative evaluations."""
 
 
-def _rebuild_failure(
-    kind: type[SimulationFailure], time: float, reason: str
-) -> SimulationFailure:
+def _rebuild_failure(kind: type[SimulationFailure], time: float, reason: str) -> SimulationFailure:
     return kind(time=time, reason=reason)

@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from tetra_drake import thesis
+from tetra_drake import __version__, thesis
 from tetra_drake.files import write_whole
 from tetra_drake.gait import Gait
 from tetra_drake.scenario import Scenario
@@ -21,8 +21,8 @@ SCHEMA = 1
 
 def versions() -> dict[str, str]:
     """What decides the last digits of a result."""
-    packages = ("tetra_drake", "drake", "numpy", "numba")
-    return {"python": platform.python_version(), **{p: metadata.version(p) for p in packages}}
+    libraries = {name: metadata.version(name) for name in ("drake", "numpy", "numba")}
+    return {"tetra_drake": __version__, "python": platform.python_version(), **libraries}
 
 
 def result_to_json(scenario: Scenario, gait: Gait, result: SimulationResult) -> dict[str, Any]:
@@ -42,9 +42,7 @@ def result_to_json(scenario: Scenario, gait: Gait, result: SimulationResult) -> 
     }
 
 
-def save_result(
-    path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult
-) -> None:
+def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult) -> None:
     """Writes result.json."""
     content = result_to_json(scenario, gait, result)
     write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
@@ -67,7 +65,8 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
         ("fitness", f"{result.fitness:8.2f}", ""),
     ]
     lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
-    lines += [f"  {name:<16}{value:<14}{f'({note})' if note else ''}".rstrip() for name, value, note in rows]
+    for name, value, note in rows:
+        lines.append(f"  {name:<16}{value:<14}{f'({note})' if note else ''}".rstrip())
     lines.append(
         f"  simulated in {result.wall_time:.1f} s, {result.duration / result.wall_time:.1f} times "
         f"real time: {work.scheme}, accuracy {work.accuracy:g}, {work.steps} steps, "

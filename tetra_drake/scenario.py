@@ -20,6 +20,7 @@ from pydrake.common.yaml import yaml_load_typed
 from tetra_drake.errors import InputError
 from tetra_drake.units import quantity_to_si
 
+
 def _quantity(unit: str, **limits: float) -> Any:
     """A field that holds a number of SI unit `unit` and is written as text with a unit."""
     return field(default=math.nan, metadata={"unit": unit, **limits})
@@ -304,9 +305,7 @@ def _parse(text: str, source: str) -> dict[str, Any]:
     return raw
 
 
-def _to_si(
-    schema: type, raw: dict[str, Any], source: str, *, prefix: str
-) -> dict[str, Any]:
+def _to_si(schema: type, raw: dict[str, Any], source: str, *, prefix: str) -> dict[str, Any]:
     """Checks every key and value of `raw` against the dataclass and turns them into SI."""
     fields = {f.name: f for f in dataclasses.fields(schema)}
     types = typing.get_type_hints(schema)
@@ -372,9 +371,7 @@ def _merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
-def _require_complete(
-    schema: type, tree: dict[str, Any], source: str, *, prefix: str
-) -> None:
+def _require_complete(schema: type, tree: dict[str, Any], source: str, *, prefix: str) -> None:
     types = typing.get_type_hints(schema)
     for f in dataclasses.fields(schema):
         key = f"{prefix}{f.name}"
@@ -383,7 +380,7 @@ def _require_complete(
                 source, key, "is missing; give it, or begin the file with `base: thesis`"
             )
         if dataclasses.is_dataclass(types[f.name]):
-            _require_complete(types[f.name], tree[f.name], source, prefix=f"{key}.")  # type: ignore[arg-type]
+            _require_complete(types[f.name], tree[f.name], source, prefix=f"{key}.")
 
 
 def _check_consistency(scenario: Scenario, source: str) -> None:

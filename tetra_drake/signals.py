@@ -6,14 +6,18 @@ its output fed to the cables as a recording, as the thesis does.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.trajectories import PiecewisePolynomial
 
+from tetra_drake.files import whole_file
 from tetra_drake.gait import Gait
 from tetra_drake.physics.oscillator import inhibition_matrix, listing_output
-from tetra_drake.scenario import CpgScenario
+from tetra_drake.scenario import CpgScenario, Scenario
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg, initial_state
+from tetra_drake.units import POUND_FORCE
 
 _ACCURACY = 1e-7
 _KNOT_SPACING = 1e-3  # s; between knots the signal deviates from its chord by about 1e-5 N
@@ -85,3 +89,28 @@ def signal_trajectory(
     if times[-1] < duration:  # the listing's last sample is stamped one step early
         times, raw = np.append(times, duration), np.vstack([raw, raw[-1:]])
     return PiecewisePolynomial.FirstOrderHold(times, cpg.gain * raw.T)
+
+
+def save_signals(
+    path: str | Path, scenario: Scenario, gait: Gait, *, raw: bool, listing: bool
+) -> None:
+    """Writes the signals of a gait as CSV: time_s, signal_1 ... signal_n, each listing step.
+
+    In lbf, with gain and start-up applied; or `raw`, y_extensor - y_flexor without either.
+    `listing` steps the network as the thesis does instead of integrating it with error control.
+    """
+    cpg, oscillators = scenario.cpg, scenario.oscillators
+    duration = scenario.simulation.duration
+    if listing:
+        times, signals = listing_samples(cpg, gait, oscillators=oscillators, duration=duration)
+    else:
+        states = integrate_network(cpg, gait, oscillators=oscillators, duration=duration)
+        times = np.arange(round(duration / cpg.listing_step) + 1) * cpg.listing_step
+        y = np.maximum(0.0, states.vector_values(times)[: 2 * oscillators])
+        signals = (y[0::2] - y[1::2]).T
+    if not raw:
+        signals = np.where(times[:, None] < cpg.start_up, 0.0, signals * cpg.gain / POUND_FORCE)
+    header = ",".join(["time_s", *(f"signal_{i + 1}" for i in range(oscillators))])
+    with whole_file(path) as temporary:
+        rows = np.column_stack([times, signals])
+        np.savetxt(temporary, rows, delimiter=",", header=header, comments="", fmt="%.12g")

@@ -71,9 +71,7 @@ class Recorder:
         ]
 
 
-def make_dataset(
-    diagram: Diagram, structure: Structure, samples: list[Sample]
-) -> xarray.Dataset:
+def make_dataset(diagram: Diagram, structure: Structure, samples: list[Sample]) -> xarray.Dataset:
     """The samples with all that the diagram's output ports say of them.
 
     Dimensions: time, tetrahedron, node, cable, contact, junction, axis. SI values, with a

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from numba import njit
 
@@ -17,7 +17,6 @@ def compiled(function: F) -> F:
     (say, a read-only installation without a home), the kernel is compiled anew each time.
     """
     try:
-        kernel: F = njit(cache=True, error_model="numpy")(function)
+        return cast(F, njit(cache=True, error_model="numpy")(function))
     except RuntimeError:
-        kernel = njit(error_model="numpy")(function)
-    return kernel
+        return cast(F, njit(error_model="numpy")(function))

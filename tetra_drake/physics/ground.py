@@ -139,10 +139,8 @@ def ground_forces(
 
 
 @compiled
-def update_modes(
-    state: Array, p_BN: Array, contacts: Array, ground: Array, modes: Array
-) -> None:
-    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with `state`.
+def update_modes(state: Array, p_BN: Array, contacts: Array, ground: Array, modes: Array) -> bool:
+    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with `state`; whether they changed.
 
     A node that lands sticks where it lands; one that sticks again does so where it is
     (the reset of the integrator). The arguments are those of `ground_forces`.
@@ -153,27 +151,32 @@ def update_modes(
     v_WN = np.empty((nodes, 3))
     node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
     stiction_range = ground[0].stiction_range
+    changed = False
     for i in range(contacts.size):
         node = contacts[i]
         touched = modes[i, CONTACT] != 0.0
         touches = p_WN[node, 2] <= 0.0
-        modes[i, CONTACT] = 1.0 if touches else 0.0
+        if not (touched or touches):
+            continue
+        if touched != touches:
+            modes[i, CONTACT] = 1.0 if touches else 0.0
+            changed = True
         for axis in range(2):
-            mode = modes[i, MODE + axis]
+            before = modes[i, MODE + axis]
+            after = STICK
             if touched and touches:
                 deflection = p_WN[node, axis] - modes[i, STICK_POINT + axis]
-                after = next_friction_mode(v_WN[node, axis], deflection, mode, stiction_range)
-            else:
-                after = STICK
-            if after == STICK and (mode != STICK or not touched):
+                after = next_friction_mode(v_WN[node, axis], deflection, before, stiction_range)
+            if after == STICK and (before != STICK or not touched):
                 modes[i, STICK_POINT + axis] = p_WN[node, axis]
-            modes[i, MODE + axis] = after
+            if after != before:
+                modes[i, MODE + axis] = after
+                changed = True
+    return changed
 
 
 @compiled
-def mode_margin(
-    state: Array, modes: Array, p_BN: Array, contacts: Array, ground: Array
-) -> float:
+def mode_margin(state: Array, modes: Array, p_BN: Array, contacts: Array, ground: Array) -> float:
     """Positive while no mode is due to change; crosses zero where the first one is.
 
     The least of: height in the air, depth on the ground (m), stiction range less deflection

@@ -7,6 +7,7 @@ from pydrake.systems.framework import (
     BasicVector,
     Context,
     DiscreteValues,
+    EventStatus,
     LeafSystem,
     WitnessFunction,
     WitnessFunctionDirection,
@@ -100,15 +101,13 @@ class GroundContact(LeafSystem):
         """Predicted time (s) to the next mode change, at most `horizon` (s).
 
         `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
+        0 where one is due right now: what follows it cannot be foreseen.
         """
+        state, rows = self._state.Eval(context), self._rows(context).copy()
+        if update_modes(state, self._p_BN, self._contacts, self._law, rows):
+            return 0.0
         return time_to_mode_change(
-            self._state.Eval(context),
-            acceleration,
-            self._rows(context),
-            self._p_BN,
-            self._contacts,
-            self._law,
-            horizon,
+            state, acceleration, rows, self._p_BN, self._contacts, self._law, horizon
         )
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
@@ -118,14 +117,17 @@ class GroundContact(LeafSystem):
     def _rows(self, context: Context) -> np.ndarray:
         return context.get_discrete_state_vector().value().reshape(-1, MODE_COLUMNS)
 
-    def _start(self, context: Context, values: DiscreteValues) -> None:
+    def _start(self, context: Context, values: DiscreteValues) -> EventStatus:
         # From "nowhere in contact", an update makes every node at or below 0 stick where it is.
         values.set_value(np.zeros(values.value().size))
         self._update(context, values)
+        return EventStatus.Succeeded()
 
-    def _update(self, context: Context, values: DiscreteValues) -> None:
+    def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         rows = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
-        update_modes(self._state.Eval(context), self._p_BN, self._contacts, self._law, rows)
+        if update_modes(self._state.Eval(context), self._p_BN, self._contacts, self._law, rows):
+            return EventStatus.Succeeded()
+        return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
     def _margin(self, context: Context) -> float:
         return mode_margin(

@@ -1,0 +1,42 @@
+"""What several test modules start from."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tetra_drake.errors import InputError
+from tetra_drake.scenario import Scenario, load_scenario
+
+Refused = Callable[[object, str, str], contextlib.AbstractContextManager[None]]
+
+
+@pytest.fixture
+def scenario() -> Scenario:
+    """The thesis scenario, a fresh copy that a test may change."""
+    return load_scenario("thesis")
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """The folder of the reference data; its README says what they are."""
+    return Path(__file__).parent / "data"
+
+
+@pytest.fixture(scope="session")
+def refused() -> Refused:
+    """refused(source, key, problem): a block that must end with an InputError whose message is
+    one line, names source and key, and contains `problem`."""
+
+    @contextlib.contextmanager
+    def block(source: object, key: str, problem: str) -> Iterator[None]:
+        with pytest.raises(InputError) as caught:
+            yield
+        error = caught.value
+        assert (error.source, error.key) == (str(source), key)
+        assert str(error).startswith(f"{source}: {key}: " if key else f"{source}: ")
+        assert problem in str(error)
+        assert len(str(error).splitlines()) == 1
+
+    return block

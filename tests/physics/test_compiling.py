@@ -1,0 +1,64 @@
+"""Where compiled kernels are kept. The package is copied and run in a fresh process, with a
+plain file standing where its cache folder would be: as unwritable as a read-only
+installation, whoever runs the test."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tetra_drake
+
+PROGRAM = (
+    "from tetra_drake.physics.cable import cable_tension;"
+    "print(cable_tension(0.3, 0.0, 0.0, 10.0, 0.0, 0.1, False))"
+)
+
+
+@pytest.fixture
+def read_only_package(tmp_path: Path) -> Path:
+    source = Path(tetra_drake.__file__).parent
+    target = tmp_path / "installed" / "tetra_drake"
+    shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
+    (target / "physics" / "__pycache__").write_text("in the way")
+    return target.parent
+
+
+def run(package: Path, cache_home: Path) -> subprocess.CompletedProcess[str]:
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
+    environment |= {
+        "PYTHONPATH": str(package),
+        "XDG_CACHE_HOME": str(cache_home),
+        "HOME": str(cache_home),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    return subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        env=environment,
+        cwd=package,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+
+
+def test_a_read_only_installation_caches_in_the_users_folder(
+    read_only_package: Path, tmp_path: Path
+) -> None:
+    cache_home = tmp_path / "cache"
+    cache_home.mkdir()
+    assert float(run(read_only_package, cache_home).stdout) == pytest.approx(2.0)
+    assert list(cache_home.rglob("cable.cable_tension*.nbi"))
+
+
+def test_without_any_folder_for_a_cache_kernels_still_work(
+    read_only_package: Path, tmp_path: Path
+) -> None:
+    nowhere = tmp_path / "file"
+    nowhere.write_text("")
+    assert float(run(read_only_package, nowhere / "cache").stdout) == pytest.approx(2.0)
