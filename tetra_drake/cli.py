@@ -71,6 +71,7 @@ def _add_simulate(commands: argparse._SubParsersAction) -> None:
 
 
 def _simulate(options: argparse.Namespace) -> None:
+    from tetra_drake.files import check_folder
     from tetra_drake.replay import save_replay
     from tetra_drake.results import save_result, summary
     from tetra_drake.simulation import simulate
@@ -78,7 +79,7 @@ def _simulate(options: argparse.Namespace) -> None:
 
     scenario = load_scenario(options.scenario)
     gait = _gait(options, scenario)
-    _check_folder(options.out)
+    check_folder(options.out)
     result = simulate(scenario=scenario, gait=gait, record=True)
     assert result.trajectory is not None
     print(summary(scenario, gait, result))
@@ -98,7 +99,9 @@ def _add_cpg(commands: argparse._SubParsersAction) -> None:
         "cpg",
         help="write the oscillator signals of a gait to a CSV file",
         description="Integrates the oscillator network of a gait alone, with error control, and "
-        "writes its signals: time_s, then signal_1, signal_2 ... in lbf as the cables get them.",
+        "writes its signals: time_s, then signal_1, signal_2 ... in lbf, zero before the start-up "
+        "time. (Scenarios whose cpg.signals is `listing`, such as thesis, feed the robot what "
+        "--listing writes.)",
     )
     _add_scenario(command)
     _add_gait(command)
@@ -181,8 +184,8 @@ def _add_scenario(command: argparse.ArgumentParser) -> None:
         "--scenario",
         metavar="NAME|FILE",
         default="thesis",
-        help="a shipped scenario (%s) or a YAML file (default: %%(default)s)"
-        % ", ".join(shipped_scenarios()),
+        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
+        "(default: %(default)s)",
     )
 
 
@@ -202,10 +205,9 @@ DEFAULT_SEED = 80
 
 
 def _seed(text: str) -> int:
-    seed = int(text)
-    if seed < 0:
-        raise argparse.ArgumentTypeError(f"found {seed}, expected 0 or more")
-    return seed
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"found '{text}', expected an integer, 0 or more")
+    return int(text)
 
 
 def _gait(options: argparse.Namespace, scenario: Scenario) -> Gait:
@@ -213,12 +215,6 @@ def _gait(options: argparse.Namespace, scenario: Scenario) -> Gait:
         return load_gait(options.gait, oscillators=scenario.oscillators)
     generator = np.random.default_rng(options.seed)
     return random_gait(scenario, generator, name=f"random gait {options.seed}")
-
-
-def _check_folder(folder: Path) -> None:
-    """Finds out before the simulation whether its results can be written."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError(folder, "", "is a file, expected a folder to write to")
 
 
 if __name__ == "__main__":

@@ -14,8 +14,8 @@ class InputError(ValueError):
         self.source = str(source)
         self.key = key
         self.problem = problem
-        where = f"{source}: {key}" if key else f"{source}"
-        super().__init__(f"{where}: {problem}")
+        message = f"{source}: {key}: {problem}" if key else f"{source}: {problem}"
+        super().__init__(" ".join(message.split()))
 
 
 class SimulationFailure(RuntimeError):

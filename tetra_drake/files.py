@@ -26,8 +26,12 @@ def whole_file(path: str | Path) -> Iterator[Path]:
             dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix
         )
         os.close(handle)
-    except OSError as error:
-        raise InputError(path, "", f"cannot be written: {error.strerror}") from error
+    except InputError:
+        raise
+    except (FileExistsError, NotADirectoryError) as error:
+        raise InputError(path, "", "cannot be written: its folder is a file") from error
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", f"cannot be written: {error}") from error
     temporary = Path(name)
     try:
         yield temporary
@@ -35,6 +39,19 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_folder(folder: str | Path) -> None:
+    """Raises InputError if `folder` is not, and cannot become, a folder to write to."""
+    folder = Path(folder)
+    existing = folder
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    if not existing.is_dir():
+        what = "is a file" if existing == folder else f"'{existing}' is a file"
+        raise InputError(folder, "", f"{what}, expected a folder to write to")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise InputError(folder, "", f"'{existing}' is not writable")
 
 
 def write_whole(path: str | Path, text: str) -> None:

@@ -69,14 +69,16 @@ def load_gait(path: str | Path, *, oscillators: int) -> Gait:
     Raises InputError, naming file and key, for whatever is wrong in the file.
     """
     try:
-        raw = json.loads(Path(path).read_text(encoding="utf-8"))
+        text = Path(path).read_text(encoding="utf-8")
     except FileNotFoundError as error:
         raise InputError(path, "", "no such gait file") from error
     except IsADirectoryError as error:
         raise InputError(path, "", "is a directory, expected a gait file") from error
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise InputError(path, "", f"cannot be read as a text file: {error}") from error
-    except (json.JSONDecodeError, RecursionError) as error:
+    try:
+        raw = json.loads(text, object_pairs_hook=_unique_keys)
+    except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"is not JSON: {error}") from error
     return gait_from_json(raw, source=str(path), oscillators=oscillators)
 
@@ -93,11 +95,12 @@ def gait_from_json(raw: Any, *, source: str, oscillators: int) -> Gait:
     for key in ("schema", "weights", "tau_a_s"):
         if key not in raw:
             raise InputError(source, key, "is missing")
-    if raw["schema"] != SCHEMA:
-        raise InputError(source, "schema", f"found {raw['schema']!r}, expected {SCHEMA}")
+    if type(raw["schema"]) is not int or raw["schema"] != SCHEMA:
+        found = json.dumps(raw["schema"])
+        raise InputError(source, "schema", f"found {found}, expected {SCHEMA}")
     name = raw.get("name", Path(source).stem)
     if not isinstance(name, str):
-        raise InputError(source, "name", f"found {name!r}, expected text")
+        raise InputError(source, "name", f"found {json.dumps(name)}, expected text")
     tau_a = _number(raw["tau_a_s"], source, "tau_a_s", above=0.0)
     tau_b = _number(raw.get("tau_b_s", TAU_B_PER_TAU_A * tau_a), source, "tau_b_s", above=0.0)
     return Gait(
@@ -108,7 +111,7 @@ def gait_from_json(raw: Any, *, source: str, oscillators: int) -> Gait:
 def _weights(raw: Any, source: str, oscillators: int) -> tuple[float, ...]:
     expected = f"expected {weight_count(oscillators)} numbers for {oscillators} oscillators"
     if not isinstance(raw, list):
-        raise InputError(source, "weights", f"found {raw!r}, {expected}")
+        raise InputError(source, "weights", f"found {json.dumps(raw)}, {expected}")
     if len(raw) != weight_count(oscillators):
         raise InputError(source, "weights", f"found {len(raw)} numbers, {expected}")
     return tuple(_number(w, source, f"weights[{i}]", at_least=0.0) for i, w in enumerate(raw))
@@ -118,11 +121,18 @@ def _number(
     value: Any, source: str, key: str, *, above: float = -math.inf, at_least: float = -math.inf
 ) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(source, key, f"found {value!r}, expected a number")
-    if not math.isfinite(value):
-        raise InputError(source, key, f"found {value}, expected a finite number")
+        raise InputError(source, key, f"found {json.dumps(value)}, expected a number")
+    if not abs(value) < 1e300:  # NaN, infinity, and integers beyond floating point
+        raise InputError(source, key, f"found {str(value)[:40]}, expected a finite number")
     if not value > above:
         raise InputError(source, key, f"found {value}, expected more than {above:g}")
     if not value >= at_least:
         raise InputError(source, key, f"found {value}, expected at least {at_least:g}")
     return float(value)
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        raise ValueError("a key is given twice")
+    return content

@@ -5,9 +5,11 @@ The file is text with units ("25 lbf/in"); the dataclasses below hold SI numbers
 (Drake's YAML loader reads the annotations as types, so they are not postponed here.)
 """
 
+import contextlib
 import dataclasses
 import difflib
 import math
+import os
 import typing
 from dataclasses import dataclass, field
 from importlib import resources
@@ -259,19 +261,21 @@ def _load_tree(
 ) -> tuple[dict[str, Any], str]:
     """The SI tree of a scenario with its bases merged in, and the name of its source."""
     text, source = _read(name_or_file, asked_by)
-    if source in seen:
-        raise InputError(source, "base", f"the scenario is based on itself: {' -> '.join(seen)}")
+    identity = str(Path(source).resolve())
+    if identity in seen:
+        raise InputError(source, "base", "the scenario is based on itself")
     raw = _parse(text, source)
     base = raw.pop("base", None)
     tree = _to_si(Scenario, raw, source, prefix="")
     if base is None:
         return tree, source
-    if not isinstance(base, str):
-        raise InputError(source, "base", f"found {base!r}, expected the name of a scenario")
-    candidate = Path(source).parent / base
-    base_tree, _ = _load_tree(
-        str(candidate) if candidate.is_file() else base, asked_by=source, seen=(*seen, source)
-    )
+    if not isinstance(base, str) or not base:
+        raise InputError(
+            source, "base", f"found {_describe(base)}, expected the name of a scenario"
+        )
+    if base not in shipped_scenarios():
+        base = str(Path(source).parent / base)
+    base_tree, _ = _load_tree(base, asked_by=source, seen=(*seen, identity))
     return _merge(base_tree, tree), source
 
 
@@ -281,25 +285,39 @@ def _read(name_or_file: str, asked_by: str | None) -> tuple[str, str]:
         resource = resources.files("tetra_drake") / "scenarios" / f"{name_or_file}.yaml"
         return resource.read_text(encoding="utf-8"), str(resource)
     path = Path(name_or_file)
-    source, key = (asked_by, "base") if asked_by else (name_or_file, "")
-    if path.is_dir():
-        raise InputError(source, key, f"'{path}' is a directory, expected a scenario file")
+    source, key, what = str(path), "", ""
+    if asked_by:
+        source, key, what = asked_by, "base", f" '{os.path.relpath(path, Path(asked_by).parent)}'"
     try:
         return path.read_text(encoding="utf-8"), str(path)
     except FileNotFoundError as error:
-        known = ", ".join(shipped)
-        raise InputError(
-            source, key, f"no such scenario file '{path}', and no shipped scenario ({known})"
-        ) from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(source, key, f"cannot be read as a text file: {error}") from error
+        problem = f"no such scenario file{what}, and no shipped scenario ({', '.join(shipped)})"
+        raise InputError(source, key, problem) from error
+    except IsADirectoryError as error:
+        problem = f"{what} is a directory, expected a scenario file"
+        raise InputError(source, key, problem.strip()) from error
+    except (OSError, ValueError) as error:
+        raise InputError(source, key, f"{what} cannot be read as text: {error}".strip()) from error
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """YAML without the licence to give a key twice, of which one value would be lost."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"found the key '{key}' twice", node.start_mark
+                )
+        return super().construct_mapping(node, deep)
 
 
 def _parse(text: str, source: str) -> dict[str, Any]:
     try:
-        raw = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise InputError(source, "", f"is not YAML: {' '.join(str(error).split())}") from error
+        raw = yaml.load(text, _UniqueKeyLoader)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise InputError(source, "", f"is not YAML: {error}") from error
     if not isinstance(raw, dict):
         raise InputError(source, "", f"found {_describe(raw)}, expected a mapping of keys")
     return raw
@@ -337,17 +355,26 @@ def _value_to_si(kind: type, metadata: Any, value: Any) -> Any:
         number = quantity_to_si(value, metadata["unit"])
         return _within_limits(number, metadata, shown=f"'{value}'")
     if kind in (int, float):
-        wanted = "an integer" if kind is int else "a number"
-        if isinstance(value, bool) or not isinstance(value, (kind, int)):
-            raise ValueError(f"found {_describe(value)}, expected {wanted}")
-        if not math.isfinite(value):
-            raise ValueError(f"found {value}, expected a finite number")
-        return kind(_within_limits(value, metadata, shown=str(value)))
+        number = _plain_number(kind, value)
+        return kind(_within_limits(number, metadata, shown=str(number)))
     if not isinstance(value, kind):
         raise ValueError(f"found {_describe(value)}, expected {_TYPE_NAMES[kind]}")
     if "choices" in metadata and value not in metadata["choices"]:
         raise ValueError(f"found '{value}', expected one of {', '.join(metadata['choices'])}")
     return value
+
+
+def _plain_number(kind: type[int] | type[float], value: Any) -> float:
+    if kind is float and isinstance(value, str):  # YAML 1.1 takes 1e-3 for text
+        with contextlib.suppress(ValueError):
+            value = float(value)
+    if isinstance(value, bool) or not isinstance(value, (kind, int)):
+        wanted = "an integer" if kind is int else "a number"
+        raise ValueError(f"found {_describe(value)}, expected {wanted}")
+    number: float = value
+    if not abs(number) < 1e300:  # NaN, infinity, and integers beyond floating point
+        raise ValueError(f"found {str(value)[:40]}, expected a finite number")
+    return number
 
 
 _TYPE_NAMES = {bool: "true or false", str: "text"}
@@ -392,7 +419,9 @@ def _check_consistency(scenario: Scenario, source: str) -> None:
     ):
         if low > high:
             raise InputError(
-                source, f"gait_bounds.{name}_min", f"found {low}, expected at most {name}_max"
+                source,
+                f"gait_bounds.{name}_min",
+                f"found {low}, expected at most {name}_max, {high}",
             )
     if simulation.steady_from >= simulation.duration:
         raise InputError(

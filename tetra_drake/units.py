@@ -14,8 +14,10 @@ POUND_FORCE = 4.4482216152605
 """Newtons in a pound-force (exact)."""
 
 
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
 _QUANTITY = re.compile(
-    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[A-Za-z][\w*/^(). -]*)"
+    rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*)\s*"
 )
 
 
@@ -39,7 +41,7 @@ def quantity_to_si(text: str, unit: str) -> float:
     if match is None:
         raise ValueError(f"found '{text}', which is not a quantity; {example}")
     try:
-        quantity = _registry().Quantity(float(match["number"]), match["unit"].strip())
+        quantity = _registry().Quantity(float(match["number"]), match["unit"])
         value = float(quantity.to(unit).magnitude)
     except pint.DimensionalityError as error:
         raise ValueError(f"found '{text}', {example}") from error

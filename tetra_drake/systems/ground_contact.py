@@ -101,11 +101,10 @@ class GroundContact(LeafSystem):
         """Predicted time (s) to the next mode change, at most `horizon` (s).
 
         `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
-        0 where one is due right now: what follows it cannot be foreseen.
+        Changes due right now count as made.
         """
         state, rows = self._state.Eval(context), self._rows(context).copy()
-        if update_modes(state, self._p_BN, self._contacts, self._law, rows):
-            return 0.0
+        update_modes(state, self._p_BN, self._contacts, self._law, rows)
         return time_to_mode_change(
             state, acceleration, rows, self._p_BN, self._contacts, self._law, horizon
         )

@@ -1,0 +1,334 @@
+"""The replay page: what it shows is the recording, and it needs nothing but itself."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import re
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RollPitchYaw, RotationMatrix
+
+from tetra_drake.errors import InputError
+from tetra_drake.gait import random_gait
+from tetra_drake.replay import (
+    ARROW_LENGTH,
+    FRAMES_PER_SECOND,
+    HIDDEN,
+    aligning_quaternions,
+    body_poses,
+    camera_position,
+    frame_samples,
+    save_replay,
+)
+from tetra_drake.robot import MakeStructure, Structure
+from tetra_drake.scenario import Scenario, load_scenario
+from tetra_drake.simulation import simulate
+
+TITLE = '<script>bad()</script> & \\1 "gait": 4.36 in'
+
+Tracks = dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]
+"""By path and property: times (frames,) in s and values (frames, ...) of the key frames."""
+
+
+@pytest.fixture(scope="module")
+def scenario() -> Scenario:
+    thesis = load_scenario()
+    settings = dataclasses.replace(thesis.simulation, duration=0.2, steady_from=0.1)
+    return dataclasses.replace(thesis, simulation=settings)
+
+
+@pytest.fixture(scope="module")
+def structure(scenario: Scenario) -> Structure:
+    return MakeStructure(scenario.robot, scenario.cables)
+
+
+@pytest.fixture(scope="module")
+def trajectory(scenario: Scenario) -> xarray.Dataset:
+    gait = random_gait(scenario, np.random.default_rng(0), name="any")
+    recorded = simulate(scenario=scenario, gait=gait, record=True).trajectory
+    assert recorded is not None
+    return recorded
+
+
+@pytest.fixture(scope="module")
+def page(
+    scenario: Scenario, trajectory: xarray.Dataset, tmp_path_factory: pytest.TempPathFactory
+) -> str:
+    path = tmp_path_factory.mktemp("replay") / "new" / "replay.html"
+    save_replay(path, scenario=scenario, trajectory=trajectory, title=TITLE)
+    return path.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def animation(page: str) -> Tracks:
+    return read_animation(page)
+
+
+def read_animation(page: str) -> Tracks:
+    tracks: Tracks = {}
+    for one in unpack(packed_animation(page))["animations"]:
+        clip = one["clip"]
+        tracks[one["path"]] = {
+            track["name"]: (
+                np.array([key["time"] for key in track["keys"]]) / clip["fps"],
+                np.array([key["value"] for key in track["keys"]]),
+            )
+            for track in clip["tracks"]
+        }
+    return tracks
+
+
+def packed_animation(page: str) -> bytes:
+    """The one command of the page that holds all key frames."""
+    commands = map(base64.b64decode, re.findall(r"base64,([A-Za-z0-9+/=]+)", page))
+    (command,) = (command for command in commands if b"set_animation" in command)
+    return command
+
+
+def unpack(data: bytes) -> Any:
+    """Reads the MessagePack that Meshcat's commands are written in."""
+    value, end = _unpack(data, 0)
+    assert end == len(data)
+    return value
+
+
+def _unpack(data: bytes, at: int) -> tuple[Any, int]:
+    code, at = data[at], at + 1
+    if code < 0x80:
+        return code, at
+    if code in _NUMBERS:
+        (number,) = struct.unpack_from(_NUMBERS[code], data, at)
+        return number, at + struct.calcsize(_NUMBERS[code])
+    if code in (0xC0, 0xC2, 0xC3):
+        return {0xC0: None, 0xC2: False, 0xC3: True}[code], at
+    if 0xA0 <= code < 0xC0:
+        return data[at : at + code - 0xA0].decode(), at + code - 0xA0
+    if code in _SIZES:
+        kind, form = _SIZES[code]
+        (size,) = struct.unpack_from(form, data, at)
+        at += struct.calcsize(form)
+    else:
+        assert code < 0xA0, hex(code)
+        kind, size = ("list", code - 0x90) if code >= 0x90 else ("dict", code - 0x80)
+    if kind == "text":
+        return data[at : at + size].decode(), at + size
+    items = []
+    for _ in range(size if kind == "list" else 2 * size):
+        item, at = _unpack(data, at)
+        items.append(item)
+    return (items if kind == "list" else dict(zip(items[::2], items[1::2], strict=True))), at
+
+
+_NUMBERS = {0xCA: ">f", 0xCB: ">d", 0xCC: ">B", 0xCD: ">H", 0xCE: ">I", 0xCF: ">Q"}
+_SIZES = {
+    0xD9: ("text", ">B"),
+    0xDA: ("text", ">H"),
+    0xDC: ("list", ">H"),
+    0xDD: ("list", ">I"),
+    0xDE: ("dict", ">H"),
+}
+
+
+def test_frames_are_the_samples_nearest_to_evenly_spaced_instants() -> None:
+    times = np.cumsum(np.random.default_rng(1).uniform(0.002, 0.017, 1000))
+    chosen = frame_samples(times, 25.0)
+    assert chosen[0] == 0
+    assert chosen[-1] == len(times) - 1
+    instants = np.linspace(times[0], times[-1], len(chosen))
+    nearest = np.abs(times - instants[:, np.newaxis]).min(axis=1)
+    np.testing.assert_array_equal(np.abs(times[chosen] - instants), nearest)
+    assert 24.0 < (len(chosen) - 1) / (times[-1] - times[0]) <= 25.0
+
+
+@pytest.mark.parametrize("times", [[0.0], [0.0, 0.001], [0.0, 1.0]])
+def test_frames_of_the_shortest_and_coarsest_recordings(times: list[float]) -> None:
+    chosen = frame_samples(np.array(times))
+    assert chosen[0] == 0
+    assert len(set(chosen)) == len(chosen)
+
+
+def test_poses_are_recovered_exactly(structure: Structure) -> None:
+    random = np.random.default_rng(2)
+    angles = random.uniform(-np.pi, np.pi, (40, 3))
+    R_WB = np.array([RollPitchYaw(a).ToRotationMatrix().matrix() for a in angles])
+    p_WB = random.uniform(-1.0, 1.0, (40, 3))
+    p_WN = p_WB[:, np.newaxis] + structure.p_BN @ np.swapaxes(R_WB, 1, 2)
+    R, p = body_poses(structure, p_WN.reshape(8, 5, 4, 3))
+    np.testing.assert_allclose(R.reshape(40, 3, 3), R_WB, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(p.reshape(40, 3), p_WB, rtol=0, atol=1e-9)
+
+
+def test_aligning_quaternions_turn_z_into_the_direction() -> None:
+    directions = np.random.default_rng(3).normal(size=(50, 3))
+    directions[:3] = [(0.0, 0.0, 2.0), (0.0, 0.0, -3.0), (0.0, 1e-12, -1.0)]
+    for q, direction in zip(aligning_quaternions(directions), directions, strict=True):
+        z = RotationMatrix(Quaternion(q)).matrix()[:, 2]
+        np.testing.assert_allclose(z, direction / np.linalg.norm(direction), rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(aligning_quaternions(np.zeros(3)[np.newaxis]), [[1, 0, 0, 0]])
+
+
+def test_camera_sees_every_point() -> None:
+    points = np.random.default_rng(4).uniform((0, -0.1, 0), (0.8, 0.1, 0.15), (200, 3))
+    target = points.mean(axis=0)
+    camera = camera_position(points, target)
+    assert camera[2] > 0.15  # looks down on the floor
+    assert camera[1] < -0.1  # from the right, so that the robot walks to the right
+    rays = points - camera
+    forward = (target - camera) / np.linalg.norm(target - camera)
+    upward = np.array([0.0, 0.0, 1.0]) - forward[2] * forward
+    slope = rays @ (upward / np.linalg.norm(upward)) / (rays @ forward)
+    assert np.abs(slope).max() < np.tan(np.deg2rad(35.0 / 2))
+
+
+def test_frames_of_the_page_are_recorded_samples_at_their_times(
+    structure: Structure,
+    trajectory: xarray.Dataset,
+    animation: Tracks,
+) -> None:
+    recorded = trajectory["time"].values
+    for i, body in enumerate(structure.bodies):
+        times, positions = animation[f"/robot/{body}"][".position"]
+        _, quaternions = animation[f"/robot/{body}"][".quaternion"]
+        assert len(times) <= 60.0 * (times[-1] - times[0]) + 1
+        samples = np.abs(recorded - recorded[0] - times[:, np.newaxis]).argmin(axis=1)
+        np.testing.assert_allclose(recorded[samples] - recorded[0], times, rtol=0, atol=1e-5)
+        assert times[-1] == pytest.approx(0.2)
+        for sample, p, (x, y, z, w) in zip(samples, positions, quaternions, strict=True):
+            R = RotationMatrix(Quaternion(np.array([w, x, y, z]))).matrix()
+            shown = p + structure.p_BN @ R.T
+            np.testing.assert_allclose(
+                shown, trajectory["p_WN"].values[sample, i], rtol=0, atol=1e-9
+            )
+
+
+def test_all_tracks_start_and_end_together(
+    animation: Tracks,
+) -> None:
+    ends = {(times[0], times[-1]) for tracks in animation.values() for times, _ in tracks.values()}
+    assert len(ends) == 1
+
+
+def test_cables_reach_from_node_to_node_and_swell_with_tension(
+    structure: Structure,
+    trajectory: xarray.Dataset,
+    animation: Tracks,
+) -> None:
+    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
+    p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
+    paths = {path.rsplit("/", 1)[1]: path for path in animation if path.startswith("/cables/")}
+    assert sorted(paths) == sorted(structure.cable_names)
+    for c, (name, cable) in enumerate(zip(structure.cable_names, structure.cables, strict=True)):
+        kind = "actuated" if cable["signal"] >= 0 else name.split()[1]
+        assert paths[name] == f"/cables/{kind}/{name}"
+        tracks = animation[paths[name]]
+        middle, xyzw, scale = (tracks[key][1] for key in (".position", ".quaternion", ".scale"))
+        for f in range(len(middle)):
+            R = RotationMatrix(Quaternion(np.roll(xyzw[f], 1))).matrix()
+            half = R[:, 2] * scale[f, 2] / 2
+            ends = [middle[f] - half, middle[f] + half]
+            nodes = [p_WN[f, cable["node_a"]], p_WN[f, cable["node_b"]]]
+            np.testing.assert_allclose(ends, nodes, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(scale[:, 2], frames["length"].values[:, c], rtol=1e-9)
+        tension = frames["tension"].values[:, c]
+        np.testing.assert_array_equal(np.argsort(tension), np.argsort(scale[:, 0]))
+
+
+def test_arrows_stand_on_their_nodes_and_are_as_long_as_the_force(
+    trajectory: xarray.Dataset,
+    animation: Tracks,
+) -> None:
+    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
+    for contact in trajectory["contact"].values:
+        body, node = contact.split()
+        p_WN = frames["p_WN"].sel(tetrahedron=body, node=node).values
+        normal = frames["normal_force"].sel(contact=contact).values
+        friction = frames["friction_force"].sel(contact=contact).values
+        sizes = {"normal": normal, "friction": np.linalg.norm(friction, axis=1)}
+        for kind, size in sizes.items():
+            tracks = animation[f"/forces/{kind}/{contact}"]
+            np.testing.assert_allclose(tracks[".position"][1], p_WN, rtol=0, atol=1e-12)
+            length = ARROW_LENGTH * size.clip(min=HIDDEN)
+            np.testing.assert_allclose(tracks[".scale"][1][:, 2], length, rtol=1e-9)
+    assert (trajectory["normal_force"].values > 0.0).any()
+
+
+def test_the_title_is_text_and_not_markup(page: str) -> None:
+    escaped = "&lt;script&gt;bad()&lt;/script&gt; &amp; \\1 &quot;gait&quot;: 4.36 in"
+    assert f"<title>{escaped}</title>" in page
+    assert re.search(rf"<h1[^>]*>{re.escape(escaped)}</h1>", page)
+    assert "bad()</script>" not in page
+    assert "Drake MeshCat" not in page
+
+
+def test_the_page_loads_nothing_from_elsewhere(page: str) -> None:
+    tags = re.findall(r"<(?:script|link|img|iframe|source)\b[^>]*>", page)
+    assert tags
+    assert not [tag for tag in tags if "src" in tag or "href" in tag]
+    assert "WebSocket(url)" not in page
+
+
+def test_a_long_replay_stays_small(page: str) -> None:
+    in_base64 = 4 / 3 * len(packed_animation(page))
+    frames = 15.0 * FRAMES_PER_SECOND
+    assert len(page) + frames * in_base64 / (0.2 * FRAMES_PER_SECOND) < 8e6
+
+
+def test_another_robot_and_a_slice_of_a_recording_replay_too(
+    scenario: Scenario, tmp_path: Path
+) -> None:
+    two = dataclasses.replace(scenario, robot=dataclasses.replace(scenario.robot, tetrahedra=2))
+    gait = random_gait(two, np.random.default_rng(0), name="any")
+    recorded = simulate(scenario=two, gait=gait, record=True).trajectory
+    assert recorded is not None
+    path = tmp_path / "replay.html"
+    save_replay(path, scenario=two, trajectory=recorded.isel(time=slice(5, None)), title="two")
+    tracks = read_animation(path.read_text(encoding="utf-8"))
+    assert sum(name.startswith("/robot/") for name in tracks) == 2
+    assert sum(name.startswith("/cables/") for name in tracks) == 6
+    assert tracks["/robot/T1"][".position"][0][0] == 0.0
+
+
+def test_the_same_recording_gives_the_same_page(
+    scenario: Scenario, trajectory: xarray.Dataset, page: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "replay.html"
+    save_replay(path, scenario=scenario, trajectory=trajectory, title=TITLE)
+    again = read_animation(path.read_text(encoding="utf-8"))
+    for name, tracks in read_animation(page).items():
+        for track, (times, values) in tracks.items():
+            np.testing.assert_array_equal(again[name][track][0], times)
+            np.testing.assert_array_equal(again[name][track][1], values)
+
+
+def test_a_failed_write_leaves_the_old_page_and_nothing_else(
+    scenario: Scenario,
+    trajectory: xarray.Dataset,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "replay.html"
+    path.write_text("the old page", encoding="utf-8")
+
+    def fail(self: Path, target: Path) -> None:
+        raise OSError("disk full")
+
+    monkeypatch.setattr(Path, "replace", fail)
+    with pytest.raises(OSError, match="disk full"):
+        save_replay(path, scenario=scenario, trajectory=trajectory, title="new")
+    assert path.read_text(encoding="utf-8") == "the old page"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_is_no_place_for_the_page(
+    scenario: Scenario, trajectory: xarray.Dataset, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match="is a directory"):
+        save_replay(tmp_path, scenario=scenario, trajectory=trajectory, title="any")
+    assert not list(tmp_path.iterdir())
