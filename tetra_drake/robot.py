@@ -182,15 +182,9 @@ def _add_visuals(plant: MultibodyPlant, structure: Structure, body: RigidBody) -
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
     """p_WN (nodes, 3) in m from the state (13 n,) of the bodies."""
-    return _node_motion(structure, state)[0]
+    return node_motion(state, structure.p_BN)[1]
 
 
 def node_velocities(structure: Structure, state: np.ndarray) -> np.ndarray:
     """v_WN (nodes, 3) in m/s from the state (13 n,) of the bodies."""
-    return _node_motion(structure, state)[1]
-
-
-def _node_motion(structure: Structure, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    p_BN_W, p_WN, v_WN = (np.empty((4 * len(structure.bodies), 3)) for _ in range(3))
-    node_motion(state, structure.p_BN, p_BN_W, p_WN, v_WN)
-    return p_WN, v_WN
+    return node_motion(state, structure.p_BN)[2]

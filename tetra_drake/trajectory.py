@@ -75,7 +75,8 @@ def make_dataset(diagram: Diagram, structure: Structure, samples: list[Sample]) 
     """The samples with all that the diagram's output ports say of them.
 
     Dimensions: time, tetrahedron, node, cable, contact, junction, axis. SI values, with a
-    `units` attribute each; `modes` as GroundContact's port gives them.
+    `units` attribute each. Forces and modes are those of the step that ends at the sample:
+    a mode change due there shows in the next one.
     """
     import xarray
 

@@ -68,11 +68,7 @@ def cable_forces(
         tensions, lengths: (cables,), written, in N and m.
     """
     nodes_a_body = p_BN.shape[0]
-    nodes = nodes_a_body * (state.size // 13)
-    p_BN_W = np.empty((nodes, 3))
-    p_WN = np.empty((nodes, 3))
-    v_WN = np.empty((nodes, 3))
-    node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
+    p_BN_W, p_WN, v_WN = node_motion(state, p_BN)
     generalized_force[:] = 0.0
     for i in range(cables.size):
         cable = cables[i]

@@ -106,11 +106,7 @@ def ground_forces(
         friction: (contacts, 2), written, along x and y in N.
     """
     nodes_a_body = p_BN.shape[0]
-    nodes = nodes_a_body * (state.size // 13)
-    p_BN_W = np.empty((nodes, 3))
-    p_WN = np.empty((nodes, 3))
-    v_WN = np.empty((nodes, 3))
-    node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
+    p_BN_W, p_WN, v_WN = node_motion(state, p_BN)
     law = ground[0]
     generalized_force[:] = 0.0
     for i in range(contacts.size):
@@ -145,11 +141,7 @@ def update_modes(state: Array, p_BN: Array, contacts: Array, ground: Array, mode
     A node that lands sticks where it lands; one that sticks again does so where it is
     (the reset of the integrator). The arguments are those of `ground_forces`.
     """
-    nodes = p_BN.shape[0] * (state.size // 13)
-    p_BN_W = np.empty((nodes, 3))
-    p_WN = np.empty((nodes, 3))
-    v_WN = np.empty((nodes, 3))
-    node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
+    _, p_WN, v_WN = node_motion(state, p_BN)
     stiction_range = ground[0].stiction_range
     changed = False
     for i in range(contacts.size):
@@ -182,11 +174,7 @@ def mode_margin(state: Array, modes: Array, p_BN: Array, contacts: Array, ground
     The least of: height in the air, depth on the ground (m), stiction range less deflection
     (m), speed in the direction of slip (m/s). Only its sign has a meaning.
     """
-    nodes = p_BN.shape[0] * (state.size // 13)
-    p_BN_W = np.empty((nodes, 3))
-    p_WN = np.empty((nodes, 3))
-    v_WN = np.empty((nodes, 3))
-    node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
+    _, p_WN, v_WN = node_motion(state, p_BN)
     margin = math.inf
     for i in range(contacts.size):
         node = contacts[i]
@@ -239,11 +227,7 @@ def time_to_mode_change(
     other arguments are those of `ground_forces`.
     """
     nodes_a_body = p_BN.shape[0]
-    nodes = nodes_a_body * (state.size // 13)
-    p_BN_W = np.empty((nodes, 3))
-    p_WN = np.empty((nodes, 3))
-    v_WN = np.empty((nodes, 3))
-    node_motion(state, p_BN, p_BN_W, p_WN, v_WN)
+    p_BN_W, p_WN, v_WN = node_motion(state, p_BN)
     stiction_range = ground[0].stiction_range
     time = horizon
     for i in range(contacts.size):

@@ -10,17 +10,22 @@ Array = np.ndarray
 
 
 @compiled
-def node_motion(state: Array, p_BN: Array, p_BN_W: Array, p_WN: Array, v_WN: Array) -> None:
+def node_motion(state: Array, p_BN: Array) -> tuple[Array, Array, Array]:
     """Moves the body-fixed nodes with their bodies.
 
     Args:
         state: [q; v] of the bodies, 13 numbers a body.
         p_BN: (nodes a body, 3), the same for every body, in m.
-        p_BN_W, p_WN, v_WN: (nodes, 3), written: from body origin to node expressed in
-            World (m), position (m) and velocity (m/s) in World; nodes run body by body.
+
+    Returns:
+        p_BN_W, p_WN, v_WN: (nodes, 3), from body origin to node expressed in World (m),
+        position (m) and velocity (m/s) in World; nodes run body by body.
     """
     bodies = state.size // 13
     nodes = p_BN.shape[0]
+    p_BN_W = np.empty((nodes * bodies, 3))
+    p_WN = np.empty((nodes * bodies, 3))
+    v_WN = np.empty((nodes * bodies, 3))
     for body in range(bodies):
         q = 7 * body
         v = 7 * bodies + 6 * body
@@ -45,6 +50,7 @@ def node_motion(state: Array, p_BN: Array, p_BN_W: Array, p_WN: Array, v_WN: Arr
             v_WN[node, 0] = state[v + 3] + w_y * p_z - w_z * p_y
             v_WN[node, 1] = state[v + 4] + w_z * p_x - w_x * p_z
             v_WN[node, 2] = state[v + 5] + w_x * p_y - w_y * p_x
+    return p_BN_W, p_WN, v_WN
 
 
 @compiled
