@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.evolution.command import add_evolve
 from tetra_drake.gait import Gait, load_gait, random_gait
 from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios
 
@@ -44,6 +45,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_simulate(commands)
+    add_evolve(commands)
     _add_cpg(commands)
     _add_diagram(commands)
     _add_work_precision(commands)

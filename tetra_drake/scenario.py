@@ -123,7 +123,7 @@ class CpgScenario:
 
 @dataclass
 class GaitBoundsScenario:
-    """Where random gaits are drawn from (Table 5)."""
+    """Where random gaits are drawn from (Table 5). Equal bounds of tau_A fix it."""
 
     weight_min: float = _number(at_least=0)
     weight_max: float = _number(at_least=0)
@@ -157,8 +157,8 @@ class SimulationScenario:
     mode_changes: str = _choice("step_end", "witness")
     """Where contact and stiction change: at the end of steps, or localised by a witness."""
     look_ahead: float = _quantity("s", at_least=0)
-    """With mode changes at step ends: the shortest step taken so that one ends where a mode
-    change is predicted; 0 for no look-ahead."""
+    """With mode changes at step ends and an implicit scheme: the shortest step taken so that one
+    ends where a mode change is predicted; 0 for no look-ahead."""
     witness_window: float = _quantity("s", above=0)
     """How closely a witness localises a mode change."""
     max_evaluations: int = _count(at_least=1)
@@ -201,6 +201,10 @@ class EvolutionScenario:
     stop_window: int = _count(at_least=1)
     stop_after: int = _count(at_least=0)
     """... but not before this iteration."""
+    independent_tau_b: bool = False
+    """Whether tau_B evolves by itself instead of staying at 2 tau_A."""
+    time_budget: float = _quantity("s", above=0)
+    """Wall time after which an evaluation counts as failed; meant never to be reached."""
 
 
 @dataclass

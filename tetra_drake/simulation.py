@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     import xarray
 
 _WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; how Drake's Simulator derives the isolation window
+_IMPLICIT_SCHEMES = ("radau3", "radau1", "implicit_euler", "velocity_implicit_euler")
+"""Those whose steps may be long; stability keeps the steps of the others short."""
+
 _AIM_BEYOND = 1.02, 5e-5  # factor and s: a step shall end just after the mode change it aims at
 
 
@@ -127,7 +130,11 @@ class _Watch:
         self._state = diagram.GetOutputPort("state")
         bodies = len(structure.bodies)
         self._velocities = slice(7 * bodies, 13 * bodies)
-        self._aims = settings.mode_changes == "step_end" and settings.look_ahead > 0.0
+        self._aims = (
+            settings.mode_changes == "step_end"
+            and settings.look_ahead > 0.0
+            and settings.scheme in _IMPLICIT_SCHEMES
+        )
         self._last_time = 0.0
         self._last_velocities = np.zeros(6 * bodies)
         self._acceleration = np.zeros(6 * bodies)

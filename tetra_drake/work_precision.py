@@ -91,12 +91,14 @@ def settings_to_compare() -> list[Setting]:
     """Schemes x accuracies x largest steps x placements of mode changes."""
     placements = ((STEP_END, 0.0), (LOOK_AHEAD, 0.25), (WITNESS, 0.02))
     explicit = [
-        Setting("runge_kutta3", accuracy, 2.0, STEP_END) for accuracy in (1e-2, 1e-3, 1e-4)
-    ] + [Setting("runge_kutta3", 1e-3, 2.0, *placement) for placement in placements[1:]]
+        Setting("runge_kutta3", accuracy, 2.0, placement, resolution)
+        for accuracy in (1e-2, 1e-3, 1e-4)
+        for placement, resolution in ((STEP_END, 0.0), (WITNESS, 0.02))
+    ]
     implicit = [
         Setting("radau3", accuracy, max_step, *placement)
         for max_step in (2.0, 4.0, 8.0)
-        for accuracy in (1e-2, 2e-3)
+        for accuracy in (5e-3, 1e-3)
         for placement in placements
     ]
     others = [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 from pydrake.systems.framework import (
     BasicVector,
@@ -83,9 +85,13 @@ class GroundContact(LeafSystem):
         self._witnesses: list[WitnessFunction] = []
         if witness:
             # It carries no event of its own: it ends the step, and the update follows there.
+            # (A bound method in its place would keep the system alive for ever.)
+            this = weakref.proxy(self)
             self._witnesses.append(
                 self.MakeWitnessFunction(
-                    "mode margin", WitnessFunctionDirection.kPositiveThenNonPositive, self._margin
+                    "mode margin",
+                    WitnessFunctionDirection.kPositiveThenNonPositive,
+                    lambda context: this._margin(context),
                 )
             )
 

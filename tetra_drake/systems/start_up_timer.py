@@ -27,13 +27,17 @@ class StartUpTimer(LeafSystem):
 
     def __init__(self, *, start_up: float, before: InputPortIndex, after: InputPortIndex) -> None:
         super().__init__()
-        self._before = before
-        self._after = after
+
+        # Drake never frees a system whose abstract port calls a bound method.
+        def calc_selector(context: Context, output: AbstractValue) -> None:
+            started = context.get_discrete_state_vector().value()[0] != 0.0
+            output.set_value(after if started else before)
+
         self.DeclareDiscreteState([0.0 if start_up > 0.0 else 1.0])
         self.DeclareAbstractOutputPort(
             "selector",
             alloc=lambda: Value(InputPortIndex(0)),
-            calc=self._calc_selector,
+            calc=calc_selector,
             prerequisites_of_calc={self.xd_ticket()},
         )
         if start_up > 0.0:
@@ -43,7 +47,3 @@ class StartUpTimer(LeafSystem):
 
     def _switch(self, context: Context, values: DiscreteValues) -> None:
         values.set_value([1.0])
-
-    def _calc_selector(self, context: Context, output: AbstractValue) -> None:
-        started = context.get_discrete_state_vector().value()[0] != 0.0
-        output.set_value(self._after if started else self._before)

@@ -1,0 +1,75 @@
+"""Cheap fitness functions to try the trial loop on, a scenario for it, and a look at its record.
+
+A module of its own so that worker processes can import it.
+"""
+
+import copy
+import json
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from tetra_drake.evolution.optimizer import Evaluation
+from tetra_drake.scenario import Scenario, load_scenario
+
+
+@dataclass(frozen=True)
+class Bowl:
+    """Fitness falls with the squared distance of the weights from 2; about one genome in
+    `fails_every` fails. Lasts up to `delay` s, differently for each genome."""
+
+    delay: float = 0.0
+    fails_every: int = 5
+
+    def __call__(self, genome):
+        chance = hash(tuple(genome.tolist()))
+        time.sleep(self.delay * (chance % 97) / 97)
+        if chance % self.fails_every == 0:
+            return Evaluation.failed("fell off the table", wall_time=self.delay)
+        fitness = -float(((genome[:-2] - 2.0) ** 2).sum())
+        return Evaluation(fitness, {"distance_in": 10.0 + fitness}, wall_time=self.delay)
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """Kills its process for about one genome in eight."""
+
+    def __call__(self, genome):
+        if hash(tuple(genome.tolist())) % 8 == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return Bowl()(genome)
+
+
+def is_deadly(genome):
+    """Whether Deadly dies of a genome, given as a list."""
+    return hash(tuple(genome)) % 8 == 0
+
+
+def small_scenario(
+    *, oscillators: int = 4, population: int = 12, iterations: int = 15, trials: int = 2
+) -> Scenario:
+    """The thesis with little to do."""
+    scenario = copy.deepcopy(load_scenario("thesis"))
+    scenario.robot.tetrahedra = oscillators + 1
+    scenario.evolution.population = population
+    scenario.evolution.max_iterations = iterations
+    scenario.evolution.trials = trials
+    return scenario
+
+
+def read_record(directory: Path) -> dict[str, object]:
+    """All files of a run, wall times taken out, by their names."""
+    record: dict[str, object] = {}
+    for path in sorted(directory.rglob("*")):
+        if path.is_dir():
+            continue
+        name = str(path.relative_to(directory))
+        record[name] = path.read_bytes()
+        if path.name == "evaluations.jsonl":
+            entries = [json.loads(line) for line in path.read_text().splitlines()]
+            for entry in entries:
+                del entry["wall_time_s"]
+            record[name] = [json.dumps(entry) for entry in entries]
+    return record

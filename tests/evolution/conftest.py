@@ -1,0 +1,31 @@
+"""What the tests of records and runs start from."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from analytic import Bowl, small_scenario
+
+from tetra_drake.evolution.record import RunRecord
+from tetra_drake.evolution.run import evolve
+
+
+@pytest.fixture
+def run_small(tmp_path):
+    """run_small(name, ...): a small run in threads; its directory."""
+
+    def run(name="run", *, seed=5, workers=2, evaluate=None, resume=False, **options):
+        directory = tmp_path / name
+        if resume:
+            record = RunRecord.resume(directory)
+        else:
+            record = RunRecord.create(directory, scenario=small_scenario(**options), seed=seed)
+        with record:
+            evolve(
+                record,
+                evaluate=evaluate or Bowl(),
+                workers=workers,
+                make_executor=ThreadPoolExecutor,
+            )
+        return directory
+
+    return run

@@ -1,0 +1,26 @@
+"""A small run to be killed, on a cheap fitness: killed_run.py DIRECTORY processes|threads DELAY."""
+
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from analytic import Bowl, small_scenario
+
+from tetra_drake.evolution.executor import process_executor
+from tetra_drake.evolution.record import MANIFEST, RunRecord
+from tetra_drake.evolution.run import evolve
+
+if __name__ == "__main__":
+    directory = Path(sys.argv[1])
+    if (directory / MANIFEST).exists():
+        opened = RunRecord.resume(directory)
+    else:
+        opened = RunRecord.create(directory, scenario=small_scenario(iterations=150), seed=9)
+    with opened as record:
+        print("begun", flush=True)
+        evolve(
+            record,
+            evaluate=Bowl(delay=float(sys.argv[3])),
+            workers=2,
+            make_executor=process_executor if sys.argv[2] == "processes" else ThreadPoolExecutor,
+        )

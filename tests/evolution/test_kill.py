@@ -1,0 +1,97 @@
+"""kill -9 at random moments, and Ctrl-C: what is resumed ends as if nothing had happened."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from analytic import Bowl, read_record, small_scenario
+
+from tetra_drake.evolution.record import RunRecord
+from tetra_drake.evolution.run import evolve
+
+PROGRAM = Path(__file__).parent / "killed_run.py"
+
+
+def run_and_kill(directory, executor, *, after=None, sign=signal.SIGKILL, delay=0.006):
+    """Starts the run, ends it `after` s; its exit status and its session's number."""
+    # A session of its own: what the run leaves behind can be told from everything else.
+    with subprocess.Popen(
+        [sys.executable, PROGRAM, directory, executor, str(delay)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+    ) as process:
+        assert process.stdout.readline() == b"begun\n"
+        if after is not None:
+            time.sleep(after)
+            os.killpg(process.pid, sign) if sign == signal.SIGINT else process.send_signal(sign)
+        process.communicate(timeout=60)
+    return process.returncode, process.pid
+
+
+def wait_until_gone(session):
+    """Waits for all processes of a session to end."""
+    deadline = time.monotonic() + 10.0
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(session, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.05)
+    raise AssertionError("processes are left over")
+
+
+@pytest.fixture
+def uninterrupted(tmp_path):
+    with RunRecord.create(
+        tmp_path / "whole", scenario=small_scenario(iterations=150), seed=9
+    ) as record:
+        evolve(record, evaluate=Bowl(), workers=2, make_executor=ThreadPoolExecutor)
+    return read_record(tmp_path / "whole")
+
+
+def kill_again_and_again(directory, executor, *, kills, longest, delay=0.006):
+    """Lets the run end after some kills; how many of them hit it before it was done."""
+    generator = np.random.default_rng()
+    hits = 0
+    for _ in range(kills):
+        after = generator.uniform(0.0, longest)
+        status, session = run_and_kill(directory, executor, after=after, delay=delay)
+        hits += status == -signal.SIGKILL
+        wait_until_gone(session)
+    # The rest in threads, which start faster; the record must not depend on it.
+    assert run_and_kill(directory, "threads", delay=0.0)[0] == 0
+    return hits
+
+
+def test_a_run_killed_a_few_times_ends_like_one_that_was_not(tmp_path, uninterrupted):
+    kill_again_and_again(tmp_path / "run", "threads", kills=4, longest=0.3)
+    assert read_record(tmp_path / "run") == uninterrupted
+
+
+def test_with_worker_processes_too_and_none_is_left_behind(tmp_path, uninterrupted):
+    kill_again_and_again(tmp_path / "run", "processes", kills=1, longest=1.5)
+    assert read_record(tmp_path / "run") == uninterrupted
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("executor", "longest"), [("threads", 0.4), ("processes", 1.5)])
+def test_twenty_kills_leave_no_trace(tmp_path, uninterrupted, executor, longest):
+    hits = kill_again_and_again(tmp_path / "run", executor, kills=20, longest=longest, delay=0.04)
+    assert hits >= 10
+    assert read_record(tmp_path / "run") == uninterrupted
+
+
+def test_a_ctrl_c_ends_the_run_at_once_and_it_can_be_resumed(tmp_path, uninterrupted):
+    status, session = run_and_kill(tmp_path / "run", "processes", after=0.8, sign=signal.SIGINT)
+    assert status != 0
+    wait_until_gone(session)
+    assert run_and_kill(tmp_path / "run", "threads")[0] == 0
+    assert read_record(tmp_path / "run") == uninterrupted

@@ -1,0 +1,154 @@
+"""The command `tetra-drake evolve`."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios
+
+if TYPE_CHECKING:
+    from tetra_drake.evolution.record import RunRecord
+
+DEFAULT_SCENARIO = "thesis"
+DEFAULT_SEED = 0
+
+
+def add_evolve(commands: argparse._SubParsersAction) -> None:
+    """Registers the command with the parser's subcommands."""
+    command = commands.add_parser(
+        "evolve",
+        help="evolve gaits that walk far",
+        description="Evolves gaits by the thesis's evolutionary algorithm, one simulation a "
+        "candidate, and records every evaluation in a run directory. Ctrl-C ends it; the same "
+        "command with --resume goes on. The result depends on scenario and seed only.",
+    )
+    command.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
+        f"(default: {DEFAULT_SCENARIO}; with --resume, the run's)",
+    )
+    command.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="the run directory, as runs/NAME"
+    )
+    command.add_argument(
+        "--trials", metavar="N", type=_count, help="independent trials, instead of the scenario's"
+    )
+    command.add_argument(
+        "--iterations",
+        metavar="N",
+        type=_count,
+        help="iterations of a trial at most, instead of the scenario's",
+    )
+    command.add_argument(
+        "--seed", metavar="N", type=_seed, help=f"of all chance (default: {DEFAULT_SEED})"
+    )
+    command.add_argument(
+        "--workers", metavar="N", type=_count, help="worker processes (default: one a core)"
+    )
+    command.add_argument(
+        "--resume", action="store_true", help="go on with an interrupted run; needs only --out"
+    )
+    command.set_defaults(run=_evolve)
+
+
+def _evolve(options: argparse.Namespace) -> None:
+    from tetra_drake.evolution.evaluation import GaitEvaluation
+    from tetra_drake.evolution.executor import available_cores
+    from tetra_drake.evolution.progress import make_progress
+    from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, RunRecord, trial_folder
+    from tetra_drake.evolution.run import evolve
+    from tetra_drake.evolution.summary import summary
+
+    if options.resume:
+        record = RunRecord.resume(
+            options.out, scenario=_scenario_to_compare(options), seed=options.seed
+        )
+    else:
+        record = RunRecord.create(
+            options.out,
+            scenario=_with_counts(load_scenario(options.scenario or DEFAULT_SCENARIO), options),
+            seed=DEFAULT_SEED if options.seed is None else options.seed,
+        )
+    workers = options.workers or available_cores()
+    with record:
+        _introduce(record, workers)
+        try:
+            statuses = evolve(
+                record,
+                evaluate=GaitEvaluation(record.scenario),
+                workers=workers,
+                progress=make_progress(sys.stdout),
+            )
+        except KeyboardInterrupt:
+            print(
+                f"\nnothing is lost; go on with: tetra-drake evolve --out {options.out} --resume",
+                file=sys.stderr,
+            )
+            raise
+    print(summary(statuses))
+    best = max(statuses, key=lambda status: status.best_fitness)
+    print(
+        f"see the best gait with: tetra-drake simulate --scenario {options.out / SCENARIO} "
+        f"--gait {trial_folder(options.out, best.number) / BEST_GAIT}"
+    )
+
+
+def _scenario_to_compare(options: argparse.Namespace) -> Scenario | None:
+    """What the options say of the scenario of a run to resume; None if nothing."""
+    from tetra_drake.evolution.record import read_manifest
+
+    if options.scenario is not None:
+        return _with_counts(load_scenario(options.scenario), options)
+    if options.trials is None and options.iterations is None:
+        return None
+    return _with_counts(read_manifest(options.out).scenario, options)
+
+
+def _with_counts(scenario: Scenario, options: argparse.Namespace) -> Scenario:
+    """The scenario with the numbers of trials and iterations that the options ask for."""
+    asked = {"trials": options.trials, "max_iterations": options.iterations}
+    changes = {name: value for name, value in asked.items() if value is not None}
+    return dataclasses.replace(
+        scenario, evolution=dataclasses.replace(scenario.evolution, **changes)
+    )
+
+
+def _introduce(record: RunRecord, workers: int) -> None:
+    from tetra_drake.results import versions
+
+    settings = record.scenario.evolution
+    print(
+        f"{record.directory}: scenario {record.scenario.name}, seed {record.seed}, "
+        f"{settings.trials} trial{'s' if settings.trials > 1 else ''} of at most "
+        f"{settings.max_iterations} iterations, population {settings.population}, "
+        f"{workers} worker{'s' if workers > 1 else ''}",
+        flush=True,
+    )
+    now = versions()
+    changed = [name for name in now if record.versions_then.get(name) != now[name]]
+    if changed:
+        then = ", ".join(f"{name} {record.versions_then.get(name)}" for name in changed)
+        print(
+            f"tetra-drake: the run was begun with {then}; with other versions it ends "
+            "differently from an uninterrupted one",
+            file=sys.stderr,
+        )
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 1:
+        raise argparse.ArgumentTypeError(f"found {count}, expected 1 or more")
+    return count
+
+
+def _seed(text: str) -> int:
+    seed = int(text)
+    if seed < 0:
+        raise argparse.ArgumentTypeError(f"found {seed}, expected 0 or more")
+    return seed

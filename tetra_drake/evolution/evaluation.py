@@ -1,0 +1,88 @@
+"""From a genome to its evaluation: one diagram, one simulation."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import FrameType
+
+from tetra_drake.errors import SimulationFailure
+from tetra_drake.evolution.genome import gait_of, read_options
+from tetra_drake.evolution.optimizer import Evaluation, Genome
+from tetra_drake.scenario import Scenario
+from tetra_drake.simulation import simulate
+
+
+@dataclass(frozen=True)
+class GaitEvaluation:
+    """Evaluates genomes by simulating their gaits on a scenario.
+
+    The same genome gives the same numbers, bit for bit, in any process; only the time
+    budget depends on the machine, and is meant to be far beyond any simulation's time.
+    """
+
+    scenario: Scenario
+
+    def __call__(self, genome: Genome) -> Evaluation:
+        """Fitness and metrics of one genome, or why it has none."""
+        started = time.perf_counter()
+        try:
+            with time_limit(read_options(self.scenario).time_budget):
+                result = simulate(scenario=self.scenario, gait=gait_of(genome, name="candidate"))
+        except (SimulationFailure, TimeBudgetExceeded) as error:
+            return Evaluation.failed(
+                f"{_KINDS.get(type(error).__name__, 'failed')}: {error}",
+                wall_time=time.perf_counter() - started,
+            )
+        wall_time = time.perf_counter() - started
+        if not math.isfinite(result.fitness):
+            return Evaluation.failed("diverged: the fitness is not finite", wall_time=wall_time)
+        return Evaluation(
+            fitness=result.fitness,
+            metrics=dataclasses.asdict(result.metrics),
+            wall_time=wall_time,
+        )
+
+
+class TimeBudgetExceeded(Exception):
+    """An evaluation took longer than allowed.
+
+    No RuntimeError: simulate() takes those for Drake's own and calls them divergence.
+    """
+
+
+_KINDS = {
+    "Diverged": "diverged",
+    "StepBudgetExceeded": "step budget",
+    "TimeBudgetExceeded": "time budget",
+}
+
+
+@contextlib.contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Ends the block with TimeBudgetExceeded after this wall time.
+
+    Works in a process's main thread, where worker processes run their tasks; elsewhere
+    there is no limit.
+    """
+    if threading.current_thread() is not threading.main_thread() or not math.isfinite(seconds):
+        yield
+        return
+
+    def give_up(number: int, frame: FrameType | None) -> None:
+        raise TimeBudgetExceeded(f"not done after {seconds:g} s")
+
+    # Drake calls back into Python at every derivative evaluation: there the alarm is heard.
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

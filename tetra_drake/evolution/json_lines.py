@@ -1,0 +1,60 @@
+"""Append-only files of JSON objects, one a line, that survive a kill at any moment."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from tetra_drake.errors import InputError
+
+
+def append_lines(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
+    """Appends the entries, and hands them to the system before it returns.
+
+    After a kill in between only the last line there is can be torn.
+    """
+    text = "".join(json.dumps(entry, allow_nan=False) + "\n" for entry in entries)
+    try:
+        with path.open("ab") as file:
+            file.write(text.encode())
+    except OSError as error:
+        raise InputError(path, "", f"cannot be written: {error.strerror}") from error
+
+
+def repair_torn_line(path: Path) -> None:
+    """Cuts off a last line that was not written to its end."""
+    if not path.exists():
+        return
+    content = path.read_bytes()
+    whole = content.rfind(b"\n") + 1
+    if whole < len(content):
+        os.truncate(path, whole)
+
+
+def read_lines(path: Path) -> list[dict[str, Any]]:
+    """The entries of all whole lines; none if there is no file.
+
+    Raises InputError, naming file and line, where a line is not a JSON object.
+    """
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read: {error.strerror}") from error
+    lines = content.split(b"\n")[:-1]
+    return [_parse(line, path, number) for number, line in enumerate(lines, start=1)]
+
+
+def _parse(line: bytes, path: Path, number: int) -> dict[str, Any]:
+    try:
+        entry = json.loads(line.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(path, f"line {number}", f"is damaged: {reason}") from error
+    if not isinstance(entry, dict):
+        raise InputError(path, f"line {number}", "is damaged: expected a JSON object")
+    return entry
