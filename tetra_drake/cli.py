@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tetra_drake import arguments
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.command import add_evolve
 from tetra_drake.gait import Gait, load_gait, random_gait
@@ -18,9 +19,9 @@ BAD_INPUT, FAILED = 2, 1
 """Exit statuses: the input cannot be used; the simulation failed."""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
-    options = make_parser().parse_args(arguments)
+    options = make_parser().parse_args(argv)
     try:
         options.run(options)
     except InputError as error:
@@ -166,7 +167,10 @@ def _add_work_precision(commands: argparse._SubParsersAction) -> None:
         "gaits", metavar="GAIT", type=Path, nargs="+", help="gait files; at least six say something"
     )
     command.add_argument(
-        "--workers", type=int, default=1, help="processes; 1 for times that mean something"
+        "--workers",
+        type=arguments.count,
+        default=1,
+        help="processes; 1 for times that mean something",
     )
     command.set_defaults(run=_work_precision)
 
@@ -197,19 +201,13 @@ def _add_gait(command: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--seed",
         metavar="N",
-        type=_seed,
+        type=arguments.seed,
         default=DEFAULT_SEED,
         help="instead, a gait drawn at random with this seed (default: %(default)s, which walks)",
     )
 
 
 DEFAULT_SEED = 80
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"found '{text}', expected an integer, 0 or more")
-    return int(text)
 
 
 def _gait(options: argparse.Namespace, scenario: Scenario) -> Gait:

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tetra_drake import arguments
 from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios
 
 if TYPE_CHECKING:
@@ -36,19 +37,25 @@ def add_evolve(commands: argparse._SubParsersAction) -> None:
         "--out", metavar="DIR", type=Path, required=True, help="the run directory, as runs/NAME"
     )
     command.add_argument(
-        "--trials", metavar="N", type=_count, help="independent trials, instead of the scenario's"
+        "--trials",
+        metavar="N",
+        type=arguments.count,
+        help="independent trials, instead of the scenario's",
     )
     command.add_argument(
         "--iterations",
         metavar="N",
-        type=_count,
+        type=arguments.count,
         help="iterations of a trial at most, instead of the scenario's",
     )
     command.add_argument(
-        "--seed", metavar="N", type=_seed, help=f"of all chance (default: {DEFAULT_SEED})"
+        "--seed", metavar="N", type=arguments.seed, help=f"of all chance (default: {DEFAULT_SEED})"
     )
     command.add_argument(
-        "--workers", metavar="N", type=_count, help="worker processes (default: one a core)"
+        "--workers",
+        metavar="N",
+        type=arguments.count,
+        help="worker processes (default: one a core)",
     )
     command.add_argument(
         "--resume", action="store_true", help="go on with an interrupted run; needs only --out"
@@ -138,17 +145,3 @@ def _introduce(record: RunRecord, workers: int) -> None:
             "differently from an uninterrupted one",
             file=sys.stderr,
         )
-
-
-def _count(text: str) -> int:
-    count = int(text)
-    if count < 1:
-        raise argparse.ArgumentTypeError(f"found {count}, expected 1 or more")
-    return count
-
-
-def _seed(text: str) -> int:
-    seed = int(text)
-    if seed < 0:
-        raise argparse.ArgumentTypeError(f"found {seed}, expected 0 or more")
-    return seed

@@ -1,0 +1,21 @@
+"""Types of command-line arguments, with messages made for people."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def seed(text: str) -> int:
+    """A seed: an integer, 0 or more."""
+    return _integer(text, least=0)
+
+
+def count(text: str) -> int:
+    """A number of things: an integer, 1 or more."""
+    return _integer(text, least=1)
+
+
+def _integer(text: str, *, least: int) -> int:
+    if not (text.isascii() and text.isdecimal() and int(text) >= least):
+        raise argparse.ArgumentTypeError(f"found '{text}', expected an integer, {least} or more")
+    return int(text)
