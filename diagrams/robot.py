@@ -22,16 +22,13 @@ from tetra_drake.diagram import MakeTensegrityDiagram
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.files import whole_file
-from tetra_drake.gait import Gait, load_gait, random_gait
+from tetra_drake.gait import Gait, load_gait, seeded_gait
 from tetra_drake.scenario import Scenario, load_scenario
 from tetra_drake.simulation import SimulationResult, simulate
 from tetra_drake.units import INCH, POUND_FORCE
 
 if TYPE_CHECKING:
     import xarray
-
-SEED = 80
-"""Of a random gait that walks."""
 
 
 def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
@@ -101,10 +98,10 @@ def report(gait: Gait, result: SimulationResult) -> str:
 
 
 def choose_gait(path: Path | None, scenario: Scenario) -> Gait:
-    """The gait in the file, or without one the random gait of SEED."""
+    """The gait in the file, or without one a random one that walks."""
     if path is not None:
         return load_gait(path, oscillators=scenario.oscillators)
-    return random_gait(scenario, np.random.default_rng(SEED), name=f"random gait {SEED}")
+    return seeded_gait(scenario)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

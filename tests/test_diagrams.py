@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tetra_drake import thesis
-from tetra_drake.gait import random_gait
+from tetra_drake.gait import seeded_gait
 from tetra_drake.robot import BASE, BOTTOM_LEFT, TOP, tetrahedron_inertia
 from tetra_drake.scenario import Scenario, load_scenario
 from tetra_drake.simulation import simulate
@@ -75,7 +75,7 @@ def walk():
     """Scenario, gait and result of two seconds of walking."""
     scenario = load_scenario("thesis")
     scenario.simulation = dataclasses.replace(scenario.simulation, duration=2.0, steady_from=1.0)
-    gait = random_gait(scenario, np.random.default_rng(robot.SEED), name="short walk")
+    gait = dataclasses.replace(seeded_gait(scenario), name="short walk")
     return scenario, gait, simulate(scenario=scenario, gait=gait, record=True)
 
 

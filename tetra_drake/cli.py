@@ -8,12 +8,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from tetra_drake import arguments
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.command import add_evolve
-from tetra_drake.gait import Gait, load_gait, random_gait
+from tetra_drake.gait import WALKING_SEED, Gait, load_gait, seeded_gait
 from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios
 
 BAD_INPUT, FAILED = 2, 1
@@ -155,8 +153,7 @@ def _diagram(options: argparse.Namespace) -> None:
     from tetra_drake.figures.block_diagram import save_block_diagram
 
     scenario = load_scenario(options.scenario)
-    gait = random_gait(scenario, np.random.default_rng(0), name="any")
-    save_block_diagram(MakeTensegrityDiagram(scenario, gait), options.out)
+    save_block_diagram(MakeTensegrityDiagram(scenario, seeded_gait(scenario)), options.out)
 
 
 def _add_work_precision(commands: argparse._SubParsersAction) -> None:
@@ -206,19 +203,15 @@ def _add_gait(command: argparse.ArgumentParser) -> None:
         "--seed",
         metavar="N",
         type=arguments.seed,
-        default=DEFAULT_SEED,
+        default=WALKING_SEED,
         help="instead, a gait drawn at random with this seed (default: %(default)s, which walks)",
     )
-
-
-DEFAULT_SEED = 80
 
 
 def _gait(options: argparse.Namespace, scenario: Scenario) -> Gait:
     if options.gait is not None:
         return load_gait(options.gait, oscillators=scenario.oscillators)
-    generator = np.random.default_rng(options.seed)
-    return random_gait(scenario, generator, name=f"random gait {options.seed}")
+    return seeded_gait(scenario, options.seed)
 
 
 if __name__ == "__main__":

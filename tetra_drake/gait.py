@@ -58,6 +58,15 @@ def random_gait(scenario: Scenario, generator: np.random.Generator, *, name: str
     )
 
 
+WALKING_SEED = 80
+"""Of a random gait of the thesis's scenario that walks forward, for want of a better one."""
+
+
+def seeded_gait(scenario: Scenario, seed: int = WALKING_SEED) -> Gait:
+    """The random gait of a seed."""
+    return random_gait(scenario, np.random.default_rng(seed), name=f"random gait {seed}")
+
+
 def save_gait(gait: Gait, path: str | Path) -> None:
     """Writes a gait file; it loads back to the same numbers."""
     write_whole(path, json.dumps(gait.to_json(), indent=1) + "\n")

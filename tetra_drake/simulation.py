@@ -159,7 +159,7 @@ class _Watch:
         if self._failure is not None:
             return EventStatus.ReachedTermination(self._diagram, self._failure.reason)
         if self._aims:
-            self._aim_next_step(context)
+            self._aim_next_step(context.get_time(), state[self._velocities])
         if self._recorder is not None:
             self._recorder.after_step(context)
         return EventStatus.Succeeded()
@@ -177,12 +177,11 @@ class _Watch:
             return StepBudgetExceeded(time=time, reason=f"{used} derivative evaluations, {limit}")
         return None
 
-    def _aim_next_step(self, context: Context) -> None:
+    def _aim_next_step(self, time: float, velocities: np.ndarray) -> None:
         """Lets the next step end where the next mode change is predicted, if that is near.
 
         The prediction takes the mean acceleration of the last step, which costs nothing.
         """
-        time, velocities = context.get_time(), self._state.Eval(context)[self._velocities]
         step_taken = time - self._last_time
         if step_taken > 0.0:
             self._acceleration = (velocities - self._last_velocities) / step_taken

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from types import FrameType
 
 from tetra_drake.errors import SimulationFailure
-from tetra_drake.evolution.genome import gait_of, read_options
+from tetra_drake.evolution.genome import gait_of
 from tetra_drake.evolution.optimizer import Evaluation, Genome
 from tetra_drake.scenario import Scenario
 from tetra_drake.simulation import simulate
@@ -33,7 +33,7 @@ class GaitEvaluation:
         """Fitness and metrics of one genome, or why it has none."""
         started = time.perf_counter()
         try:
-            with time_limit(read_options(self.scenario).time_budget):
+            with time_limit(self.scenario.evolution.time_budget):
                 result = simulate(scenario=self.scenario, gait=gait_of(genome, name="candidate"))
         except (SimulationFailure, TimeBudgetExceeded) as error:
             return Evaluation.failed(

@@ -22,24 +22,6 @@ NO_FLOOR = 0.0
 
 
 @dataclass(frozen=True)
-class Options:
-    """What an evolution can be asked for beyond the thesis."""
-
-    independent_tau_b: bool
-    """Whether tau_B evolves by itself; otherwise tau_B = 2 tau_A throughout."""
-    time_budget: float
-    """Wall time in s after which an evaluation is given up."""
-
-
-def read_options(scenario: Scenario) -> Options:
-    """The options of a scenario."""
-    return Options(
-        independent_tau_b=scenario.evolution.independent_tau_b,
-        time_budget=scenario.evolution.time_budget,
-    )
-
-
-@dataclass(frozen=True)
 class MutationLimits:
     """How far, per parameter of a genome, one mutation may reach."""
 

@@ -10,7 +10,6 @@ from tetra_drake.evolution.genome import (
     couple_tau_b,
     mutation_limits,
     random_genome,
-    read_options,
 )
 from tetra_drake.evolution.operators import (
     cross_over,
@@ -38,7 +37,7 @@ class SteadyState:
         self._scenario = scenario
         self._settings = scenario.evolution
         self._limits = mutation_limits(scenario)
-        self._couples_tau_b = not read_options(scenario).independent_tau_b
+        self._couples_tau_b = not scenario.evolution.independent_tau_b
         self._generator = generator
         self._asked: list[Genome] = []
         self._genomes: list[Genome] = []
