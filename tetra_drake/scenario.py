@@ -133,8 +133,13 @@ class GaitBoundsScenario:
 
 @dataclass
 class SimulationScenario:
-    """How long to simulate, how finely, and when to give up."""
+    """How long to simulate, on which engine, how finely, and when to give up.
 
+    From `scheme` to `witness_window`, the settings are those of the engine `drake`.
+    """
+
+    engine: str = _choice("drake", "compiled")
+    """The Drake diagram, or the same laws compiled end to end."""
     duration: float = _quantity("s", above=0)
     steady_from: float = _quantity("s", at_least=0)
     """Start of the stretch that the fitness measures (thesis section 2.3)."""
@@ -167,6 +172,17 @@ class SimulationScenario:
     """A faster body counts as diverged."""
     sample_period: float = _quantity("s", above=0)
     """Least time between the samples of a recorded trajectory."""
+
+
+@dataclass
+class CompiledScenario:
+    """How finely the engine `compiled` simulates."""
+
+    tolerance: float = _quantity("m/s", above=0)
+    """Error allowed in one step: of a body's velocity, or of its strut tips' by rotation."""
+    max_step: float = _quantity("s", above=0)
+    look_ahead: float = _quantity("s", above=0)
+    """The shortest step taken so that one ends where a mode change is predicted."""
 
 
 @dataclass
@@ -219,6 +235,7 @@ class Scenario:
     cpg: CpgScenario = field(default_factory=CpgScenario)
     gait_bounds: GaitBoundsScenario = field(default_factory=GaitBoundsScenario)
     simulation: SimulationScenario = field(default_factory=SimulationScenario)
+    compiled: CompiledScenario = field(default_factory=CompiledScenario)
     fitness: FitnessScenario = field(default_factory=FitnessScenario)
     evolution: EvolutionScenario = field(default_factory=EvolutionScenario)
 

@@ -32,6 +32,7 @@ class GaitEvaluation:
     def __call__(self, genome: Genome) -> Evaluation:
         """Fitness and metrics of one genome, or why it has none."""
         started = time.perf_counter()
+        engine = self.scenario.simulation.engine
         try:
             with time_limit(self.scenario.evolution.time_budget):
                 result = simulate(scenario=self.scenario, gait=gait_of(genome, name="candidate"))
@@ -39,14 +40,17 @@ class GaitEvaluation:
             return Evaluation.failed(
                 f"{_KINDS.get(type(error).__name__, 'failed')}: {error}",
                 wall_time=time.perf_counter() - started,
+                engine=engine,
             )
         wall_time = time.perf_counter() - started
         if not math.isfinite(result.fitness):
-            return Evaluation.failed("diverged: the fitness is not finite", wall_time=wall_time)
+            reason = "diverged: the fitness is not finite"
+            return Evaluation.failed(reason, wall_time=wall_time, engine=engine)
         return Evaluation(
             fitness=result.fitness,
             metrics=dataclasses.asdict(result.metrics),
             wall_time=wall_time,
+            engine=engine,
         )
 
 

@@ -23,11 +23,13 @@ class Evaluation:
     failure: str | None = None
     wall_time: float = 0.0
     """Time from genome to fitness, in s."""
+    engine: str = ""
+    """What evaluated it."""
 
     @classmethod
-    def failed(cls, reason: str, *, wall_time: float = 0.0) -> Evaluation:
+    def failed(cls, reason: str, *, wall_time: float = 0.0, engine: str = "") -> Evaluation:
         """An evaluation that came to nothing, and why."""
-        return cls(fitness=-math.inf, failure=reason, wall_time=wall_time)
+        return cls(fitness=-math.inf, failure=reason, wall_time=wall_time, engine=engine)
 
     @property
     def distance_in(self) -> float:

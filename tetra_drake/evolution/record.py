@@ -50,6 +50,7 @@ _EVALUATION_KEYS = {
     "fitness": (int, float, type(None)),
     "failure": (str, type(None)),
     "wall_time_s": (int, float),
+    "engine": (str,),
 }
 
 
@@ -207,6 +208,7 @@ class TrialRecord:
             metrics=entry["metrics"],
             failure=entry["failure"],
             wall_time=entry["wall_time_s"],
+            engine=entry["engine"],
         )
 
     def keep(self, index: int, iteration: int, genome: Genome, evaluation: Evaluation) -> None:
@@ -268,6 +270,7 @@ def evaluation_entry(
         "fitness": evaluation.fitness if math.isfinite(evaluation.fitness) else None,
         "failure": evaluation.failure,
         "wall_time_s": round(evaluation.wall_time, 4),
+        "engine": evaluation.engine,
     }
 
 
