@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 
 from tetra_drake.physics.cable import CABLE, PASSIVE
-from tetra_drake.physics.kinematics import node_motion
+from tetra_drake.physics.kinematics import P_WN, V_WN, node_motion
 from tetra_drake.scenario import CableScenario, RobotScenario
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
@@ -182,9 +182,9 @@ def _add_visuals(plant: MultibodyPlant, structure: Structure, body: RigidBody) -
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
     """p_WN (nodes, 3) in m from the state (13 n,) of the bodies."""
-    return node_motion(state, structure.p_BN)[1]
+    return node_motion(state, structure.p_BN)[:, P_WN : P_WN + 3]
 
 
 def node_velocities(structure: Structure, state: np.ndarray) -> np.ndarray:
     """v_WN (nodes, 3) in m/s from the state (13 n,) of the bodies."""
-    return node_motion(state, structure.p_BN)[2]
+    return node_motion(state, structure.p_BN)[:, V_WN : V_WN + 3]

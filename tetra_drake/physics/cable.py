@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.kinematics import add_node_force, node_motion
+from tetra_drake.physics.kinematics import P_WN, V_WN, gather_forces, node_motion
 
 Array = np.ndarray
 
@@ -46,6 +46,57 @@ def cable_tension(
 
 
 @compiled
+def add_cable_forces(
+    motion: Array,
+    signals: Array,
+    cables: Array,
+    slack: bool,
+    node_force: Array,
+    tensions: Array,
+    lengths: Array,
+) -> None:
+    """Adds the forces of all cables to those at the nodes.
+
+    Args:
+        motion: (nodes, MOTION_COLUMNS) of `kinematics`.
+        signals: (signals,), actuation forces in N.
+        cables: (cables,) of dtype CABLE.
+        slack: whether cables go slack instead of pushing.
+        node_force: (nodes, 3), added to, in N.
+        tensions, lengths: (cables,), written, in N and m.
+    """
+    for i in range(cables.size):
+        cable = cables[i]
+        a = cable.node_a
+        b = cable.node_b
+        d_x = motion[b, P_WN] - motion[a, P_WN]
+        d_y = motion[b, P_WN + 1] - motion[a, P_WN + 1]
+        d_z = motion[b, P_WN + 2] - motion[a, P_WN + 2]
+        length = np.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
+        d_x /= length
+        d_y /= length
+        d_z /= length
+        rate = (
+            (motion[b, V_WN] - motion[a, V_WN]) * d_x
+            + (motion[b, V_WN + 1] - motion[a, V_WN + 1]) * d_y
+            + (motion[b, V_WN + 2] - motion[a, V_WN + 2]) * d_z
+        )
+        signal = signals[cable.signal] if cable.signal >= 0 else 0.0
+        tension = cable_tension(
+            length, rate, signal, cable.stiffness, cable.damping, cable.free_length, slack
+        )
+        f_x, f_y, f_z = tension * d_x, tension * d_y, tension * d_z
+        node_force[a, 0] += f_x
+        node_force[a, 1] += f_y
+        node_force[a, 2] += f_z
+        node_force[b, 0] -= f_x
+        node_force[b, 1] -= f_y
+        node_force[b, 2] -= f_z
+        tensions[i] = tension
+        lengths[i] = length
+
+
+@compiled
 def cable_forces(
     state: Array,
     signals: Array,
@@ -60,38 +111,11 @@ def cable_forces(
 
     Args:
         state: [q; v] of the bodies, 13 numbers a body.
-        signals: (signals,), actuation forces in N.
         p_BN: (nodes a body, 3), in m.
-        cables: (cables,) of dtype CABLE.
-        slack: whether cables go slack instead of pushing.
         generalized_force: (6 bodies,), written, [t_W; f_W] at each Bo.
-        tensions, lengths: (cables,), written, in N and m.
+        signals, cables, slack, tensions, lengths: as in `add_cable_forces`.
     """
-    nodes_a_body = p_BN.shape[0]
-    p_BN_W, p_WN, v_WN = node_motion(state, p_BN)
-    generalized_force[:] = 0.0
-    for i in range(cables.size):
-        cable = cables[i]
-        a = cable.node_a
-        b = cable.node_b
-        d_x = p_WN[b, 0] - p_WN[a, 0]
-        d_y = p_WN[b, 1] - p_WN[a, 1]
-        d_z = p_WN[b, 2] - p_WN[a, 2]
-        length = np.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
-        d_x /= length
-        d_y /= length
-        d_z /= length
-        rate = (
-            (v_WN[b, 0] - v_WN[a, 0]) * d_x
-            + (v_WN[b, 1] - v_WN[a, 1]) * d_y
-            + (v_WN[b, 2] - v_WN[a, 2]) * d_z
-        )
-        signal = signals[cable.signal] if cable.signal >= 0 else 0.0
-        tension = cable_tension(
-            length, rate, signal, cable.stiffness, cable.damping, cable.free_length, slack
-        )
-        f_x, f_y, f_z = tension * d_x, tension * d_y, tension * d_z
-        add_node_force(a // nodes_a_body, p_BN_W[a], f_x, f_y, f_z, generalized_force)
-        add_node_force(b // nodes_a_body, p_BN_W[b], -f_x, -f_y, -f_z, generalized_force)
-        tensions[i] = tension
-        lengths[i] = length
+    motion = node_motion(state, p_BN)
+    node_force = np.zeros((motion.shape[0], 3))
+    add_cable_forces(motion, signals, cables, slack, node_force, tensions, lengths)
+    gather_forces(motion, node_force, generalized_force)

@@ -12,7 +12,14 @@ import math
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.kinematics import add_node_force, node_acceleration, node_motion
+from tetra_drake.physics.kinematics import (
+    P_BN_W,
+    P_WN,
+    V_WN,
+    gather_forces,
+    node_acceleration,
+    node_motion,
+)
 
 Array = np.ndarray
 
@@ -83,6 +90,49 @@ def next_friction_mode(
 
 
 @compiled
+def add_ground_forces(
+    motion: Array,
+    modes: Array,
+    contacts: Array,
+    ground: Array,
+    node_force: Array,
+    normal: Array,
+    friction: Array,
+) -> None:
+    """Adds the forces of the ground to those at the nodes.
+
+    Args:
+        motion: (nodes, MOTION_COLUMNS) of `kinematics`.
+        modes: (contacts, MODE_COLUMNS).
+        contacts: (contacts,), the indices of the nodes that may touch the ground.
+        ground: (1,) of dtype GROUND.
+        node_force: (nodes, 3), added to, in N.
+        normal: (contacts,), written, in N.
+        friction: (contacts, 2), written, along x and y in N.
+    """
+    law = ground[0]
+    for i in range(contacts.size):
+        node = contacts[i]
+        normal[i] = normal_force(
+            -motion[node, P_WN + 2], -motion[node, V_WN + 2], law.stiffness, law.damping
+        )
+        node_force[node, 2] += normal[i]
+        for axis in range(2):
+            friction[i, axis] = 0.0
+            if modes[i, CONTACT] != 0.0:
+                friction[i, axis] = friction_force(
+                    motion[node, V_WN + axis],
+                    motion[node, P_WN + axis] - modes[i, STICK_POINT + axis],
+                    modes[i, MODE + axis],
+                    law.stiction_range,
+                    law.stiction_damping,
+                    law.stiction_switch,
+                    law.proportional_stiction,
+                )
+                node_force[node, axis] += friction[i, axis]
+
+
+@compiled
 def ground_forces(
     state: Array,
     modes: Array,
@@ -97,57 +147,29 @@ def ground_forces(
 
     Args:
         state: [q; v] of the bodies, 13 numbers a body.
-        modes: (contacts, MODE_COLUMNS).
         p_BN: (nodes a body, 3), in m.
-        contacts: (contacts,), the indices of the nodes that may touch the ground.
-        ground: (1,) of dtype GROUND.
         generalized_force: (6 bodies,), written, [t_W; f_W] at each Bo.
-        normal: (contacts,), written, in N.
-        friction: (contacts, 2), written, along x and y in N.
+        modes, contacts, ground, normal, friction: as in `add_ground_forces`.
     """
-    nodes_a_body = p_BN.shape[0]
-    p_BN_W, p_WN, v_WN = node_motion(state, p_BN)
-    law = ground[0]
-    generalized_force[:] = 0.0
-    for i in range(contacts.size):
-        node = contacts[i]
-        normal[i] = normal_force(-p_WN[node, 2], -v_WN[node, 2], law.stiffness, law.damping)
-        for axis in range(2):
-            friction[i, axis] = 0.0
-            if modes[i, CONTACT] != 0.0:
-                friction[i, axis] = friction_force(
-                    v_WN[node, axis],
-                    p_WN[node, axis] - modes[i, STICK_POINT + axis],
-                    modes[i, MODE + axis],
-                    law.stiction_range,
-                    law.stiction_damping,
-                    law.stiction_switch,
-                    law.proportional_stiction,
-                )
-        add_node_force(
-            node // nodes_a_body,
-            p_BN_W[node],
-            friction[i, 0],
-            friction[i, 1],
-            normal[i],
-            generalized_force,
-        )
+    motion = node_motion(state, p_BN)
+    node_force = np.zeros((motion.shape[0], 3))
+    add_ground_forces(motion, modes, contacts, ground, node_force, normal, friction)
+    gather_forces(motion, node_force, generalized_force)
 
 
 @compiled
-def update_modes(state: Array, p_BN: Array, contacts: Array, ground: Array, modes: Array) -> bool:
-    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with `state`; whether they changed.
+def update_modes(motion: Array, contacts: Array, ground: Array, modes: Array) -> bool:
+    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with `motion`; whether they changed.
 
     A node that lands sticks where it lands; one that sticks again does so where it is
-    (the reset of the integrator). The arguments are those of `ground_forces`.
+    (the reset of the integrator). The arguments are those of `add_ground_forces`.
     """
-    _, p_WN, v_WN = node_motion(state, p_BN)
     stiction_range = ground[0].stiction_range
     changed = False
     for i in range(contacts.size):
         node = contacts[i]
         touched = modes[i, CONTACT] != 0.0
-        touches = p_WN[node, 2] <= 0.0
+        touches = motion[node, P_WN + 2] <= 0.0
         if not (touched or touches):
             continue
         if touched != touches:
@@ -156,11 +178,13 @@ def update_modes(state: Array, p_BN: Array, contacts: Array, ground: Array, mode
         for axis in range(2):
             before = modes[i, MODE + axis]
             after = STICK
+            position = motion[node, P_WN + axis]
             if touched and touches:
-                deflection = p_WN[node, axis] - modes[i, STICK_POINT + axis]
-                after = next_friction_mode(v_WN[node, axis], deflection, before, stiction_range)
+                deflection = position - modes[i, STICK_POINT + axis]
+                velocity = motion[node, V_WN + axis]
+                after = next_friction_mode(velocity, deflection, before, stiction_range)
             if after == STICK and (before != STICK or not touched):
-                modes[i, STICK_POINT + axis] = p_WN[node, axis]
+                modes[i, STICK_POINT + axis] = position
             if after != before:
                 modes[i, MODE + axis] = after
                 changed = True
@@ -168,27 +192,26 @@ def update_modes(state: Array, p_BN: Array, contacts: Array, ground: Array, mode
 
 
 @compiled
-def mode_margin(state: Array, modes: Array, p_BN: Array, contacts: Array, ground: Array) -> float:
+def mode_margin(motion: Array, modes: Array, contacts: Array, ground: Array) -> float:
     """Positive while no mode is due to change; crosses zero where the first one is.
 
     The least of: height in the air, depth on the ground (m), stiction range less deflection
     (m), speed in the direction of slip (m/s). Only its sign has a meaning.
     """
-    _, p_WN, v_WN = node_motion(state, p_BN)
     margin = math.inf
     for i in range(contacts.size):
         node = contacts[i]
         if modes[i, CONTACT] == 0.0:
-            margin = min(margin, p_WN[node, 2])
+            margin = min(margin, motion[node, P_WN + 2])
             continue
-        margin = min(margin, -p_WN[node, 2])
+        margin = min(margin, -motion[node, P_WN + 2])
         for axis in range(2):
             mode = modes[i, MODE + axis]
             if mode == STICK:
-                deflection = p_WN[node, axis] - modes[i, STICK_POINT + axis]
+                deflection = motion[node, P_WN + axis] - modes[i, STICK_POINT + axis]
                 margin = min(margin, ground[0].stiction_range - abs(deflection))
             else:
-                margin = min(margin, mode * v_WN[node, axis])
+                margin = min(margin, mode * motion[node, V_WN + axis])
     return margin
 
 
@@ -215,34 +238,35 @@ def first_zero(value: float, rate: float, rate_rate: float, horizon: float) -> f
 def time_to_mode_change(
     state: Array,
     acceleration: Array,
+    motion: Array,
     modes: Array,
-    p_BN: Array,
     contacts: Array,
     ground: Array,
     horizon: float,
 ) -> float:
     """Time (s) to the next mode change, extrapolating with constant node accelerations.
 
-    `acceleration` is dv/dt, 6 numbers a body; no answer exceeds `horizon` (s). The
-    other arguments are those of `ground_forces`.
+    `acceleration` is dv/dt, 6 numbers a body; no answer exceeds `horizon` (s). `motion`
+    belongs to `state`. The other arguments are those of `add_ground_forces`.
     """
-    nodes_a_body = p_BN.shape[0]
-    p_BN_W, p_WN, v_WN = node_motion(state, p_BN)
+    nodes_a_body = motion.shape[0] // (state.size // 13)
     stiction_range = ground[0].stiction_range
     time = horizon
     for i in range(contacts.size):
         node = contacts[i]
-        a_WN = node_acceleration(state, acceleration, node // nodes_a_body, p_BN_W[node])
-        p_z, v_z, a_z = p_WN[node, 2], v_WN[node, 2], a_WN[2]
+        a_WN = node_acceleration(
+            state, acceleration, node // nodes_a_body, motion[node, P_BN_W : P_BN_W + 3]
+        )
+        p_z, v_z, a_z = motion[node, P_WN + 2], motion[node, V_WN + 2], a_WN[2]
         if modes[i, CONTACT] == 0.0:
             time = min(time, first_zero(p_z, v_z, a_z, horizon))
             continue
         time = min(time, first_zero(-p_z, -v_z, -a_z, horizon))
         for axis in range(2):
-            velocity = v_WN[node, axis]
+            velocity = motion[node, V_WN + axis]
             mode = modes[i, MODE + axis]
             if mode == STICK:
-                x = p_WN[node, axis] - modes[i, STICK_POINT + axis]
+                x = motion[node, P_WN + axis] - modes[i, STICK_POINT + axis]
                 a = a_WN[axis]
                 time = min(time, first_zero(stiction_range - x, -velocity, -a, horizon))
                 time = min(time, first_zero(stiction_range + x, velocity, a, horizon))

@@ -9,23 +9,22 @@ from tetra_drake.physics.compiling import compiled
 Array = np.ndarray
 
 
+P_BN_W, P_WN, V_WN, MOTION_COLUMNS = 0, 3, 6, 9
+"""Columns of `motion`, (nodes, 9), a row a node: the vectors from body origin to node (m),
+its position (m) and velocity (m/s), all in World; and their number. Nodes run body by body."""
+
+
 @compiled
-def node_motion(state: Array, p_BN: Array) -> tuple[Array, Array, Array]:
+def move_nodes(state: Array, p_BN: Array, motion: Array) -> None:
     """Moves the body-fixed nodes with their bodies.
 
     Args:
         state: [q; v] of the bodies, 13 numbers a body.
         p_BN: (nodes a body, 3), the same for every body, in m.
-
-    Returns:
-        p_BN_W, p_WN, v_WN: (nodes, 3), from body origin to node expressed in World (m),
-        position (m) and velocity (m/s) in World; nodes run body by body.
+        motion: (nodes, MOTION_COLUMNS), written.
     """
     bodies = state.size // 13
     nodes = p_BN.shape[0]
-    p_BN_W = np.empty((nodes * bodies, 3))
-    p_WN = np.empty((nodes * bodies, 3))
-    v_WN = np.empty((nodes * bodies, 3))
     for body in range(bodies):
         q = 7 * body
         v = 7 * bodies + 6 * body
@@ -41,16 +40,23 @@ def node_motion(state: Array, p_BN: Array) -> tuple[Array, Array, Array]:
             p_y = r_10 * a + r_11 * b + r_12 * c
             p_z = r_20 * a + r_21 * b + r_22 * c
             node = nodes * body + k
-            p_BN_W[node, 0] = p_x
-            p_BN_W[node, 1] = p_y
-            p_BN_W[node, 2] = p_z
-            p_WN[node, 0] = state[q + 4] + p_x
-            p_WN[node, 1] = state[q + 5] + p_y
-            p_WN[node, 2] = state[q + 6] + p_z
-            v_WN[node, 0] = state[v + 3] + w_y * p_z - w_z * p_y
-            v_WN[node, 1] = state[v + 4] + w_z * p_x - w_x * p_z
-            v_WN[node, 2] = state[v + 5] + w_x * p_y - w_y * p_x
-    return p_BN_W, p_WN, v_WN
+            motion[node, P_BN_W] = p_x
+            motion[node, P_BN_W + 1] = p_y
+            motion[node, P_BN_W + 2] = p_z
+            motion[node, P_WN] = state[q + 4] + p_x
+            motion[node, P_WN + 1] = state[q + 5] + p_y
+            motion[node, P_WN + 2] = state[q + 6] + p_z
+            motion[node, V_WN] = state[v + 3] + w_y * p_z - w_z * p_y
+            motion[node, V_WN + 1] = state[v + 4] + w_z * p_x - w_x * p_z
+            motion[node, V_WN + 2] = state[v + 5] + w_x * p_y - w_y * p_x
+
+
+@compiled
+def node_motion(state: Array, p_BN: Array) -> Array:
+    """The `motion` of the nodes in a new array; the arguments are those of `move_nodes`."""
+    motion = np.empty((p_BN.shape[0] * (state.size // 13), MOTION_COLUMNS))
+    move_nodes(state, p_BN, motion)
+    return motion
 
 
 @compiled
@@ -77,18 +83,29 @@ def node_acceleration(
 
 
 @compiled
-def add_node_force(
-    body: int, p_BN_W: Array, f_x: float, f_y: float, f_z: float, generalized_force: Array
-) -> None:
-    """Adds a force in World (N) at the node at `p_BN_W` (3,) on `body`.
+def gather_forces(motion: Array, node_force: Array, generalized_force: Array) -> None:
+    """Sums forces at the nodes, (nodes, 3) in World (N), body by body.
 
-    `generalized_force` holds [t_W; f_W] at Bo, 6 numbers a body, as Drake's
+    `generalized_force`, (6 bodies,), is written: [t_W; f_W] at each Bo, as Drake's
     applied_generalized_force port wants them.
     """
-    g = 6 * body
-    generalized_force[g] += p_BN_W[1] * f_z - p_BN_W[2] * f_y
-    generalized_force[g + 1] += p_BN_W[2] * f_x - p_BN_W[0] * f_z
-    generalized_force[g + 2] += p_BN_W[0] * f_y - p_BN_W[1] * f_x
-    generalized_force[g + 3] += f_x
-    generalized_force[g + 4] += f_y
-    generalized_force[g + 5] += f_z
+    bodies = generalized_force.size // 6
+    nodes = motion.shape[0] // bodies
+    for body in range(bodies):
+        t_x = t_y = t_z = f_x = f_y = f_z = 0.0
+        for node in range(nodes * body, nodes * (body + 1)):
+            p_x, p_y, p_z = motion[node, P_BN_W], motion[node, P_BN_W + 1], motion[node, P_BN_W + 2]
+            x, y, z = node_force[node, 0], node_force[node, 1], node_force[node, 2]
+            t_x += p_y * z - p_z * y
+            t_y += p_z * x - p_x * z
+            t_z += p_x * y - p_y * x
+            f_x += x
+            f_y += y
+            f_z += z
+        g = 6 * body
+        generalized_force[g] = t_x
+        generalized_force[g + 1] = t_y
+        generalized_force[g + 2] = t_z
+        generalized_force[g + 3] = f_x
+        generalized_force[g + 4] = f_y
+        generalized_force[g + 5] = f_z

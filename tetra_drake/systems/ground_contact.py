@@ -24,6 +24,7 @@ from tetra_drake.physics.ground import (
     time_to_mode_change,
     update_modes,
 )
+from tetra_drake.physics.kinematics import node_motion
 from tetra_drake.robot import Structure
 from tetra_drake.scenario import FrictionScenario, GroundScenario
 
@@ -110,9 +111,10 @@ class GroundContact(LeafSystem):
         Changes due right now count as made.
         """
         state, rows = self._state.Eval(context), self._rows(context).copy()
-        update_modes(state, self._p_BN, self._contacts, self._law, rows)
+        motion = node_motion(state, self._p_BN)
+        update_modes(motion, self._contacts, self._law, rows)
         return time_to_mode_change(
-            state, acceleration, rows, self._p_BN, self._contacts, self._law, horizon
+            state, acceleration, motion, rows, self._contacts, self._law, horizon
         )
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
@@ -122,6 +124,9 @@ class GroundContact(LeafSystem):
     def _rows(self, context: Context) -> np.ndarray:
         return context.get_discrete_state_vector().value().reshape(-1, MODE_COLUMNS)
 
+    def _motion(self, context: Context) -> np.ndarray:
+        return node_motion(self._state.Eval(context), self._p_BN)
+
     def _start(self, context: Context, values: DiscreteValues) -> EventStatus:
         # From "nowhere in contact", an update makes every node at or below 0 stick where it is.
         values.set_value(np.zeros(values.value().size))
@@ -130,14 +135,13 @@ class GroundContact(LeafSystem):
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         rows = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
-        if update_modes(self._state.Eval(context), self._p_BN, self._contacts, self._law, rows):
+        if update_modes(self._motion(context), self._contacts, self._law, rows):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
     def _margin(self, context: Context) -> float:
-        return mode_margin(
-            self._state.Eval(context), self._rows(context), self._p_BN, self._contacts, self._law
-        )
+        rows = self._rows(context)
+        return mode_margin(self._motion(context), rows, self._contacts, self._law)
 
     def _calc(self, context: Context, generalized_force: np.ndarray) -> None:
         ground_forces(
