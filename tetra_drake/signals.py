@@ -6,6 +6,7 @@ its output fed to the cables as a recording, as the thesis does.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.files import whole_file
 from tetra_drake.gait import Gait
-from tetra_drake.physics.oscillator import inhibition_matrix, listing_output
+from tetra_drake.physics.oscillator import inhibition_matrix, listing_output, network_output
 from tetra_drake.scenario import CpgScenario, Scenario
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg, initial_state
 from tetra_drake.units import POUND_FORCE
@@ -36,17 +37,20 @@ def listing_samples(
     listing_output(
         state[: 2 * oscillators].copy(),
         state[2 * oscillators :].copy(),
-        inhibition_matrix(
-            np.array(gait.weights), oscillators=oscillators, partner_weight=cpg.partner_weight
-        ),
-        gait.tau_a,
-        gait.tau_b,
-        cpg.self_inhibition_weight,
-        cpg.external_input,
-        cpg.listing_step,
+        *_network(cpg, gait, oscillators),
         output,
     )
     return np.arange(count) * cpg.listing_step, output
+
+
+def _network(
+    cpg: CpgScenario, gait: Gait, oscillators: int
+) -> tuple[np.ndarray, float, float, float, float, float]:
+    """The network's constants as the kernels that step it take them."""
+    weights = np.array(gait.weights)
+    matrix = inhibition_matrix(weights, oscillators=oscillators, partner_weight=cpg.partner_weight)
+    beta, u0 = cpg.self_inhibition_weight, cpg.external_input
+    return matrix, gait.tau_a, gait.tau_b, beta, u0, cpg.listing_step
 
 
 def integrate_network(
@@ -89,6 +93,28 @@ def signal_trajectory(
     if times[-1] < duration:  # the listing's last sample is stamped one step early
         times, raw = np.append(times, duration), np.vstack([raw, raw[-1:]])
     return PiecewisePolynomial.FirstOrderHold(times, cpg.gain * raw.T)
+
+
+def even_samples(scenario: Scenario, gait: Gait) -> np.ndarray:
+    """The signals (samples, n) in N at 0, one listing step, two ... to beyond the duration.
+
+    Those of `cpg.signals`; for `recorded` and `live` the network is stepped by a Runge-Kutta
+    method of order 4, whose error is 1e-5 of the signals.
+    """
+    cpg, oscillators = scenario.cpg, scenario.oscillators
+    duration = scenario.simulation.duration
+    if cpg.signals == "listing":
+        _, raw = listing_samples(cpg, gait, oscillators=oscillators, duration=duration)
+    else:
+        raw = np.empty((math.ceil(duration / cpg.listing_step) + 1, oscillators))
+        state = initial_state(cpg, oscillators)
+        network_output(
+            state[: 2 * oscillators].copy(),
+            state[2 * oscillators :].copy(),
+            *_network(cpg, gait, oscillators),
+            raw,
+        )
+    return cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
 
 
 def save_signals(

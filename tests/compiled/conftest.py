@@ -1,0 +1,13 @@
+"""What the tests of the compiled engine start from."""
+
+from __future__ import annotations
+
+import pytest
+
+from tetra_drake.scenario import Scenario, load_scenario, with_engine
+
+
+@pytest.fixture
+def compiled_scenario() -> Scenario:
+    """The thesis scenario on the compiled engine."""
+    return with_engine(load_scenario("thesis"), "compiled")

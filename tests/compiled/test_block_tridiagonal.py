@@ -1,0 +1,43 @@
+"""The linear solver, against numpy on the same matrix written out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tetra_drake.compiled.block_tridiagonal import (
+    BLOCK,
+    ROW,
+    add_outer_product,
+    factorise,
+    solve,
+)
+
+
+def random_system(bodies: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of a random positive definite system and the same written out in full."""
+    generator = np.random.default_rng(bodies)
+    rows, full = np.zeros((bodies, BLOCK, ROW)), np.zeros((BLOCK * bodies, BLOCK * bodies))
+    for body in range(bodies):
+        rows[body, range(BLOCK), range(BLOCK)] = 0.1
+    full += 0.1 * np.eye(BLOCK * bodies)
+    for _ in range(20 * bodies):
+        body = int(generator.integers(bodies))
+        size = ROW if body + 1 < bodies and generator.random() < 0.7 else BLOCK
+        vector = np.zeros(ROW)
+        vector[:size] = generator.normal(size=size)
+        factor = generator.uniform(0.1, 2.0)
+        add_outer_product(factor, vector, body, size, rows)
+        place = slice(BLOCK * body, BLOCK * body + size)
+        full[place, place] += factor * np.outer(vector[:size], vector[:size])
+    return rows, full
+
+
+@pytest.mark.parametrize("bodies", [1, 2, 5, 8])
+def test_solves_what_it_was_made_of(bodies: int) -> None:
+    rows, full = random_system(bodies)
+    right_side = np.random.default_rng(1).normal(size=BLOCK * bodies)
+    x = right_side.copy()
+    factorise(rows)
+    solve(rows, x)
+    np.testing.assert_allclose(x, np.linalg.solve(full, right_side), rtol=1e-9, atol=1e-12)
