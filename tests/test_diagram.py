@@ -7,7 +7,6 @@ import os
 from pathlib import Path
 
 import pytest
-from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
 
 from tetra_drake.diagram import MakeTensegrityDiagram
@@ -31,20 +30,6 @@ def test_has_the_blocks_of_the_thesis_and_nothing_to_show_or_log(
 ) -> None:
     actuation = {"cpg", "start_up", "start_up_timer", "no_actuation"}
     assert names(scenario, gait) == {"plant", "cables", "ground", "forces", *actuation}
-
-
-def test_visuals_and_their_scene_graph_exist_only_when_asked_for(
-    scenario: Scenario, gait: Gait
-) -> None:
-    plain = MakeTensegrityDiagram(scenario, gait).GetSubsystemByName("plant")
-    assert not plain.geometry_source_is_registered()
-    shown = MakeTensegrityDiagram(scenario, gait, meshcat=Meshcat())
-    assert shown.HasSubsystemNamed("scene_graph")
-    plant = shown.GetSubsystemByName("plant")
-    for body in ("T1", "T5"):
-        shapes = plant.GetVisualGeometriesForBody(plant.GetBodyByName(body))
-        assert len(shapes) == 6 + 4, "six struts and four nodes"
-    Simulator(shown).AdvanceTo(0.01)
 
 
 def test_exports_what_a_user_wants_to_plot(scenario: Scenario, gait: Gait) -> None:

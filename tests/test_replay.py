@@ -2,33 +2,23 @@
 
 from __future__ import annotations
 
-import base64
 import dataclasses
 import re
-import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import xarray
+from meshcat_page import commands, unpack
 from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RollPitchYaw, RotationMatrix
+from pydrake.math import RotationMatrix
 
 from tetra_drake.errors import InputError
 from tetra_drake.gait import random_gait
-from tetra_drake.replay import (
-    ARROW_LENGTH,
-    FRAMES_PER_SECOND,
-    HIDDEN,
-    aligning_quaternions,
-    body_poses,
-    camera_position,
-    frame_samples,
-    save_replay,
-)
+from tetra_drake.replay import FRAMES_PER_SECOND, frame_samples, replay_title, save_replay
 from tetra_drake.robot import MakeStructure, Structure
 from tetra_drake.scenario import Scenario, load_scenario
+from tetra_drake.scene import ARROW_LENGTH, CABLE_RADIUS, HIDDEN
 from tetra_drake.simulation import simulate
 
 TITLE = '<script>bad()</script> & \\1 "gait": 4.36 in'
@@ -87,53 +77,8 @@ def read_animation(page: str) -> Tracks:
 
 def packed_animation(page: str) -> bytes:
     """The one command of the page that holds all key frames."""
-    commands = map(base64.b64decode, re.findall(r"base64,([A-Za-z0-9+/=]+)", page))
-    (command,) = (command for command in commands if b"set_animation" in command)
+    (command,) = commands(page, "set_animation")
     return command
-
-
-def unpack(data: bytes) -> Any:
-    """Reads the MessagePack that Meshcat's commands are written in."""
-    value, end = _unpack(data, 0)
-    assert end == len(data)
-    return value
-
-
-def _unpack(data: bytes, at: int) -> tuple[Any, int]:
-    code, at = data[at], at + 1
-    if code < 0x80:
-        return code, at
-    if code in _NUMBERS:
-        (number,) = struct.unpack_from(_NUMBERS[code], data, at)
-        return number, at + struct.calcsize(_NUMBERS[code])
-    if code in (0xC0, 0xC2, 0xC3):
-        return {0xC0: None, 0xC2: False, 0xC3: True}[code], at
-    if 0xA0 <= code < 0xC0:
-        return data[at : at + code - 0xA0].decode(), at + code - 0xA0
-    if code in _SIZES:
-        kind, form = _SIZES[code]
-        (size,) = struct.unpack_from(form, data, at)
-        at += struct.calcsize(form)
-    else:
-        assert code < 0xA0, hex(code)
-        kind, size = ("list", code - 0x90) if code >= 0x90 else ("dict", code - 0x80)
-    if kind == "text":
-        return data[at : at + size].decode(), at + size
-    items = []
-    for _ in range(size if kind == "list" else 2 * size):
-        item, at = _unpack(data, at)
-        items.append(item)
-    return (items if kind == "list" else dict(zip(items[::2], items[1::2], strict=True))), at
-
-
-_NUMBERS = {0xCA: ">f", 0xCB: ">d", 0xCC: ">B", 0xCD: ">H", 0xCE: ">I", 0xCF: ">Q"}
-_SIZES = {
-    0xD9: ("text", ">B"),
-    0xDA: ("text", ">H"),
-    0xDC: ("list", ">H"),
-    0xDD: ("list", ">I"),
-    0xDE: ("dict", ">H"),
-}
 
 
 def test_frames_are_the_samples_nearest_to_evenly_spaced_instants() -> None:
@@ -152,39 +97,6 @@ def test_frames_of_the_shortest_and_coarsest_recordings(times: list[float]) -> N
     chosen = frame_samples(np.array(times))
     assert chosen[0] == 0
     assert len(set(chosen)) == len(chosen)
-
-
-def test_poses_are_recovered_exactly(structure: Structure) -> None:
-    random = np.random.default_rng(2)
-    angles = random.uniform(-np.pi, np.pi, (40, 3))
-    R_WB = np.array([RollPitchYaw(a).ToRotationMatrix().matrix() for a in angles])
-    p_WB = random.uniform(-1.0, 1.0, (40, 3))
-    p_WN = p_WB[:, np.newaxis] + structure.p_BN @ np.swapaxes(R_WB, 1, 2)
-    R, p = body_poses(structure, p_WN.reshape(8, 5, 4, 3))
-    np.testing.assert_allclose(R.reshape(40, 3, 3), R_WB, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(p.reshape(40, 3), p_WB, rtol=0, atol=1e-9)
-
-
-def test_aligning_quaternions_turn_z_into_the_direction() -> None:
-    directions = np.random.default_rng(3).normal(size=(50, 3))
-    directions[:3] = [(0.0, 0.0, 2.0), (0.0, 0.0, -3.0), (0.0, 1e-12, -1.0)]
-    for q, direction in zip(aligning_quaternions(directions), directions, strict=True):
-        z = RotationMatrix(Quaternion(q)).matrix()[:, 2]
-        np.testing.assert_allclose(z, direction / np.linalg.norm(direction), rtol=0, atol=1e-9)
-    np.testing.assert_array_equal(aligning_quaternions(np.zeros(3)[np.newaxis]), [[1, 0, 0, 0]])
-
-
-def test_camera_sees_every_point() -> None:
-    points = np.random.default_rng(4).uniform((0, -0.1, 0), (0.8, 0.1, 0.15), (200, 3))
-    target = points.mean(axis=0)
-    camera = camera_position(points, target)
-    assert camera[2] > 0.15  # looks down on the floor
-    assert camera[1] < -0.1  # from the right, so that the robot walks to the right
-    rays = points - camera
-    forward = (target - camera) / np.linalg.norm(target - camera)
-    upward = np.array([0.0, 0.0, 1.0]) - forward[2] * forward
-    slope = rays @ (upward / np.linalg.norm(upward)) / (rays @ forward)
-    assert np.abs(slope).max() < np.tan(np.deg2rad(35.0 / 2))
 
 
 def test_frames_of_the_page_are_recorded_samples_at_their_times(
@@ -236,8 +148,8 @@ def test_cables_reach_from_node_to_node_and_swell_with_tension(
             nodes = [p_WN[f, cable["node_a"]], p_WN[f, cable["node_b"]]]
             np.testing.assert_allclose(ends, nodes, rtol=0, atol=1e-9)
         np.testing.assert_allclose(scale[:, 2], frames["length"].values[:, c], rtol=1e-9)
-        tension = frames["tension"].values[:, c]
-        np.testing.assert_array_equal(np.argsort(tension), np.argsort(scale[:, 0]))
+        radius = CABLE_RADIUS * frames["tension"].values[:, c]
+        np.testing.assert_allclose(scale[:, :2], np.column_stack([radius, radius]), rtol=1e-12)
 
 
 def test_arrows_stand_on_their_nodes_and_are_as_long_as_the_force(
@@ -293,6 +205,18 @@ def test_another_robot_and_a_slice_of_a_recording_replay_too(
     assert sum(name.startswith("/robot/") for name in tracks) == 2
     assert sum(name.startswith("/cables/") for name in tracks) == 6
     assert tracks["/robot/T1"][".position"][0][0] == 0.0
+
+
+def test_the_page_plays_again_and_again(page: str) -> None:
+    options = unpack(packed_animation(page))["options"]
+    assert options["play"] is True
+    assert options["repetitions"] > 1000
+
+
+def test_the_title_says_who_went_how_far_in_which_time(trajectory: xarray.Dataset) -> None:
+    x1 = trajectory["p_WN"].sel(tetrahedron="T1", node="bottom_left", axis="x")
+    inches = float(x1[-1] - x1[0]) / 0.0254
+    assert replay_title("gait x", trajectory) == f"gait x: {inches:.2f} inches in 0.2 s"
 
 
 def test_the_same_recording_gives_the_same_page(

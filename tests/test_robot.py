@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
-from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.robot import (
@@ -349,33 +348,9 @@ def test_every_body_of_the_plant_has_the_tetrahedrons_inertia(structure):
         assert np.array_equal(inertia.CopyToFullMatrix6(), expected)
 
 
-def test_no_scene_graph_is_needed_without_visuals(structure):
+def test_no_scene_graph_is_needed(structure):
     plant = plant_with(structure)
     assert not plant.geometry_source_is_registered()
     # Falls freely: no geometry is asked for.
     derivatives = plant.EvalTimeDerivatives(plant.CreateDefaultContext()).CopyToVector()
     assert derivatives[-1] == pytest.approx(-9.81, abs=0.01)
-
-
-def test_visuals_show_six_struts_and_four_nodes_and_collide_with_nothing(structure):
-    builder = DiagramBuilder()
-    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
-    bodies = AddTetrahedra(plant, structure, visuals=True)
-    plant.Finalize()
-    assert plant.num_collision_geometries() == 0
-    inspector = scene_graph.model_inspector()
-    for body in bodies:
-        shown = plant.GetVisualGeometriesForBody(body)
-        kinds = sorted(type(inspector.GetShape(geometry)).__name__ for geometry in shown)
-        assert kinds == ["Cylinder"] * 6 + ["Sphere"] * 4
-
-
-def test_visuals_change_no_mass(structure):
-    builder = DiagramBuilder()
-    plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
-    AddTetrahedra(plant, structure, visuals=True)
-    plant.Finalize()
-    plain = plant_with(structure)
-    assert plant.CalcTotalMass(plant.CreateDefaultContext()) == plain.CalcTotalMass(
-        plain.CreateDefaultContext()
-    )

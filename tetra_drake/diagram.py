@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.geometry import Meshcat, MeshcatVisualizer
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource, PortSwitch, TrajectorySource
 
@@ -15,22 +14,20 @@ from tetra_drake.signals import signal_trajectory
 from tetra_drake.systems import CableNetwork, GroundContact, MatsuokaCpg, StartUpTimer
 
 
-def MakeTensegrityDiagram(
-    scenario: Scenario, gait: Gait, *, meshcat: Meshcat | None = None
-) -> Diagram:
+def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
     """The robot walking by one gait, with its default context at the scenario's start.
 
         cpg -> start_up -> cables -> forces -> plant -> state -> (cables, ground)
                            ground -> forces
 
-    Subsystems: cpg, start_up, cables, ground, forces, plant (and, with `meshcat`, a SceneGraph
-    and a visualizer; neither exists without).
+    Subsystems: cpg, start_up, cables, ground, forces, plant. There is no SceneGraph: pictures
+    are made from trajectories (see scene.py).
     Output ports: state, signals, tensions, lengths, normal_forces, friction_forces, modes.
     Shapes and units are those of the systems the ports come from.
     """
     structure = MakeStructure(scenario.robot, scenario.cables)
     builder = DiagramBuilder()
-    plant = AddPlant(builder, scenario, structure, meshcat=meshcat)
+    plant = AddPlant(builder, scenario, structure)
     cpg = AddCpg(builder, scenario, gait)
     signals = AddStartUp(builder, scenario, cpg.get_output_port(0))
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
@@ -60,23 +57,10 @@ def MakeTensegrityDiagram(
     return diagram
 
 
-def AddPlant(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    structure: Structure,
-    *,
-    meshcat: Meshcat | None = None,
-) -> MultibodyPlant:
-    """Adds the continuous-time plant "plant" with the tetrahedra at their start.
-
-    With `meshcat` it gets visuals, a SceneGraph and a visualizer.
-    """
-    if meshcat is None:
-        plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-    else:
-        plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
-        MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
-    AddTetrahedra(plant, structure, visuals=meshcat is not None)
+def AddPlant(builder: DiagramBuilder, scenario: Scenario, structure: Structure) -> MultibodyPlant:
+    """Adds the continuous-time plant "plant" with the tetrahedra at their start."""
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+    AddTetrahedra(plant, structure)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Cylinder, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
@@ -151,33 +150,10 @@ def tetrahedron_inertia(structure: Structure) -> SpatialInertia:
     return SpatialInertia(total.get_mass(), np.zeros(3), unit)
 
 
-def AddTetrahedra(
-    plant: MultibodyPlant, structure: Structure, *, visuals: bool = False
-) -> list[RigidBody]:
-    """Adds the free bodies T1 ... Tn to a plant that is not finalized yet.
-
-    With `visuals`, the plant, which then must have a SceneGraph, shows struts and nodes.
-    """
+def AddTetrahedra(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
+    """Adds the free bodies T1 ... Tn to a plant that is not finalized yet."""
     inertia = tetrahedron_inertia(structure)
-    bodies = [plant.AddRigidBody(name, inertia) for name in structure.bodies]
-    if visuals:
-        for body in bodies:
-            _add_visuals(plant, structure, body)
-    return bodies
-
-
-_GREY, _BLUE = (0.55, 0.57, 0.6, 1.0), (0.0, 0.45, 0.7, 1.0)
-
-
-def _add_visuals(plant: MultibodyPlant, structure: Structure, body: RigidBody) -> None:
-    for strut in STRUTS:
-        length = float(np.linalg.norm(structure.p_BN[strut[1]] - structure.p_BN[strut[0]]))
-        name = f"strut_{NODES[strut[0]]}_{NODES[strut[1]]}"
-        shape = Cylinder(structure.strut_radius, length)
-        plant.RegisterVisualGeometry(body, strut_pose(structure, strut), shape, name, _GREY)
-    for name, p_BNi in zip(NODES, structure.p_BN, strict=True):
-        shape = Sphere(structure.node_radius)
-        plant.RegisterVisualGeometry(body, RigidTransform(p_BNi), shape, name, _BLUE)
+    return [plant.AddRigidBody(name, inertia) for name in structure.bodies]
 
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:

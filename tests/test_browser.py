@@ -1,0 +1,330 @@
+"""The pages in a real browser, headless and without network.
+
+Without Chromium the tests skip; where CI is set they fail instead.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import dataclasses
+import importlib.util
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import xarray
+from matplotlib.colors import hex2color, rgb_to_hsv
+from matplotlib.image import imread
+from meshcat_page import unpack
+
+from tetra_drake.cli import main
+from tetra_drake.gait import load_gait
+from tetra_drake.replay import frame_samples, replay_title, save_replay
+from tetra_drake.robot import MakeStructure
+from tetra_drake.scenario import Scenario, load_scenario
+from tetra_drake.scene import COLOURS, body_poses
+from tetra_drake.simulation import simulate
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+DIAGRAMS = Path(__file__).parent.parent / "diagrams"
+_spec = importlib.util.spec_from_file_location("still", DIAGRAMS / "still.py")
+assert _spec is not None and _spec.loader is not None
+still = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(still)
+
+if not os.environ.get("CI"):
+    pytest.importorskip("playwright")
+    if still.find_browser() is None:
+        pytest.skip("neither Chromium nor Chrome is installed", allow_module_level=True)
+
+CABLES = ("actuated", "outer", "inner")
+CANVAS = 900, 600
+PATIENCE = 90_000  # ms
+WINDOW = 600, 400  # small, as it is drawn again and again in software
+
+
+@pytest.fixture(scope="module")
+def scenario() -> Scenario:
+    """Long enough to get somewhere."""
+    thesis = load_scenario()
+    settings = dataclasses.replace(thesis.simulation, duration=5.0)
+    return dataclasses.replace(thesis, simulation=settings)
+
+
+@pytest.fixture(scope="module")
+def trajectory(scenario: Scenario, data: Path) -> xarray.Dataset:
+    gait = load_gait(data / "gait_g.json", oscillators=scenario.oscillators)
+    recorded = simulate(scenario=scenario, gait=gait, record=True).trajectory
+    assert recorded is not None
+    return recorded
+
+
+@pytest.fixture(scope="module")
+def replay(
+    scenario: Scenario, trajectory: xarray.Dataset, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    path = tmp_path_factory.mktemp("replay") / "replay.html"
+    title = replay_title("a gait", trajectory)
+    save_replay(path, scenario=scenario, trajectory=trajectory, title=title)
+    return path
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with still.launch_browser() as launched:
+        yield launched
+
+
+@contextlib.contextmanager
+def new_page(
+    browser: Browser, *, size: tuple[int, int] = WINDOW, offline: bool = True
+) -> Iterator[Page]:
+    width, height = size
+    context = browser.new_context(viewport={"width": width, "height": height}, offline=offline)
+    with contextlib.closing(context):
+        page = context.new_page()
+        page.set_default_timeout(PATIENCE)
+        yield page
+
+
+@contextlib.contextmanager
+def opened(browser: Browser, path: Path, size: tuple[int, int] = WINDOW) -> Iterator[Page]:
+    """A file's page, loaded with the network off; it must not complain, nor ask for anything
+    but what lies beside it."""
+    complaints: list[str] = []
+    requests: list[str] = []
+    with new_page(browser, size=size) as page:
+        page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(path.as_uri())
+        yield page
+    assert not complaints
+    local = ("data:", "blob:", path.parent.as_uri())
+    assert not [url for url in requests if not url.startswith(local)]
+
+
+@pytest.fixture(scope="module")
+def page(browser: Browser, replay: Path) -> Iterator[Page]:
+    """The replay page, for tests that leave it as it was but for the time it shows."""
+    with opened(browser, replay) as loaded:
+        still.wait_until_loaded(loaded)
+        still.show_instant(loaded, 0.0)
+        yield loaded
+
+
+def picture(page: Page) -> np.ndarray:
+    """What the canvas shows, without the texts over it: (rows, columns, 3) from 0 to 1."""
+    url = page.evaluate("([width, height]) => viewer.capture_image(width, height)", CANVAS)
+    png = io.BytesIO(base64.b64decode(url.removeprefix("data:image/png;base64,")))
+    image: np.ndarray = imread(png, format="png")[..., :3]
+    return image
+
+
+def pixels_of(image: np.ndarray, name: str) -> np.ndarray:
+    """Rows and columns (pixels, 2) of what has the hue of one of COLOURS, however lit."""
+    hue, saturation, _ = np.moveaxis(rgb_to_hsv(image), -1, 0)
+    wanted, wanted_saturation, _ = rgb_to_hsv(hex2color(COLOURS[name]))
+    apart = np.abs((hue - wanted + 0.5) % 1.0 - 0.5)
+    return np.argwhere((apart < 0.02) & (saturation > 0.7 * wanted_saturation))
+
+
+def position_of(page: Page, path: str) -> list[float]:
+    """Where the page has the origin of an object, in World."""
+    return page.evaluate(
+        "path => viewer.scene_tree.find(path.split('/')).object.position.toArray()", path
+    )
+
+
+def test_loads_and_says_who_goes_how_far(page: Page, trajectory: xarray.Dataset) -> None:
+    title = replay_title("a gait", trajectory)
+    assert page.title() == title
+    assert page.locator("h1").text_content() == title
+
+
+def test_plays_by_itself_at_real_speed(browser: Browser, replay: Path) -> None:
+    with opened(browser, replay) as page:
+        still.wait_until_loaded(page)
+        page.wait_for_function("viewer.animator.playing && viewer.animator.time > 0.1")
+        assert page.evaluate("[viewer.animator.mixer.timeScale, viewer.animator.duration]") == [
+            pytest.approx(1.0),
+            pytest.approx(5.0),
+        ]
+        page.wait_for_function("parseFloat(document.getElementById('clock').value) > 0")
+
+
+def test_shows_all_kinds_of_cables_apart(page: Page) -> None:
+    still.show_instant(page, 1.0)
+    image = picture(page)
+    assert image.shape == (CANVAS[1], CANVAS[0], 3)
+    assert image.std() > 0.05, "not blank"
+    for name in CABLES:
+        assert len(pixels_of(image, name)) > 200, name
+
+
+def test_a_later_time_shows_the_robot_elsewhere(page: Page) -> None:
+    columns = []
+    for time in (0.0, 5.0):
+        still.show_instant(page, time)
+        columns.append(pixels_of(picture(page), "inner")[:, 1].mean())
+    assert columns[1] > columns[0] + 10, "it walks to the right"
+
+
+def test_the_browser_puts_the_bodies_where_they_were(
+    page: Page, scenario: Scenario, trajectory: xarray.Dataset
+) -> None:
+    structure = MakeStructure(scenario.robot, scenario.cables)
+    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
+    _, p_WB = body_poses(structure, frames["p_WN"].values)
+    for frame in (0, 60, len(p_WB) - 1):
+        still.show_instant(page, float(frames["time"].values[frame]))
+        for i, body in enumerate(structure.bodies):
+            shown = position_of(page, f"robot/{body}")
+            # Times of key frames are rounded to 0.01 ms, and nothing moves at 1 m/s.
+            np.testing.assert_allclose(shown, p_WB[frame, i], rtol=0, atol=1e-5)
+
+
+def test_a_lifted_foot_has_no_arrow(page: Page, trajectory: xarray.Dataset) -> None:
+    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
+    force = frames["normal_force"].sel(contact="T2 bottom_left").values
+    lifted = np.flatnonzero((force[:-1] == 0.0) & (force[1:] == 0.0))
+    standing = np.flatnonzero(force > 0.05)
+    assert len(lifted) and len(standing)
+    for frame, length in ((lifted[-1], 0.0), (standing[-1], 0.17 * force[standing[-1]])):
+        still.show_instant(page, float(frames["time"].values[frame]))
+        scale = page.evaluate(
+            "viewer.scene_tree.find(['forces', 'normal', 'T2 bottom_left']).object.scale.z"
+        )
+        assert scale == pytest.approx(length, rel=0.02, abs=1e-3)
+
+
+def test_forces_can_be_hidden_in_the_controls(browser: Browser, replay: Path) -> None:
+    with opened(browser, replay) as page:
+        still.wait_until_loaded(page)
+        still.show_instant(page, 1.0)
+        assert len(pixels_of(picture(page), "normal")) > 50
+        page.get_by_text("Open Controls", exact=True).click()
+        page.locator("//li[.='forces']/../../div/input[@type='checkbox']").uncheck()
+        assert len(pixels_of(picture(page), "normal")) == 0
+        assert len(pixels_of(picture(page), "inner")) > 200
+
+
+def test_every_window_shows_the_whole_robot_and_its_path(
+    browser: Browser, replay: Path, trajectory: xarray.Dataset
+) -> None:
+    points = trajectory["p_WN"].values[::50].reshape(-1, 3).tolist()
+    with opened(browser, replay, (500, 700)) as page:
+        still.wait_until_loaded(page)
+        for width, height in ((500, 700), (640, 360), (300, 600), (1000, 300)):
+            page.set_viewport_size({"width": width, "height": height})
+            page.wait_for_function(f"viewer.renderer.domElement.width == {width}")
+            seen = page.evaluate(
+                """points => {
+                    viewer.render();
+                    // Meshcat's scene has its y axis up, so World is turned in it.
+                    const world = viewer.scene_tree.object.matrixWorld;
+                    return points.map(point => new MeshCat.THREE.Vector3(...point)
+                        .applyMatrix4(world).project(viewer.camera).toArray());
+                }""",
+                points,
+            )
+            extent = np.abs(np.array(seen)[:, :2]).max()
+            assert 0.5 < extent < 1.0, f"in a window of {width} to {height}"
+
+
+def test_the_still_is_a_picture_of_the_page(replay: Path, tmp_path: Path) -> None:
+    path = tmp_path / "still.png"
+    arguments = [str(replay), "--time", "1", "--out", str(path)]
+    subprocess.run([sys.executable, still.__file__, *arguments], check=True)
+    image = imread(path)
+    assert image.shape[:2] == still.SIZE[::-1]
+    for name in CABLES:
+        assert len(pixels_of(image[200:, :, :3], name)) > 200, "below the legend"
+
+
+SHORT = "base: thesis\nname: short\nsimulation: {duration: 1 s, steady_from: 0.5 s}\n"
+
+
+def test_a_simulation_can_be_watched_as_it_runs(browser: Browser, tmp_path: Path) -> None:
+    (tmp_path / "short.yaml").write_text(SHORT)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tetra_drake.cli", "simulate", "--scenario=short.yaml", "--meshcat"],
+        cwd=tmp_path,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    messages: list[bytes] = []
+    with process, new_page(browser, offline=False) as page:
+        try:
+            assert process.stdout is not None
+            page.on(
+                "websocket",
+                lambda socket: socket.on("framereceived", lambda frame: messages.append(frame)),
+            )
+            page.goto(re.findall(r"http://\S+", process.stdout.readline())[0])
+            page.wait_for_function("viewer.animator.duration > 0.9")
+            _, errors = process.communicate(input="\n", timeout=60)
+        finally:
+            process.kill()
+    assert (process.returncode, errors) == (0, "")
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["duration_s"] == 1.0
+    moves = [unpack(message) for message in messages if b"set_transform" in message]
+    matrices = {tuple(move["matrix"]) for move in moves if move["path"] == "/robot/T1"}
+    assert len(matrices) > 10, "it was shown moving"
+
+
+TINY = """\
+base: thesis
+name: tiny <i>"run"</i> &
+simulation: {duration: 2 s, steady_from: 1 s}
+evolution: {population: 3, tournament: 2}
+"""
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report that `evolve` leaves of a run with a name that must not become markup."""
+    folder = tmp_path_factory.mktemp("evolve")
+    (folder / "tiny.yaml").write_text(TINY)
+    scenario = ["--scenario", str(folder / "tiny.yaml")]
+    counts = ["--trials", "1", "--iterations", "1", "--workers", "1"]
+    assert main(["evolve", *scenario, *counts, "--out", str(folder / "run")]) == 0
+    return folder / "run" / "report.html"
+
+
+def test_the_report_shows_its_figures_and_the_best_gait(browser: Browser, report: Path) -> None:
+    with opened(browser, report) as page:
+        page.wait_for_load_state("networkidle")
+        assert page.title().startswith('tiny <i>"run"</i> &, seed 0')
+        assert page.locator("i").count() == 0
+        assert page.locator("img").count() > 10
+        assert page.evaluate("[...document.images].every(image => image.naturalWidth > 100)")
+        page.get_by_text("Show it here").click()
+        page.wait_for_function("window.frames.length == 1")
+        page.frames[1].wait_for_function("viewer.animator.duration > 1.9")
+
+
+def test_the_reports_link_leads_to_the_replay(browser: Browser, report: Path) -> None:
+    with opened(browser, report) as page:
+        page.get_by_role("link", name="See it walk").click()
+        still.wait_until_loaded(page)
+        assert page.evaluate("viewer.animator.duration") == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("width", [400, 1280])
+def test_the_report_fits_its_window(browser: Browser, report: Path, width: int) -> None:
+    with opened(browser, report, (width, 800)) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
