@@ -1,7 +1,7 @@
 """The robot walking: how its tetrahedra move against each other (thesis Fig. 14), and the signals
 and tensions of its actuated cables (Fig. 19).
 
-Writes the block diagram and the figure, and prints distance and signals beside the thesis's.
+Writes the block diagram and the figures, and prints distance and signals beside the thesis's.
 """
 
 from __future__ import annotations
@@ -10,75 +10,21 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import style
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
 
 from tetra_drake import thesis
 from tetra_drake.diagram import MakeTensegrityDiagram
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.figures.block_diagram import save_block_diagram
-from tetra_drake.files import whole_file
+from tetra_drake.figures.forces import figure_19_signal_and_tension
+from tetra_drake.figures.measures import actuated_cable
+from tetra_drake.figures.motion import figure_14_relative_distances
+from tetra_drake.figures.style import save_figure
 from tetra_drake.gait import Gait, load_gait, seeded_gait
 from tetra_drake.scenario import Scenario, load_scenario
 from tetra_drake.simulation import SimulationResult, simulate
-from tetra_drake.units import INCH, POUND_FORCE
-
-if TYPE_CHECKING:
-    import xarray
-
-
-def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """(time, tetrahedron): x of each tetrahedron's centre of mass from that of T1, in m."""
-    x = trajectory.p_WN.sel(axis="x").mean("node")
-    return x - x.isel(tetrahedron=0)
-
-
-def actuated_cable(junction: str) -> str:
-    """One of the two cables that the junction's signal drives; the other mirrors it."""
-    return f"{junction} outer bottom_left"
-
-
-def draw(trajectory: xarray.Dataset) -> Figure:
-    """Fig. 14 on the left, Fig. 19, one panel a junction, on the right."""
-    with style.context("tableau-colorblind10"):
-        figure = Figure(figsize=(11, 6.5), layout="constrained")
-        left, right = figure.subfigures(1, 2, squeeze=False)[0]
-        left.suptitle("Distances between tetrahedra (Fig. 14)")
-        _draw_distances(left.subplots(), relative_distances(trajectory))
-        right.suptitle("Signals and tensions of actuated cables (Fig. 19)")
-        _draw_cables(right, trajectory)
-    return figure
-
-
-def _draw_distances(panel: Axes, distances: xarray.DataArray) -> None:
-    for name in distances.tetrahedron.values:
-        inches = distances.sel(tetrahedron=name) / INCH
-        # Each line says at its end what it is, so that all may have one colour.
-        panel.plot(distances.time, inches, color="black")
-        panel.annotate(name, (1.01, inches[-1]), xycoords=("axes fraction", "data"), va="center")
-    panel.set_xlabel("time (s)")
-    panel.set_ylabel("distance from T1 along x (in)")
-    panel.margins(x=0)
-    panel.grid(alpha=0.4)
-
-
-def _draw_cables(figure: SubFigure, trajectory: xarray.Dataset) -> None:
-    junctions = trajectory.junction.values
-    panels = figure.subplots(len(junctions), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    for panel, junction in zip(panels, junctions, strict=True):
-        tension = trajectory.tension.sel(cable=actuated_cable(junction)) / POUND_FORCE
-        signal = trajectory.signal.sel(junction=junction) / POUND_FORCE
-        panel.plot(trajectory.time, tension, label="tension")
-        panel.plot(trajectory.time, signal, "--", label="signal")
-        panel.set_ylabel(f"{junction} (lbf)")
-        panel.margins(x=0)
-        panel.grid(alpha=0.4)
-    panels[0].legend(loc="lower left", fontsize="small")
-    panels[-1].set_xlabel("time (s)")
+from tetra_drake.units import POUND_FORCE
 
 
 def report(gait: Gait, result: SimulationResult) -> str:
@@ -116,8 +62,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         save_block_diagram(MakeTensegrityDiagram(scenario, gait), options.out / "robot.svg")
         result = simulate(scenario=scenario, gait=gait, record=True)
         assert result.trajectory is not None
-        with whole_file(options.out / "robot.png") as file:
-            draw(result.trajectory).savefig(file, dpi=90)
+        distances = figure_14_relative_distances(result.trajectory)
+        tensions = figure_19_signal_and_tension(result.trajectory)
+        save_figure(distances, options.out, "figure_14", kinds=["svg"])
+        save_figure(tensions, options.out, "figure_19", kinds=["svg"])
     except InputError as error:
         parser.error(str(error))
     except SimulationFailure as error:

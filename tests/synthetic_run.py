@@ -1,0 +1,105 @@
+"""Runs made up for tests of what is shown of them, written as the real ones are."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tetra_drake.evolution.genome import random_genome
+from tetra_drake.evolution.optimizer import Evaluation
+from tetra_drake.evolution.record import RunRecord, evaluation_entry
+from tetra_drake.scenario import Scenario, load_scenario
+
+Child = tuple[float | None, int | None]
+"""Fitness, None where the gait failed, and the place it took, None where it took none."""
+
+PER_DISTANCE = 2.0
+"""Fitness per inch of distance, so that no figure can mistake one for the other."""
+
+
+def tiny_scenario(*, trials: int = 1, name: str = "tiny") -> Scenario:
+    """A robot of three tetrahedra that walks for a moment."""
+    scenario = copy.deepcopy(load_scenario("thesis"))
+    scenario.name = name
+    scenario.robot.tetrahedra = 3
+    scenario.simulation.duration = 0.3
+    scenario.simulation.steady_from = 0.1
+    scenario.evolution.trials = trials
+    return scenario
+
+
+def write_run(
+    directory: Path,
+    trials: Sequence[Sequence[Sequence[Child]]],
+    *,
+    scenario: Scenario | None = None,
+    unfinished: Sequence[int] = (),
+) -> Path:
+    """A run of which each trial is given as its iterations, each as its children.
+
+    The mean fitness follows from who took whose place. Genomes are random, and the same
+    wherever the same fitness is given. `unfinished` trials have not ended.
+    """
+    scenario = scenario or tiny_scenario()
+    scenario.evolution.trials = len(trials)
+    with RunRecord.create(directory, scenario=scenario, seed=7) as record:
+        for number, iterations in enumerate(trials):
+            trial = record.open_trial(number)
+            for entries, line in _lines(iterations, scenario, ends=number not in unfinished):
+                trial.complete(entries, line)
+    return directory
+
+
+def _lines(iterations, scenario, *, ends):
+    population: dict[int, float | None] = {}
+    count = 0
+    best: tuple[float, int] | None = None
+    for iteration, children in enumerate(iterations):
+        entries = []
+        for fitness, placed in children:
+            entries.append(_entry(count, iteration, fitness, scenario) | {"placed": placed})
+            if placed is not None:
+                population[placed] = fitness
+            if fitness is not None and (best is None or fitness > best[0]):
+                best = fitness, count
+            count += 1
+        finite = [fitness for fitness in population.values() if fitness is not None]
+        last = iteration == len(iterations) - 1
+        yield (
+            entries,
+            {
+                "iteration": iteration,
+                "evaluations": count,
+                "mean_fitness": sum(finite) / len(finite) if finite else None,
+                "best_fitness": best[0] if best else None,
+                "best_distance_in": best[0] / PER_DISTANCE if best else None,
+                "best_evaluation": best[1] if best else None,
+                "stop": "all iterations done" if last and ends else None,
+            },
+        )
+
+
+def _entry(index, iteration, fitness, scenario):
+    seed = index if fitness is None else abs(hash(fitness)) % 2**32
+    genome = random_genome(scenario, np.random.default_rng(seed))
+    evaluation = Evaluation.failed("fell over", wall_time=0.5)
+    if fitness is not None:
+        distances = {
+            "distance_in": fitness / PER_DISTANCE,
+            "steady_distance_in": fitness,
+            "heading_error_in": 0.0,
+            "direction_in": 9.0,
+            "lateral_drift_in": 0.0,
+        }
+        evaluation = Evaluation(fitness, distances, wall_time=0.5)
+    return evaluation_entry(index, iteration, genome, evaluation)
+
+
+def iterations_with_means(means: Sequence[float]) -> list[list[Child]]:
+    """Iterations of a trial whose population of one has these fitnesses, one after the other."""
+    assert all(math.isfinite(mean) for mean in means)
+    return [[(mean, 0)] for mean in means]

@@ -1,0 +1,1 @@
+"""Parts of the robot simulated alone, as the thesis does to show its models."""
