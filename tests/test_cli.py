@@ -231,11 +231,11 @@ def test_help_names_every_command(capsys):
         main(["--help"])
     assert caught.value.code == 0
     text = capsys.readouterr().out
-    for command in ("simulate", "cpg", "diagram"):
+    for command in ("simulate", "evolve", "replay", "cpg", "diagram"):
         assert command in text
 
 
-@pytest.mark.parametrize("command", ["simulate", "cpg", "diagram"])
+@pytest.mark.parametrize("command", ["simulate", "replay", "cpg", "diagram"])
 def test_every_command_explains_its_options(command, capsys):
     with pytest.raises(SystemExit) as caught:
         main([command, "--help"])
@@ -277,7 +277,8 @@ def gait_3() -> Gait:
 
 
 def test_simulate_writes_numbers_trajectory_and_replay(simulated):
-    assert sorted(os.listdir(simulated[0])) == ["replay.html", "result.json", "trajectory.nc"]
+    names = ["replay.html", "result.json", "scenario.yaml", "trajectory.nc"]
+    assert sorted(os.listdir(simulated[0])) == names
     assert (simulated[0] / "replay.html").read_text()[:200].lstrip().lower().startswith("<!doctype")
 
 
@@ -468,3 +469,45 @@ def test_a_result_folder_below_a_file_is_refused_before_simulating(tmp_path, cap
     captured = capsys.readouterr()
     assert captured.out == "", "nothing was simulated"
     assert "is a file, expected a folder to write to" in captured.err
+
+
+# replay
+
+
+def test_replay_makes_the_page_of_simulate_again_from_its_recording(simulated, work, capsys):
+    assert main(["replay", str(simulated[0]), "--out", "again.html"]) == 0
+    assert (work / "again.html").read_bytes() == (simulated[0] / "replay.html").read_bytes()
+    assert capsys.readouterr().out.splitlines()[-1] == "wrote again.html"
+
+
+def test_replay_simulates_a_gait_file(inputs, simulated, work, gait_3):
+    save_gait(gait_3, "gait.json")
+    arguments = ["gait.json", "--scenario", str(inputs / "short.yaml"), "--out", "sub/gait.html"]
+    assert main(["replay", *arguments]) == 0
+    assert (work / "sub/gait.html").read_bytes() == (simulated[0] / "replay.html").read_bytes()
+
+
+def test_replay_refuses_what_is_not_there_or_does_not_fit(inputs, work, capsys):
+    six = ["--scenario", str(inputs / "six.yaml")]
+    for source, options, problem in (
+        ("missing", [], "no such file or folder"),
+        ("folder", [], "holds neither result.json"),
+        ("23.json", [], "found 23 numbers, expected 24"),
+        ("good.json", six, "found 24 numbers, expected 40"),
+        ("short.yaml", [], "is not JSON"),
+    ):
+        source = str(inputs / source)
+        assert main(["replay", source, *options, "--out", "new/replay.html"]) == 2
+        assert_refused_in_one_line(capsys.readouterr(), source, problem)
+        assert os.listdir(work) == []
+
+
+@pytest.mark.parametrize("out", ["folder", "file/replay.html"])
+def test_replay_refuses_a_place_it_cannot_write_to(simulated, out, work, capsys):
+    (work / "folder").mkdir()
+    (work / "file").write_text("old")
+    assert main(["replay", str(simulated[0]), "--out", out]) == 2
+    assert_refused_in_one_line(capsys.readouterr(), out.split("/")[0], "is a ")
+    assert sorted(os.listdir(work)) == ["file", "folder"]
+    assert os.listdir(work / "folder") == []
+    assert (work / "file").read_text() == "old"

@@ -4,6 +4,18 @@ from __future__ import annotations
 
 import argparse
 
+from tetra_drake.scenario import ENGINES
+
+
+def add_engine(command: argparse.ArgumentParser) -> None:
+    """Adds the option --engine."""
+    command.add_argument(
+        "--engine",
+        choices=ENGINES,
+        help="the Drake diagram, or the same laws compiled end to end, many times faster "
+        "(default: the scenario's)",
+    )
+
 
 def seed(text: str) -> int:
     """A seed: an integer, 0 or more."""

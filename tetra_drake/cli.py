@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.command import add_evolve
+from tetra_drake.experiment.command import add_analyse, add_tables
+from tetra_drake.figures.command import add_figures
 from tetra_drake.gait import WALKING_SEED, Gait, load_gait, seeded_gait
-from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios
+from tetra_drake.replay_command import add_replay
+from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios, with_engine
+
+if TYPE_CHECKING:
+    from tetra_drake.live import LiveView
 
 BAD_INPUT, FAILED = 2, 1
 """Exit statuses: the input cannot be used; the simulation failed."""
@@ -49,6 +57,10 @@ def make_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_simulate(commands)
     add_evolve(commands)
+    add_replay(commands)
+    add_figures(commands)
+    add_analyse(commands)
+    add_tables(commands)
     _add_cpg(commands)
     _add_diagram(commands)
     _add_work_precision(commands)
@@ -59,12 +71,14 @@ def _add_simulate(commands: argparse._SubParsersAction) -> None:
     command = commands.add_parser(
         "simulate",
         help="simulate one gait and say how far it walks",
-        description="Builds one diagram for one gait, simulates it, prints how far and how "
-        "straight the robot walked, and writes result.json (the numbers), trajectory.nc (motion "
-        "and forces over time, for xarray) and replay.html (open it in a browser).",
+        description="Simulates one gait, as a Drake diagram or on the compiled engine, prints "
+        "how far and how straight the robot walked, and writes result.json (the numbers), "
+        "trajectory.nc (motion and forces over time, for xarray), replay.html (open it in a "
+        "browser) and scenario.yaml (the scenario in full).",
     )
     _add_scenario(command)
     _add_gait(command)
+    arguments.add_engine(command)
     command.add_argument(
         "--out",
         metavar="DIR",
@@ -72,31 +86,48 @@ def _add_simulate(commands: argparse._SubParsersAction) -> None:
         default=Path("out"),
         help="the folder to write to, made if missing (default: %(default)s)",
     )
+    command.add_argument(
+        "--meshcat",
+        action="store_true",
+        help="show the robot in a browser as it walks, no faster than real time; the numbers "
+        "stay the same",
+    )
     command.set_defaults(run=_simulate)
 
 
 def _simulate(options: argparse.Namespace) -> None:
-    from tetra_drake.files import check_folder
-    from tetra_drake.replay import save_replay
-    from tetra_drake.results import save_result, summary
+    from tetra_drake.result_folder import check_result_folder, save_result_folder
+    from tetra_drake.results import summary
     from tetra_drake.simulation import simulate
-    from tetra_drake.trajectory import save_dataset
 
-    scenario = load_scenario(options.scenario)
+    scenario = with_engine(load_scenario(options.scenario), options.engine)
     gait = _gait(options, scenario)
-    check_folder(options.out)
-    result = simulate(scenario=scenario, gait=gait, record=True)
+    check_result_folder(options.out)
+    if scenario.simulation.engine == "compiled":
+        from tetra_drake.compiled.simulation import compile_engine
+
+        compile_engine(scenario, lambda message: print(message, flush=True))
+    view = _open_view(scenario) if options.meshcat else None
+    result = simulate(scenario=scenario, gait=gait, record=True, viewer=view)
     assert result.trajectory is not None
     print(summary(scenario, gait, result))
-    save_dataset(result.trajectory, options.out / "trajectory.nc")
-    save_replay(
-        options.out / "replay.html",
-        scenario=scenario,
-        trajectory=result.trajectory,
-        title=f"{gait.name}: {result.metrics.distance_in:.2f} in in {result.duration:g} s",
-    )
-    save_result(options.out / "result.json", scenario, gait, result)
-    print(f"wrote result.json, trajectory.nc and replay.html to {options.out}/")
+    save_result_folder(options.out, scenario=scenario, gait=gait, result=result)
+    print(f"wrote result.json, trajectory.nc, replay.html and scenario.yaml to {options.out}/")
+    if view is not None:
+        view.replay(result.trajectory)
+        with contextlib.suppress(EOFError, KeyboardInterrupt):
+            input("the browser shows it again and again; press Enter to end ")
+
+
+def _open_view(scenario: Scenario) -> LiveView:
+    from pydrake.geometry import MeshcatParams
+
+    from tetra_drake.live import LiveView
+    from tetra_drake.replay import quiet_meshcat
+
+    meshcat = quiet_meshcat(MeshcatParams())
+    print(f"open {meshcat.web_url()} in a browser, which starts the simulation", flush=True)
+    return LiveView(meshcat, scenario)
 
 
 def _add_cpg(commands: argparse._SubParsersAction) -> None:

@@ -36,6 +36,7 @@ def result_to_json(scenario: Scenario, gait: Gait, result: SimulationResult) -> 
         "duration_s": result.duration,
         "wall_time_s": result.wall_time,
         "real_time_factor": result.duration / result.wall_time,
+        "engine": result.engine,
         "integrator": dataclasses.asdict(result.integrator),
         "versions": versions(),
         "gait": gait.to_json(),

@@ -131,6 +131,9 @@ class GaitBoundsScenario:
     tau_a_max: float = _quantity("s", above=0)
 
 
+ENGINES = ("drake", "compiled")
+
+
 @dataclass
 class SimulationScenario:
     """How long to simulate, on which engine, how finely, and when to give up.
@@ -138,7 +141,7 @@ class SimulationScenario:
     From `scheme` to `witness_window`, the settings are those of the engine `drake`.
     """
 
-    engine: str = _choice("drake", "compiled")
+    engine: str = _choice(*ENGINES)
     """The Drake diagram, or the same laws compiled end to end."""
     duration: float = _quantity("s", above=0)
     steady_from: float = _quantity("s", at_least=0)
@@ -182,7 +185,7 @@ class CompiledScenario:
     """Error allowed in one step: of a body's velocity, or of its strut tips' by rotation."""
     max_step: float = _quantity("s", above=0)
     look_ahead: float = _quantity("s", above=0)
-    """The shortest step taken so that one ends where a mode change is predicted."""
+    """How long after a predicted mode change a step ends that aims at it."""
 
 
 @dataclass
@@ -270,6 +273,14 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     )
     _check_consistency(scenario, source)
     return scenario
+
+
+def with_engine(scenario: Scenario, engine: str | None) -> Scenario:
+    """The scenario on another engine; on its own if that is None."""
+    if engine is None:
+        return scenario
+    simulation = dataclasses.replace(scenario.simulation, engine=engine)
+    return dataclasses.replace(scenario, simulation=simulation)
 
 
 def dump_scenario(scenario: Scenario) -> str:

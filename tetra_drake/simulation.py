@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram, EventStatus
 
@@ -17,7 +16,7 @@ from tetra_drake.fitness import Metrics, compute_fitness, compute_metrics
 from tetra_drake.gait import Gait
 from tetra_drake.robot import MakeStructure, Structure, node_positions
 from tetra_drake.scenario import Scenario, SimulationScenario
-from tetra_drake.trajectory import Recorder, make_dataset
+from tetra_drake.trajectory import Recorder, Sample, make_dataset
 
 if TYPE_CHECKING:
     import xarray
@@ -52,30 +51,48 @@ class SimulationResult:
     wall_time: float
     """Time from the start of the integration to its end, in s; building is not in it."""
     integrator: IntegratorWork
+    engine: str
+    """Of the scenario: "drake" or "compiled"."""
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
     """See trajectory.make_dataset; None unless asked for."""
 
 
-def simulate(
-    *,
-    scenario: Scenario,
-    gait: Gait,
-    record: bool = False,
-    meshcat: Meshcat | None = None,
-) -> SimulationResult:
-    """Simulates the scenario's robot walking by a gait for the scenario's duration.
+class Viewer(Protocol):
+    """Someone who watches a simulation as it runs."""
 
-    Pure: the same arguments give the same numbers, bit for bit, wall time aside, whether
-    or not a trajectory is recorded. (Showing it live in `meshcat` ends steps at each frame
-    and so may change the last digits.)
+    def wants(self, time: float) -> bool:
+        """Whether to be shown the state at this time (s)."""
+
+    def show(self, frame: xarray.Dataset) -> None:
+        """Takes one sample of a trajectory (see trajectory.make_dataset)."""
+
+
+def simulate(
+    *, scenario: Scenario, gait: Gait, record: bool = False, viewer: Viewer | None = None
+) -> SimulationResult:
+    """Simulates the scenario's robot walking by a gait for the scenario's duration, on the
+    engine that the scenario names.
+
+    Pure: the same scenario and gait give the same numbers, bit for bit, wall time aside,
+    whether or not a trajectory is recorded and whoever watches.
 
     Raises Diverged or StepBudgetExceeded, which say when and why.
     """
-    diagram = MakeTensegrityDiagram(scenario, gait, meshcat=meshcat)
+    if scenario.simulation.engine == "compiled":
+        from tetra_drake.compiled.simulation import simulate_compiled
+
+        return simulate_compiled(scenario=scenario, gait=gait, record=record, viewer=viewer)
+    return _simulate_diagram(scenario, gait, record=record, viewer=viewer)
+
+
+def _simulate_diagram(
+    scenario: Scenario, gait: Gait, *, record: bool, viewer: Viewer | None
+) -> SimulationResult:
+    diagram = MakeTensegrityDiagram(scenario, gait)
     structure = MakeStructure(scenario.robot, scenario.cables)
     simulator = MakeSimulator(diagram, scenario.simulation)
     recorder = Recorder(scenario.simulation.sample_period) if record else None
-    watch = _Watch(diagram, simulator, structure, scenario.simulation, recorder)
+    watch = _Watch(diagram, simulator, structure, scenario.simulation, recorder, viewer)
     simulator.set_monitor(watch.after_step)
 
     times = (0.0, scenario.simulation.steady_from, scenario.simulation.duration)
@@ -90,6 +107,7 @@ def simulate(
         duration=scenario.simulation.duration,
         wall_time=wall_time,
         integrator=_integrator_work(simulator.get_integrator(), scenario.simulation),
+        engine="drake",
         trajectory=make_dataset(diagram, structure, recorder.samples()) if recorder else None,
     )
 
@@ -109,7 +127,7 @@ def MakeSimulator(diagram: Diagram, settings: SimulationScenario) -> Simulator:
 
 
 class _Watch:
-    """Looks on after every step: ends what has failed, aims the next step, records."""
+    """Looks on after every step: ends what has failed, aims the next step, records, shows."""
 
     def __init__(
         self,
@@ -118,6 +136,7 @@ class _Watch:
         structure: Structure,
         settings: SimulationScenario,
         recorder: Recorder | None,
+        viewer: Viewer | None,
     ) -> None:
         self._diagram = diagram
         self._simulator = simulator
@@ -125,6 +144,7 @@ class _Watch:
         self._structure = structure
         self._settings = settings
         self._recorder = recorder
+        self._viewer = viewer
         self._ground = diagram.GetSubsystemByName("ground")
         self._ground_context = self._ground.GetMyContextFromRoot(simulator.get_mutable_context())
         self._state = diagram.GetOutputPort("state")
@@ -153,7 +173,7 @@ class _Watch:
         return node_positions(self._structure, self._state.Eval(context))
 
     def after_step(self, context: Context) -> EventStatus:
-        """The simulator's monitor; it must not depend on whether anything is recorded."""
+        """The simulator's monitor; it must not depend on who records or watches."""
         state = self._state.Eval(context)
         self._failure = self._find_failure(context.get_time(), state)
         if self._failure is not None:
@@ -162,6 +182,9 @@ class _Watch:
             self._aim_next_step(context.get_time(), state[self._velocities])
         if self._recorder is not None:
             self._recorder.after_step(context)
+        if self._viewer is not None and self._viewer.wants(context.get_time()):
+            frame = make_dataset(self._diagram, self._structure, [Sample.of(context)])
+            self._viewer.show(frame)
         return EventStatus.Succeeded()
 
     def _find_failure(self, time: float, state: np.ndarray) -> SimulationFailure | None:

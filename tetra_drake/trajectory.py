@@ -25,6 +25,16 @@ class Sample:
     continuous: np.ndarray
     discrete: tuple[np.ndarray, ...]
 
+    @classmethod
+    def of(cls, context: Context) -> Sample:
+        """A copy of what the context holds."""
+        discrete = context.get_discrete_state()
+        return cls(
+            time=context.get_time(),
+            continuous=context.get_continuous_state_vector().CopyToVector(),
+            discrete=tuple(discrete.value(i).copy() for i in range(discrete.num_groups())),
+        )
+
     def restore(self, context: Context) -> None:
         """Puts the sample back into a context of the same diagram."""
         context.SetTime(self.time)
@@ -48,12 +58,7 @@ class Recorder:
 
     def after_step(self, context: Context) -> None:
         """Takes a sample, which stays if one is due."""
-        discrete = context.get_discrete_state()
-        self._latest = Sample(
-            time=context.get_time(),
-            continuous=context.get_continuous_state_vector().CopyToVector(),
-            discrete=tuple(discrete.value(i).copy() for i in range(discrete.num_groups())),
-        )
+        self._latest = Sample.of(context)
         if self._latest.time >= self._due:
             self._samples.append(self._latest)
             self._due = self._period * (np.floor(self._latest.time / self._period) + 1.0)
@@ -74,37 +79,58 @@ class Recorder:
 def make_dataset(diagram: Diagram, structure: Structure, samples: list[Sample]) -> xarray.Dataset:
     """The samples with all that the diagram's output ports say of them.
 
-    Dimensions: time, tetrahedron, node, cable, contact, junction, axis. SI values, with a
-    `units` attribute each. Forces and modes are those of the step that ends at the sample:
-    a mode change due there shows in the next one.
+    Forces and modes are those of the step that ends at the sample: a mode change due there
+    shows in the next one. See assemble_dataset.
     """
-    import xarray
-
-    ports = ("signals", "tensions", "lengths", "normal_forces", "friction_forces", "modes")
+    ports = ("state", "signals", "tensions", "lengths", "normal_forces", "friction_forces", "modes")
     columns: dict[str, list[np.ndarray]] = {port: [] for port in ports}
-    positions, velocities = [], []
     context = diagram.CreateDefaultContext()
     for sample in samples:
         sample.restore(context)
-        state = diagram.GetOutputPort("state").Eval(context)
-        positions.append(node_positions(structure, state))
-        velocities.append(node_velocities(structure, state))
         for port in ports:
             columns[port].append(diagram.GetOutputPort(port).Eval(context))
+    table = {port: np.array(rows) for port, rows in columns.items()}
+    return assemble_dataset(
+        structure,
+        times=np.array([sample.time for sample in samples]),
+        states=table.pop("state"),
+        **table,
+    )
+
+
+def assemble_dataset(
+    structure: Structure,
+    *,
+    times: np.ndarray,
+    states: np.ndarray,
+    signals: np.ndarray,
+    tensions: np.ndarray,
+    lengths: np.ndarray,
+    normal_forces: np.ndarray,
+    friction_forces: np.ndarray,
+    modes: np.ndarray,
+) -> xarray.Dataset:
+    """A trajectory from its columns, a row a sample, in the order of the diagram's ports.
+
+    Dimensions: time, tetrahedron, node, cable, contact, junction, axis, horizontal. SI values,
+    with a `units` attribute each.
+    """
+    import xarray
 
     bodies, contacts = len(structure.bodies), len(structure.contacts)
-    table = {port: np.array(rows) for port, rows in columns.items()}
-    modes = table["modes"].reshape(-1, contacts, 3)
-    friction = table["friction_forces"].reshape(-1, contacts, 2)
+    modes = modes.reshape(-1, contacts, 3)
+    friction = friction_forces.reshape(-1, contacts, 2)
+    positions = np.array([node_positions(structure, state) for state in states])
+    velocities = np.array([node_velocities(structure, state) for state in states])
     node_dims = ("time", "tetrahedron", "node", "axis")
     node_shape = (-1, bodies, len(NODES), 3)
     variables = {
-        "p_WN": (node_dims, np.array(positions).reshape(node_shape), "m", "node position"),
-        "v_WN": (node_dims, np.array(velocities).reshape(node_shape), "m/s", "node velocity"),
-        "tension": (("time", "cable"), table["tensions"], "N", "cable tension"),
-        "length": (("time", "cable"), table["lengths"], "m", "cable length"),
-        "signal": (("time", "junction"), table["signals"], "N", "actuation signal"),
-        "normal_force": (("time", "contact"), table["normal_forces"], "N", "upward force"),
+        "p_WN": (node_dims, positions.reshape(node_shape), "m", "node position"),
+        "v_WN": (node_dims, velocities.reshape(node_shape), "m/s", "node velocity"),
+        "tension": (("time", "cable"), tensions, "N", "cable tension"),
+        "length": (("time", "cable"), lengths, "m", "cable length"),
+        "signal": (("time", "junction"), signals, "N", "actuation signal"),
+        "normal_force": (("time", "contact"), normal_forces, "N", "upward force"),
         "friction_force": (("time", "contact", "horizontal"), friction, "N", "friction force"),
         "in_contact": (("time", "contact"), modes[..., 0].astype(np.int8), "1", "1 on the ground"),
         "friction_mode": (
@@ -121,7 +147,7 @@ def make_dataset(diagram: Diagram, structure: Structure, samples: list[Sample]) 
             for name, (dims, values, unit, meaning) in variables.items()
         },
         coords={
-            "time": ("time", np.array([s.time for s in samples]), {"units": "s"}),
+            "time": ("time", times, {"units": "s"}),
             "tetrahedron": list(structure.bodies),
             "node": list(NODES),
             "cable": list(structure.cable_names),

@@ -8,18 +8,19 @@ import math
 import pytest
 from analytic import Bowl, read_record
 
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution import evaluation
 from tetra_drake.evolution.command import add_evolve
 from tetra_drake.evolution.progress import LiveProgress, PlainProgress, cells, duration, plain_line
 from tetra_drake.evolution.record import read_manifest
+from tetra_drake.evolution.tables import load_run
 from tetra_drake.evolution.trial import TrialStatus
 from tetra_drake.scenario import load_scenario
 
 
 @pytest.fixture
 def evolve(monkeypatch):
-    """evolve("--out", ...) runs the command on a cheap fitness."""
+    """evolve("--out", ...) runs the command on a cheap fitness, and without its report."""
 
     def run(*arguments):
         parser = argparse.ArgumentParser()
@@ -28,6 +29,7 @@ def evolve(monkeypatch):
         options.run(options)
 
     monkeypatch.setattr(evaluation, "GaitEvaluation", lambda scenario: Bowl())
+    monkeypatch.setattr("tetra_drake.report.write_report", lambda directory: [])
     return run
 
 
@@ -105,6 +107,55 @@ def test_counts_are_counts(evolve, tmp_path, option, value, capsys):
         evolve("--out", tmp_path / "run", f"{option}={value}")
     assert caught.value.code == 2
     assert option in capsys.readouterr().err
+
+
+def test_a_report_is_written_at_the_end_even_of_a_run_that_has_ended(
+    evolve, tmp_path, capsys, monkeypatch
+):
+    reported = []
+
+    def write_report(directory):
+        reported.append(len(load_run(directory).iterations))
+        return ["report.html"]
+
+    monkeypatch.setattr("tetra_drake.report.write_report", write_report)
+    for options in (SMALL, ("--resume",)):
+        evolve("--out", tmp_path / "run", *options)
+        printed = capsys.readouterr().out
+        assert printed.endswith(f"\nwrote report.html to {tmp_path / 'run'}/\n")
+    assert reported == [4, 4]
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (InputError("report.html", "", "cannot be written"), ": report.html: cannot be written;"),
+        (SimulationFailure(time=1.5, reason="it fell"), "simulation failed at t = 1.5000 s: it"),
+        (KeyError("x1"), "KeyError('x1')"),
+    ],
+)
+def test_a_report_that_fails_does_not_look_like_a_run_that_failed(
+    evolve, tmp_path, capsys, monkeypatch, error, reason
+):
+    def write_report(directory):
+        raise error
+
+    monkeypatch.setattr("tetra_drake.report.write_report", write_report)
+    evolve(*SMALL, "--out", tmp_path / "run")
+    captured = capsys.readouterr()
+    assert "14.34 in" in captured.out
+    assert len(captured.err.splitlines()) == 1
+    assert "the run is complete, but its report could not be written" in captured.err
+    assert reason in captured.err
+    assert captured.err.endswith(f"try again with: tetra-drake figures {tmp_path / 'run'}\n")
+
+
+def test_where_all_gaits_failed_none_is_offered_to_be_seen(evolve, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(evaluation, "GaitEvaluation", lambda scenario: Bowl(fails_every=1))
+    evolve(*SMALL, "--out", tmp_path / "run")
+    printed = capsys.readouterr().out
+    assert "26 failed" in printed
+    assert "see the best gait" not in printed
 
 
 def test_an_interrupted_run_says_how_to_go_on(evolve, tmp_path, capsys, monkeypatch):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
-from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios
+from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios, with_engine
 
 if TYPE_CHECKING:
     from tetra_drake.evolution.record import RunRecord
@@ -25,7 +27,8 @@ def add_evolve(commands: argparse._SubParsersAction) -> None:
         help="evolve gaits that walk far",
         description="Evolves gaits by the thesis's evolutionary algorithm, one simulation a "
         "candidate, and records every evaluation in a run directory. Ctrl-C ends it; the same "
-        "command with --resume goes on. The result depends on scenario and seed only.",
+        "command with --resume goes on. The result depends on scenario and seed only. In the end "
+        "it writes report.html, replay.html and figures/ into the run directory, too.",
     )
     command.add_argument(
         "--scenario",
@@ -36,6 +39,7 @@ def add_evolve(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--out", metavar="DIR", type=Path, required=True, help="the run directory, as runs/NAME"
     )
+    arguments.add_engine(command)
     command.add_argument(
         "--trials",
         metavar="N",
@@ -64,8 +68,9 @@ def add_evolve(commands: argparse._SubParsersAction) -> None:
 
 
 def _evolve(options: argparse.Namespace) -> None:
+    from tetra_drake.compiled.simulation import compile_engine
     from tetra_drake.evolution.evaluation import GaitEvaluation
-    from tetra_drake.evolution.executor import available_cores
+    from tetra_drake.evolution.executor import available_cores, process_executor, thread_executor
     from tetra_drake.evolution.progress import make_progress
     from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, RunRecord, trial_folder
     from tetra_drake.evolution.run import evolve
@@ -78,19 +83,25 @@ def _evolve(options: argparse.Namespace) -> None:
     else:
         record = RunRecord.create(
             options.out,
-            scenario=_with_counts(load_scenario(options.scenario or DEFAULT_SCENARIO), options),
+            scenario=_with_options(load_scenario(options.scenario or DEFAULT_SCENARIO), options),
             seed=DEFAULT_SEED if options.seed is None else options.seed,
         )
     workers = options.workers or available_cores()
     with record:
         _introduce(record, workers)
+        compiled = record.scenario.simulation.engine == "compiled"
+        if compiled:
+            compile_engine(record.scenario, lambda message: print(message, flush=True))
         try:
             statuses = evolve(
                 record,
                 evaluate=GaitEvaluation(record.scenario),
                 workers=workers,
+                make_executor=thread_executor if compiled else process_executor,
                 progress=make_progress(sys.stdout),
             )
+            if compiled:
+                _reevaluate_best(options.out, workers)
         except KeyboardInterrupt:
             print(
                 f"\nnothing is lost; go on with: tetra-drake evolve --out {options.out} --resume",
@@ -99,10 +110,30 @@ def _evolve(options: argparse.Namespace) -> None:
             raise
     print(summary(statuses))
     best = max(statuses, key=lambda status: status.best_fitness)
-    print(
-        f"see the best gait with: tetra-drake simulate --scenario {options.out / SCENARIO} "
-        f"--gait {trial_folder(options.out, best.number) / BEST_GAIT}"
-    )
+    if math.isfinite(best.best_fitness):
+        print(
+            f"see the best gait with: tetra-drake simulate --scenario {options.out / SCENARIO} "
+            f"--gait {trial_folder(options.out, best.number) / BEST_GAIT}",
+            flush=True,
+        )
+    _report(options.out)
+
+
+def _report(directory: Path) -> None:
+    """Writes the report; the run is complete, whatever becomes of that."""
+    from tetra_drake.report import write_report
+
+    try:
+        written = write_report(directory)
+    except Exception as error:
+        known = isinstance(error, (InputError, SimulationFailure))
+        print(
+            "tetra-drake: the run is complete, but its report could not be written: "
+            f"{error if known else repr(error)}; try again with: tetra-drake figures {directory}",
+            file=sys.stderr,
+        )
+    else:
+        print(f"wrote {', '.join(written)} to {directory}/")
 
 
 def _scenario_to_compare(options: argparse.Namespace) -> Scenario | None:
@@ -110,19 +141,30 @@ def _scenario_to_compare(options: argparse.Namespace) -> Scenario | None:
     from tetra_drake.evolution.record import read_manifest
 
     if options.scenario is not None:
-        return _with_counts(load_scenario(options.scenario), options)
-    if options.trials is None and options.iterations is None:
+        return _with_options(load_scenario(options.scenario), options)
+    if (options.trials, options.iterations, options.engine) == (None, None, None):
         return None
-    return _with_counts(read_manifest(options.out).scenario, options)
+    return _with_options(read_manifest(options.out).scenario, options)
 
 
-def _with_counts(scenario: Scenario, options: argparse.Namespace) -> Scenario:
-    """The scenario with the numbers of trials and iterations that the options ask for."""
+def _with_options(scenario: Scenario, options: argparse.Namespace) -> Scenario:
+    """The scenario with the engine and the numbers of trials and iterations asked for."""
+    scenario = with_engine(scenario, options.engine)
     asked = {"trials": options.trials, "max_iterations": options.iterations}
     changes = {name: value for name, value in asked.items() if value is not None}
     return dataclasses.replace(
         scenario, evolution=dataclasses.replace(scenario.evolution, **changes)
     )
+
+
+def _reevaluate_best(directory: Path, workers: int) -> None:
+    from tetra_drake.evolution.reevaluation import best_distances, best_gaits, reevaluate
+    from tetra_drake.evolution.tables import load_run
+
+    print("evaluating the best gaits of each trial on the Drake diagram", flush=True)
+    reevaluate(directory, best_gaits, workers=workers)
+    for trial, compiled_in, drake_in in best_distances(load_run(directory)):
+        print(f"trial {trial}: best gait {compiled_in:.2f} in, on the diagram {drake_in:.2f} in")
 
 
 def _introduce(record: RunRecord, workers: int) -> None:
@@ -133,6 +175,7 @@ def _introduce(record: RunRecord, workers: int) -> None:
         f"{record.directory}: scenario {record.scenario.name}, seed {record.seed}, "
         f"{settings.trials} trial{'s' if settings.trials > 1 else ''} of at most "
         f"{settings.max_iterations} iterations, population {settings.population}, "
+        f"engine {record.scenario.simulation.engine}, "
         f"{workers} worker{'s' if workers > 1 else ''}",
         flush=True,
     )

@@ -14,6 +14,7 @@ from concurrent.futures import (
     Executor,
     Future,
     ProcessPoolExecutor,
+    ThreadPoolExecutor,
     wait,
 )
 from dataclasses import dataclass
@@ -52,6 +53,11 @@ def process_executor(workers: int) -> ProcessPoolExecutor:
         initializer=_end_with_parent,
         max_tasks_per_child=TASKS_PER_WORKER,
     )
+
+
+def thread_executor(workers: int) -> ThreadPoolExecutor:
+    """Threads, for evaluations that let other threads run meanwhile, as the compiled engine."""
+    return ThreadPoolExecutor(workers)
 
 
 def available_cores() -> int:

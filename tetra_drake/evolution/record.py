@@ -8,6 +8,7 @@
       iterations.jsonl        a line an iteration: mean and best fitness, best distance
       in_progress.jsonl       while an iteration lasts: what of it is evaluated already
       best_gait.json          the fittest gait so far, a gait file
+      reevaluations.jsonl     gaits evaluated once more on the Drake diagram (see reevaluation.py)
 
 Evaluations become final lines iteration by iteration, so the record does not depend on
 which of them was ready first. A record is resumed by going through the whole run again with
@@ -41,6 +42,7 @@ SCHEMA = 1
 MANIFEST, SCENARIO, LOCK = "manifest.json", "scenario.yaml", ".lock"
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
+REEVALUATIONS = "reevaluations.jsonl"
 
 _EVALUATION_KEYS = {
     "index": (int,),

@@ -11,6 +11,7 @@ from tetra_drake.evolution.json_lines import read_lines
 from tetra_drake.evolution.record import (
     EVALUATIONS,
     ITERATIONS,
+    REEVALUATIONS,
     Manifest,
     read_manifest,
     trial_folder,
@@ -28,11 +29,14 @@ class RunTables:
     """Scenario, seed and versions."""
     evaluations: pandas.DataFrame
     """A row an evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
-    wall_time_s, placed (index in the population; missing if dropped), a column for each
+    wall_time_s, engine, placed (index in the population; missing if dropped), a column for each
     metric (distance_in ...), weight_1 ... in the listing's order, tau_a_s, tau_b_s."""
     iterations: pandas.DataFrame
     """A row an iteration, 0 being the initial population: trial, iteration, evaluations so
     far, mean_fitness, best_fitness, best_distance_in, best_evaluation (its index), stop."""
+    reevaluations: pandas.DataFrame
+    """Gaits evaluated once more on the Drake diagram: columns as in evaluations, without
+    `placed`; empty if there are none."""
 
 
 def load_run(path: str | Path) -> RunTables:
@@ -50,6 +54,7 @@ def load_run(path: str | Path) -> RunTables:
         manifest=manifest,
         evaluations=_frame(directory, EVALUATIONS, trials, _flatten),
         iterations=_frame(directory, ITERATIONS, trials, dict),
+        reevaluations=_frame(directory, REEVALUATIONS, trials, _flatten),
     )
 
 
