@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.evolution.command import add_evolve
+from tetra_drake.evolution.command import add_evolve, add_reevaluate
 from tetra_drake.experiment.command import add_analyse, add_tables
 from tetra_drake.figures.command import add_figures
 from tetra_drake.gait import WALKING_SEED, Gait, load_gait, seeded_gait
@@ -57,6 +57,7 @@ def make_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_simulate(commands)
     add_evolve(commands)
+    add_reevaluate(commands)
     add_replay(commands)
     add_figures(commands)
     add_analyse(commands)

@@ -1,6 +1,7 @@
 """Run directories: what is refused, repaired and reported, and what resuming makes of it."""
 
 import json
+import lzma
 import math
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import pytest
 from analytic import Bowl, read_record, small_scenario
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.json_lines import append_lines
 from tetra_drake.evolution.optimizer import Evaluation
 from tetra_drake.evolution.record import RunRecord, TrialRecord, read_manifest
 from tetra_drake.evolution.tables import load_run
@@ -287,3 +289,36 @@ def test_a_run_in_progress_loads_and_is_left_alone(run_small):
         for file in (run / trial).iterdir():
             file.unlink()
     assert load_run(run).evaluations.empty
+
+
+def test_a_compressed_record_reads_alike_and_is_not_added_to(run_small, refused):
+    run = run_small()
+    plain = load_run(run)
+    for path in run.rglob("*.jsonl"):
+        path.with_name(path.name + ".xz").write_bytes(lzma.compress(path.read_bytes()))
+        path.unlink()
+    packed = load_run(run)
+    assert packed.evaluations.equals(plain.evaluations)
+    assert packed.iterations.equals(plain.iterations)
+    path = run / "trial_00" / "iterations.jsonl"
+    with refused(f"{path}.xz", "", "decompress it first"):
+        append_lines(path, [{}])
+    path.with_name("iterations.jsonl.xz").write_bytes(b"no xz")
+    with refused(f"{path}.xz", "", "cannot be read"):
+        load_run(run)
+
+
+@pytest.mark.parametrize(
+    ("name", "entry", "key"),
+    [
+        ("evaluations.jsonl", {"index": 0}, "iteration"),
+        ("iterations.jsonl", {"iteration": "first"}, "iteration"),
+        ("reevaluations.jsonl", {"index": 0, "iteration": 0, "genome": 3}, "genome"),
+    ],
+)
+def test_tables_report_a_line_that_is_no_entry(run_small, refused, name, entry, key):
+    run = run_small()
+    path = run / "trial_01" / name
+    path.write_text(json.dumps(entry) + "\n")
+    with refused(path, "line 1", f"{key} is missing or no good"):
+        load_run(run)

@@ -4,8 +4,14 @@ import numpy as np
 import pandas
 import pytest
 
+from tetra_drake.evolution.record import REEVALUATIONS, trial_folder
 from tetra_drake.evolution.tables import load_run
-from tetra_drake.experiment.engines import agreement, draw_engines, figure_engines
+from tetra_drake.experiment.engines import (
+    agreement,
+    draw_engines,
+    figure_engines,
+    initial_distances,
+)
 
 
 def both(compiled, drake):
@@ -38,6 +44,16 @@ def test_the_figure_shows_every_gait_and_names_median_and_percentile():
     np.testing.assert_array_equal(dots.get_xdata(), compiled)
     np.testing.assert_array_equal(dots.get_ydata(), compiled + 0.02)
     assert [text.get_text() for text in shares.texts] == ["50 %: 0.02 in", "95 %: 0.02 in"]
+
+
+def test_the_figure_of_a_run_is_of_its_initial_gaits(runs, tmp_path):
+    folder = trial_folder(runs / "thesis", 0)
+    first, second, failed, best, _ = (folder / "evaluations.jsonl").read_text().splitlines()
+    (folder / REEVALUATIONS).write_text("\n".join([first, second, failed, best, ""]))
+    run = load_run(runs / "thesis")
+    assert initial_distances(run)["index"].tolist() == [0, 1, 2]
+    assert draw_engines(run, tmp_path)
+    assert {path.name for path in tmp_path.glob("engines.*")} == {"engines.svg", "engines.png"}
 
 
 def test_no_figure_is_drawn_of_gaits_that_were_evaluated_once_only(runs, tmp_path):

@@ -33,6 +33,7 @@ def test_the_comparison_sets_each_run_beside_the_thesis(runs):
         "50 % of 2",
     ]
     assert row(cells, "best evolved distance")[:3] == ["14.34", "20.00", "6.00"]
+    assert row(cells, "the same gait on the Drake diagram")[:3] == ["–", "20.00", "6.00"]
     assert row(cells, "mean fitness, best trial")[1:3] == ["2.00 → 24.00", "2.00 → 10.00"]
     assert row(cells, "mean fitness, average trial")[1:3] == ["2.00 → 14.50", "2.00 → 10.00"]
     assert row(cells, "rise of the best distance, average")[:3] == ["32 %", "212 %", "50 %"]
@@ -102,6 +103,14 @@ def test_robustness_is_the_median_change_and_its_range(runs):
     assert cells["friction"] == ["-", "-, 2 failed"]
 
 
+def test_robustness_is_told_of_each_gait(runs):
+    cells = table("robust-gaits", runs)
+    assert next(iter(cells.values()))[1:3] == ["± 2 %: change, in", "± 2 %: loses over 10 %"]
+    assert cells["`thesis`, trial 0"][:3] == ["20.00", "0.60 (-1.00 to +0.20)", "0 %"]
+    assert cells["`thesis`, trial 1"][:3] == ["5.00", "0.60 (-1.00 to +0.20)", "50 %"]
+    assert cells["`thesis`, trial 0"][3:] == ["-, 1 failed", "100 %"]
+
+
 def test_the_two_mutations_stand_side_by_side(runs):
     cells = table("tau-mutation", runs)
     assert cells["0"][0::4] == ["20.00", "6.00"]
@@ -128,6 +137,10 @@ def test_a_table_is_the_same_again(runs, name):
     tables = [TABLES[name](load_experiment(runs)) for _ in range(2)]
     assert tables[0] == tables[1]
     assert "nan" not in tables[0]
+
+
+def test_there_is_no_agreement_of_gaits_that_were_evaluated_once_only(runs):
+    assert TABLES["engines"](load_experiment(runs)) == "No gait was evaluated on both engines."
 
 
 def test_an_analysis_of_other_gaits_is_refused(runs, refused):

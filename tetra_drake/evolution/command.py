@@ -67,6 +67,46 @@ def add_evolve(commands: argparse._SubParsersAction) -> None:
     command.set_defaults(run=_evolve)
 
 
+def add_reevaluate(commands: argparse._SubParsersAction) -> None:
+    """Registers the command with the parser's subcommands."""
+    command = commands.add_parser(
+        "reevaluate",
+        help="evaluate gaits of a run once more, on the Drake diagram",
+        description="Evaluates gaits of a run made on the compiled engine once more, on the Drake "
+        "diagram, and keeps that in the run's directory (reevaluations.jsonl of each trial): the "
+        "best gaits of each trial, which evolve itself does when it ends, or all initial gaits. "
+        "What has been done already is not done again.",
+    )
+    command.add_argument("run_directory", metavar="RUN", type=Path, help="the run directory")
+    command.add_argument(
+        "--initial", action="store_true", help="the initial gaits instead of the best"
+    )
+    command.add_argument(
+        "--workers",
+        metavar="N",
+        type=arguments.count,
+        help="worker processes (default: one a core)",
+    )
+    command.set_defaults(run=_reevaluate)
+
+
+def _reevaluate(options: argparse.Namespace) -> None:
+    from tetra_drake.evolution.executor import available_cores
+    from tetra_drake.evolution.reevaluation import best_gaits, initial_gaits, reevaluate
+
+    reevaluate(
+        options.run_directory,
+        initial_gaits if options.initial else best_gaits,
+        workers=options.workers or available_cores(),
+        progress=_show_progress,
+    )
+
+
+def _show_progress(done: int, total: int) -> None:
+    if done % 20 == 0 or done == total:
+        print(f"{done} of {total} gaits evaluated on the Drake diagram", flush=True)
+
+
 def _evolve(options: argparse.Namespace) -> None:
     from tetra_drake.compiled.simulation import compile_engine
     from tetra_drake.evolution.evaluation import GaitEvaluation

@@ -1,8 +1,12 @@
-"""Append-only files of JSON objects, one a line, that survive a kill at any moment."""
+"""Append-only files of JSON objects, one a line, that survive a kill at any moment.
+
+A file that is complete may be compressed by `xz`, which names it NAME.xz: it can still be read.
+"""
 
 from __future__ import annotations
 
 import json
+import lzma
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -16,6 +20,8 @@ def append_lines(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
 
     After a kill in between only the last line there is can be torn.
     """
+    if _compressed(path).exists():
+        raise InputError(_compressed(path), "", "is compressed; to add to it, decompress it first")
     text = "".join(json.dumps(entry, allow_nan=False) + "\n" for entry in entries)
     try:
         with path.open("ab") as file:
@@ -40,13 +46,21 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
     Raises InputError, naming file and line, where a line is not a JSON object.
     """
     try:
-        content = path.read_bytes()
+        if _compressed(path).exists():
+            path = _compressed(path)
+            content = lzma.decompress(path.read_bytes())
+        else:
+            content = path.read_bytes()
     except FileNotFoundError:
         return []
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read: {error.strerror}") from error
+    except (OSError, lzma.LZMAError) as error:
+        raise InputError(path, "", f"cannot be read: {error}") from error
     lines = content.split(b"\n")[:-1]
     return [_parse(line, path, number) for number, line in enumerate(lines, start=1)]
+
+
+def _compressed(path: Path) -> Path:
+    return path.with_name(path.name + ".xz")
 
 
 def _parse(line: bytes, path: Path, number: int) -> dict[str, Any]:

@@ -54,6 +54,15 @@ _EVALUATION_KEYS = {
     "wall_time_s": (int, float),
     "engine": (str,),
 }
+_ITERATION_KEYS = {
+    "iteration": (int,),
+    "evaluations": (int,),
+    "mean_fitness": (int, float, type(None)),
+    "best_fitness": (int, float, type(None)),
+    "best_distance_in": (int, float, type(None)),
+    "best_evaluation": (int, type(None)),
+    "stop": (str, type(None)),
+}
 
 
 def trial_folder(directory: Path, number: int) -> Path:
@@ -177,13 +186,13 @@ class TrialRecord:
             repair_torn_line(folder / name)
         self._evaluations = read_lines(folder / EVALUATIONS)
         for index, entry in enumerate(self._evaluations):
-            _check_evaluation(entry, self._folder / EVALUATIONS, index + 1)
+            check_evaluation(entry, self._folder / EVALUATIONS, index + 1)
             if entry["index"] != index:
                 self._refuse(EVALUATIONS, index, f"index is {entry['index']}, expected {index}")
         self._iterations = read_lines(folder / ITERATIONS)
         self._in_progress: dict[int, tuple[int, dict[str, Any]]] = {}
         for row, entry in enumerate(read_lines(folder / IN_PROGRESS)):
-            _check_evaluation(entry, self._folder / IN_PROGRESS, row + 1)
+            check_evaluation(entry, self._folder / IN_PROGRESS, row + 1)
             self._in_progress[entry["index"]] = row, entry
 
     @property
@@ -276,8 +285,20 @@ def evaluation_entry(
     }
 
 
-def _check_evaluation(entry: Mapping[str, Any], path: Path, line: int) -> None:
-    for key, kinds in _EVALUATION_KEYS.items():
+def check_evaluation(entry: Mapping[str, Any], path: Path, line: int) -> None:
+    """Raises InputError, naming file and line, where an entry is no evaluation."""
+    _check_keys(_EVALUATION_KEYS, entry, path, line)
+
+
+def check_iteration(entry: Mapping[str, Any], path: Path, line: int) -> None:
+    """Raises InputError, naming file and line, where an entry is no iteration."""
+    _check_keys(_ITERATION_KEYS, entry, path, line)
+
+
+def _check_keys(
+    keys: Mapping[str, tuple[type, ...]], entry: Mapping[str, Any], path: Path, line: int
+) -> None:
+    for key, kinds in keys.items():
         if key not in entry or not isinstance(entry[key], kinds):
             raise InputError(path, f"line {line}", f"is damaged: {key} is missing or no good")
 

@@ -13,6 +13,8 @@ from tetra_drake.evolution.record import (
     ITERATIONS,
     REEVALUATIONS,
     Manifest,
+    check_evaluation,
+    check_iteration,
     read_manifest,
     trial_folder,
 )
@@ -52,22 +54,27 @@ def load_run(path: str | Path) -> RunTables:
     trials = range(manifest.scenario.evolution.trials)
     return RunTables(
         manifest=manifest,
-        evaluations=_frame(directory, EVALUATIONS, trials, _flatten),
-        iterations=_frame(directory, ITERATIONS, trials, dict),
-        reevaluations=_frame(directory, REEVALUATIONS, trials, _flatten),
+        evaluations=_frame(directory, EVALUATIONS, trials, check_evaluation, _flatten),
+        iterations=_frame(directory, ITERATIONS, trials, check_iteration, dict),
+        reevaluations=_frame(directory, REEVALUATIONS, trials, check_evaluation, _flatten),
     )
 
 
 def _frame(
-    directory: Path, name: str, trials: range, row: Callable[[dict[str, Any]], dict[str, Any]]
+    directory: Path,
+    name: str,
+    trials: range,
+    check: Callable[[dict[str, Any], Path, int], None],
+    row: Callable[[dict[str, Any]], dict[str, Any]],
 ) -> pandas.DataFrame:
     import pandas
 
-    rows = [
-        {"trial": trial, **row(entry)}
-        for trial in trials
-        for entry in read_lines(trial_folder(directory, trial) / name)
-    ]
+    rows = []
+    for trial in trials:
+        path = trial_folder(directory, trial) / name
+        for line, entry in enumerate(read_lines(path), start=1):
+            check(entry, path, line)
+            rows.append({"trial": trial, **row(entry)})
     table = pandas.DataFrame(rows)
     whole = [column for column in ("placed", "best_evaluation") if column in table]
     numbers = [column for column in table if column.endswith(("fitness", "_in"))]

@@ -14,6 +14,7 @@ from tetra_drake.evolution.steady_state import CHILDREN
 from tetra_drake.evolution.summary import improvement_percent
 from tetra_drake.experiment.markdown import fixed, markdown_table
 from tetra_drake.experiment.recorded import Experiment, RecordedRun
+from tetra_drake.experiment.variations import DEFAULT
 from tetra_drake.figures.evolution import table_8_two_best
 
 if TYPE_CHECKING:
@@ -109,6 +110,11 @@ def _evolved(runs: list[RecordedRun]) -> Iterator[Row]:
         f"{thesis.BEST_EVOLVED_DISTANCE_IN:g}",
         [fixed(value) for value in best.values()],
         _farther(best, thesis.BEST_EVOLVED_DISTANCE_IN),
+    )
+    yield Row(
+        "the same gait on the Drake diagram, in",
+        DASH,
+        [fixed(_on_diagram(run)) for run in runs],
     )
     means = {
         run.name: [(s.initial_mean_fitness, s.mean_fitness) for s in run.statuses] for run in runs
@@ -238,6 +244,12 @@ def _best_walk(run: RecordedRun, column: str) -> dict[str, float]:
 def _mean(values: list[float]) -> float:
     finite = [value for value in values if math.isfinite(value)]
     return float(np.mean(finite)) if finite else math.nan
+
+
+def _on_diagram(run: RecordedRun) -> float:
+    """The distance (in) of the run's best gait on the Drake diagram, default settings."""
+    again = run.analysis.resimulations.set_index(["trial", "setting"])["distance_in"]
+    return float(again[(run.best_trial.number, DEFAULT)])
 
 
 def _nan(value: float | None) -> float:

@@ -13,6 +13,7 @@ from tetra_drake.experiment.trust import (
     best_gaits_table,
     engines_table,
     resimulation_table,
+    robust_gaits_table,
     robustness_table,
     runs_table,
     tau_mutation_table,
@@ -25,6 +26,7 @@ TABLES: Mapping[str, Callable[[Experiment], str]] = {
     "best-gaits": best_gaits_table,
     "resimulation": resimulation_table,
     "robustness": robustness_table,
+    "robust-gaits": robust_gaits_table,
     "tau-mutation": tau_mutation_table,
     "engines": engines_table,
 }

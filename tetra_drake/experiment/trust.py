@@ -95,6 +95,32 @@ def robustness_table(experiment: Experiment) -> str:
     return markdown_table(["what is off", *headings], rows)
 
 
+def robust_gaits_table(experiment: Experiment) -> str:
+    """How each trial's best gait takes it that robot or surroundings are a few percent off.
+
+    For each percentage, over all that is off and both signs: median of the absolute change of
+    the distance (in) with the range of the change, and how often the gait loses over 10 %.
+    """
+    rows = []
+    percents: list[float] = []
+    for run in experiment.values():
+        changes = _changes(run)
+        percents = sorted(changes["percent"].unique())
+        for trial, of_gait in changes.groupby("trial"):
+            cells = []
+            for percent in percents:
+                chosen = of_gait[of_gait["percent"] == percent]
+                cells += [_spread(chosen), f"{100.0 * _share_lost(chosen):.0f} %"]
+            distance = fixed(run.best.loc[trial, "distance_in"])
+            rows.append([f"`{run.name}`, trial {trial}", distance, *cells])
+    headings = [
+        f"± {percent:g} %: {what}"
+        for percent in percents
+        for what in ("change, in", "loses over 10 %")
+    ]
+    return markdown_table(["best gait", "distance, in", *headings], rows)
+
+
 def tau_mutation_table(experiment: Experiment) -> str:
     """The two ways to mutate the time constants, trial by trial."""
     runs = [experiment[name] for name in (INTENDED, LISTING) if name in experiment]
@@ -121,6 +147,8 @@ def engines_table(experiment: Experiment) -> str:
         ):
             if len(distances.dropna()):
                 rows.append([f"`{run.name}`, {what}", *_agreement_cells(agreement(distances))])
+    if not rows:
+        return "No gait was evaluated on both engines."
     headings = [
         "gaits on both engines",
         "count",
@@ -163,12 +191,14 @@ def _agreement_cells(found: Agreement) -> list[str]:
 
 
 def _changes(run: RecordedRun) -> pandas.DataFrame:
-    """The variations with `change_in`, and percents without their signs."""
+    """The variations with `unchanged_in` and `change_in`, and percents without their signs."""
     table = run.analysis.variations
     unchanged = table[table["what"] == NOTHING].set_index("trial")["distance_in"]
     changed = table[table["what"] != NOTHING]
+    unchanged_in = changed["trial"].map(unchanged)
     return changed.assign(
-        change_in=changed["distance_in"] - changed["trial"].map(unchanged),
+        unchanged_in=unchanged_in,
+        change_in=changed["distance_in"] - unchanged_in,
         percent=changed["percent"].abs(),
     )
 
@@ -181,6 +211,12 @@ def _spread(changes: pandas.DataFrame) -> str:
         return f"-{note}"
     ends = f"{signed(values.min())} to {signed(values.max())}"
     return f"{fixed(values.abs().median())} ({ends}{note})"
+
+
+def _share_lost(changes: pandas.DataFrame) -> float:
+    """How often a tenth of the distance or more is lost, or the simulation fails."""
+    kept = changes["change_in"] > -0.1 * changes["unchanged_in"].abs()
+    return float((~kept).mean())
 
 
 def _population_tau(run: RecordedRun, trial: int) -> float:
