@@ -29,7 +29,9 @@ def read_only_package(tmp_path: Path) -> Path:
     return target.parent
 
 
-def run(package: Path, cache_home: Path) -> subprocess.CompletedProcess[str]:
+def run(
+    package: Path, cache_home: Path, program: str = PROGRAM
+) -> subprocess.CompletedProcess[str]:
     environment = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
     environment |= {
         "PYTHONPATH": str(package),
@@ -38,7 +40,7 @@ def run(package: Path, cache_home: Path) -> subprocess.CompletedProcess[str]:
         "PYTHONDONTWRITEBYTECODE": "1",
     }
     return subprocess.run(
-        [sys.executable, "-c", PROGRAM],
+        [sys.executable, "-c", program],
         env=environment,
         cwd=package,
         capture_output=True,
@@ -62,3 +64,22 @@ def test_without_any_folder_for_a_cache_kernels_still_work(
     nowhere = tmp_path / "file"
     nowhere.write_text("")
     assert float(run(read_only_package, nowhere / "cache").stdout) == pytest.approx(2.0)
+
+
+def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(
+    read_only_package: Path, tmp_path: Path
+) -> None:
+    kernels = read_only_package / "tetra_drake" / "physics"
+    begin = "from tetra_drake.physics.compiling import compiled\n"
+    (kernels / "inner.py").write_text(f"{begin}@compiled\ndef inner():\n    return 1.0\n")
+    (kernels / "outer.py").write_text(
+        f"{begin}from tetra_drake.physics.inner import inner\n"
+        "@compiled\ndef outer():\n    return inner()\n"
+    )
+    program = "from tetra_drake.physics.outer import outer; print(outer())"
+    cache_home = tmp_path / "cache"
+    cache_home.mkdir()
+    assert float(run(read_only_package, cache_home, program).stdout) == 1.0
+    assert list(cache_home.rglob("outer.outer*.nbi")), "the outer kernel is cached"
+    (kernels / "inner.py").write_text(f"{begin}@compiled\ndef inner():\n    return 2.0\n")
+    assert float(run(read_only_package, cache_home, program).stdout) == 2.0
