@@ -10,13 +10,15 @@ import pytest
 
 from tetra_drake import work_precision
 from tetra_drake.gait import load_gait
-from tetra_drake.scenario import Scenario
+from tetra_drake.scenario import Scenario, with_engine
 from tetra_drake.work_precision import (
     CONVERGED,
+    CONVERGED_COMPILED,
     HEADER,
     LOOK_AHEAD,
     STEP_END,
     WITNESS,
+    CompiledSetting,
     Row,
     Run,
     Setting,
@@ -70,3 +72,24 @@ def test_a_row_says_how_many_gaits_failed() -> None:
     line = format_row(row, 15.0)
     assert "0.250 (1 failed)" in line and "| 7.5 |" in line
     assert line.count("|") == HEADER.splitlines()[0].count("|")
+
+
+def test_the_compiled_engine_has_settings_of_its_own(
+    scenario: Scenario, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = with_engine(scenario, "compiled")
+    scenario.simulation.duration, scenario.simulation.steady_from = 0.2, 0.1
+    assert default_setting(scenario).apply(scenario).compiled.max_step == pytest.approx(
+        scenario.compiled.max_step
+    )
+    coarse = CompiledSetting(1.0, 4.0, 0.05)
+    monkeypatch.setattr(work_precision, "compiled_settings_to_compare", lambda: [coarse])
+    rows = list(measure(scenario, [load_gait(data / "gait_b.json", oscillators=4)]))
+    assert [row.setting for row in rows] == [
+        CONVERGED_COMPILED,
+        default_setting(scenario),
+        coarse,
+    ]
+    evaluations = [row.runs[0].derivative_evaluations for row in rows]
+    assert evaluations == sorted(evaluations, reverse=True)
+    assert format_row(rows[2], 0.2).startswith("| ros2 | 1 mm/s | 4 ms | look-ahead 0.05 ms |")

@@ -196,6 +196,7 @@ def _add_work_precision(commands: argparse._SubParsersAction) -> None:
         "distance error against a converged run, derivative evaluations and wall time.",
     )
     _add_scenario(command)
+    arguments.add_engine(command)
     command.add_argument(
         "gaits", metavar="GAIT", type=Path, nargs="+", help="gait files; at least six say something"
     )
@@ -211,7 +212,7 @@ def _add_work_precision(commands: argparse._SubParsersAction) -> None:
 def _work_precision(options: argparse.Namespace) -> None:
     from tetra_drake.work_precision import HEADER, format_row, measure
 
-    scenario = load_scenario(options.scenario)
+    scenario = with_engine(load_scenario(options.scenario), options.engine)
     gaits = [load_gait(path, oscillators=scenario.oscillators) for path in options.gaits]
     print(HEADER)
     for row in measure(scenario, gaits, workers=options.workers):

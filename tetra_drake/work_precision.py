@@ -13,7 +13,7 @@ import numpy as np
 
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.gait import Gait
-from tetra_drake.scenario import Scenario
+from tetra_drake.scenario import CompiledScenario, Scenario
 from tetra_drake.simulation import simulate
 
 STEP_END, LOOK_AHEAD, WITNESS = "step end", "look-ahead", "witness"
@@ -45,9 +45,45 @@ class Setting:
             simulation.witness_window = 1e-3 * self.resolution_ms
         return dataclasses.replace(scenario, simulation=simulation)
 
+    @property
+    def cells(self) -> list[str]:
+        """What the table says of the setting."""
+        placement = self.mode_changes
+        if self.resolution_ms:
+            placement += f" {self.resolution_ms:g} ms"
+        return [self.scheme, f"{self.accuracy:g}", f"{self.max_step_ms:g} ms", placement]
+
+
+@dataclass(frozen=True)
+class CompiledSetting:
+    """One row of the compiled engine's table. Tolerances in mm/s, times in ms."""
+
+    tolerance_mm_s: float
+    max_step_ms: float
+    look_ahead_ms: float
+
+    def apply(self, scenario: Scenario) -> Scenario:
+        """The scenario with this setting of the compiled engine."""
+        compiled = CompiledScenario(
+            tolerance=1e-3 * self.tolerance_mm_s,
+            max_step=1e-3 * self.max_step_ms,
+            look_ahead=1e-3 * self.look_ahead_ms,
+        )
+        return dataclasses.replace(scenario, compiled=compiled)
+
+    @property
+    def cells(self) -> list[str]:
+        """What the table says of the setting."""
+        placement = f"{LOOK_AHEAD} {self.look_ahead_ms:g} ms"
+        return ["ros2", f"{self.tolerance_mm_s:g} mm/s", f"{self.max_step_ms:g} ms", placement]
+
+
+AnySetting = Setting | CompiledSetting
 
 CONVERGED = Setting("runge_kutta3", 1e-5, 0.05, STEP_END)
 """Steps well inside the explicit stability limit, short against every stiction phase."""
+
+CONVERGED_COMPILED = CompiledSetting(1e-3, 0.5, 1e-3)
 
 
 @dataclass(frozen=True)
@@ -65,13 +101,18 @@ class Run:
 class Row:
     """A setting's runs, and their distance errors (in) against the converged runs, by gait."""
 
-    setting: Setting
+    setting: AnySetting
     runs: tuple[Run, ...]
     errors_in: np.ndarray
 
 
-def default_setting(scenario: Scenario) -> Setting:
+def default_setting(scenario: Scenario) -> AnySetting:
     """What the scenario itself asks for."""
+    if scenario.simulation.engine == "compiled":
+        compiled = scenario.compiled
+        return CompiledSetting(
+            1e3 * compiled.tolerance, 1e3 * compiled.max_step, 1e3 * compiled.look_ahead
+        )
     simulation = scenario.simulation
     placement, resolution = STEP_END, 0.0
     if simulation.mode_changes == "witness":
@@ -110,7 +151,17 @@ def settings_to_compare() -> list[Setting]:
     return explicit + implicit + others
 
 
-def run_setting(scenario: Scenario, gait: Gait, setting: Setting) -> Run:
+def compiled_settings_to_compare() -> list[CompiledSetting]:
+    """Tolerances x largest steps x ends beyond predicted mode changes."""
+    return [
+        CompiledSetting(tolerance, max_step, look_ahead)
+        for tolerance in (1.0, 0.3, 0.1, 0.03)
+        for max_step in (2.0, 3.0, 4.0)
+        for look_ahead in (0.05, 0.02, 0.005)
+    ]
+
+
+def run_setting(scenario: Scenario, gait: Gait, setting: AnySetting) -> Run:
     """Simulates one gait with one setting."""
     try:
         result = simulate(scenario=setting.apply(scenario), gait=gait)
@@ -131,9 +182,13 @@ def measure(scenario: Scenario, gaits: Sequence[Gait], *, workers: int = 1) -> I
     Yields row after row. Wall times mean something with one worker on an idle machine.
     """
     default = default_setting(scenario)
-    rest = [setting for setting in settings_to_compare() if setting != default]
+    converged: AnySetting = CONVERGED
+    candidates: Sequence[AnySetting] = settings_to_compare()
+    if scenario.simulation.engine == "compiled":
+        converged, candidates = CONVERGED_COMPILED, compiled_settings_to_compare()
+    rest = [setting for setting in candidates if setting.cells != default.cells]
     exact = None
-    for setting in (CONVERGED, default, *rest):
+    for setting in (converged, default, *rest):
         runs = run_gaits(scenario, gaits, setting, workers=workers)
         distances = np.array([run.distance_in for run in runs])
         exact = distances if exact is None else exact
@@ -141,7 +196,7 @@ def measure(scenario: Scenario, gaits: Sequence[Gait], *, workers: int = 1) -> I
 
 
 def run_gaits(
-    scenario: Scenario, gaits: Sequence[Gait], setting: Setting, *, workers: int
+    scenario: Scenario, gaits: Sequence[Gait], setting: AnySetting, *, workers: int
 ) -> tuple[Run, ...]:
     """Simulates the gaits with one setting, in fresh processes: some Drakes leak diagrams."""
     context = multiprocessing.get_context("spawn")
@@ -160,14 +215,10 @@ def _warm_up(scenario: Scenario, gait: Gait) -> None:
 
 def format_row(row: Row, duration: float) -> str:
     """One line of the table, in Markdown."""
-    setting = row.setting
-    placement = setting.mode_changes
-    if setting.resolution_ms:
-        placement += f" {setting.resolution_ms:g} ms"
     errors = np.abs(row.errors_in)
     runs = [run for run in row.runs if math.isfinite(run.wall_time)]
     failed = len(row.runs) - len(runs)
-    cells = [setting.scheme, f"{setting.accuracy:g}", f"{setting.max_step_ms:g} ms", placement]
+    cells = row.setting.cells
     if not runs:
         return "| " + " | ".join([*cells, "failed", "", "", "", "", ""]) + " |"
     wall = float(np.mean([run.wall_time for run in runs]))
@@ -176,8 +227,8 @@ def format_row(row: Row, duration: float) -> str:
         f"{np.nanmax(errors):.3f}" + (f" ({failed} failed)" if failed else ""),
         f"{np.mean([run.derivative_evaluations for run in runs]) / 1e3:.0f}k",
         f"{np.mean([run.jacobian_evaluations for run in runs]) / 1e3:.0f}k",
-        f"{wall:.2f} s",
-        f"{duration / wall:.1f}",
+        f"{wall:.2g} s",
+        f"{duration / wall:.3g}",
     ]
     return "| " + " | ".join(cells) + " |"
 
