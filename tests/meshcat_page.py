@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import re
 import struct
+from pathlib import Path
 from typing import Any
+
+
+def read_page(path: Path) -> str:
+    """The page that a replay page unpacks into in a browser."""
+    (packed,) = re.findall(r'packed = "([A-Za-z0-9+/=]+)"', path.read_text(encoding="utf-8"))
+    return gzip.decompress(base64.b64decode(packed)).decode("utf-8")
 
 
 def commands(page: str, kind: str) -> list[bytes]:

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from meshcat_page import commands, unpack
+from meshcat_page import commands, read_page, unpack
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 
 from tetra_drake.errors import InputError
 from tetra_drake.gait import random_gait
+from tetra_drake.packed_page import pack_page
 from tetra_drake.replay import FRAMES_PER_SECOND, frame_samples, replay_title, save_replay
 from tetra_drake.robot import MakeStructure, Structure
 from tetra_drake.scenario import Scenario, load_scenario
@@ -53,7 +54,7 @@ def page(
 ) -> str:
     path = tmp_path_factory.mktemp("replay") / "new" / "replay.html"
     save_replay(path, scenario=scenario, trajectory=trajectory, title=TITLE)
-    return path.read_text(encoding="utf-8")
+    return read_page(path)
 
 
 @pytest.fixture(scope="module")
@@ -177,6 +178,7 @@ def test_the_title_is_text_and_not_markup(page: str) -> None:
     assert re.search(rf"<h1[^>]*>{re.escape(escaped)}</h1>", page)
     assert "bad()</script>" not in page
     assert "Drake MeshCat" not in page
+    assert f"<title>{escaped}</title>" in pack_page(page, title=TITLE)
 
 
 def test_the_page_loads_nothing_from_elsewhere(page: str) -> None:
@@ -189,7 +191,8 @@ def test_the_page_loads_nothing_from_elsewhere(page: str) -> None:
 def test_a_long_replay_stays_small(page: str) -> None:
     in_base64 = 4 / 3 * len(packed_animation(page))
     frames = 15.0 * FRAMES_PER_SECOND
-    assert len(page) + frames * in_base64 / (0.2 * FRAMES_PER_SECOND) < 8e6
+    assert len(page) + frames * in_base64 / (0.2 * FRAMES_PER_SECOND) < 8e6, "in the browser"
+    assert len(pack_page(page, title="any")) < 0.5 * len(page), "as a file"
 
 
 def test_another_robot_and_a_slice_of_a_recording_replay_too(
@@ -201,7 +204,7 @@ def test_another_robot_and_a_slice_of_a_recording_replay_too(
     assert recorded is not None
     path = tmp_path / "replay.html"
     save_replay(path, scenario=two, trajectory=recorded.isel(time=slice(5, None)), title="two")
-    tracks = read_animation(path.read_text(encoding="utf-8"))
+    tracks = read_animation(read_page(path))
     assert sum(name.startswith("/robot/") for name in tracks) == 2
     assert sum(name.startswith("/cables/") for name in tracks) == 6
     assert tracks["/robot/T1"][".position"][0][0] == 0.0
@@ -224,7 +227,7 @@ def test_the_same_recording_gives_the_same_page(
 ) -> None:
     path = tmp_path / "replay.html"
     save_replay(path, scenario=scenario, trajectory=trajectory, title=TITLE)
-    again = read_animation(path.read_text(encoding="utf-8"))
+    again = read_animation(read_page(path))
     for name, tracks in read_animation(page).items():
         for track, (times, values) in tracks.items():
             np.testing.assert_array_equal(again[name][track][0], times)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from meshcat_page import read_page
 from synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import make_parser
@@ -132,6 +133,7 @@ def test_names_are_escaped(run: Path, source: str, page: Page) -> None:
     assert page.texts["h1"][0].startswith(EVIL)
     assert page.texts["title"][0].startswith(EVIL)
     assert "<script>alert" not in (run / "replay.html").read_text(encoding="utf-8")
+    assert "<script>alert" not in read_page(run / "replay.html")
 
 
 def test_it_is_a_whole_page_of_moderate_size(source: str, page: Page) -> None:

@@ -14,6 +14,7 @@ from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams
 from pydrake.math import RigidTransform
 
 from tetra_drake.files import write_whole
+from tetra_drake.packed_page import pack_page
 from tetra_drake.robot import BOTTOM_LEFT, BOTTOM_RIGHT, NODES, MakeStructure, Structure
 from tetra_drake.scenario import Scenario
 from tetra_drake.scene import ASPECT, COLOURS, Motion, add_robot, motions, rgba, set_surroundings
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     import xarray
 
 FRAMES_PER_SECOND = 25.0
-"""Key frames per second of motion, at most; 15 s then make a page of 6 MB."""
+"""Key frames per second of motion, at most; 15 s then make a page of 2.5 MB."""
 
 TICKS_PER_SECOND = 100_000
 """Resolution of a key frame's time: Meshcat counts in integers."""
@@ -54,7 +55,7 @@ def save_replay(
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     add_robot(meshcat, MakeStructure(scenario.robot, scenario.cables))
     show_replay(meshcat, scenario=scenario, trajectory=trajectory)
-    write_whole(path, _with_title(meshcat.StaticHtml(), title))
+    write_whole(path, pack_page(_with_title(meshcat.StaticHtml(), title), title=title))
 
 
 def replay_title(gait: str, trajectory: xarray.Dataset) -> str:
