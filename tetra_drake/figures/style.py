@@ -7,6 +7,7 @@ figure; save_figure() writes it. Nothing here needs a display or keeps pyplot's 
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -127,3 +128,11 @@ def save_figure(
         metadata = {"Date": None} if kind == "svg" else None
         with whole_file(Path(folder) / f"{name}.{kind}") as file:
             figure.savefig(file, format=kind, dpi=PNG_DPI, metadata=metadata)
+            if kind == "svg":
+                svg = file.read_text(encoding="utf-8")
+                file.write_text(_without_needless_digits(svg), encoding="utf-8")
+
+
+def _without_needless_digits(svg: str) -> str:
+    """Paths to 0.01 points, which matplotlib writes to 1e-6: an eighth of the file."""
+    return re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)
