@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
+from tetra_drake.bench.command import add_bench
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.command import add_evolve, add_reevaluate
 from tetra_drake.experiment.command import add_analyse, add_tables
@@ -62,6 +63,7 @@ def make_parser() -> argparse.ArgumentParser:
     add_figures(commands)
     add_analyse(commands)
     add_tables(commands)
+    add_bench(commands)
     _add_cpg(commands)
     _add_diagram(commands)
     _add_work_precision(commands)
