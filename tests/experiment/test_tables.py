@@ -58,7 +58,8 @@ def test_the_comparison_says_where_a_run_is_worse_than_the_thesis(runs):
         "Larger in `thesis`; smaller, which is worse, in `thesis-listing`."
     )
     assert row(cells, "seconds per iteration")[-1].startswith(
-        "Of two simulations; 22 times faster in `thesis` and 22 times faster in `thesis-listing`"
+        "Median, of two simulations; "
+        "22 times faster in `thesis` and 22 times faster in `thesis-listing`"
     )
     assert row(cells, "initial gaits that go backward")[-1] == (
         "Not within 40 to 50 %: `thesis` and `thesis-listing`."

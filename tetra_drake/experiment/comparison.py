@@ -72,14 +72,14 @@ def _size(runs: list[RecordedRun]) -> Iterator[Row]:
         "one did.",
     )
     seconds = {
-        run.name: CHILDREN * float(run.tables.evaluations["wall_time_s"].mean()) for run in runs
+        run.name: CHILDREN * float(run.tables.evaluations["wall_time_s"].median()) for run in runs
     }
     yield Row(
         "seconds per iteration",
         f"{thesis.SECONDS_PER_ITERATION:g}",
         [f"{value:.2g}" for value in seconds.values()],
-        f"Of two simulations; {_times_faster(seconds, thesis.SECONDS_PER_ITERATION)}, on another "
-        "computer.",
+        "Median, of two simulations; "
+        f"{_times_faster(seconds, thesis.SECONDS_PER_ITERATION)}, on another computer.",
     )
 
 
