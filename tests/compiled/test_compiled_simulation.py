@@ -19,6 +19,7 @@ from tetra_drake.robot import MakeStructure, Structure, node_positions
 from tetra_drake.scenario import Scenario, with_engine
 from tetra_drake.simulation import simulate
 from tetra_drake.units import INCH
+from tetra_drake.work_precision import CONVERGED
 
 
 def finely(scenario: Scenario, *, tetrahedra: int = 5, duration: float) -> Scenario:
@@ -89,6 +90,8 @@ def test_distances_are_those_of_the_independent_simulation(
 def test_nine_of_ten_well_conditioned_random_gaits_end_where_the_diagrams_do(
     compiled_scenario: Scenario,
 ) -> None:
+    # The diagram's default settings are themselves off by 0.2 in and more in every fourth gait.
+    diagram = CONVERGED.apply(with_engine(compiled_scenario, "drake"))
     coarser = with_changes(compiled_scenario, compiled={"tolerance": 5e-6, "look_ahead": 2e-6})
     finer = with_changes(compiled_scenario, compiled={"tolerance": 2e-6, "look_ahead": 1e-6})
     close = compared = 0
@@ -98,7 +101,7 @@ def test_nine_of_ten_well_conditioned_random_gaits_end_where_the_diagrams_do(
         if abs(spread) > 0.05:
             continue  # ill-conditioned: two converged runs differ
         compared += 1
-        on_drake = simulate(scenario=with_engine(compiled_scenario, "drake"), gait=gait)
+        on_drake = simulate(scenario=diagram, gait=gait)
         close += abs(on_drake.metrics.distance_in - distance(compiled_scenario, seed)) < 0.15
         if compared == 10:
             break
