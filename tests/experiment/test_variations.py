@@ -114,4 +114,4 @@ def test_resimulations_are_of_the_diagram_and_differ_as_their_names_say(scenario
     other = settings["runge_kutta3"].simulation
     assert (other.scheme, other.accuracy) == ("runge_kutta3", 0.001)
     localised = [name for name, each in settings.items() if is_localised(each)]
-    assert localised == ["witness", "runge_kutta3, witness"]
+    assert localised == ["witness, steps ≤ 2 ms", "runge_kutta3, witness"]

@@ -110,7 +110,7 @@ def resimulations(scenario: Scenario) -> dict[str, Scenario]:
         DEFAULT: {},
         "accuracy × 10": {"accuracy": accuracy / 10.0},
         "accuracy × 100": {"accuracy": accuracy / 100.0},
-        "witness": {"mode_changes": "witness"},
+        "witness, steps ≤ 2 ms": {"mode_changes": "witness", "max_step": 2e-3},
         "runge_kutta3": explicit,
         "runge_kutta3, witness": explicit | {"mode_changes": "witness"},
     }
