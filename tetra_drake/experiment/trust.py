@@ -167,7 +167,7 @@ def _run_facts(run: RecordedRun) -> dict[str, str]:
     return {
         "engine": run.scenario.simulation.engine,
         "mutation of the time constants": run.scenario.evolution.tau_mutation,
-        "trials": f"{run.scenario.evolution.trials}, of which {ended} have ended",
+        "trials": f"{run.scenario.evolution.trials}, {ended} of them ended",
         "seed": f"{manifest.seed}",
         "evaluations": f"{len(evaluations)}",
         "of which failed": f"{int(evaluations['failure'].notna().sum())}",
