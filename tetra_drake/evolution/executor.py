@@ -47,12 +47,17 @@ class _WorkerContext(SpawnContext):
 
 def process_executor(workers: int) -> ProcessPoolExecutor:
     """Worker processes that start from scratch, are recycled, and end with their parent."""
-    return ProcessPoolExecutor(
+    executor = ProcessPoolExecutor(
         workers,
         mp_context=_WorkerContext(),
         initializer=_end_with_parent,
         max_tasks_per_child=TASKS_PER_WORKER,
     )
+    # All start now. Python's pool starts one with each task, and where another dies meanwhile,
+    # the pool forgets the new one or raises OSError.
+    for _ in range(workers):
+        executor.submit(_do_nothing)
+    return executor
 
 
 def thread_executor(workers: int) -> ThreadPoolExecutor:
@@ -65,6 +70,10 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def _do_nothing() -> None:
+    """The first task of each worker."""
 
 
 def _end_with_parent() -> None:
@@ -140,9 +149,7 @@ class EvaluationPool(Generic[JobT]):
         """Ends the workers; at once, or after what is under way."""
         self._executor.shutdown(wait=not at_once, cancel_futures=True)
         if at_once:
-            for process in multiprocessing.active_children():
-                if isinstance(process, _Worker):
-                    process.terminate()
+            _terminate_workers()
 
     def _fill(self) -> None:
         while self._suspects or self._queue:
@@ -173,4 +180,11 @@ class EvaluationPool(Generic[JobT]):
 
     def _renew(self) -> None:
         self._executor.shutdown(wait=False)
+        _terminate_workers()  # a broken pool may wait for ever for one it has not told to end
         self._executor = self._make_executor(self._workers)
+
+
+def _terminate_workers() -> None:
+    for process in multiprocessing.active_children():
+        if isinstance(process, _Worker):
+            process.terminate()
