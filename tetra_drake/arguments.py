@@ -1,10 +1,31 @@
-"""Types of command-line arguments, with messages made for people."""
+"""Options that commands share, and types of arguments, with messages made for people."""
 
 from __future__ import annotations
 
 import argparse
 
-from tetra_drake.scenario import ENGINES
+from tetra_drake.scenario import ENGINES, shipped_scenarios
+
+
+def add_scenario(command: argparse.ArgumentParser) -> None:
+    """Adds the option --scenario."""
+    command.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        default="thesis",
+        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
+        "(default: %(default)s)",
+    )
+
+
+def add_workers(command: argparse.ArgumentParser) -> None:
+    """Adds the option --workers; None stands for one a core."""
+    command.add_argument(
+        "--workers",
+        metavar="N",
+        type=count,
+        help="worker processes (default: one a core)",
+    )
 
 
 def add_engine(command: argparse.ArgumentParser) -> None:

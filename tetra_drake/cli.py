@@ -18,7 +18,7 @@ from tetra_drake.experiment.command import add_analyse, add_tables
 from tetra_drake.figures.command import add_figures
 from tetra_drake.gait import WALKING_SEED, Gait, load_gait, seeded_gait
 from tetra_drake.replay_command import add_replay
-from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios, with_engine
+from tetra_drake.scenario import Scenario, load_scenario, with_engine
 
 if TYPE_CHECKING:
     from tetra_drake.live import LiveView
@@ -79,7 +79,7 @@ def _add_simulate(commands: argparse._SubParsersAction) -> None:
         "trajectory.nc (motion and forces over time, for xarray), replay.html (open it in a "
         "browser) and scenario.yaml (the scenario in full).",
     )
-    _add_scenario(command)
+    arguments.add_scenario(command)
     _add_gait(command)
     arguments.add_engine(command)
     command.add_argument(
@@ -142,7 +142,7 @@ def _add_cpg(commands: argparse._SubParsersAction) -> None:
         "time. (Scenarios whose cpg.signals is `listing`, such as thesis, feed the robot what "
         "--listing writes.)",
     )
-    _add_scenario(command)
+    arguments.add_scenario(command)
     _add_gait(command)
     command.add_argument(
         "--out", metavar="FILE", type=Path, required=True, help="the CSV file to write"
@@ -175,7 +175,7 @@ def _add_diagram(commands: argparse._SubParsersAction) -> None:
         description="Draws the block diagram of the robot. FILE.dot is Graphviz source; .svg, "
         ".png and .pdf are drawn by Graphviz's program `dot`, which must be installed.",
     )
-    _add_scenario(command)
+    arguments.add_scenario(command)
     command.add_argument(
         "--out", metavar="FILE", type=Path, required=True, help="the file to write"
     )
@@ -197,7 +197,7 @@ def _add_work_precision(commands: argparse._SubParsersAction) -> None:
         description="Simulates gaits with many integrator settings and prints, for each, the "
         "distance error against a converged run, derivative evaluations and wall time.",
     )
-    _add_scenario(command)
+    arguments.add_scenario(command)
     arguments.add_engine(command)
     command.add_argument(
         "gaits", metavar="GAIT", type=Path, nargs="+", help="gait files; at least six say something"
@@ -219,16 +219,6 @@ def _work_precision(options: argparse.Namespace) -> None:
     print(HEADER)
     for row in measure(scenario, gaits, workers=options.workers):
         print(format_row(row, scenario.simulation.duration), flush=True)
-
-
-def _add_scenario(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--scenario",
-        metavar="NAME|FILE",
-        default="thesis",
-        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
-        "(default: %(default)s)",
-    )
 
 
 def _add_gait(command: argparse.ArgumentParser) -> None:

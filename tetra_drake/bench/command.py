@@ -12,7 +12,7 @@ from tetra_drake import arguments
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
 from tetra_drake.gait import Gait, load_gait, seeded_gait
-from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios
+from tetra_drake.scenario import Scenario, load_scenario
 
 DEFAULT_GAITS = 12
 
@@ -37,13 +37,7 @@ def add_bench(commands: argparse._SubParsersAction) -> None:
         type=arguments.count,
         help=f"how many gaits at random, of the seeds 0, 1 ... (default: {DEFAULT_GAITS})",
     )
-    command.add_argument(
-        "--scenario",
-        metavar="NAME|FILE",
-        default="thesis",
-        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
-        "(default: %(default)s)",
-    )
+    arguments.add_scenario(command)
     command.add_argument(
         "--json", metavar="FILE", type=Path, help="write everything measured to a JSON file, too"
     )

@@ -53,16 +53,23 @@ class Walk(NamedTuple):
 
 
 def simulate_compiled(
-    *, scenario: Scenario, gait: Gait, record: bool, viewer: Viewer | None = None
+    *,
+    scenario: Scenario,
+    gait: Gait,
+    record: bool,
+    viewer: Viewer | None = None,
+    structure: Structure | None = None,
 ) -> SimulationResult:
     """Simulates a gait as simulate() does, without Drake.
+
+    `structure` takes the place of the scenario's own, as for a robot that starts elsewhere.
 
     Deterministic: the numbers depend on scenario and gait only. Other threads run meanwhile.
     It is too fast to be watched: the viewer is shown the recording.
 
     Raises Diverged or StepBudgetExceeded, which say when and why.
     """
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = structure or MakeStructure(scenario.robot, scenario.cables)
     prepared = prepare(scenario, gait, structure, record=record or viewer is not None)
     compile_engine(scenario)
     start = node_positions(structure, prepared.state)

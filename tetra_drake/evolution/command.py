@@ -55,12 +55,7 @@ def add_evolve(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--seed", metavar="N", type=arguments.seed, help=f"of all chance (default: {DEFAULT_SEED})"
     )
-    command.add_argument(
-        "--workers",
-        metavar="N",
-        type=arguments.count,
-        help="worker processes (default: one a core)",
-    )
+    arguments.add_workers(command)
     command.add_argument(
         "--resume", action="store_true", help="go on with an interrupted run; needs only --out"
     )
@@ -81,12 +76,7 @@ def add_reevaluate(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--initial", action="store_true", help="the initial gaits instead of the best"
     )
-    command.add_argument(
-        "--workers",
-        metavar="N",
-        type=arguments.count,
-        help="worker processes (default: one a core)",
-    )
+    arguments.add_workers(command)
     command.set_defaults(run=_reevaluate)
 
 

@@ -19,12 +19,7 @@ def add_analyse(commands: argparse._SubParsersAction) -> None:
         "how far the two engines agree, if the initial gaits were re-evaluated.",
     )
     command.add_argument("run_dir", metavar="RUN", type=Path, help="a folder written by `evolve`")
-    command.add_argument(
-        "--workers",
-        metavar="N",
-        type=arguments.count,
-        help="worker processes (default: one a core)",
-    )
+    arguments.add_workers(command)
     command.set_defaults(run=_analyse)
 
 

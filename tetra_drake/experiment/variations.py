@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.compiled.simulation import prepare
-from tetra_drake.compiled.walk import DONE, walk
+from tetra_drake.compiled.simulation import simulate_compiled
+from tetra_drake.errors import SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.genome import gait_of
 from tetra_drake.evolution.optimizer import Evaluate, Evaluation, Genome
-from tetra_drake.fitness import compute_fitness, compute_metrics
-from tetra_drake.robot import MakeStructure, Structure, node_positions
+from tetra_drake.robot import MakeStructure, Structure
 from tetra_drake.scenario import Scenario, with_engine
 
 DEFAULT = "default"
@@ -80,23 +79,16 @@ class DisplacedStart:
 
     def __call__(self, genome: Genome) -> Evaluation:
         """Fitness and metrics of one genome, or why it has none."""
-        structure, simulation = self.structure(), self.scenario.simulation
         gait = gait_of(genome, name="candidate")
-        prepared = prepare(self.scenario, gait, structure, record=False)
-        start = node_positions(structure, prepared.state)
-        status, ended, *_ = walk(*prepared)
-        if status != DONE:
-            return Evaluation.failed(f"ended at {ended:g} s", engine="compiled")
-        positions = {0.0: start, **dict(zip(prepared.marks, prepared.positions, strict=True))}
-        metrics = compute_metrics(
-            structure,
-            start=start,
-            steady=positions[simulation.steady_from],
-            end=positions[simulation.duration],
-        )
+        try:
+            result = simulate_compiled(
+                scenario=self.scenario, gait=gait, record=False, structure=self.structure()
+            )
+        except SimulationFailure as failure:
+            return Evaluation.failed(f"ended at {failure.time:g} s", engine="compiled")
         return Evaluation(
-            fitness=compute_fitness(metrics, self.scenario.fitness),
-            metrics=dataclasses.asdict(metrics),
+            fitness=result.fitness,
+            metrics=dataclasses.asdict(result.metrics),
             engine="compiled",
         )
 
