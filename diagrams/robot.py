@@ -14,17 +14,19 @@ from pathlib import Path
 import numpy as np
 
 from tetra_drake import thesis
-from tetra_drake.diagram import MakeTensegrityDiagram
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.figures.forces import figure_19_signal_and_tension
-from tetra_drake.figures.measures import actuated_cable
 from tetra_drake.figures.motion import figure_14_relative_distances
 from tetra_drake.figures.style import save_figure
-from tetra_drake.gait import Gait, load_gait, seeded_gait
-from tetra_drake.scenario import Scenario, load_scenario
-from tetra_drake.simulation import SimulationResult, simulate
-from tetra_drake.units import POUND_FORCE
+from tetra_drake.results.measures import actuated_cable
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import POUND_FORCE
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 def report(gait: Gait, result: SimulationResult) -> str:

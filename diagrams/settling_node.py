@@ -20,8 +20,9 @@ from tetra_drake.figures.contact import figure_05_settling
 from tetra_drake.figures.style import save_figure
 from tetra_drake.parts.settling_node import NODE, bounce, first_contact, settle
 from tetra_drake.parts.single_tetrahedron import MakeTetrahedronDiagram, Motion, weight
-from tetra_drake.scenario import Scenario, load_scenario
-from tetra_drake.units import INCH
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 
 def report(scenario: Scenario, settling: Motion, bouncing: Motion) -> str:

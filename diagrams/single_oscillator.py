@@ -27,8 +27,9 @@ from tetra_drake.parts.single_oscillator import (
     oscillations_by_weight,
     peak_to_peak,
 )
-from tetra_drake.scenario import Scenario, load_scenario
-from tetra_drake.units import POUND_FORCE
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import POUND_FORCE
 
 
 def report(scenario: Scenario, oscillation: Oscillation) -> str:

@@ -18,9 +18,9 @@ from tetra_drake.figures.contact import figure_06_sliding
 from tetra_drake.figures.style import save_figure
 from tetra_drake.parts.single_tetrahedron import MakeTetrahedronDiagram, Motion
 from tetra_drake.parts.sliding_tetrahedron import LEADING, flights, slide, slips, travel
-from tetra_drake.robot import BASE, NODES
-from tetra_drake.scenario import load_scenario
-from tetra_drake.units import INCH
+from tetra_drake.robot.structure import BASE, NODES
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.units import INCH
 
 
 def report(motion: Motion) -> str:

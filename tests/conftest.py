@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario import Scenario, load_scenario
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
 
 Refused = Callable[[object, str, str], contextlib.AbstractContextManager[None]]
 

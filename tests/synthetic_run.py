@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from tetra_drake.evolution.genome import random_genome
-from tetra_drake.evolution.optimizer import Evaluation
+from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.record import RunRecord, evaluation_entry
-from tetra_drake.scenario import Scenario, load_scenario
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
 
 Child = tuple[float | None, int | None]
 """Fitness, None where the gait failed, and the place it took, None where it took none."""

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import Diagram
 
-from tetra_drake.diagram import MakeTensegrityDiagram
 from tetra_drake.figures.block_diagram import readable_graphviz, save_block_diagram
-from tetra_drake.gait import random_gait
-from tetra_drake.scenario import Scenario
+from tetra_drake.robot.gait import random_gait
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 needs_dot = pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
 

@@ -27,12 +27,13 @@ from matplotlib.image import imread
 from meshcat_page import unpack
 
 from tetra_drake.cli import main
-from tetra_drake.gait import load_gait
-from tetra_drake.replay import frame_samples, replay_title, save_replay
-from tetra_drake.robot import MakeStructure
-from tetra_drake.scenario import Scenario, load_scenario
-from tetra_drake.scene import COLOURS, body_poses
-from tetra_drake.simulation import simulate
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.visualization.replay import frame_samples, replay_title, save_replay
+from tetra_drake.visualization.scene import COLOURS, body_poses
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

@@ -13,8 +13,8 @@ import pytest
 import xarray
 
 from tetra_drake.cli import main
-from tetra_drake.gait import Gait, gait_from_json, random_gait, save_gait
-from tetra_drake.scenario import load_scenario
+from tetra_drake.robot.gait import Gait, gait_from_json, random_gait, save_gait
+from tetra_drake.scenario.load import load_scenario
 
 SHORT = """\
 base: thesis

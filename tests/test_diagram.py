@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from tetra_drake.diagram import MakeTensegrityDiagram
-from tetra_drake.gait import Gait, load_gait
-from tetra_drake.scenario import Scenario
-from tetra_drake.simulation import MakeSimulator
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import MatsuokaCpg
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ from types import ModuleType
 import pytest
 
 from tetra_drake import thesis
-from tetra_drake.gait import seeded_gait
-from tetra_drake.scenario import Scenario
-from tetra_drake.simulation import simulate
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.scenario.schema import Scenario
 
 DIAGRAMS = Path(__file__).parent.parent / "diagrams"
 

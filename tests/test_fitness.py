@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tetra_drake.fitness import Metrics, compute_fitness, compute_metrics
-from tetra_drake.robot import MakeStructure, node_positions
-from tetra_drake.scenario import Scenario
+from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
+from tetra_drake.robot.structure import MakeStructure, node_positions
+from tetra_drake.scenario.schema import Scenario
 
 
 def test_metrics_are_the_displacements_of_figure_13_in_inches(scenario: Scenario) -> None:

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from tetra_drake.errors import InputError
-from tetra_drake.gait import Gait, gait_from_json, load_gait, random_gait, save_gait, weight_count
+from tetra_drake.robot.gait import (
+    Gait,
+    gait_from_json,
+    load_gait,
+    random_gait,
+    save_gait,
+    weight_count,
+)
 
 WEIGHTS = [1.0 + 0.1 * i for i in range(24)]
 

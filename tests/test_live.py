@@ -12,13 +12,13 @@ import xarray
 from meshcat_page import commands, unpack
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from tetra_drake.gait import Gait, seeded_gait
-from tetra_drake.live import FRAMES_PER_SECOND, LiveView
-from tetra_drake.replay import quiet_meshcat
-from tetra_drake.robot import MakeStructure
-from tetra_drake.scenario import Scenario
-from tetra_drake.scene import body_poses
-from tetra_drake.simulation import simulate
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.gait import Gait, seeded_gait
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.visualization.live import FRAMES_PER_SECOND, LiveView
+from tetra_drake.visualization.replay import quiet_meshcat
+from tetra_drake.visualization.scene import body_poses
 
 HANDSHAKE = (
     "GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"

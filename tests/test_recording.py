@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 import xarray
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.record import RunRecord
-from tetra_drake.gait import Gait, random_gait, save_gait
-from tetra_drake.recording import load_recording
-from tetra_drake.result_folder import check_result_folder, load_result_folder, save_result_folder
-from tetra_drake.scenario import Scenario, dump_scenario, load_scenario
-from tetra_drake.simulation import SimulationResult, simulate
+from tetra_drake.report.recording import load_recording
+from tetra_drake.results.folder import check_result_folder, load_result_folder, save_result_folder
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import Gait, random_gait, save_gait
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.schema import Scenario
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +206,7 @@ def test_a_result_stands_for_files_that_are_complete(
     def fail(*arguments: object, **options: object) -> None:
         raise OSError("disk full")
 
-    monkeypatch.setattr("tetra_drake.trajectory.save_dataset", fail)
+    monkeypatch.setattr("tetra_drake.results.trajectory.save_dataset", fail)
     with pytest.raises(OSError, match="disk full"):
         save_result_folder(folder, scenario=short, gait=gait, result=result)
     assert not (folder / "result.json").exists()

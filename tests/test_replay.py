@@ -13,14 +13,20 @@ from meshcat_page import commands, read_page, unpack
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
-from tetra_drake.gait import random_gait
-from tetra_drake.packed_page import pack_page
-from tetra_drake.replay import FRAMES_PER_SECOND, frame_samples, replay_title, save_replay
-from tetra_drake.robot import MakeStructure, Structure
-from tetra_drake.scenario import Scenario, load_scenario
-from tetra_drake.scene import ARROW_LENGTH, CABLE_RADIUS, HIDDEN
-from tetra_drake.simulation import simulate
+from tetra_drake.robot.gait import random_gait
+from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.visualization.packed_page import pack_page
+from tetra_drake.visualization.replay import (
+    FRAMES_PER_SECOND,
+    frame_samples,
+    replay_title,
+    save_replay,
+)
+from tetra_drake.visualization.scene import ARROW_LENGTH, CABLE_RADIUS, HIDDEN
 
 TITLE = '<script>bad()</script> & \\1 "gait": 4.36 in'
 

@@ -19,7 +19,7 @@ from tetra_drake.evolution.study import Study, study_run
 from tetra_drake.evolution.summary import comparisons, recorded_statuses
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.figures.evolution import table_8_two_best
-from tetra_drake.report import render_report, write_report
+from tetra_drake.report.run_page import render_report, write_report
 
 EVIL = """<script>alert(1)</script> & "quoted" 'name'"""
 FIGURES = (5, 6, 9, 10, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23)

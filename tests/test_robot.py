@@ -11,19 +11,21 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
 
 from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.robot import (
-    NODES,
-    STRUTS,
-    TIP,
+from tetra_drake.robot.bodies import (
     AddTetrahedra,
-    MakeStructure,
-    Structure,
     node_inertia,
-    node_positions,
-    node_velocities,
     strut_inertia,
     strut_pose,
     tetrahedron_inertia,
+)
+from tetra_drake.robot.structure import (
+    NODES,
+    STRUTS,
+    TIP,
+    MakeStructure,
+    Structure,
+    node_positions,
+    node_velocities,
 )
 
 IN = 0.0254

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario import Scenario, dump_scenario, load_scenario, shipped_scenarios
+from tetra_drake.scenario.load import dump_scenario, load_scenario, shipped_scenarios
+from tetra_drake.scenario.schema import Scenario
 
 # Exact by definition.
 IN = 0.0254

@@ -7,9 +7,9 @@ import pytest
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RollPitchYaw, RotationMatrix
 
-from tetra_drake.robot import MakeStructure, Structure
-from tetra_drake.scenario import Scenario
-from tetra_drake.scene import (
+from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.visualization.scene import (
     ASPECT,
     FIELD_OF_VIEW,
     Motion,

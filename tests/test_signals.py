@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tetra_drake.gait import load_gait
-from tetra_drake.scenario import Scenario
-from tetra_drake.signals import integrate_network, save_signals, signal_trajectory
-from tetra_drake.units import POUND_FORCE
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.signals import integrate_network, save_signals, signal_trajectory
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import POUND_FORCE
 
 
 def read(path: Path) -> tuple[np.ndarray, np.ndarray]:

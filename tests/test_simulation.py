@@ -12,13 +12,20 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from tetra_drake.diagram import MakeTensegrityDiagram
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, StepBudgetExceeded
-from tetra_drake.gait import Gait, load_gait
-from tetra_drake.robot import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, MakeStructure, node_positions
-from tetra_drake.scenario import Scenario
-from tetra_drake.simulation import MakeSimulator, simulate
-from tetra_drake.units import INCH, POUND_FORCE
+from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.structure import (
+    BOTTOM_LEFT,
+    BOTTOM_RIGHT,
+    TIP,
+    MakeStructure,
+    node_positions,
+)
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH, POUND_FORCE
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 def with_settings(scenario: Scenario, **settings: Any) -> Scenario:

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import xarray
 
-from tetra_drake.gait import load_gait
-from tetra_drake.scenario import Scenario, load_scenario
-from tetra_drake.simulation import simulate
-from tetra_drake.trajectory import save_dataset
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.results.trajectory import save_dataset
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
 
 
 def recorded(scenario: Scenario, data: Path, *, duration: float) -> xarray.Dataset:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from tetra_drake.units import INCH, POUND_FORCE, quantity_to_si
+from tetra_drake.scenario.units import INCH, POUND_FORCE, quantity_to_si
 
 # Exact by definition: the international inch, the avoirdupois pound (0.45359237 kg) and
 # standard gravity (9.80665 m/s^2), whose product is the pound-force.

@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tetra_drake import work_precision
-from tetra_drake.gait import load_gait
-from tetra_drake.scenario import Scenario, with_engine
-from tetra_drake.work_precision import (
+from tetra_drake.benchmark import work_precision
+from tetra_drake.benchmark.work_precision import (
     CONVERGED,
     CONVERGED_COMPILED,
     HEADER,
@@ -26,6 +24,9 @@ from tetra_drake.work_precision import (
     format_row,
     measure,
 )
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.scenario.load import with_engine
+from tetra_drake.scenario.schema import Scenario
 
 
 def test_a_setting_changes_the_integrator_and_nothing_else(scenario: Scenario) -> None:

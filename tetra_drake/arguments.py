@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from tetra_drake.scenario import ENGINES, shipped_scenarios
+from tetra_drake.scenario.load import shipped_scenarios
+from tetra_drake.scenario.schema import ENGINES
 
 
 def add_scenario(command: argparse.ArgumentParser) -> None:

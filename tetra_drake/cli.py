@@ -11,17 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
-from tetra_drake.bench.command import add_bench
+from tetra_drake.benchmark.command import add_bench
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.command import add_evolve, add_reevaluate
 from tetra_drake.experiment.command import add_analyse, add_tables
 from tetra_drake.figures.command import add_figures
-from tetra_drake.gait import WALKING_SEED, Gait, load_gait, seeded_gait
-from tetra_drake.replay_command import add_replay
-from tetra_drake.scenario import Scenario, load_scenario, with_engine
+from tetra_drake.report.replay_command import add_replay
+from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, seeded_gait
+from tetra_drake.scenario.load import load_scenario, with_engine
+from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
-    from tetra_drake.live import LiveView
+    from tetra_drake.visualization.live import LiveView
 
 BAD_INPUT, FAILED = 2, 1
 """Exit statuses: the input cannot be used; the simulation failed."""
@@ -99,15 +100,15 @@ def _add_simulate(commands: argparse._SubParsersAction) -> None:
 
 
 def _simulate(options: argparse.Namespace) -> None:
-    from tetra_drake.result_folder import check_result_folder, save_result_folder
-    from tetra_drake.results import summary
-    from tetra_drake.simulation import simulate
+    from tetra_drake.engines.simulate import simulate
+    from tetra_drake.results.folder import check_result_folder, save_result_folder
+    from tetra_drake.results.result import summary
 
     scenario = with_engine(load_scenario(options.scenario), options.engine)
     gait = _gait(options, scenario)
     check_result_folder(options.out)
     if scenario.simulation.engine == "compiled":
-        from tetra_drake.compiled.simulation import compile_engine
+        from tetra_drake.engines.compiled.engine import compile_engine
 
         compile_engine(scenario, lambda message: print(message, flush=True))
     view = _open_view(scenario) if options.meshcat else None
@@ -125,8 +126,8 @@ def _simulate(options: argparse.Namespace) -> None:
 def _open_view(scenario: Scenario) -> LiveView:
     from pydrake.geometry import MeshcatParams
 
-    from tetra_drake.live import LiveView
-    from tetra_drake.replay import quiet_meshcat
+    from tetra_drake.visualization.live import LiveView
+    from tetra_drake.visualization.replay import quiet_meshcat
 
     meshcat = quiet_meshcat(MeshcatParams())
     print(f"open {meshcat.web_url()} in a browser, which starts the simulation", flush=True)
@@ -161,7 +162,7 @@ def _add_cpg(commands: argparse._SubParsersAction) -> None:
 
 
 def _cpg(options: argparse.Namespace) -> None:
-    from tetra_drake.signals import save_signals
+    from tetra_drake.robot.signals import save_signals
 
     scenario = load_scenario(options.scenario)
     gait = _gait(options, scenario)
@@ -183,8 +184,8 @@ def _add_diagram(commands: argparse._SubParsersAction) -> None:
 
 
 def _diagram(options: argparse.Namespace) -> None:
-    from tetra_drake.diagram import MakeTensegrityDiagram
     from tetra_drake.figures.block_diagram import save_block_diagram
+    from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
     scenario = load_scenario(options.scenario)
     save_block_diagram(MakeTensegrityDiagram(scenario, seeded_gait(scenario)), options.out)
@@ -212,7 +213,7 @@ def _add_work_precision(commands: argparse._SubParsersAction) -> None:
 
 
 def _work_precision(options: argparse.Namespace) -> None:
-    from tetra_drake.work_precision import HEADER, format_row, measure
+    from tetra_drake.benchmark.work_precision import HEADER, format_row, measure
 
     scenario = with_engine(load_scenario(options.scenario), options.engine)
     gaits = [load_gait(path, oscillators=scenario.oscillators) for path in options.gaits]

@@ -10,13 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tetra_drake.bench import measure, mujoco_robot
-from tetra_drake.bench.errors import ErrorStatistics, well_conditioned
-from tetra_drake.bench.measure import Method, measure_step_costs
-from tetra_drake.bench.mujoco_steps import Choice, choose_steps
+from tetra_drake.benchmark import measure
+from tetra_drake.benchmark.errors import ErrorStatistics, well_conditioned
+from tetra_drake.benchmark.measure import Method, measure_step_costs
+from tetra_drake.benchmark.mujoco_steps import Choice, choose_steps
 from tetra_drake.cli import main
-from tetra_drake.gait import Gait, save_gait, seeded_gait
-from tetra_drake.scenario import Scenario, load_scenario
+from tetra_drake.engines import mujoco as mujoco_robot
+from tetra_drake.robot.gait import Gait, save_gait, seeded_gait
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
 
 SHORT = """\
 base: thesis

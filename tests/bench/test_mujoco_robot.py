@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tetra_drake.bench.mujoco_robot import (
+from tetra_drake.engines.mujoco import (
     INSTALL,
     control_signals,
     installed,
@@ -19,12 +19,13 @@ from tetra_drake.bench.mujoco_robot import (
     mujoco_kept_quiet,
     walk_in_mujoco,
 )
-from tetra_drake.gait import seeded_gait
 from tetra_drake.physics.cable import PASSIVE, cable_forces
-from tetra_drake.robot import MakeStructure, tetrahedron_inertia
-from tetra_drake.scenario import Scenario
-from tetra_drake.signals import even_samples
-from tetra_drake.units import INCH, POUND_FORCE
+from tetra_drake.robot.bodies import tetrahedron_inertia
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.signals import even_samples
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 pytestmark = pytest.mark.skipif(not installed(), reason=f"needs MuJoCo: {INSTALL}")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from tetra_drake.scenario import Scenario
+from tetra_drake.scenario.schema import Scenario
 
 
 def with_changes(scenario: Scenario, **sections: dict[str, Any]) -> Scenario:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tetra_drake.scenario import Scenario, load_scenario, with_engine
+from tetra_drake.scenario.load import load_scenario, with_engine
+from tetra_drake.scenario.schema import Scenario
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tetra_drake.compiled.block_tridiagonal import (
+from tetra_drake.engines.compiled.block_tridiagonal import (
     BLOCK,
     ROW,
     add_outer_product,

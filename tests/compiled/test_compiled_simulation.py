@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 from changes import with_changes
 
-from tetra_drake.compiled.simulation import make_robot, prepare
-from tetra_drake.compiled.walk import DONE, walk
+from tetra_drake.benchmark.work_precision import CONVERGED
+from tetra_drake.engines.compiled.engine import make_robot, prepare
+from tetra_drake.engines.compiled.walk import DONE, walk
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, StepBudgetExceeded
-from tetra_drake.gait import load_gait, seeded_gait
-from tetra_drake.robot import MakeStructure, Structure, node_positions
-from tetra_drake.scenario import Scenario, with_engine
-from tetra_drake.simulation import simulate
-from tetra_drake.units import INCH
-from tetra_drake.work_precision import CONVERGED
+from tetra_drake.robot.gait import load_gait, seeded_gait
+from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
+from tetra_drake.scenario.load import with_engine
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 
 def finely(scenario: Scenario, *, tetrahedra: int = 5, duration: float) -> Scenario:

@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 from changes import with_changes
 
-from tetra_drake.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.compiled.dynamics import (
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
+from tetra_drake.engines.compiled.dynamics import (
     compute_forces,
     divide_by_mass,
     implicit_matrix,
     make_forces,
     move_bodies,
 )
-from tetra_drake.compiled.simulation import make_robot
-from tetra_drake.diagram import MakeTensegrityDiagram
-from tetra_drake.gait import seeded_gait
+from tetra_drake.engines.compiled.engine import make_robot
 from tetra_drake.physics.ground import MODE_COLUMNS, update_modes
 from tetra_drake.physics.kinematics import node_motion
-from tetra_drake.robot import MakeStructure, Structure
-from tetra_drake.scenario import Scenario
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 def disturbed(structure: Structure, seed: int) -> np.ndarray:

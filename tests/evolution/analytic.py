@@ -11,8 +11,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from tetra_drake.evolution.optimizer import Evaluation
-from tetra_drake.scenario import Scenario, load_scenario
+from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
 
 
 @dataclass(frozen=True)

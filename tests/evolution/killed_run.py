@@ -6,7 +6,7 @@ from pathlib import Path
 
 from analytic import Bowl, small_scenario
 
-from tetra_drake.evolution.executor import process_executor
+from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.record import MANIFEST, RunRecord
 from tetra_drake.evolution.run import evolve
 

@@ -15,7 +15,7 @@ from tetra_drake.evolution.progress import LiveProgress, PlainProgress, cells, d
 from tetra_drake.evolution.record import read_manifest
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.evolution.trial import TrialStatus
-from tetra_drake.scenario import load_scenario
+from tetra_drake.scenario.load import load_scenario
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def evolve(monkeypatch):
         options.run(options)
 
     monkeypatch.setattr(evaluation, "GaitEvaluation", lambda scenario: Bowl())
-    monkeypatch.setattr("tetra_drake.report.write_report", lambda directory: [])
+    monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: [])
     return run
 
 
@@ -118,7 +118,7 @@ def test_a_report_is_written_at_the_end_even_of_a_run_that_has_ended(
         reported.append(len(load_run(directory).iterations))
         return ["report.html"]
 
-    monkeypatch.setattr("tetra_drake.report.write_report", write_report)
+    monkeypatch.setattr("tetra_drake.report.run_page.write_report", write_report)
     for options in (SMALL, ("--resume",)):
         evolve("--out", tmp_path / "run", *options)
         printed = capsys.readouterr().out
@@ -140,7 +140,7 @@ def test_a_report_that_fails_does_not_look_like_a_run_that_failed(
     def write_report(directory):
         raise error
 
-    monkeypatch.setattr("tetra_drake.report.write_report", write_report)
+    monkeypatch.setattr("tetra_drake.report.run_page.write_report", write_report)
     evolve(*SMALL, "--out", tmp_path / "run")
     captured = capsys.readouterr()
     assert "14.34 in" in captured.out

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from analytic import read_record, small_scenario
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged
 from tetra_drake.evolution import evaluation
 from tetra_drake.evolution.evaluation import GaitEvaluation, TimeBudgetExceeded, time_limit
-from tetra_drake.evolution.executor import process_executor
+from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.genome import random_genome
 from tetra_drake.evolution.record import RunRecord, read_manifest
 from tetra_drake.evolution.run import evolve
-from tetra_drake.gait import load_gait
-from tetra_drake.simulation import simulate
+from tetra_drake.robot.gait import load_gait
 
 
 def tiny_scenario():

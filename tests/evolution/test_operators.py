@@ -14,7 +14,7 @@ from tetra_drake.evolution.genome import (
     mutation_limits,
     random_genome,
 )
-from tetra_drake.evolution.operators import (
+from tetra_drake.evolution.optimizers.operators import (
     cross_over,
     draw_mutation,
     find_place,
@@ -24,7 +24,7 @@ from tetra_drake.evolution.operators import (
     select_parent,
     select_victim,
 )
-from tetra_drake.gait import random_gait
+from tetra_drake.robot.gait import random_gait
 
 DRAWS = 2000
 

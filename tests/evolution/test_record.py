@@ -12,10 +12,10 @@ from analytic import Bowl, read_record, small_scenario
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines
-from tetra_drake.evolution.optimizer import Evaluation
+from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.record import RunRecord, TrialRecord, read_manifest
 from tetra_drake.evolution.tables import load_run
-from tetra_drake.results import versions
+from tetra_drake.results.result import versions
 
 
 def cut(path, size):

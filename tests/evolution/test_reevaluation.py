@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import pytest
 from analytic import Bowl
 
-from tetra_drake.evolution.optimizer import Evaluation
+from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.reevaluation import (
     best_distances,
     best_gaits,

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from analytic import Bowl, Deadly, is_deadly, read_record, small_scenario
 
-from tetra_drake.evolution.executor import process_executor
+from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.genome import genome_of
-from tetra_drake.evolution.optimizer import Evaluation, Iteration
+from tetra_drake.evolution.optimizers.base import Evaluation, Iteration
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.run import evolve
 from tetra_drake.evolution.summary import summary
-from tetra_drake.gait import load_gait
+from tetra_drake.robot.gait import load_gait
 
 
 def lines(path):
@@ -144,7 +144,7 @@ def test_what_kills_its_process_fails_and_the_run_goes_on(tmp_path):
 
 
 def test_workers_are_recycled_without_losing_any(tmp_path, monkeypatch):
-    monkeypatch.setattr("tetra_drake.evolution.executor.TASKS_PER_WORKER", 12)
+    monkeypatch.setattr("tetra_drake.evolution.executors.TASKS_PER_WORKER", 12)
     scenario = small_scenario(population=30, iterations=10, trials=1)
     with RunRecord.create(tmp_path / "run", scenario=scenario, seed=2) as record:
         (status,) = evolve(record, evaluate=Bowl(), workers=2)

@@ -5,7 +5,7 @@ import pytest
 from analytic import small_scenario
 
 from tetra_drake.evolution.genome import TAU_A, TAU_B
-from tetra_drake.evolution.steady_state import SteadyState
+from tetra_drake.evolution.optimizers.steady_state import SteadyState
 
 
 def fitness_of(genome):

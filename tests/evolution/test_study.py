@@ -9,7 +9,7 @@ from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.run import evolve
 from tetra_drake.evolution.study import study_run
-from tetra_drake.gait import load_gait
+from tetra_drake.robot.gait import load_gait
 
 
 def test_the_gaits_walk_as_they_did_in_the_run(tmp_path):

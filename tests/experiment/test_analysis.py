@@ -11,8 +11,8 @@ from tetra_drake.evolution.tables import load_run
 from tetra_drake.experiment import analysis
 from tetra_drake.experiment.analysis import ANALYSIS, analyse, best_of_trials, load_analysis
 from tetra_drake.experiment.variations import DEFAULT, NOTHING, resimulations, variations
-from tetra_drake.results import versions
-from tetra_drake.scenario import with_engine
+from tetra_drake.results.result import versions
+from tetra_drake.scenario.load import with_engine
 
 TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1)]]]
 """Trial 1 has no gait with a fitness."""

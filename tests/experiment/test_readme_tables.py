@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.record import MANIFEST
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.experiment.recorded import RUNS, load_experiment
 from tetra_drake.experiment.tables import filled
-from tetra_drake.gait import load_gait
-from tetra_drake.results import versions
-from tetra_drake.simulation import simulate
+from tetra_drake.results.result import versions
+from tetra_drake.robot.gait import load_gait
 
 CHECKOUT = Path(__file__).parents[2]
 RECORDED = CHECKOUT / "runs"

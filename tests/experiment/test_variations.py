@@ -19,8 +19,9 @@ from tetra_drake.experiment.variations import (
     resimulations,
     variations,
 )
-from tetra_drake.robot import MakeStructure
-from tetra_drake.scenario import Scenario, with_engine
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.load import with_engine
+from tetra_drake.scenario.schema import Scenario
 
 
 def differences(one: Scenario, other: Scenario) -> dict[str, float]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray
 
-from tetra_drake.robot import MakeStructure
-from tetra_drake.scenario import load_scenario
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.load import load_scenario
 
 PERIOD = 2.0  # s
 SPEED = 0.01  # m/s

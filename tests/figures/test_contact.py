@@ -14,9 +14,10 @@ from tetra_drake.figures.style import save_figure
 from tetra_drake.parts.settling_node import bounce, settle
 from tetra_drake.parts.single_tetrahedron import Motion
 from tetra_drake.parts.sliding_tetrahedron import LEADING, slide, slips, travel
-from tetra_drake.robot import BOTTOM_LEFT
-from tetra_drake.scenario import Scenario, load_scenario
-from tetra_drake.units import INCH, POUND_FORCE
+from tetra_drake.robot.structure import BOTTOM_LEFT
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import pytest
 from synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import main
-from tetra_drake.gait import seeded_gait
-from tetra_drake.result_folder import save_result_folder
-from tetra_drake.simulation import simulate
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.results.folder import save_result_folder
+from tetra_drake.robot.gait import seeded_gait
 
 TRIALS = [[[(2.0, 0), (1.0, 1)], [(3.0, 1), (0.5, None)]]]
 OF_ONE_GAIT = {f"{number:02d}" for number in (5, 6, 9, 10, 14, 15, 19, 20, 21)}

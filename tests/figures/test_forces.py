@@ -11,7 +11,7 @@ from made_up_walk import LOAD, PERIOD, make_walk
 
 from tetra_drake.figures.forces import figure_19_signal_and_tension, figure_20_ground_forces
 from tetra_drake.figures.style import save_figure
-from tetra_drake.units import POUND_FORCE
+from tetra_drake.scenario.units import POUND_FORCE
 
 
 def test_any_number_of_tetrahedra_can_be_drawn(other_walk: xarray.Dataset, tmp_path: Path) -> None:

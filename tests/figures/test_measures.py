@@ -9,7 +9,8 @@ import pytest
 import xarray
 from made_up_walk import HEIGHT, PERIOD, SPEED, make_walk
 
-from tetra_drake.figures.measures import (
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.results.measures import (
     actuated_cable,
     distance_walked,
     last_step,
@@ -18,10 +19,9 @@ from tetra_drake.figures.measures import (
     relative_distances,
     share_of_time,
 )
-from tetra_drake.gait import seeded_gait
-from tetra_drake.robot import MakeStructure
-from tetra_drake.scenario import Scenario
-from tetra_drake.simulation import simulate
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.schema import Scenario
 
 
 def test_the_walk_of_these_tests_is_like_a_recorded_one(

@@ -13,7 +13,6 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from tetra_drake import thesis
-from tetra_drake.figures.measures import lifted
 from tetra_drake.figures.motion import (
     figure_14_relative_distances,
     figure_15_time_lapse,
@@ -21,8 +20,9 @@ from tetra_drake.figures.motion import (
     figure_21_one_step,
 )
 from tetra_drake.figures.style import OKABE_ITO, save_figure
-from tetra_drake.robot import STRUTS
-from tetra_drake.units import INCH
+from tetra_drake.results.measures import lifted
+from tetra_drake.robot.structure import STRUTS
+from tetra_drake.scenario.units import INCH
 
 STRUT_ENDS = 3 * len(STRUTS)
 """Vertices of the line that draws a tetrahedron: each strut's ends and a gap."""

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from tetra_drake.figures.oscillators import figure_09_time_constants, figure_10_weights
 from tetra_drake.parts.single_oscillator import Oscillation
-from tetra_drake.units import POUND_FORCE
+from tetra_drake.scenario.units import POUND_FORCE
 
 TIMES = np.linspace(0.0, 15.0, 1501)
 

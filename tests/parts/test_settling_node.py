@@ -11,9 +11,9 @@ from integral import integral
 
 from tetra_drake.parts.settling_node import IMPACT_SPEED, bounce, first_contact, settle
 from tetra_drake.parts.single_tetrahedron import weight
-from tetra_drake.robot import BASE
-from tetra_drake.scenario import Scenario
-from tetra_drake.units import INCH
+from tetra_drake.robot.structure import BASE
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 
 def test_rests_on_its_weight(scenario: Scenario) -> None:

@@ -19,8 +19,8 @@ from tetra_drake.parts.single_oscillator import (
     oscillations_by_weight,
     peak_to_peak,
 )
-from tetra_drake.scenario import Scenario
-from tetra_drake.units import POUND_FORCE
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import POUND_FORCE
 
 # With d = u1 - u2 and e = v1 - v2 while both neurons fire, Eq. 7 is
 #   tau_A d' = (w - 1) d - beta e,   tau_B e' = d - e,

@@ -8,9 +8,10 @@ from integral import integral
 
 from tetra_drake.parts.single_tetrahedron import Motion, weight
 from tetra_drake.parts.sliding_tetrahedron import INITIAL_SPEED, flights, slide, slips, travel
-from tetra_drake.robot import BASE, BOTTOM_LEFT, TOP
-from tetra_drake.scenario import Scenario, load_scenario
-from tetra_drake.units import INCH
+from tetra_drake.robot.structure import BASE, BOTTOM_LEFT, TOP
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 
 @pytest.fixture(scope="module")

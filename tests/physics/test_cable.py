@@ -8,14 +8,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
 from tetra_drake.physics.cable import cable_forces, cable_tension
-from tetra_drake.robot import (
-    AddTetrahedra,
-    MakeStructure,
-    Structure,
-    node_positions,
-    node_velocities,
-)
-from tetra_drake.scenario import Scenario
+from tetra_drake.robot.bodies import AddTetrahedra
+from tetra_drake.robot.structure import MakeStructure, Structure, node_positions, node_velocities
+from tetra_drake.scenario.schema import Scenario
 
 
 def random_state(structure: Structure, seed: int) -> np.ndarray:

@@ -28,8 +28,8 @@ from tetra_drake.physics.ground import (
     update_modes,
 )
 from tetra_drake.physics.kinematics import node_motion
-from tetra_drake.robot import MakeStructure, Structure
-from tetra_drake.scenario import Scenario
+from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems.ground_contact import ground_law
 
 P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0

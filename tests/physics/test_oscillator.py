@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tetra_drake.gait import load_gait
 from tetra_drake.physics.oscillator import inhibition_matrix, neuron_rates, oscillator_output
-from tetra_drake.scenario import Scenario
-from tetra_drake.signals import listing_samples
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.signals import listing_samples
+from tetra_drake.scenario.schema import Scenario
 
 
 @pytest.mark.parametrize("name", ["gait_a", "gait_b", "single_oscillators"])

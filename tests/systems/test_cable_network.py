@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.robot import MakeStructure, node_positions
-from tetra_drake.scenario import Scenario
+from tetra_drake.robot.structure import MakeStructure, node_positions
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import CableNetwork
 
 

@@ -12,8 +12,9 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from tetra_drake.physics.ground import CONTACT, MODE, MODE_COLUMNS, STICK
-from tetra_drake.robot import AddTetrahedra, MakeStructure, Structure, node_positions
-from tetra_drake.scenario import Scenario
+from tetra_drake.robot.bodies import AddTetrahedra
+from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import GroundContact
 
 FACE = (0, 1, 3)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from tetra_drake.gait import Gait, load_gait
 from tetra_drake.physics.oscillator import inhibition_matrix, neuron_rates
-from tetra_drake.scenario import Scenario
+from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import MatsuokaCpg
 
 

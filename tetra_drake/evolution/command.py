@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.scenario import Scenario, load_scenario, shipped_scenarios, with_engine
+from tetra_drake.scenario.load import load_scenario, shipped_scenarios, with_engine
+from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     from tetra_drake.evolution.record import RunRecord
@@ -81,7 +82,7 @@ def add_reevaluate(commands: argparse._SubParsersAction) -> None:
 
 
 def _reevaluate(options: argparse.Namespace) -> None:
-    from tetra_drake.evolution.executor import available_cores
+    from tetra_drake.evolution.executors import available_cores
     from tetra_drake.evolution.reevaluation import best_gaits, initial_gaits, reevaluate
 
     reevaluate(
@@ -98,9 +99,9 @@ def _show_progress(done: int, total: int) -> None:
 
 
 def _evolve(options: argparse.Namespace) -> None:
-    from tetra_drake.compiled.simulation import compile_engine
+    from tetra_drake.engines.compiled.engine import compile_engine
     from tetra_drake.evolution.evaluation import GaitEvaluation
-    from tetra_drake.evolution.executor import available_cores, process_executor, thread_executor
+    from tetra_drake.evolution.executors import available_cores, process_executor, thread_executor
     from tetra_drake.evolution.progress import make_progress
     from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, RunRecord, trial_folder
     from tetra_drake.evolution.run import evolve
@@ -151,7 +152,7 @@ def _evolve(options: argparse.Namespace) -> None:
 
 def _report(directory: Path) -> None:
     """Writes the report; the run is complete, whatever becomes of that."""
-    from tetra_drake.report import write_report
+    from tetra_drake.report.run_page import write_report
 
     try:
         written = write_report(directory)
@@ -198,7 +199,7 @@ def _reevaluate_best(directory: Path, workers: int) -> None:
 
 
 def _introduce(record: RunRecord, workers: int) -> None:
-    from tetra_drake.results import versions
+    from tetra_drake.results.result import versions
 
     settings = record.scenario.evolution
     print(

@@ -12,11 +12,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from types import FrameType
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.evolution.genome import gait_of
-from tetra_drake.evolution.optimizer import Evaluation, Genome
-from tetra_drake.scenario import Scenario
-from tetra_drake.simulation import simulate
+from tetra_drake.evolution.optimizers.base import Evaluation, Genome
+from tetra_drake.scenario.schema import Scenario
 
 
 @dataclass(frozen=True)

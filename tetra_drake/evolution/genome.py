@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetra_drake.evolution.optimizer import Genome
-from tetra_drake.gait import TAU_B_PER_TAU_A, Gait, random_gait, weight_count
-from tetra_drake.scenario import Scenario
+from tetra_drake.evolution.optimizers.base import Genome
+from tetra_drake.robot.gait import TAU_B_PER_TAU_A, Gait, random_gait, weight_count
+from tetra_drake.scenario.schema import Scenario
 
 TAU_A, TAU_B = -2, -1
 """Where the time constants stand in a genome."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.evolution.optimizer import Genome
+from tetra_drake.evolution.optimizers.base import Genome
 
 if TYPE_CHECKING:
     import pandas

@@ -32,11 +32,12 @@ import yaml
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
-from tetra_drake.evolution.optimizer import Evaluation, Genome
+from tetra_drake.evolution.optimizers.base import Evaluation, Genome
 from tetra_drake.files import write_whole
-from tetra_drake.gait import Gait, save_gait
-from tetra_drake.results import versions
-from tetra_drake.scenario import Scenario, dump_scenario, load_scenario
+from tetra_drake.results.result import versions
+from tetra_drake.robot.gait import Gait, save_gait
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.schema import Scenario
 
 SCHEMA = 1
 MANIFEST, SCENARIO, LOCK = "manifest.json", "scenario.yaml", ".lock"

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.executor import EvaluationPool, process_executor
+from tetra_drake.evolution.executors import EvaluationPool, process_executor
 from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
-from tetra_drake.evolution.optimizer import Evaluate
+from tetra_drake.evolution.optimizers.base import Evaluate
 from tetra_drake.evolution.population import genome_columns
 from tetra_drake.evolution.record import REEVALUATIONS, evaluation_entry, trial_folder
 from tetra_drake.evolution.tables import RunTables, load_run
 from tetra_drake.evolution.trial import Assignment
-from tetra_drake.scenario import with_engine
+from tetra_drake.scenario.load import with_engine
 
 if TYPE_CHECKING:
     import pandas

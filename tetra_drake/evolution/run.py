@@ -7,13 +7,13 @@ from concurrent.futures import Executor
 
 import numpy as np
 
-from tetra_drake.evolution.executor import EvaluationPool, process_executor
-from tetra_drake.evolution.optimizer import Evaluate, Optimizer
+from tetra_drake.evolution.executors import EvaluationPool, process_executor
+from tetra_drake.evolution.optimizers.base import Evaluate, Optimizer
+from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress, SilentProgress
 from tetra_drake.evolution.record import RunRecord
-from tetra_drake.evolution.steady_state import SteadyState
 from tetra_drake.evolution.trial import Assignment, Trial, TrialStatus
-from tetra_drake.scenario import Scenario
+from tetra_drake.scenario.schema import Scenario
 
 MakeOptimizer = Callable[[Scenario, np.random.Generator], Optimizer]
 MakeExecutor = Callable[[int], Executor]

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.genome import gait_of
 from tetra_drake.evolution.population import genome_columns
 from tetra_drake.evolution.summary import recorded_statuses
 from tetra_drake.evolution.tables import RunTables, load_run
 from tetra_drake.evolution.trial import TrialStatus
-from tetra_drake.gait import Gait
-from tetra_drake.simulation import SimulationResult, simulate
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import Gait
 
 if TYPE_CHECKING:
     import pandas

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetra_drake import thesis
+from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.progress import number
-from tetra_drake.evolution.steady_state import CHILDREN
 from tetra_drake.evolution.tables import RunTables
 from tetra_drake.evolution.trial import TrialStatus
 

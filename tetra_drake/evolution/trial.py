@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tetra_drake.evolution.genome import gait_of
-from tetra_drake.evolution.optimizer import Evaluation, Genome, Iteration, Optimizer
+from tetra_drake.evolution.optimizers.base import Evaluation, Genome, Iteration, Optimizer
 from tetra_drake.evolution.record import TrialRecord, evaluation_entry
 
 

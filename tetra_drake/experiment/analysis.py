@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.compiled.simulation import compile_engine
+from tetra_drake.engines.compiled.engine import compile_engine
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.executor import EvaluationPool, process_executor, thread_executor
+from tetra_drake.evolution.executors import EvaluationPool, process_executor, thread_executor
 from tetra_drake.evolution.genome import gait_of
-from tetra_drake.evolution.optimizer import Evaluate, Evaluation, Genome
+from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, Genome
 from tetra_drake.evolution.population import genome_columns
 from tetra_drake.evolution.reevaluation import best_gaits
 from tetra_drake.evolution.tables import RunTables, load_run
@@ -25,9 +26,8 @@ from tetra_drake.experiment.variations import resimulations, variations
 from tetra_drake.experiment.walking import shares_off_ground, signal_frequencies
 from tetra_drake.files import write_whole
 from tetra_drake.parts.single_oscillator import TAU_A, frequency, oscillate
-from tetra_drake.results import versions
-from tetra_drake.scenario import Scenario
-from tetra_drake.simulation import simulate
+from tetra_drake.results.result import versions
+from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     import pandas

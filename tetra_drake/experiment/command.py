@@ -24,11 +24,11 @@ def add_analyse(commands: argparse._SubParsersAction) -> None:
 
 
 def _analyse(options: argparse.Namespace) -> None:
-    from tetra_drake.evolution.executor import available_cores
+    from tetra_drake.evolution.executors import available_cores
     from tetra_drake.evolution.tables import load_run
     from tetra_drake.experiment.analysis import ANALYSIS, analyse
     from tetra_drake.experiment.engines import FIGURE, draw_engines
-    from tetra_drake.report import FIGURES
+    from tetra_drake.report.run_page import FIGURES
 
     directory = options.run_dir
     analyse(

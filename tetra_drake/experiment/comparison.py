@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetra_drake import thesis
-from tetra_drake.evolution.steady_state import CHILDREN
+from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.summary import improvement_percent
 from tetra_drake.experiment.markdown import fixed, markdown_table
 from tetra_drake.experiment.recorded import Experiment, RecordedRun

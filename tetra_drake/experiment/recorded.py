@@ -13,7 +13,7 @@ from tetra_drake.evolution.summary import recorded_statuses
 from tetra_drake.evolution.tables import RunTables, load_run
 from tetra_drake.evolution.trial import TrialStatus
 from tetra_drake.experiment.analysis import ANALYSIS, Analysis, best_of_trials, load_analysis
-from tetra_drake.scenario import Scenario
+from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     import pandas

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.compiled.simulation import simulate_compiled
+from tetra_drake.engines.compiled.engine import simulate_compiled
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.genome import gait_of
-from tetra_drake.evolution.optimizer import Evaluate, Evaluation, Genome
-from tetra_drake.robot import MakeStructure, Structure
-from tetra_drake.scenario import Scenario, with_engine
+from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, Genome
+from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.load import with_engine
+from tetra_drake.scenario.schema import Scenario
 
 DEFAULT = "default"
 """The setting that the others are compared with."""

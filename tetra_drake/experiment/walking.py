@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.figures.measures import lifted, share_of_time
+from tetra_drake.results.measures import lifted, share_of_time
 
 if TYPE_CHECKING:
     import xarray

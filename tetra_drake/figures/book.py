@@ -32,13 +32,13 @@ from tetra_drake.files import write_whole
 from tetra_drake.parts.settling_node import bounce, settle
 from tetra_drake.parts.single_oscillator import oscillations_by_factor, oscillations_by_weight
 from tetra_drake.parts.sliding_tetrahedron import slide
-from tetra_drake.scenario import Scenario
+from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     import xarray
 
     from tetra_drake.evolution.study import Study
-    from tetra_drake.result_folder import Recording
+    from tetra_drake.results.folder import Recording
 
 TABLE_8 = "table_08_two_best.csv"
 

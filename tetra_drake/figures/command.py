@@ -37,8 +37,8 @@ def _figures(options: argparse.Namespace) -> None:
     from tetra_drake.evolution.study import study_run
     from tetra_drake.figures.book import draw_recording, draw_run
     from tetra_drake.files import check_folder
-    from tetra_drake.report import FIGURES, write_report
-    from tetra_drake.result_folder import RESULT, load_result_folder
+    from tetra_drake.report.run_page import FIGURES, write_report
+    from tetra_drake.results.folder import RESULT, load_result_folder
 
     source, out = options.source, options.out
     if not ((source / MANIFEST).exists() or (source / RESULT).exists()):

@@ -15,7 +15,7 @@ from tetra_drake.figures.style import OKABE_ITO, SHADE, common_style, make_figur
 from tetra_drake.parts.settling_node import NODE, first_contact
 from tetra_drake.parts.single_tetrahedron import Motion
 from tetra_drake.parts.sliding_tetrahedron import LEADING, TRAILING, flights, slips, travel
-from tetra_drake.units import INCH, POUND_FORCE
+from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 
 @common_style()

@@ -14,10 +14,10 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from tetra_drake import thesis
-from tetra_drake.figures.measures import distance_walked, last_step, lifted, relative_distances
 from tetra_drake.figures.style import OKABE_ITO, REFERENCE, common_style, line_style, make_figure
-from tetra_drake.robot import BOTTOM_LEFT, BOTTOM_RIGHT, STRUTS
-from tetra_drake.units import INCH
+from tetra_drake.results.measures import distance_walked, last_step, lifted, relative_distances
+from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, STRUTS
+from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
     import xarray

@@ -17,7 +17,7 @@ from tetra_drake.parts.single_oscillator import (
     frequency,
     peak_to_peak,
 )
-from tetra_drake.units import POUND_FORCE
+from tetra_drake.scenario.units import POUND_FORCE
 
 
 def figure_09_time_constants(by_factor: Mapping[float, Oscillation]) -> Figure:

@@ -12,9 +12,9 @@ import numpy as np
 
 from tetra_drake import thesis
 from tetra_drake.parts.single_tetrahedron import Motion, let_go
-from tetra_drake.robot import BOTTOM_LEFT
-from tetra_drake.scenario import Scenario
-from tetra_drake.units import INCH
+from tetra_drake.robot.structure import BOTTOM_LEFT
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 IMPACT_SPEED = thesis.SETTLING_IMPACT_SPEED_IN_S * INCH
 """m/s."""

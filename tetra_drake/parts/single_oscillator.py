@@ -10,9 +10,9 @@ import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
-from tetra_drake.gait import TAU_B_PER_TAU_A, Gait
-from tetra_drake.scenario import Scenario
-from tetra_drake.simulation import MakeSimulator
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.robot.gait import TAU_B_PER_TAU_A, Gait
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import MatsuokaCpg
 
 TAU_A = 0.3

@@ -12,18 +12,18 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
-from tetra_drake.diagram import AddGround, AddPlant
-from tetra_drake.robot import (
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.robot.bodies import tetrahedron_inertia
+from tetra_drake.robot.structure import (
     BASE,
     BOTTOM_LEFT,
     MakeStructure,
     Structure,
     node_positions,
     node_velocities,
-    tetrahedron_inertia,
 )
-from tetra_drake.scenario import Scenario, SimulationScenario
-from tetra_drake.simulation import MakeSimulator
+from tetra_drake.scenario.schema import Scenario, SimulationScenario
+from tetra_drake.systems.diagram import AddGround, AddPlant
 
 R_WB = RotationMatrix([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 """Turns a tetrahedron so that its tip points up and its `top` node forward."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from tetra_drake.intervals import intervals
 from tetra_drake.parts.single_tetrahedron import Motion, let_go, weight
-from tetra_drake.robot import BASE, BOTTOM_LEFT, TOP
-from tetra_drake.scenario import Scenario
-from tetra_drake.units import INCH
+from tetra_drake.robot.structure import BASE, BOTTOM_LEFT, TOP
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 INITIAL_SPEED = 30.0 * INCH
 """m/s, forward."""

@@ -36,7 +36,7 @@ def _stamp_of_all_kernels() -> str:
     """Changes with any source file that holds kernels."""
     package = Path(__file__).parent.parent
     digest = hashlib.sha256()
-    for folder in ("physics", "compiled"):
+    for folder in ("physics", "engines/compiled"):
         for source in sorted((package / folder).glob("*.py")):
             digest.update(source.read_bytes())
     return digest.hexdigest()

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from tetra_drake.physics.cable import cable_forces
-from tetra_drake.robot import Structure
+from tetra_drake.robot.structure import Structure
 
 
 class CableNetwork(LeafSystem):

@@ -25,8 +25,8 @@ from tetra_drake.physics.ground import (
     update_modes,
 )
 from tetra_drake.physics.kinematics import node_motion
-from tetra_drake.robot import Structure
-from tetra_drake.scenario import FrictionScenario, GroundScenario
+from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario.schema import FrictionScenario, GroundScenario
 
 
 class GroundContact(LeafSystem):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
-from tetra_drake.gait import Gait
 from tetra_drake.physics.oscillator import inhibition_matrix, neuron_rates, oscillator_output
-from tetra_drake.scenario import CpgScenario
+from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.schema import CpgScenario
 
 
 class MatsuokaCpg(LeafSystem):

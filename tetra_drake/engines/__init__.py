@@ -1,0 +1,1 @@
+"""Engines that simulate a gait on a scenario; all return a SimulationResult."""

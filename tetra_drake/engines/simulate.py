@@ -1,0 +1,28 @@
+"""simulate(): one gait on one scenario, by the engine that the scenario names."""
+
+from __future__ import annotations
+
+from tetra_drake.engines.viewer import Viewer
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.schema import Scenario
+
+
+def simulate(
+    *, scenario: Scenario, gait: Gait, record: bool = False, viewer: Viewer | None = None
+) -> SimulationResult:
+    """Simulates the scenario's robot walking by a gait for the scenario's duration, on the
+    engine that the scenario names.
+
+    Pure: the same scenario and gait give the same numbers, bit for bit, wall time aside,
+    whether or not a trajectory is recorded and whoever watches.
+
+    Raises Diverged or StepBudgetExceeded, which say when and why.
+    """
+    if scenario.simulation.engine == "compiled":
+        from tetra_drake.engines.compiled.engine import simulate_compiled
+
+        return simulate_compiled(scenario=scenario, gait=gait, record=record, viewer=viewer)
+    from tetra_drake.engines.drake import simulate_drake
+
+    return simulate_drake(scenario=scenario, gait=gait, record=record, viewer=viewer)

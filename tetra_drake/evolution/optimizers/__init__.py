@@ -1,0 +1,1 @@
+"""Optimisers behind ask/tell, and their operators."""

@@ -1,0 +1,96 @@
+"""The evolutionary operators of the thesis (section 2.3, listing A.3), each by itself.
+
+Pure functions on genomes, rows of numbers, with the random generator as an argument. The
+comparisons are the listing's: a chance p comes true when a number drawn from [0, 1) is
+beyond 1 - p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from tetra_drake.evolution.optimizers.base import Genome
+
+Fitnesses = npt.NDArray[np.float64]
+
+
+def draw_candidates(
+    population: int, *, count: int, generator: np.random.Generator
+) -> npt.NDArray[np.int64]:
+    """The members of a tournament, drawn with replacement."""
+    return generator.integers(0, population, size=count)
+
+
+def select_parent(fitnesses: Fitnesses, *, tournament: int, generator: np.random.Generator) -> int:
+    """The best of a tournament; of equals the first drawn (listing A.3.2)."""
+    candidates = draw_candidates(len(fitnesses), count=tournament, generator=generator)
+    return int(candidates[np.argmax(fitnesses[candidates])])
+
+
+def select_victim(fitnesses: Fitnesses, *, tournament: int, generator: np.random.Generator) -> int:
+    """The worst of a tournament; of equals the last drawn (listing A.3.5)."""
+    candidates = draw_candidates(len(fitnesses), count=tournament, generator=generator)[::-1]
+    return int(candidates[np.argmin(fitnesses[candidates])])
+
+
+def cross_over(
+    first: Genome, second: Genome, *, probability: float, generator: np.random.Generator
+) -> tuple[Genome, Genome]:
+    """Two children, which are the parents with each parameter swapped at this probability."""
+    swapped = generator.random(len(first)) >= 1.0 - probability
+    return np.where(swapped, second, first), np.where(swapped, first, second)
+
+
+def draw_mutation(reach: Genome, *, probability: float, generator: np.random.Generator) -> Genome:
+    """What to add to each parameter: 0, or up to its reach with either sign.
+
+    One such row serves both children of an iteration, as in the listing.
+    """
+    sign = np.where(generator.random(len(reach)) > 0.5, 1.0, -1.0)
+    moved = generator.random(len(reach)) >= 1.0 - probability
+    size = reach * generator.random(len(reach))
+    return np.where(moved, sign * size, 0.0)
+
+
+def mutate(genome: Genome, *, mutation: Genome, floors: Genome) -> Genome:
+    """The genome with the mutation added; a parameter it would take to its floor or below stays.
+
+    Only reductions are checked, as in the listing (A.3.3, A.3.4).
+    """
+    moved = genome + mutation
+    refused = (mutation < 0.0) & ~(moved > floors)
+    return np.where(refused, genome, moved)
+
+
+def find_place(
+    fitnesses: Fitnesses, child: float, *, tournament: int, generator: np.random.Generator
+) -> int | None:
+    """Whom a child of this fitness replaces: the worst of a tournament if the child is fitter,
+    else the worst of all if it is fitter than that, else nobody.
+    """
+    victim = select_victim(fitnesses, tournament=tournament, generator=generator)
+    if child > fitnesses[victim]:
+        return victim
+    worst = int(np.argmin(fitnesses))
+    return worst if child > fitnesses[worst] else None
+
+
+def mean_fitness(fitnesses: Fitnesses) -> float:
+    """Mean over the members that have not failed; NaN if all have."""
+    finite = fitnesses[np.isfinite(fitnesses)]
+    return float(np.mean(finite)) if finite.size else float("nan")
+
+
+def has_levelled_off(means: Sequence[float], *, rise: float, window: int, after: int) -> bool:
+    """Whether the mean fitness rose by less than `rise` in the last `window` iterations.
+
+    `means` begins with the initial population's, iteration 0. Never before iteration
+    `after` is over.
+    """
+    iteration = len(means) - 1
+    if iteration <= after or iteration < window:
+        return False
+    return means[iteration] - means[iteration - window] < rise

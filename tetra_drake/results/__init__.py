@@ -1,0 +1,1 @@
+"""What one simulation gives: metrics, trajectory, result folder."""

@@ -1,0 +1,140 @@
+"""The folder that a simulation leaves behind: written by `simulate`, read by `replay`.
+
+scenario.yaml     the scenario in full, for `--scenario`
+trajectory.nc     motion and forces over time, for xarray
+replay.html       the same to look at
+result.json       the numbers and the gait
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.record import MANIFEST
+from tetra_drake.files import check_folder, write_whole
+from tetra_drake.robot.gait import Gait, gait_from_json
+from tetra_drake.robot.structure import NODES, MakeStructure, Structure
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    import xarray
+
+    from tetra_drake.results.result import SimulationResult
+
+SCENARIO, TRAJECTORY = "scenario.yaml", "trajectory.nc"
+REPLAY, RESULT = "replay.html", "result.json"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One gait's motion, with all it takes to show it."""
+
+    scenario: Scenario
+    gait: Gait
+    trajectory: xarray.Dataset
+    """See trajectory.make_dataset."""
+
+
+def check_result_folder(folder: Path) -> None:
+    """Raises InputError if a simulation cannot leave its files in `folder`."""
+    check_folder(folder)
+    if (folder / MANIFEST).exists():
+        raise InputError(folder, "", "holds a run of `evolve`, expected another folder")
+
+
+def save_result_folder(
+    folder: Path, *, scenario: Scenario, gait: Gait, result: SimulationResult
+) -> None:
+    """Writes the files of a simulation that recorded its trajectory.
+
+    Raises InputError if the folder cannot be written to.
+    """
+    from tetra_drake.results.result import save_result
+    from tetra_drake.results.trajectory import save_dataset
+    from tetra_drake.visualization.replay import replay_title, save_replay
+
+    trajectory = result.trajectory
+    assert trajectory is not None
+    # While there is a result.json, the other files belong to it.
+    (folder / RESULT).unlink(missing_ok=True)
+    write_whole(folder / SCENARIO, dump_scenario(scenario))
+    save_dataset(trajectory, folder / TRAJECTORY)
+    title = replay_title(gait.name, trajectory)
+    save_replay(folder / REPLAY, scenario=scenario, trajectory=trajectory, title=title)
+    save_result(folder / RESULT, scenario, gait, result)
+
+
+def load_result_folder(folder: Path) -> Recording:
+    """Reads a simulation's scenario, gait and trajectory back.
+
+    Raises InputError, naming the file, if one is missing, damaged, or not of this scenario.
+    """
+    for name in (RESULT, SCENARIO, TRAJECTORY):
+        if not (folder / name).is_file():
+            raise InputError(folder, "", f"holds no {name}, so is no folder written by `simulate`")
+    scenario = load_scenario(folder / SCENARIO)
+    structure = MakeStructure(scenario.robot, scenario.cables)
+    return Recording(
+        scenario=scenario,
+        gait=_load_gait(folder / RESULT, oscillators=scenario.oscillators),
+        trajectory=_load_trajectory(folder / TRAJECTORY, structure),
+    )
+
+
+def _load_gait(path: Path, *, oscillators: int) -> Gait:
+    try:
+        raw: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(path, "", f"cannot be read: {error}") from error
+    if not isinstance(raw, dict) or "gait" not in raw:
+        raise InputError(path, "gait", "is missing")
+    return gait_from_json(raw["gait"], source=str(path), oscillators=oscillators)
+
+
+def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
+    import xarray
+
+    try:
+        trajectory = xarray.load_dataset(path, engine="h5netcdf")
+    except Exception as error:  # what HDF5 raises for damaged files has no common ancestor
+        raise InputError(path, "", f"cannot be read as netCDF: {error}") from error
+    _check_trajectory(path, trajectory, structure)
+    return trajectory
+
+
+def _check_trajectory(path: Path, trajectory: xarray.Dataset, structure: Structure) -> None:
+    """Raises InputError unless the file holds what there is to show of this robot."""
+    names = np.array(structure.node_names)
+    expected = {
+        "tetrahedron": structure.bodies,
+        "node": NODES,
+        "cable": structure.cable_names,
+        "contact": tuple(names[structure.contacts].tolist()),
+        "axis": ("x", "y", "z"),
+        "horizontal": ("x", "y"),
+    }
+    for name, labels in expected.items():
+        if name not in trajectory.coords or tuple(trajectory[name].values.tolist()) != labels:
+            problem = f"is not as in {SCENARIO}, with {len(structure.bodies)} tetrahedra"
+            raise InputError(path, name, problem)
+    dims = {
+        "time": ("time",),
+        "p_WN": ("time", "tetrahedron", "node", "axis"),
+        "tension": ("time", "cable"),
+        "normal_force": ("time", "contact"),
+        "friction_force": ("time", "contact", "horizontal"),
+    }
+    for name, wanted in dims.items():
+        if name not in trajectory.variables or trajectory[name].dims != wanted:
+            raise InputError(path, name, f"is missing, or not over {', '.join(wanted)}")
+        if trajectory[name].size == 0 or not np.isfinite(trajectory[name].values).all():
+            raise InputError(path, name, "holds no numbers, or some that are not finite")
+    if not (np.diff(trajectory["time"].values) > 0.0).all():
+        raise InputError(path, "time", "does not ascend")

@@ -1,0 +1,114 @@
+"""SimulationResult: what every engine returns; result.json and the summary made from it."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import platform
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tetra_drake import __version__, thesis
+from tetra_drake.files import write_whole
+from tetra_drake.results.metrics import Metrics
+from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    import xarray
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class IntegratorWork:
+    """What the integrator was asked for and what that took."""
+
+    scheme: str
+    accuracy: float
+    steps: int
+    derivative_evaluations: int
+    jacobian_evaluations: int
+    """Derivative evaluations that went into Jacobian columns, among those above."""
+
+
+@dataclass(frozen=True)
+class SimulationResult:
+    """What simulate() returns."""
+
+    metrics: Metrics
+    fitness: float
+    duration: float
+    """Simulated time in s."""
+    wall_time: float
+    """Time from the start of the integration to its end, in s; building is not in it."""
+    integrator: IntegratorWork
+    engine: str
+    """Of the scenario: "drake" or "compiled"."""
+    trajectory: xarray.Dataset | None = field(default=None, repr=False)
+    """See trajectory.make_dataset; None unless asked for."""
+
+
+def versions() -> dict[str, str]:
+    """What decides the last digits of a result."""
+    libraries = {name: metadata.version(name) for name in ("drake", "numpy", "numba")}
+    return {"tetra_drake": __version__, "python": platform.python_version(), **libraries}
+
+
+def result_to_json(scenario: Scenario, gait: Gait, result: SimulationResult) -> dict[str, Any]:
+    """The content of result.json. Lengths in inches, times in s."""
+    metrics = dataclasses.asdict(result.metrics)
+    return {
+        "schema": SCHEMA,
+        "scenario": scenario.name,
+        **metrics,
+        "fitness": result.fitness,
+        "duration_s": result.duration,
+        "wall_time_s": result.wall_time,
+        "real_time_factor": result.duration / result.wall_time,
+        "engine": result.engine,
+        "integrator": dataclasses.asdict(result.integrator),
+        "versions": versions(),
+        "gait": gait.to_json(),
+    }
+
+
+def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult) -> None:
+    """Writes result.json."""
+    content = result_to_json(scenario, gait, result)
+    write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
+    """A few lines for the terminal, the thesis's numbers beside ours."""
+    metrics, work = result.metrics, result.integrator
+    after = f"from {scenario.simulation.steady_from:g} s on"
+    rows = [
+        (
+            "distance",
+            f"{metrics.distance_in:8.2f} in",
+            f"thesis: {thesis.BEST_INITIAL_DISTANCE_IN} in the best random gait, "
+            f"{thesis.BEST_EVOLVED_DISTANCE_IN} in the best evolved one",
+        ),
+        ("steady distance", f"{metrics.steady_distance_in:8.2f} in", after),
+        ("heading error", f"{_tidy(metrics.heading_error_in)} in", "twist about the vertical"),
+        ("lateral drift", f"{_tidy(metrics.lateral_drift_in)} in", ""),
+        ("fitness", f"{result.fitness:8.2f}", ""),
+    ]
+    lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
+    for name, value, note in rows:
+        lines.append(f"  {name:<16}{value:<14}{f'({note})' if note else ''}".rstrip())
+    lines.append(
+        f"  simulated in {result.wall_time:.1f} s, {result.duration / result.wall_time:.1f} times "
+        f"real time: {work.scheme}, accuracy {work.accuracy:g}, {work.steps} steps, "
+        f"{work.derivative_evaluations} derivative evaluations"
+    )
+    return "\n".join(lines)
+
+
+def _tidy(value: float) -> str:
+    """A small length without digits that are rounding."""
+    return f"{value if math.fabs(value) >= 5e-3 else 0.0:8.2f}"

@@ -1,0 +1,117 @@
+"""The robot's structure as data: nodes, struts, cables, contacts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tetra_drake.physics.cable import CABLE, PASSIVE
+from tetra_drake.physics.kinematics import P_WN, V_WN, node_motion
+from tetra_drake.scenario.schema import CableScenario, RobotScenario
+
+NODES = ("bottom_left", "bottom_right", "top", "tip")
+"""The nodes of a tetrahedron; the first three form the base triangle."""
+
+BOTTOM_LEFT, BOTTOM_RIGHT, TOP, TIP = range(4)
+BASE = (BOTTOM_LEFT, BOTTOM_RIGHT, TOP)
+STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
+
+
+@dataclass(frozen=True)
+class Structure:
+    """n tetrahedra in a row, T1 (rear) to Tn (lead), tied together by cables.
+
+    A node's index is 4 * body + its place in NODES. Lengths in m.
+    """
+
+    bodies: tuple[str, ...]
+    """The names of the bodies, "T1" to "Tn"."""
+    p_BN: np.ndarray
+    """(4, 3): the nodes in the frame of a body, whose origin is the centre of mass."""
+    p_WB: np.ndarray
+    """(n, 3): the bodies at t = 0, all with the axes of World."""
+    cables: np.ndarray
+    """(6 (n - 1),) of dtype CABLE."""
+    cable_names: tuple[str, ...]
+    """Such as "T1-T2 outer bottom_left"."""
+    contacts: np.ndarray
+    """(2 n + 1,): the indices of the nodes that the ground can touch."""
+    strut_radius: float
+    node_radius: float
+    density: float
+
+    @property
+    def signals(self) -> int:
+        """Actuation signals: one a junction."""
+        return len(self.bodies) - 1
+
+    @property
+    def node_names(self) -> tuple[str, ...]:
+        """Such as "T1 tip", by node index."""
+        return tuple(f"{body} {node}" for body in self.bodies for node in NODES)
+
+    @property
+    def initial_state(self) -> np.ndarray:
+        """(13 n,): [q; v] at t = 0, at rest."""
+        q = [np.concatenate(([1.0, 0.0, 0.0, 0.0], p_WBi)) for p_WBi in self.p_WB]
+        return np.concatenate([*q, np.zeros(6 * len(self.bodies))])
+
+
+def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
+    """The robot of thesis section 2.1 with `robot.tetrahedra` tetrahedra.
+
+    Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0; the
+    tips point forward (+x) into the next tetrahedron. Junction i joins T(i+1) and T(i+2)
+    by 3 outer cables (base node to base node), of which signal i drives the bottom two,
+    and 3 inner ones (tip to base nodes).
+    """
+    n = robot.tetrahedra
+    edge = robot.strut_length
+    circumradius = edge / math.sqrt(3.0)
+    height = edge * math.sqrt(2.0 / 3.0)
+    p_BN = np.array(
+        [
+            [-height / 4, edge / 2, -circumradius / 2],
+            [-height / 4, -edge / 2, -circumradius / 2],
+            [-height / 4, 0.0, circumradius],
+            [3 * height / 4, 0.0, 0.0],
+        ]
+    )
+    bodies = tuple(f"T{i + 1}" for i in range(n))
+    p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
+    rows, names = [], []
+    for i in range(n - 1):
+        junction = f"{bodies[i]}-{bodies[i + 1]}"
+        for node in BASE:
+            a, b = 4 * i + node, 4 * (i + 1) + node
+            signal = PASSIVE if node == TOP else i
+            rows.append((a, b, cables.outer_stiffness, cables.damping, cables.free_length, signal))
+            names.append(f"{junction} outer {NODES[node]}")
+        for node in BASE:
+            a, b = 4 * i + TIP, 4 * (i + 1) + node
+            rows.append((a, b, cables.inner_stiffness, cables.damping, cables.free_length, PASSIVE))
+            names.append(f"{junction} inner {NODES[node]}")
+    bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
+    return Structure(
+        bodies=bodies,
+        p_BN=p_BN,
+        p_WB=p_WB,
+        cables=np.array(rows, dtype=CABLE),
+        cable_names=tuple(names),
+        contacts=np.array([*bottom, 4 * (n - 1) + TIP]),
+        strut_radius=robot.strut_diameter / 2,
+        node_radius=robot.node_diameter / 2,
+        density=robot.density,
+    )
+
+
+def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
+    """p_WN (nodes, 3) in m from the state (13 n,) of the bodies."""
+    return node_motion(state, structure.p_BN)[:, P_WN : P_WN + 3]
+
+
+def node_velocities(structure: Structure, state: np.ndarray) -> np.ndarray:
+    """v_WN (nodes, 3) in m/s from the state (13 n,) of the bodies."""
+    return node_motion(state, structure.p_BN)[:, V_WN : V_WN + 3]

@@ -1,0 +1,1 @@
+"""The robot in Meshcat: scene, replay page, live view."""

@@ -1,0 +1,74 @@
+"""A simulation shown in a browser while it runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydrake.geometry import Meshcat
+
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
+from tetra_drake.visualization.replay import show_replay
+from tetra_drake.visualization.scene import add_robot, motions, set_surroundings
+
+if TYPE_CHECKING:
+    import xarray
+
+FRAMES_PER_SECOND = 30.0
+"""Frames per second of motion, at most."""
+
+ROOM = 15.0 * INCH
+"""Length of floor shown before and behind the robot, as nobody knows yet where it goes."""
+
+_PATIENCE = 0.1  # s between two looks for a browser
+
+
+class LiveView:
+    """Shows a simulation in Meshcat, no faster than real time (see simulation.Viewer).
+
+    It begins once a browser is there. `clock` and `sleep` are in s.
+    """
+
+    def __init__(
+        self,
+        meshcat: Meshcat,
+        scenario: Scenario,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._meshcat, self._scenario = meshcat, scenario
+        self._clock, self._sleep = clock, sleep
+        self._structure = MakeStructure(scenario.robot, scenario.cables)
+        self._started: float | None = None
+        self._due = 0.0
+        p_WN = self._structure.p_WB[:, np.newaxis] + self._structure.p_BN
+        room = np.array([ROOM, 0.0, 0.0])
+        add_robot(meshcat, self._structure)
+        set_surroundings(meshcat, self._structure, np.stack([p_WN - room, p_WN + room]))
+
+    def wants(self, time: float) -> bool:
+        """Whether the frame before is over at this time (s)."""
+        return time >= self._due
+
+    def show(self, frame: xarray.Dataset) -> None:
+        """Moves everything to where it is in a trajectory's sample, once its time has come."""
+        time = float(frame["time"].values[0])
+        if self._started is not None:
+            self._sleep(max(0.0, self._started + time - self._clock()))
+        for motion in motions(self._structure, frame):
+            self._meshcat.SetTransform(motion.path, motion.matrix(0))
+        if self._started is None:
+            while self._meshcat.GetNumActiveConnections() == 0:
+                self._sleep(_PATIENCE)
+            self._started = self._clock() - time
+        self._meshcat.SetSimulationTime(time)  # for the rate it shows
+        self._due = (np.floor(time * FRAMES_PER_SECOND) + 1.0) / FRAMES_PER_SECOND
+
+    def replay(self, trajectory: xarray.Dataset) -> None:
+        """Plays what was simulated again and again."""
+        show_replay(self._meshcat, scenario=self._scenario, trajectory=trajectory)
