@@ -1,3 +1,40 @@
-"""A Drake model of a walking tensegrity robot driven by a Matsuoka central pattern generator."""
+"""A Drake model of a walking tensegrity robot driven by a Matsuoka central pattern generator.
+
+    import tetra_drake as td
+
+    scenario = td.load_scenario("thesis")
+    result = td.simulate(scenario=scenario, gait=td.load_gait("gait.json", scenario), record=True)
+    run = td.evolve(scenario, "runs/mine", seed=1)
+
+Each name is imported when it is first used, so `import tetra_drake` loads neither Drake nor numba.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tetra_drake.engines.simulate import simulate as simulate
+    from tetra_drake.robot.gait import load_gait as load_gait
+    from tetra_drake.scenario.load import load_scenario as load_scenario
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "load_gait": "tetra_drake.robot.gait",
+    "load_scenario": "tetra_drake.scenario.load",
+    "simulate": "tetra_drake.engines.simulate",
+}
+
+__all__ = ["__version__", *_HOMES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'tetra_drake' has no attribute '{name}'")
+    return getattr(importlib.import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 
 from tetra_drake.scenario.load import shipped_scenarios
 from tetra_drake.scenario.schema import ENGINES
@@ -47,6 +48,17 @@ def seed(text: str) -> int:
 def count(text: str) -> int:
     """A number of things: an integer, 1 or more."""
     return _integer(text, least=1)
+
+
+def rate(text: str) -> float:
+    """A rate: a finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"found '{text}', expected a number above 0")
+    return value
 
 
 def _integer(text: str, *, least: int) -> int:

@@ -138,10 +138,10 @@ def _add_cpg(commands: argparse._SubParsersAction) -> None:
     command = commands.add_parser(
         "cpg",
         help="write the oscillator signals of a gait to a CSV file",
-        description="Integrates the oscillator network of a gait alone, with error control, and "
-        "writes its signals: time_s, then signal_1, signal_2 ... in lbf, zero before the start-up "
-        "time. (Scenarios whose cpg.signals is `listing`, such as thesis, feed the robot what "
-        "--listing writes.)",
+        description="Writes the signals that the cables of a gait are fed: time_s, signal_1, "
+        "signal_2 ..., a column per junction, from 0 to the scenario's duration, zero before the "
+        "start-up time. A positive signal shortens the two bottom outer cables of its junction. "
+        "The file's first lines, which begin with #, say what each column is.",
     )
     arguments.add_scenario(command)
     _add_gait(command)
@@ -149,14 +149,19 @@ def _add_cpg(commands: argparse._SubParsersAction) -> None:
         "--out", metavar="FILE", type=Path, required=True, help="the CSV file to write"
     )
     command.add_argument(
+        "--signals",
+        choices=("listing", "recorded"),
+        help="how the network is integrated, instead of the scenario's cpg.signals: forward Euler "
+        "as in the thesis's listing, or accurately",
+    )
+    command.add_argument("--unit", choices=("lbf", "N"), default="lbf", help="default: lbf")
+    command.add_argument(
+        "--rate", metavar="HZ", type=arguments.rate, help="samples per second (default: 2000)"
+    )
+    command.add_argument(
         "--raw",
         action="store_true",
         help="write y_extensor - y_flexor: no gain, and no zeros before the start-up time",
-    )
-    command.add_argument(
-        "--listing",
-        action="store_true",
-        help="step the network as the thesis's listing does: forward Euler, 0.5 ms",
     )
     command.set_defaults(run=_cpg)
 
@@ -165,8 +170,10 @@ def _cpg(options: argparse.Namespace) -> None:
     from tetra_drake.robot.signals import save_signals
 
     scenario = load_scenario(options.scenario)
+    if options.signals:
+        scenario.cpg.signals = options.signals
     gait = _gait(options, scenario)
-    save_signals(options.out, scenario, gait, raw=options.raw, listing=options.listing)
+    save_signals(options.out, scenario, gait, unit=options.unit, rate=options.rate, raw=options.raw)
 
 
 def _add_diagram(commands: argparse._SubParsersAction) -> None:

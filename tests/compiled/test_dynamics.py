@@ -15,7 +15,7 @@ from tetra_drake.engines.compiled.dynamics import (
     move_bodies,
 )
 from tetra_drake.engines.compiled.engine import make_robot
-from tetra_drake.physics.ground import MODE_COLUMNS, update_modes
+from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.kinematics import node_motion
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure, Structure

@@ -12,21 +12,19 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, ContactModel, C
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from tetra_drake.physics.ground import (
+from tetra_drake.physics.contact import (
     CONTACT,
     MODE,
     MODE_COLUMNS,
-    STICK,
     STICK_POINT,
     first_zero,
-    friction_force,
     ground_forces,
     mode_margin,
-    next_friction_mode,
     normal_force,
     time_to_mode_change,
     update_modes,
 )
+from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
 from tetra_drake.physics.kinematics import node_motion
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario

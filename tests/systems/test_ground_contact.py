@@ -11,7 +11,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from tetra_drake.physics.ground import CONTACT, MODE, MODE_COLUMNS, STICK
+from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS
+from tetra_drake.physics.friction import STICK
 from tetra_drake.robot.bodies import AddTetrahedra
 from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
 from tetra_drake.scenario.schema import Scenario

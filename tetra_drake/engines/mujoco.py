@@ -22,7 +22,7 @@ import numpy as np
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.signals import even_samples
+from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.structure import BOTTOM_LEFT, MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
@@ -173,7 +173,7 @@ def walk_in_mujoco(gait: Gait, *, scenario: Scenario, integrator: str, step: flo
 def control_signals(scenario: Scenario, gait: Gait, *, step: float, steps: int) -> np.ndarray:
     """(steps, driven cables): the motors' forces in N at the start of each step."""
     structure = MakeStructure(scenario.robot, scenario.cables)
-    samples = even_samples(scenario, gait)
+    samples = signal_samples(scenario, gait)
     times = step * np.arange(steps)
     grid = scenario.cpg.listing_step * np.arange(len(samples))
     signals = np.column_stack([np.interp(times, grid, column) for column in samples.T])

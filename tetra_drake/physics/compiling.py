@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Callable
+import inspect
+import re
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -27,16 +29,36 @@ def compiled(function: F, *, nogil: bool = False) -> F:
     if not hasattr(kernel, "_cache"):  # compilation is switched off (NUMBA_DISABLE_JIT)
         return cast(F, kernel)
     # Numba looks for changes in the kernel's own file only; what it calls is compiled into it.
-    kernel._cache._cache_file._source_stamp = _stamp_of_all_kernels()
+    kernel._cache._cache_file._source_stamp = source_stamp(inspect.getfile(function))
     return cast(F, kernel)
 
 
+def source_stamp(file: str) -> str:
+    """A digest of a module's source and of all modules of its package that it imports."""
+    seen: set[Path] = set()
+    pending = [Path(file).resolve()]
+    while pending:
+        path = pending.pop()
+        if path not in seen:
+            seen.add(path)
+            pending += _imported(path)
+    return hashlib.sha256(b"".join(sorted(path.read_bytes() for path in seen))).hexdigest()
+
+
 @functools.cache
-def _stamp_of_all_kernels() -> str:
-    """Changes with any source file that holds kernels."""
-    package = Path(__file__).parent.parent
-    digest = hashlib.sha256()
-    for folder in ("physics", "engines/compiled"):
-        for source in sorted((package / folder).glob("*.py")):
-            digest.update(source.read_bytes())
-    return digest.hexdigest()
+def _imported(path: Path) -> tuple[Path, ...]:
+    """The files of the modules of its own package that a module's source names in imports."""
+    root = path.parent
+    while (root.parent / "__init__.py").is_file():
+        root = root.parent
+    names = re.findall(
+        rf"^\s*(?:from|import)\s+({root.name}(?:\.\w+)+)", path.read_text(encoding="utf-8"), re.M
+    )
+    return tuple(_files(root.parent, names))
+
+
+def _files(folder: Path, names: list[str]) -> Iterator[Path]:
+    for name in names:
+        file = folder.joinpath(*name.split(".")).with_suffix(".py")
+        if file.is_file():
+            yield file

@@ -156,9 +156,9 @@ def _best_gait(best: Walk, seconds: str) -> dict[str, Any]:
         "file": f"{trial_folder(Path(), best.trial) / BEST_GAIT}",
         "facts": [
             ("fitness", number(best.result.fitness)),
-            ("steady distance", f"{number(metrics.steady_distance_in)} in"),
-            ("heading error", f"{metrics.heading_error_in:.2g} in"),
-            ("lateral drift", f"{metrics.lateral_drift_in:.2g} in"),
+            ("steady distance", f"{number(metrics.in_inches()['steady_distance_in'])} in"),
+            ("twist", f"{metrics.in_inches()['twist_in']:.2g} in"),
+            ("lateral drift", f"{metrics.in_inches()['lateral_drift_in']:.2g} in"),
         ],
         "parameters": [*_weight_columns(weights), _column("τ_A, τ_B", taus)],
     }

@@ -59,12 +59,12 @@ def versions() -> dict[str, str]:
 
 
 def result_to_json(scenario: Scenario, gait: Gait, result: SimulationResult) -> dict[str, Any]:
-    """The content of result.json. Lengths in inches, times in s."""
-    metrics = dataclasses.asdict(result.metrics)
+    """The content of result.json: metrics in SI, lengths in inches beside them, times in s."""
     return {
         "schema": SCHEMA,
         "scenario": scenario.name,
-        **metrics,
+        "metrics": dataclasses.asdict(result.metrics),
+        **result.metrics.in_inches(),
         "fitness": result.fitness,
         "duration_s": result.duration,
         "wall_time_s": result.wall_time,
@@ -84,18 +84,18 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
 
 def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     """A few lines for the terminal, the thesis's numbers beside ours."""
-    metrics, work = result.metrics, result.integrator
+    inches, work = result.metrics.in_inches(), result.integrator
     after = f"from {scenario.simulation.steady_from:g} s on"
     rows = [
         (
             "distance",
-            f"{metrics.distance_in:8.2f} in",
+            f"{inches['distance_in']:8.2f} in",
             f"thesis: {thesis.BEST_INITIAL_DISTANCE_IN} in the best random gait, "
             f"{thesis.BEST_EVOLVED_DISTANCE_IN} in the best evolved one",
         ),
-        ("steady distance", f"{metrics.steady_distance_in:8.2f} in", after),
-        ("heading error", f"{_tidy(metrics.heading_error_in)} in", "twist about the vertical"),
-        ("lateral drift", f"{_tidy(metrics.lateral_drift_in)} in", ""),
+        ("steady distance", f"{inches['steady_distance_in']:8.2f} in", after),
+        ("twist", f"{_tidy(inches['twist_in'])} in", "x1 - x2: turned about the vertical"),
+        ("lateral drift", f"{_tidy(inches['lateral_drift_in'])} in", ""),
         ("fitness", f"{result.fitness:8.2f}", ""),
     ]
     lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]

@@ -3,6 +3,6 @@
 from tetra_drake.systems.cable_network import CableNetwork
 from tetra_drake.systems.ground_contact import GroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
-from tetra_drake.systems.start_up_timer import StartUpTimer
+from tetra_drake.systems.start_up_gate import StartUpGate
 
-__all__ = ["CableNetwork", "GroundContact", "MatsuokaCpg", "StartUpTimer"]
+__all__ = ["CableNetwork", "GroundContact", "MatsuokaCpg", "StartUpGate"]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort, System
-from pydrake.systems.primitives import Adder, ConstantVectorSource, PortSwitch, TrajectorySource
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import Adder, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.robot.bodies import AddTetrahedra
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.signals import signal_trajectory
+from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.systems import CableNetwork, GroundContact, MatsuokaCpg, StartUpTimer
+from tetra_drake.systems import CableNetwork, GroundContact, MatsuokaCpg, StartUpGate
 
 
 def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
@@ -30,12 +31,15 @@ def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
     builder = DiagramBuilder()
     plant = AddPlant(builder, scenario, structure)
     cpg = AddCpg(builder, scenario, gait)
-    signals = AddStartUp(builder, scenario, cpg.get_output_port(0))
+    gate = builder.AddNamedSystem(
+        "start_up", StartUpGate(scenario.oscillators, start_up=scenario.cpg.start_up)
+    )
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
     ground = AddGround(builder, scenario, structure)
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
 
-    state = plant.get_state_output_port()
+    state, signals = plant.get_state_output_port(), gate.GetOutputPort("signals")
+    builder.Connect(cpg.get_output_port(0), gate.GetInputPort("ungated"))
     builder.Connect(signals, cables.GetInputPort("signals"))
     builder.Connect(state, cables.GetInputPort("state"))
     builder.Connect(state, ground.GetInputPort("state"))
@@ -75,32 +79,10 @@ def AddCpg(builder: DiagramBuilder, scenario: Scenario, gait: Gait) -> System:
     if scenario.cpg.signals == "live":
         cpg: System = MatsuokaCpg(scenario.cpg, gait, oscillators=oscillators)
     else:
-        cpg = TrajectorySource(
-            signal_trajectory(
-                scenario.cpg,
-                gait,
-                oscillators=oscillators,
-                duration=scenario.simulation.duration,
-            )
-        )
+        samples = signal_samples(scenario, gait)
+        times = scenario.cpg.listing_step * np.arange(len(samples))
+        cpg = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))
     return builder.AddNamedSystem("cpg", cpg)
-
-
-def AddStartUp(builder: DiagramBuilder, scenario: Scenario, signals: OutputPort) -> OutputPort:
-    """Adds the switch "start_up", which passes zeros on before the start-up time and the
-    signals afterwards; returns its output port."""
-    size = signals.size()
-    switch = builder.AddNamedSystem("start_up", PortSwitch(size))
-    off, on = switch.DeclareInputPort("off"), switch.DeclareInputPort("on")
-    zeros = builder.AddNamedSystem("no_actuation", ConstantVectorSource(np.zeros(size)))
-    timer = StartUpTimer(
-        start_up=scenario.cpg.start_up, before=off.get_index(), after=on.get_index()
-    )
-    builder.AddNamedSystem("start_up_timer", timer)
-    builder.Connect(timer.GetOutputPort("selector"), switch.get_port_selector_input_port())
-    builder.Connect(zeros.get_output_port(), off)
-    builder.Connect(signals, on)
-    return switch.get_output_port()
 
 
 def AddGround(builder: DiagramBuilder, scenario: Scenario, structure: Structure) -> GroundContact:

@@ -15,8 +15,7 @@ from pydrake.systems.framework import (
     WitnessFunctionDirection,
 )
 
-from tetra_drake.physics.ground import (
-    GROUND,
+from tetra_drake.physics.contact import (
     MODE_COLUMNS,
     STICK_POINT,
     ground_forces,
@@ -25,6 +24,7 @@ from tetra_drake.physics.ground import (
     update_modes,
 )
 from tetra_drake.physics.kinematics import node_motion
+from tetra_drake.robot.model import ground_law
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import FrictionScenario, GroundScenario
 
@@ -52,7 +52,7 @@ class GroundContact(LeafSystem):
     | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along x and y |
     |                   |         |        | (0 sticks, ±1 slips that way), by contact node   |
 
-    Discrete state: the rows of `physics.ground` (contact, modes, stick points), one a node.
+    Discrete state: the rows of `physics.contact` (contact, modes, stick points), one a node.
     In stick the bristle deflection is the way from the stick point, so no integrator has to
     be reset and the system has no continuous state. The modes are frozen within a step, which
     keeps the forces smooth there, and updated at the end of each step; Initialize() sets
@@ -168,20 +168,3 @@ class GroundContact(LeafSystem):
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._rows(context)[:, :STICK_POINT].ravel())
-
-
-def ground_law(ground: GroundScenario, friction: FrictionScenario) -> np.ndarray:
-    """The constants of the ground's laws as `physics.ground` takes them: (1,) of dtype GROUND."""
-    return np.array(
-        [
-            (
-                ground.stiffness,
-                ground.damping,
-                friction.stiction_range,
-                friction.stiction_damping,
-                friction.stiction_switch,
-                friction.proportional_stiction,
-            )
-        ],
-        dtype=GROUND,
-    )

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
-from tetra_drake.physics.oscillator import inhibition_matrix, neuron_rates, oscillator_output
+from tetra_drake.physics.oscillator import neuron_rates, oscillator_output
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.model import initial_state, make_network
 from tetra_drake.scenario.schema import CpgScenario
 
 
@@ -29,18 +30,15 @@ class MatsuokaCpg(LeafSystem):
     | neurons  | (2n,) | 1    | y = max(0, u); neurons 2k, 2k+1: extensor, flexor of the k-th |
 
     Continuous state: u (2n,), then v (2n,), the inner states and the self-inhibitions. It
-    starts at the scenario's initial values. The signals are those of the network from t = 0
-    on; that the cables get none at first is the StartUpTimer's business.
+    starts at the scenario's initial values. The signals are those of the network from t = 0 on;
+    a StartUpGate keeps them from the cables at first.
     """
 
     def __init__(self, cpg: CpgScenario, gait: Gait, *, oscillators: int) -> None:
         super().__init__()
         neurons = 2 * oscillators
-        self._cpg = cpg
-        self._gait = gait
-        self._inhibition = inhibition_matrix(
-            np.array(gait.weights), oscillators=oscillators, partner_weight=cpg.partner_weight
-        )
+        self._gain = cpg.gain
+        self._network = make_network(cpg, gait, oscillators=oscillators)
         self._no_feedback = np.zeros(neurons)
         self._feedback = self.DeclareVectorInputPort("feedback", neurons)
         state = self.DeclareContinuousState(BasicVector(initial_state(cpg, oscillators)))
@@ -60,11 +58,7 @@ class MatsuokaCpg(LeafSystem):
             u,
             v,
             feedback,
-            self._inhibition,
-            self._gait.tau_a,
-            self._gait.tau_b,
-            self._cpg.self_inhibition_weight,
-            self._cpg.external_input,
+            *self._network,
             rates[: u.size],
             rates[u.size :],
         )
@@ -77,14 +71,7 @@ class MatsuokaCpg(LeafSystem):
     def _calc_signals(self, context: Context, output: BasicVector) -> None:
         signals = output.get_mutable_value()
         oscillator_output(self._split(context)[0], signals)
-        signals *= self._cpg.gain
+        signals *= self._gain
 
     def _calc_neurons(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(np.maximum(0.0, self._split(context)[0]))
-
-
-def initial_state(cpg: CpgScenario, oscillators: int) -> np.ndarray:
-    """(4n,): u, then v, of all neurons at t = 0 (Table 4)."""
-    u = np.full(2 * oscillators, cpg.inner_state)
-    v = np.tile([cpg.extensor_self_inhibition, cpg.flexor_self_inhibition], oscillators)
-    return np.concatenate([u, v])

@@ -12,7 +12,8 @@ import numpy as np
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW, add_outer_product
 from tetra_drake.physics.cable import add_cable_forces
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.ground import CONTACT, MODE, STICK, add_ground_forces
+from tetra_drake.physics.contact import CONTACT, MODE, add_ground_forces
+from tetra_drake.physics.friction import STICK
 from tetra_drake.physics.kinematics import (
     MOTION_COLUMNS,
     P_BN_W,
@@ -20,29 +21,9 @@ from tetra_drake.physics.kinematics import (
     gather_forces,
     move_nodes,
 )
+from tetra_drake.robot.model import Model
 
 Array = np.ndarray
-
-
-class Robot(NamedTuple):
-    """A structure and its laws as kernels take them; SI units."""
-
-    p_BN: Array
-    """(nodes a body, 3)."""
-    cables: Array
-    """(cables,) of dtype CABLE, each from a body to the next."""
-    contacts: Array
-    """(contacts,), the indices of the nodes that may touch the ground."""
-    ground: Array
-    """(1,) of dtype GROUND."""
-    slack: bool
-    mass: float
-    """Of a body."""
-    moment: float
-    """Moment of inertia of a body about any axis through its centre of mass."""
-    radius: float
-    """Distance of the nodes from the centre of mass."""
-    gravity: float
 
 
 class Forces(NamedTuple):
@@ -58,7 +39,7 @@ class Forces(NamedTuple):
 
 
 @compiled
-def make_forces(robot: Robot, bodies: int) -> Forces:
+def make_forces(robot: Model, bodies: int) -> Forces:
     """Room for the forces on a robot of this many bodies."""
     nodes, cables, contacts = robot.p_BN.shape[0] * bodies, robot.cables.size, robot.contacts.size
     return Forces(
@@ -74,7 +55,7 @@ def make_forces(robot: Robot, bodies: int) -> Forces:
 
 @compiled
 def compute_forces(
-    robot: Robot, state: Array, modes: Array, signals: Array, forces: Forces
+    robot: Model, state: Array, modes: Array, signals: Array, forces: Forces
 ) -> None:
     """All forces at a state (13 bodies,), gathered body by body, gravity among them.
 
@@ -106,14 +87,14 @@ def compute_forces(
 
 
 @compiled
-def multiply_by_mass(robot: Robot, acceleration: Array, force: Array) -> None:
+def multiply_by_mass(robot: Model, acceleration: Array, force: Array) -> None:
     """The mass matrix times an acceleration; both (6 bodies,)."""
     for i in range(acceleration.size):
         force[i] = acceleration[i] * (robot.moment if i % BLOCK < 3 else robot.mass)
 
 
 @compiled
-def divide_by_mass(robot: Robot, force: Array, acceleration: Array) -> None:
+def divide_by_mass(robot: Model, force: Array, acceleration: Array) -> None:
     """Newton and Euler: dv/dt from forces; both (6 bodies,). Isotropic bodies do not precess."""
     for i in range(force.size):
         acceleration[i] = force[i] / (robot.moment if i % BLOCK < 3 else robot.mass)
@@ -150,7 +131,7 @@ def move_bodies(state: Array, velocities: Array, time: float, moved: Array) -> N
 
 @compiled
 def implicit_matrix(
-    robot: Robot, modes: Array, forces: Forces, time: float, row: Array, rows: Array
+    robot: Model, modes: Array, forces: Forces, time: float, row: Array, rows: Array
 ) -> None:
     """Mass matrix + time * damping matrix + time² * contact stiffness, into `rows` of
     block_tridiagonal.

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import Robot
 from tetra_drake.engines.compiled.walk import (
     DONE,
     STEP_TOO_SMALL,
@@ -24,16 +23,15 @@ from tetra_drake.engines.compiled.walk import (
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import cable_forces
-from tetra_drake.physics.ground import MODE_COLUMNS, STICK_POINT, ground_forces
+from tetra_drake.physics.contact import MODE_COLUMNS, STICK_POINT, ground_forces
 from tetra_drake.results.metrics import compute_fitness, compute_metrics
 from tetra_drake.results.result import IntegratorWork, SimulationResult
 from tetra_drake.results.trajectory import assemble_dataset
-from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import Gait, seeded_gait
-from tetra_drake.robot.signals import even_samples
+from tetra_drake.robot.model import Model, make_model
+from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.systems.ground_contact import ground_law
 
 if TYPE_CHECKING:
     import xarray
@@ -44,7 +42,7 @@ SCHEME = "ros2"
 class Walk(NamedTuple):
     """All arguments of the kernel `walk` for one gait, by its names."""
 
-    robot: Robot
+    robot: Model
     settings: Settings
     actuation: Actuation
     marks: np.ndarray
@@ -116,7 +114,7 @@ def prepare(scenario: Scenario, gait: Gait, structure: Structure, *, record: boo
     marks = np.array(sorted({t for t in times if 0.0 < t <= simulation.duration}))
     rows = math.ceil(simulation.duration / simulation.sample_period) + 3 if record else 0
     return Walk(
-        robot=make_robot(scenario, structure),
+        robot=make_model(scenario, structure),
         settings=Settings(
             tolerance=scenario.compiled.tolerance,
             max_step=scenario.compiled.max_step,
@@ -126,7 +124,7 @@ def prepare(scenario: Scenario, gait: Gait, structure: Structure, *, record: boo
             sample_period=simulation.sample_period,
         ),
         actuation=Actuation(
-            samples=even_samples(scenario, gait),
+            samples=signal_samples(scenario, gait),
             step=scenario.cpg.listing_step,
             start_up=scenario.cpg.start_up,
         ),
@@ -140,30 +138,6 @@ def prepare(scenario: Scenario, gait: Gait, structure: Structure, *, record: boo
             modes=np.empty((rows, contacts, MODE_COLUMNS)),
             signals=np.empty((rows, structure.signals)),
         ),
-    )
-
-
-def make_robot(scenario: Scenario, structure: Structure) -> Robot:
-    """The structure and its laws as the kernels take them."""
-    nodes = len(structure.p_BN)
-    cables = structure.cables
-    if not (cables["node_b"] // nodes == cables["node_a"] // nodes + 1).all():
-        raise ValueError("a cable does not join a body to the next one")
-    inertia = tetrahedron_inertia(structure)
-    mass = inertia.get_mass()
-    moments = mass * inertia.get_unit_inertia().get_moments()
-    if np.ptp(moments) > 1e-12 * moments[0]:
-        raise ValueError("the bodies' inertia is not isotropic")
-    return Robot(
-        p_BN=structure.p_BN,
-        cables=cables,
-        contacts=structure.contacts,
-        ground=ground_law(scenario.ground, scenario.friction),
-        slack=scenario.cables.slack,
-        mass=mass,
-        moment=float(moments[0]),
-        radius=float(np.linalg.norm(structure.p_BN, axis=1).max()),
-        gravity=scenario.robot.gravity,
     )
 
 

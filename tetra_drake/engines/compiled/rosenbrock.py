@@ -25,7 +25,6 @@ import numpy as np
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW, factorise, solve
 from tetra_drake.engines.compiled.dynamics import (
     Forces,
-    Robot,
     compute_forces,
     implicit_matrix,
     make_forces,
@@ -33,6 +32,7 @@ from tetra_drake.engines.compiled.dynamics import (
     multiply_by_mass,
 )
 from tetra_drake.physics.compiling import compiled
+from tetra_drake.robot.model import Model
 
 Array = np.ndarray
 
@@ -53,7 +53,7 @@ class Stages(NamedTuple):
 
 
 @compiled
-def make_stages(robot: Robot, bodies: int) -> Stages:
+def make_stages(robot: Model, bodies: int) -> Stages:
     """Room for the steps of a robot of this many bodies."""
     size = BLOCK * bodies
     return Stages(
@@ -70,7 +70,7 @@ def make_stages(robot: Robot, bodies: int) -> Stages:
 
 @compiled
 def take_step(
-    robot: Robot,
+    robot: Model,
     state: Array,
     modes: Array,
     forces: Forces,

@@ -9,15 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import (
-    Robot,
     compute_forces,
     divide_by_mass,
     make_forces,
 )
 from tetra_drake.engines.compiled.rosenbrock import make_stages, take_step
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.ground import time_to_mode_change, update_modes
+from tetra_drake.physics.contact import time_to_mode_change, update_modes
 from tetra_drake.physics.kinematics import P_WN, move_nodes
+from tetra_drake.robot.model import Model
 
 Array = np.ndarray
 
@@ -101,7 +101,7 @@ def keep(
 
 @functools.partial(compiled, nogil=True)
 def walk(
-    robot: Robot,
+    robot: Model,
     settings: Settings,
     actuation: Actuation,
     marks: Array,
