@@ -3,7 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from analytic import Bowl, small_scenario
+from helpers.analytic import Bowl, small_scenario
 
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.run import evolve

@@ -6,7 +6,7 @@ import io
 import math
 
 import pytest
-from analytic import Bowl, read_record
+from helpers.analytic import Bowl, read_record
 
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution import evaluation

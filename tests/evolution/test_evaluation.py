@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from analytic import read_record, small_scenario
+from helpers.analytic import read_record, small_scenario
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged

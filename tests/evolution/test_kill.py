@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from analytic import Bowl, read_record, small_scenario
+from helpers.analytic import Bowl, read_record, small_scenario
 
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.run import evolve
 
-PROGRAM = Path(__file__).parent / "killed_run.py"
+PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
 
 
 def run_and_kill(directory, executor, *, after=None, sign=signal.SIGKILL, delay=0.006):

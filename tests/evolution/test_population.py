@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from synthetic_run import write_run
+from helpers.synthetic_run import write_run
 
 from tetra_drake.evolution.population import last_population, two_best
 from tetra_drake.evolution.tables import load_run

@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from analytic import Bowl, read_record, small_scenario
+from helpers.analytic import Bowl, read_record, small_scenario
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines

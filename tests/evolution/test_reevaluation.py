@@ -4,7 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import pytest
-from analytic import Bowl
+from helpers.analytic import Bowl
 
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.reevaluation import (

@@ -6,7 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from analytic import Bowl, Deadly, is_deadly, read_record, small_scenario
+from helpers.analytic import Bowl, Deadly, is_deadly, read_record, small_scenario
 
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.genome import genome_of

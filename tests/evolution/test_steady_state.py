@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from analytic import small_scenario
+from helpers.analytic import small_scenario
 
 from tetra_drake.evolution.genome import TAU_A, TAU_B
 from tetra_drake.evolution.optimizers.steady_state import SteadyState

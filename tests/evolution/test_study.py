@@ -3,7 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from synthetic_run import tiny_scenario, write_run
+from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.record import RunRecord

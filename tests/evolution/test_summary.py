@@ -5,8 +5,8 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from analytic import Bowl, small_scenario
-from synthetic_run import write_run
+from helpers.analytic import Bowl, small_scenario
+from helpers.synthetic_run import write_run
 
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.run import evolve

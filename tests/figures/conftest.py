@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import xarray
-from made_up_walk import make_walk
+from helpers.made_up_walk import make_walk
 
 
 @pytest.fixture(scope="session")

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
+from helpers.synthetic_run import PER_DISTANCE, iterations_with_means, tiny_scenario, write_run
 from matplotlib.container import BarContainer, ErrorbarContainer
-from synthetic_run import PER_DISTANCE, iterations_with_means, tiny_scenario, write_run
 
 from tetra_drake import thesis
 from tetra_drake.evolution.tables import load_run

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 import pytest
-from synthetic_run import tiny_scenario, write_run
+from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate

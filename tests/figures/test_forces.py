@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from made_up_walk import LOAD, PERIOD, make_walk
+from helpers.made_up_walk import LOAD, PERIOD, make_walk
 
 from tetra_drake.figures.forces import figure_19_signal_and_tension, figure_20_ground_forces
 from tetra_drake.figures.style import save_figure

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from made_up_walk import PERIOD, SPEED, make_walk
+from helpers.made_up_walk import PERIOD, SPEED, make_walk
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure

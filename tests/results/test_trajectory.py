@@ -29,7 +29,7 @@ def recorded(scenario: Scenario, data: Path, *, duration: float) -> xarray.Datas
 
 @pytest.fixture(scope="module")
 def trajectory() -> xarray.Dataset:
-    return recorded(load_scenario("thesis"), Path(__file__).parent / "data", duration=3.0)
+    return recorded(load_scenario("thesis"), Path(__file__).parents[1] / "data", duration=3.0)
 
 
 def test_every_variable_has_a_unit_and_named_dimensions(trajectory: xarray.Dataset) -> None:

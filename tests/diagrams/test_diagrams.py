@@ -15,7 +15,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.schema import Scenario
 
-DIAGRAMS = Path(__file__).parent.parent / "diagrams"
+DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 
 
 def load_script(name: str) -> ModuleType:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from changes import with_changes
+from helpers.changes import with_changes
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
 from tetra_drake.engines.compiled.dynamics import (

@@ -11,8 +11,8 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from meshcat_page import read_page
-from synthetic_run import tiny_scenario, write_run
+from helpers.meshcat_page import read_page
+from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import make_parser
 from tetra_drake.evolution.study import Study, study_run

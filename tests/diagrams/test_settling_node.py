@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from integral import integral
+from helpers.integral import integral
 
 from tetra_drake.parts.settling_node import IMPACT_SPEED, bounce, first_contact, settle
 from tetra_drake.parts.single_tetrahedron import weight

@@ -4,8 +4,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from analytic import Bowl, small_scenario
-
+from helpers.analytic import Bowl, small_scenario
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.record import MANIFEST, RunRecord
 from tetra_drake.evolution.run import evolve

@@ -4,7 +4,7 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from synthetic_run import tiny_scenario, write_run
+from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.tables import load_run

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from integral import integral
+from helpers.integral import integral
 
 from tetra_drake.parts.single_tetrahedron import Motion, weight
 from tetra_drake.parts.sliding_tetrahedron import INITIAL_SPEED, flights, slide, slips, travel

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from changes import with_changes
+from helpers.changes import with_changes
 
 from tetra_drake.benchmark.work_precision import CONVERGED
 from tetra_drake.engines.compiled.engine import make_robot, prepare

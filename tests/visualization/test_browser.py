@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import xarray
+from helpers.meshcat_page import unpack
 from matplotlib.colors import hex2color, rgb_to_hsv
 from matplotlib.image import imread
-from meshcat_page import unpack
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
@@ -38,7 +38,7 @@ from tetra_drake.visualization.scene import COLOURS, body_poses
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-DIAGRAMS = Path(__file__).parent.parent / "diagrams"
+DIAGRAMS = Path(__file__).parents[2] / "diagrams"
 _spec = importlib.util.spec_from_file_location("still", DIAGRAMS / "still.py")
 assert _spec is not None and _spec.loader is not None
 still = importlib.util.module_from_spec(_spec)

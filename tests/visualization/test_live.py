@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 import xarray
-from meshcat_page import commands, unpack
+from helpers.meshcat_page import commands, unpack
 from pydrake.geometry import Meshcat, MeshcatParams
 
 from tetra_drake.engines.simulate import simulate

@@ -1,8 +1,8 @@
 """What the tests of the experiment's tables start from."""
 
 import pytest
-from made_up_analysis import write_analysis
-from synthetic_run import tiny_scenario, write_run
+from helpers.made_up_analysis import write_analysis
+from helpers.synthetic_run import tiny_scenario, write_run
 
 INITIAL = [(8.0, 0), (-4.0, 1), (None, 2)]
 """A trial's initial population: its best goes 4 in, one of the two that walk goes backward."""

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from synthetic_run import tiny_scenario
+from helpers.synthetic_run import tiny_scenario
 
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.genome import random_genome

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray
-from made_up_walk import HEIGHT, PERIOD, SPEED, make_walk
+from helpers.made_up_walk import HEIGHT, PERIOD, SPEED, make_walk
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.results.measures import (

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from meshcat_page import commands, read_page, unpack
+from helpers.meshcat_page import commands, read_page, unpack
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 
