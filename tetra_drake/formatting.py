@@ -1,0 +1,44 @@
+"""Numbers, durations, lists and tables as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+
+def fixed(value: float, digits: int = 2) -> str:
+    """A number with this many decimals; "-" where it is not finite, never "-0.00"."""
+    if not math.isfinite(value):
+        return "-"
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def signed(value: float, digits: int = 2) -> str:
+    """As fixed(), with a plus sign before positive numbers."""
+    text = fixed(value, digits)
+    return f"+{text}" if math.isfinite(value) and float(text) > 0.0 else text
+
+
+def duration(seconds: float) -> str:
+    """A time as h:mm:ss; "-" where it is not finite."""
+    if not math.isfinite(seconds):
+        return "-"
+    minutes, second = divmod(round(seconds), 60)
+    hour, minute = divmod(minutes, 60)
+    return f"{hour}:{minute:02d}:{second:02d}"
+
+
+def listed(items: Sequence[object]) -> str:
+    """Items separated by commas, the last one by "and"; "none" if there are none."""
+    *head, last = [str(item) for item in items] or ["none"]
+    return f"{', '.join(head)} and {last}" if head else last
+
+
+def markdown_table(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], text_columns: Sequence[int] = (0,)
+) -> str:
+    """A Markdown table, without a line feed at its end; columns other than `text_columns` are
+    aligned to the right."""
+    rule = ["---" if i in text_columns else "---:" for i in range(len(headings))]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in [headings, rule, *rows])
