@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from tetra_drake import thesis
-from tetra_drake.figures.contact import figure_05_settling, figure_06_sliding
 from tetra_drake.figures.evolution import (
     figure_16_initial_distances,
     figure_17_initial_fitness,
@@ -26,13 +25,8 @@ from tetra_drake.figures.motion import (
     figure_18_before_and_after,
     figure_21_one_step,
 )
-from tetra_drake.figures.oscillators import figure_09_time_constants, figure_10_weights
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
-from tetra_drake.parts.settling_node import bounce, settle
-from tetra_drake.parts.single_oscillator import oscillations_by_factor, oscillations_by_weight
-from tetra_drake.parts.sliding_tetrahedron import slide
-from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     import xarray
@@ -63,7 +57,6 @@ def draw_run(study: Study, folder: Path) -> list[Picture]:
     Raises InputError if the folder cannot be written to.
     """
     pictures = [
-        *_of_scenario(study.run.manifest.scenario),
         *_of_walk(study.best.trajectory),
         *_of_evolution(study),
     ]
@@ -78,8 +71,7 @@ def draw_recording(recording: Recording, folder: Path) -> list[Picture]:
 
     Raises InputError if the folder cannot be written to.
     """
-    pictures = [*_of_scenario(recording.scenario), *_of_walk(recording.trajectory)]
-    return _save(pictures, folder)
+    return _save(list(_of_walk(recording.trajectory)), folder)
 
 
 def _save(pictures: list[Picture], folder: Path) -> list[Picture]:
@@ -98,38 +90,6 @@ def _draw(
         caption=caption,
         thesis=thesis,
         figure=draw(*data, **options),
-    )
-
-
-def _of_scenario(scenario: Scenario) -> Iterator[Picture]:
-    """Parts of the robot alone, under the scenario's laws."""
-    yield _draw(
-        figure_05_settling,
-        settle(scenario),
-        bounce(scenario),
-        caption="A tetrahedron let go just above the ground: height and normal force of one node.",
-        thesis=f"impact at about {thesis.SETTLING_IMPACT_SPEED_IN_S:g} in/s, "
-        f"restitution {thesis.SETTLING_RESTITUTION:g}",
-    )
-    yield _draw(
-        figure_06_sliding,
-        slide(scenario),
-        stiction_range=scenario.friction.stiction_range,
-        caption="A tetrahedron thrown forward on the ground: two of its nodes break free of "
-        "stiction, slip and stick again.",
-        thesis="the same course, without numbers",
-    )
-    yield _draw(
-        figure_09_time_constants,
-        oscillations_by_factor(scenario),
-        caption="The signal of a single oscillator for some ratios of its time constants.",
-        thesis="like a sine for τ_B = 2 τ_A",
-    )
-    yield _draw(
-        figure_10_weights,
-        oscillations_by_weight(scenario),
-        caption="The signal of a single oscillator for some weights between its two neurons.",
-        thesis=f"like a sine for a weight of 1.5, at about {thesis.OSCILLATOR_FREQUENCY_HZ:g} Hz",
     )
 
 
