@@ -8,13 +8,14 @@ import numpy as np
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram, EventStatus
 
+from tetra_drake.engines.recorder import Recorder, Sample, make_dataset
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.metrics import compute_fitness, compute_metrics
 from tetra_drake.results.result import IntegratorWork, SimulationResult
-from tetra_drake.results.trajectory import Recorder, Sample, make_dataset
+from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
+from tetra_drake.robot.structure import MakeStructure, node_positions
 from tetra_drake.scenario.schema import Scenario, SimulationScenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -29,27 +30,44 @@ def simulate_drake(
     *, scenario: Scenario, gait: Gait, record: bool = False, viewer: Viewer | None = None
 ) -> SimulationResult:
     """Simulates a gait as simulate() does, on the Drake diagram."""
+    settings = scenario.simulation
     diagram = MakeTensegrityDiagram(scenario, gait)
     structure = MakeStructure(scenario.robot, scenario.cables)
-    simulator = MakeSimulator(diagram, scenario.simulation)
-    recorder = Recorder(scenario.simulation.sample_period) if record else None
-    watch = _Watch(diagram, simulator, structure, scenario.simulation, recorder, viewer)
-    simulator.set_monitor(watch.after_step)
+    simulator = MakeSimulator(diagram, settings)
+    guard = _Guard(diagram, simulator, settings)
+    aimer = _StepAimer(diagram, simulator, settings)
+    recorder = Recorder(sample_times(settings.duration, settings.sample_period))
 
-    times = (0.0, scenario.simulation.steady_from, scenario.simulation.duration)
+    def after_step(context: Context) -> EventStatus:
+        # What is done here must not depend on whether somebody records or watches.
+        if guard.check(context) is not None:
+            return EventStatus.ReachedTermination(diagram, "the simulation has failed")
+        aimer.aim(context)
+        if record:
+            recorder.after_step(context)
+        if viewer is not None and viewer.wants(context.get_time()):
+            viewer.show(make_dataset(diagram, structure, [Sample.of(context)]))
+        return EventStatus.Succeeded()
+
+    simulator.set_monitor(after_step)
     started = time.perf_counter()
-    start, steady, end = (watch.advance_to(t) for t in times)
+    positions = []
+    for instant in (0.0, settings.steady_from, settings.duration):
+        guard.advance_to(instant)
+        state = diagram.GetOutputPort("state").Eval(simulator.get_context())
+        positions.append(node_positions(structure, state))
     wall_time = time.perf_counter() - started
 
+    start, steady, end = positions
     metrics = compute_metrics(structure, start=start, steady=steady, end=end)
     return SimulationResult(
         metrics=metrics,
         fitness=compute_fitness(metrics, scenario.fitness),
-        duration=scenario.simulation.duration,
+        duration=settings.duration,
         wall_time=wall_time,
-        integrator=_integrator_work(simulator.get_integrator(), scenario.simulation),
+        integrator=_integrator_work(simulator.get_integrator(), settings),
         engine="drake",
-        trajectory=make_dataset(diagram, structure, recorder.samples()) if recorder else None,
+        trajectory=recorder.dataset(diagram, structure) if record else None,
     )
 
 
@@ -67,88 +85,78 @@ def MakeSimulator(diagram: Diagram, settings: SimulationScenario) -> Simulator:
     return simulator
 
 
-class _Watch:
-    """Looks on after every step: ends what has failed, aims the next step, records, shows."""
+class _Guard:
+    """Ends a simulation that has failed, with the reason."""
 
     def __init__(
-        self,
-        diagram: Diagram,
-        simulator: Simulator,
-        structure: Structure,
-        settings: SimulationScenario,
-        recorder: Recorder | None,
-        viewer: Viewer | None,
+        self, diagram: Diagram, simulator: Simulator, settings: SimulationScenario
     ) -> None:
-        self._diagram = diagram
         self._simulator = simulator
-        self._integrator = simulator.get_mutable_integrator()
-        self._structure = structure
+        self._integrator = simulator.get_integrator()
         self._settings = settings
-        self._recorder = recorder
-        self._viewer = viewer
+        self._state = diagram.GetOutputPort("state")
+        self._failure: SimulationFailure | None = None
+
+    def advance_to(self, time: float) -> None:
+        """Simulates up to `time` (s); raises Diverged or StepBudgetExceeded."""
+        try:
+            self._simulator.AdvanceTo(time)
+        except RuntimeError as error:
+            # Drake's own reasons: a step below the least, a state that is not finite.
+            now, reason = self._simulator.get_context().get_time(), str(error).strip()
+            raise Diverged(time=now, reason=reason.splitlines()[0]) from error
+        if self._failure is not None:
+            raise self._failure
+
+    def check(self, context: Context) -> SimulationFailure | None:
+        """Why the simulation has failed; None if it has not."""
+        settings, time = self._settings, context.get_time()
+        state = self._state.Eval(context)
+        v_WB = state[state.size // 13 * 7 :].reshape(-1, 6)[:, 3:]
+        speed = np.abs(v_WB).max()
+        used = self._integrator.get_num_derivative_evaluations()
+        if not speed <= settings.max_speed:
+            reason = f"a body moves at {speed:g} m/s, the limit is {settings.max_speed:g} m/s"
+            self._failure = Diverged(time=time, reason=reason)
+        elif used > settings.max_evaluations:
+            reason = f"{used} derivative evaluations, the budget is {settings.max_evaluations}"
+            self._failure = StepBudgetExceeded(time=time, reason=reason)
+        return self._failure
+
+
+class _StepAimer:
+    """Lets steps end where the next mode change is predicted, if that is near.
+
+    The prediction takes the mean acceleration of the last step, which costs nothing.
+    """
+
+    def __init__(
+        self, diagram: Diagram, simulator: Simulator, settings: SimulationScenario
+    ) -> None:
+        self._integrator = simulator.get_mutable_integrator()
+        self._settings = settings
         self._ground = diagram.GetSubsystemByName("ground")
         self._ground_context = self._ground.GetMyContextFromRoot(simulator.get_mutable_context())
         self._state = diagram.GetOutputPort("state")
-        bodies = len(structure.bodies)
-        self._velocities = slice(7 * bodies, 13 * bodies)
         self._aims = (
             settings.mode_changes == "step_end"
             and settings.look_ahead > 0.0
             and settings.scheme in _IMPLICIT_SCHEMES
         )
         self._last_time = 0.0
-        self._last_velocities = np.zeros(6 * bodies)
-        self._acceleration = np.zeros(6 * bodies)
-        self._failure: SimulationFailure | None = None
+        self._last_velocities = self._acceleration = np.zeros(0)
 
-    def advance_to(self, time: float) -> np.ndarray:
-        """Simulates up to `time` (s); the positions p_WN (nodes, 3) in m there."""
-        context = self._simulator.get_context()
-        try:
-            self._simulator.AdvanceTo(time)
-        except RuntimeError as error:
-            # Drake's own reasons: a step below the least, a state that is not finite.
-            raise Diverged(time=context.get_time(), reason=_first_sentence(error)) from error
-        if self._failure is not None:
-            raise self._failure
-        return node_positions(self._structure, self._state.Eval(context))
-
-    def after_step(self, context: Context) -> EventStatus:
-        """The simulator's monitor; it must not depend on who records or watches."""
-        state = self._state.Eval(context)
-        self._failure = self._find_failure(context.get_time(), state)
-        if self._failure is not None:
-            return EventStatus.ReachedTermination(self._diagram, self._failure.reason)
-        if self._aims:
-            self._aim_next_step(context.get_time(), state[self._velocities])
-        if self._recorder is not None:
-            self._recorder.after_step(context)
-        if self._viewer is not None and self._viewer.wants(context.get_time()):
-            frame = make_dataset(self._diagram, self._structure, [Sample.of(context)])
-            self._viewer.show(frame)
-        return EventStatus.Succeeded()
-
-    def _find_failure(self, time: float, state: np.ndarray) -> SimulationFailure | None:
-        settings = self._settings
-        v_WB = state[self._velocities].reshape(-1, 6)[:, 3:]
-        speed = np.abs(v_WB).max()
-        if not speed <= settings.max_speed:
-            limit = f"the limit of {settings.max_speed:g} m/s"
-            return Diverged(time=time, reason=f"a body's velocity of {speed:g} m/s exceeds {limit}")
-        used = self._integrator.get_num_derivative_evaluations()
-        if used > settings.max_evaluations:
-            limit = f"the budget of {settings.max_evaluations}"
-            return StepBudgetExceeded(time=time, reason=f"{used} derivative evaluations, {limit}")
-        return None
-
-    def _aim_next_step(self, time: float, velocities: np.ndarray) -> None:
-        """Lets the next step end where the next mode change is predicted, if that is near.
-
-        The prediction takes the mean acceleration of the last step, which costs nothing.
-        """
+    def aim(self, context: Context) -> None:
+        """Limits the next step; call it after each step."""
+        if not self._aims:
+            return
+        time, state = context.get_time(), self._state.Eval(context)
+        velocities = state[state.size // 13 * 7 :]
         step_taken = time - self._last_time
         if step_taken > 0.0:
             self._acceleration = (velocities - self._last_velocities) / step_taken
+        elif not self._acceleration.size:
+            self._acceleration = np.zeros(velocities.size)
         self._last_time, self._last_velocities = time, velocities
         horizon = self._settings.max_step
         predicted = self._ground.TimeToModeChange(
@@ -170,7 +178,3 @@ def _integrator_work(integrator: IntegratorBase, settings: SimulationScenario) -
             statistics.get("integrator_num_derivative_evaluations_for_jacobian", 0)
         ),
     )
-
-
-def _first_sentence(error: Exception) -> str:
-    return str(error).strip().splitlines()[0]

@@ -109,3 +109,43 @@ def gather_forces(motion: Array, node_force: Array, generalized_force: Array) ->
         generalized_force[g + 3] = f_x
         generalized_force[g + 4] = f_y
         generalized_force[g + 5] = f_z
+
+
+@compiled
+def interpolate_state(
+    before: Array, after: Array, step: float, part: float, between: Array
+) -> None:
+    """A state (13 bodies,) within a step, at `part` (0 to 1) of its length `step` (s).
+
+    Positions follow the cubic polynomial that has the velocities of both ends; velocities are
+    linear. `between` is written; at part 1 it equals `after`.
+    """
+    bodies = before.size // 13
+    between[:] = after
+    if part == 1.0:
+        return
+    rest = 1.0 - part
+    from_before = (1.0 + 2.0 * part) * rest * rest
+    rate_before = step * part * rest * rest
+    rate_after = -step * part * part * rest
+    for body in range(bodies):
+        q, v = 7 * body, 7 * bodies + 6 * body
+        q_rates = np.zeros((2, 7))
+        for end in range(2):
+            state = before if end == 0 else after
+            w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
+            w_x, w_y, w_z = 0.5 * state[v], 0.5 * state[v + 1], 0.5 * state[v + 2]
+            q_rates[end, 0] = -w_x * x - w_y * y - w_z * z
+            q_rates[end, 1] = w_x * w + w_y * z - w_z * y
+            q_rates[end, 2] = w_y * w + w_z * x - w_x * z
+            q_rates[end, 3] = w_z * w + w_x * y - w_y * x
+            q_rates[end, 4:] = state[v + 3 : v + 6]
+        for k in range(7):
+            between[q + k] = (
+                from_before * before[q + k]
+                + (1.0 - from_before) * after[q + k]
+                + rate_before * q_rates[0, k]
+                + rate_after * q_rates[1, k]
+            )
+        between[q : q + 4] /= np.sqrt((between[q : q + 4] ** 2).sum())
+        between[v : v + 6] = rest * before[v : v + 6] + part * after[v : v + 6]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Callable
@@ -26,7 +25,7 @@ from tetra_drake.physics.cable import cable_forces
 from tetra_drake.physics.contact import MODE_COLUMNS, STICK_POINT, ground_forces
 from tetra_drake.results.metrics import compute_fitness, compute_metrics
 from tetra_drake.results.result import IntegratorWork, SimulationResult
-from tetra_drake.results.trajectory import assemble_dataset
+from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.signals import signal_samples
@@ -74,14 +73,14 @@ def simulate_compiled(
     compile_engine(scenario)
     start = node_positions(structure, prepared.state)
     started = time.perf_counter()
-    status, ended, steps, evaluations, kept = walk(*prepared)
+    status, ended, steps, evaluations = walk(*prepared)
     wall_time = time.perf_counter() - started
     if status != DONE:
         raise _failure(status, ended, scenario)
 
     duration, steady_from = scenario.simulation.duration, scenario.simulation.steady_from
     positions = {0.0: start, **dict(zip(prepared.marks, prepared.positions, strict=True))}
-    trajectory = _dataset(structure, prepared, kept) if record or viewer else None
+    trajectory = _dataset(structure, prepared) if record or viewer else None
     if viewer is not None and trajectory is not None:
         for i, instant in enumerate(trajectory["time"].values):
             if viewer.wants(instant):
@@ -112,7 +111,9 @@ def prepare(scenario: Scenario, gait: Gait, structure: Structure, *, record: boo
     state = structure.initial_state
     times = (scenario.cpg.start_up, simulation.steady_from, simulation.duration)
     marks = np.array(sorted({t for t in times if 0.0 < t <= simulation.duration}))
-    rows = math.ceil(simulation.duration / simulation.sample_period) + 3 if record else 0
+    samples = sample_times(simulation.duration, simulation.sample_period)
+    samples = samples if record else samples[:0]
+    rows = samples.size
     return Walk(
         robot=make_model(scenario, structure),
         settings=Settings(
@@ -121,7 +122,6 @@ def prepare(scenario: Scenario, gait: Gait, structure: Structure, *, record: boo
             look_ahead=scenario.compiled.look_ahead,
             max_speed=simulation.max_speed,
             max_evaluations=simulation.max_evaluations,
-            sample_period=simulation.sample_period,
         ),
         actuation=Actuation(
             samples=signal_samples(scenario, gait),
@@ -133,7 +133,7 @@ def prepare(scenario: Scenario, gait: Gait, structure: Structure, *, record: boo
         modes=np.zeros((contacts, MODE_COLUMNS)),
         positions=np.empty((len(marks), len(structure.node_names), 3)),
         samples=Samples(
-            times=np.empty(rows),
+            times=samples,
             states=np.empty((rows, state.size)),
             modes=np.empty((rows, contacts, MODE_COLUMNS)),
             signals=np.empty((rows, structure.signals)),
@@ -170,9 +170,10 @@ def _failure(status: int, time: float, scenario: Scenario) -> SimulationFailure:
     return kind(time=time, reason=reasons[status])
 
 
-def _dataset(structure: Structure, prepared: Walk, kept: int) -> xarray.Dataset:
+def _dataset(structure: Structure, prepared: Walk) -> xarray.Dataset:
     """The recording with the forces that the kernels find at its states."""
     samples, robot = prepared.samples, prepared.robot
+    kept = samples.times.size
     force = np.empty(6 * len(structure.bodies))
     tensions, lengths = np.empty((2, kept, len(structure.cables)))
     normal = np.empty((kept, len(structure.contacts)))
@@ -186,12 +187,12 @@ def _dataset(structure: Structure, prepared: Walk, kept: int) -> xarray.Dataset:
         ground_forces(state, modes, robot.p_BN, *ground, force, normal[i], friction[i])
     return assemble_dataset(
         structure,
-        times=samples.times[:kept],
-        states=samples.states[:kept],
-        signals=samples.signals[:kept],
+        times=samples.times,
+        states=samples.states,
+        signals=samples.signals,
         tensions=tensions,
         lengths=lengths,
         normal_forces=normal,
         friction_forces=friction,
-        modes=samples.modes[:kept, :, :STICK_POINT],
+        modes=samples.modes[:, :, :STICK_POINT],
     )

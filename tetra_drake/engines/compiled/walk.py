@@ -16,7 +16,7 @@ from tetra_drake.engines.compiled.dynamics import (
 from tetra_drake.engines.compiled.rosenbrock import make_stages, take_step
 from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.contact import time_to_mode_change, update_modes
-from tetra_drake.physics.kinematics import P_WN, move_nodes
+from tetra_drake.physics.kinematics import P_WN, interpolate_state, move_nodes
 from tetra_drake.robot.model import Model
 
 Array = np.ndarray
@@ -42,7 +42,6 @@ class Settings(NamedTuple):
     look_ahead: float
     max_speed: float
     max_evaluations: int
-    sample_period: float
 
 
 class Actuation(NamedTuple):
@@ -55,14 +54,14 @@ class Actuation(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """A recording: states and modes as steps ended; with no rows, nothing is recorded."""
+    """A recording; with no rows, nothing is recorded."""
 
     times: Array
-    """(samples,)."""
+    """(samples,), ascending, from 0 to the end: when to take samples."""
     states: Array
     """(samples, 13 bodies)."""
     modes: Array
-    """(samples, contacts, MODE_COLUMNS): those of the step that ended."""
+    """(samples, contacts, MODE_COLUMNS): those of the step."""
     signals: Array
     """(samples, signals) in N."""
 
@@ -90,13 +89,25 @@ def next_step(error: float, step: float, settings: Settings) -> float:
 
 @compiled
 def keep(
-    samples: Samples, row: int, time: float, state: Array, modes: Array, signals: Array
-) -> None:
-    """Writes a sample."""
-    samples.times[row] = time
-    samples.states[row] = state
-    samples.modes[row] = modes
-    samples.signals[row] = signals
+    samples: Samples,
+    kept: int,
+    before: Array,
+    after: Array,
+    modes: Array,
+    actuation: Actuation,
+    active: bool,
+    time: float,
+    step: float,
+) -> int:
+    """Writes the samples due in the step (s) that ends at `time` (s); how many are written now."""
+    while kept < samples.times.size and samples.times[kept] <= time:
+        due = samples.times[kept]
+        part = 1.0 if due == time else (due - (time - step)) / step
+        interpolate_state(before, after, step, part, samples.states[kept])
+        samples.modes[kept] = modes
+        signals_at(actuation, due, active, samples.signals[kept])
+        kept += 1
+    return kept
 
 
 @functools.partial(compiled, nogil=True)
@@ -109,7 +120,7 @@ def walk(
     modes: Array,
     positions: Array,
     samples: Samples,
-) -> tuple[int, float, int, int, int]:
+) -> tuple[int, float, int, int]:
     """Simulates the robot from time 0 to the last mark.
 
     Args:
@@ -117,10 +128,10 @@ def walk(
         state: (13 bodies,), the start; left at the end.
         modes: (contacts, MODE_COLUMNS), zeros; left at the end.
         positions: (marks, nodes, 3), written: p_WN at the marks.
-        samples: written; its first dimension must do for all samples, or be 0.
+        samples: written at its times.
 
     Returns:
-        How it ended, when (s), steps taken, force evaluations, samples written.
+        How it ended, when (s), steps taken, force evaluations.
     """
     bodies = state.size // 13
     first = 7 * bodies
@@ -128,14 +139,12 @@ def walk(
     forces = make_forces(robot, bodies)
     acceleration = np.empty(6 * bodies)
     signals = np.zeros(actuation.samples.shape[1])
-    time, step, due = 0.0, settings.look_ahead, settings.sample_period
+    time, step = 0.0, settings.look_ahead
     steps = evaluations = kept = 0
 
     move_nodes(state, robot.p_BN, forces.motion)
     update_modes(forces.motion, robot.contacts, robot.ground, modes)
-    if samples.times.size > 0:
-        keep(samples, 0, time, state, modes, signals)
-        kept = 1
+    kept = keep(samples, 0, state, state, modes, actuation, False, 0.0, 0.0)
     for mark in range(marks.size):
         active = time >= actuation.start_up
         while time < marks[mark]:
@@ -164,22 +173,19 @@ def walk(
                 error = take_step(robot, state, modes, forces, signals, step, stages)
                 evaluations += 2
                 if evaluations > settings.max_evaluations:
-                    return TOO_MANY_EVALUATIONS, time, steps, evaluations, kept
+                    return TOO_MANY_EVALUATIONS, time, steps, evaluations
                 taken, step = step, next_step(error, step, settings)
                 if not step > LEAST_STEP:
-                    return STEP_TOO_SMALL, time, steps, evaluations, kept
+                    return STEP_TOO_SMALL, time, steps, evaluations
             steps += 1
             time = marks[mark] if taken == remaining else time + taken
+            kept = keep(samples, kept, state, stages.state, modes, actuation, active, time, taken)
             state[:] = stages.state
             for i in range(bodies):
                 for k in range(first + 6 * i + 3, first + 6 * i + 6):
                     if not abs(state[k]) <= settings.max_speed:
-                        return TOO_FAST, time, steps, evaluations, kept
-            if samples.times.size > 0 and (time >= due or time == marks[-1]):
-                keep(samples, kept, time, state, modes, signals)
-                kept += 1
-                due = settings.sample_period * (math.floor(time / settings.sample_period) + 1.0)
+                        return TOO_FAST, time, steps, evaluations
             move_nodes(state, robot.p_BN, forces.motion)
             update_modes(forces.motion, robot.contacts, robot.ground, modes)
         positions[mark] = forces.motion[:, P_WN : P_WN + 3]
-    return DONE, time, steps, evaluations, kept
+    return DONE, time, steps, evaluations
