@@ -1,8 +1,8 @@
-"""What the figures show of a trajectory."""
+"""Quantities derived from a trajectory, on walks of which everything is known."""
 
 from __future__ import annotations
 
-import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -11,25 +11,34 @@ from helpers.made_up_walk import HEIGHT, PERIOD, SPEED, make_walk
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.results.measures import (
-    actuated_cable,
     distance_walked,
+    dominant_frequency,
+    intervals,
     last_step,
     lifted,
     off_ground,
     relative_distances,
     share_of_time,
+    shares_off_ground,
+    signal_frequencies,
 )
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
+
+TIMES = np.linspace(0.0, 15.0, 1501)
+UNEVEN = np.sort(np.concatenate([TIMES, np.linspace(4.0, 5.0, 37)]))
+
+
+@pytest.fixture(scope="module")
+def walk() -> xarray.Dataset:
+    return make_walk()
 
 
 def test_the_walk_of_these_tests_is_like_a_recorded_one(
     walk: xarray.Dataset, scenario: Scenario
 ) -> None:
-    scenario.simulation = dataclasses.replace(scenario.simulation, duration=0.05, steady_from=0.02)
-    result = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True)
-    recorded = result.trajectory
+    scenario.simulation.duration, scenario.simulation.steady_from = 0.05, 0.02
+    recorded = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
     assert recorded is not None
     for name, variable in walk.data_vars.items():
         assert variable.dims == recorded[name].dims
@@ -37,25 +46,13 @@ def test_the_walk_of_these_tests_is_like_a_recorded_one(
         assert walk[name].values.tolist() == recorded[name].values.tolist()
 
 
-def test_distance_walked_counts_from_the_start(walk: xarray.Dataset) -> None:
+def test_distances(walk: xarray.Dataset, scenario: Scenario) -> None:
     later = walk.sel(time=slice(1.0, None))
     np.testing.assert_allclose(distance_walked(later), SPEED * (later.time - 1.0), atol=1e-12)
-
-
-def test_distances_are_those_of_the_centres_from_t1(
-    walk: xarray.Dataset, scenario: Scenario
-) -> None:
-    distances = relative_distances(walk)
-    assert distances.dims == ("time", "tetrahedron")
-    expected = np.broadcast_to(scenario.robot.spacing * np.arange(5), distances.shape)
-    np.testing.assert_allclose(distances, expected, atol=1e-12)
-
-
-def test_the_actuated_cable_of_a_junction_is_driven_by_its_signal(scenario: Scenario) -> None:
-    structure = MakeStructure(scenario.robot, scenario.cables)
-    for signal, junction in enumerate(("T1-T2", "T2-T3", "T3-T4", "T4-T5")):
-        cable = structure.cable_names.index(actuated_cable(junction))
-        assert structure.cables[cable]["signal"] == signal
+    apart = relative_distances(walk)
+    assert apart.dims == ("time", "tetrahedron")
+    expected = np.broadcast_to(scenario.robot.spacing * np.arange(5), apart.shape)
+    np.testing.assert_allclose(apart, expected, atol=1e-12)
 
 
 def test_a_tetrahedron_is_lifted_when_none_of_its_nodes_bears_a_force() -> None:
@@ -73,24 +70,62 @@ def test_a_lead_that_stands_on_its_tip_is_not_lifted(walk: xarray.Dataset) -> No
     assert lifted(touching).sel(tetrahedron="T3").any()
 
 
-def test_share_of_time_is_that_of_the_lift(walk: xarray.Dataset) -> None:
+@pytest.mark.parametrize(
+    ("active", "expected"),
+    [
+        ([0, 0, 1, 1, 0], [(1.0, 4.0)]),  # begins one sample before it shows
+        ([1, 1, 0, 0, 1], [(0.0, 1.0), (4.0, 8.0)]),
+        ([1, 1, 1, 1, 1], [(0.0, 8.0)]),
+        ([0, 0, 0, 0, 0], []),
+    ],
+)
+def test_intervals(active: list[int], expected: list[tuple[float, float]]) -> None:
+    times = np.array([0.0, 1.0, 2.0, 4.0, 8.0])
+    assert intervals(times, np.array(active, dtype=bool)) == expected
+
+
+def test_shares_of_time(walk: xarray.Dataset) -> None:
     periods = walk.sel(time=slice(0.0, 4 * PERIOD))
     share = share_of_time(off_ground(periods).sel(contact="T1 bottom_left"))
     assert share == pytest.approx(0.5, abs=0.01)
     assert share_of_time(off_ground(periods).sel(contact="T5 tip")) == pytest.approx(1.0)
+    late = walk.copy(deep=True)
+    late.normal_force[{"time": walk.time.values >= 8.0}] = 0.1
+    assert shares_off_ground(late, since=8.0) == {f"T{i}": 0.0 for i in range(1, 6)}
+    assert shares_off_ground(late, since=7.0)["T2"] == pytest.approx(0.5, abs=0.01)
 
 
-def test_a_step_is_one_period_of_the_signals_and_ends_late(walk: xarray.Dataset) -> None:
+@pytest.mark.parametrize("times", [TIMES, UNEVEN], ids=["even", "uneven"])
+@pytest.mark.parametrize("hertz", [0.31, 0.53, 0.8])
+def test_the_frequency_is_that_of_the_strongest_sine(hertz: float, times: np.ndarray) -> None:
+    phase = 2.0 * np.pi * hertz * times
+    assert dominant_frequency(times, 3.0 + np.sin(phase)) == pytest.approx(hertz, abs=0.003)
+    both = np.sin(phase) + 0.8 * np.sin(2.0 * phase)
+    assert dominant_frequency(times, both) == pytest.approx(hertz, abs=0.01)
+
+
+@pytest.mark.parametrize("signal", [0.0 * TIMES, 0.7 + 0.0 * TIMES, 1.0 + 1e-9 * np.sin(TIMES)])
+def test_a_constant_has_no_frequency(signal: np.ndarray) -> None:
+    assert math.isnan(dominant_frequency(TIMES, signal))
+
+
+def test_frequencies_of_the_signals(walk: xarray.Dataset) -> None:
+    frequencies = signal_frequencies(walk, since=1.0)
+    assert frequencies == dict.fromkeys(
+        ["T1-T2", "T2-T3", "T3-T4", "T4-T5"], pytest.approx(1.0 / PERIOD, abs=0.01)
+    )
+
+
+def test_the_last_step_is_one_period_and_ends_late(walk: xarray.Dataset) -> None:
     step = last_step(walk)
     assert step is not None
     start, end = step
-    assert end - start == pytest.approx(PERIOD, rel=1e-3)
+    assert end - start == pytest.approx(PERIOD, rel=0.03)
     last = float(walk.time[-1])
     assert last - PERIOD <= end <= last
 
 
-def test_signals_that_do_not_oscillate_make_no_step(walk: xarray.Dataset) -> None:
+def test_without_two_periods_there_is_no_step(walk: xarray.Dataset) -> None:
     assert last_step(walk.assign(signal=0.0 * walk.signal)) is None
-    nearly = 1.0 + 1e-9 * walk.signal
-    assert last_step(walk.assign(signal=nearly)) is None
+    assert last_step(walk.assign(signal=1.0 + 1e-9 * walk.signal)) is None
     assert last_step(make_walk(duration=1.5)) is None

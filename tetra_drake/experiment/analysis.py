@@ -23,9 +23,9 @@ from tetra_drake.evolution.population import genome_columns
 from tetra_drake.evolution.reevaluation import best_gaits
 from tetra_drake.evolution.tables import RunTables, load_run
 from tetra_drake.experiment.variations import resimulations, variations
-from tetra_drake.experiment.walking import shares_off_ground, signal_frequencies
 from tetra_drake.files import write_whole
 from tetra_drake.parts.single_oscillator import TAU_A, frequency, oscillate
+from tetra_drake.results.measures import shares_off_ground, signal_frequencies
 from tetra_drake.results.result import versions
 from tetra_drake.scenario.schema import Scenario
 

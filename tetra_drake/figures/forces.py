@@ -12,8 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from tetra_drake.figures.style import OKABE_ITO, SHADE, common_style, make_figure
-from tetra_drake.intervals import intervals
-from tetra_drake.results.measures import actuated_cable, off_ground, share_of_time
+from tetra_drake.results.measures import actuated_cable, intervals, off_ground, share_of_time
 from tetra_drake.robot.structure import BOTTOM_LEFT, NODES, TIP
 from tetra_drake.scenario.units import POUND_FORCE
 

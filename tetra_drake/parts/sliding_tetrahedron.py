@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.intervals import intervals
 from tetra_drake.parts.single_tetrahedron import Motion, let_go, weight
+from tetra_drake.results.measures import intervals
 from tetra_drake.robot.structure import BASE, BOTTOM_LEFT, TOP
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH

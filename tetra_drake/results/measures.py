@@ -1,36 +1,34 @@
-"""What the figures show of a trajectory (see trajectory.make_dataset), in SI units."""
+"""Quantities derived from a recorded trajectory (see trajectory.assemble_dataset), in SI units."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.intervals import intervals
-from tetra_drake.robot.structure import BOTTOM_LEFT, NODES
+from tetra_drake.robot.structure import BOTTOM_LEFT
 
 if TYPE_CHECKING:
     import xarray
 
 _STEADY = 0.01
-"""A signal that swings by less than this share of its size does not oscillate."""
+"""A signal that swings by less than this share of its largest value does not oscillate."""
+
+_PADDING = 16
+"""Length of a zero-padded signal over its own: how many times finer its spectrum is sampled."""
 
 
 def distance_walked(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """(time,): x1, the way of T1's bottom left node along x since the start, in m."""
+    """(time,): x1, the displacement of T1's bottom left node along x since the start, in m."""
     x = trajectory.p_WN.isel(tetrahedron=0, node=BOTTOM_LEFT).sel(axis="x")
     return x - x.isel(time=0)
 
 
 def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """(time, tetrahedron): x of each tetrahedron's centre of mass from that of T1, in m."""
+    """(time, tetrahedron): x of each tetrahedron's centre of mass less that of T1, in m."""
     x = trajectory.p_WN.sel(axis="x").mean("node")
     return x - x.isel(tetrahedron=0)
-
-
-def actuated_cable(junction: str) -> str:
-    """One of the two cables that the junction's signal drives; the other mirrors it."""
-    return f"{junction} outer {NODES[BOTTOM_LEFT]}"
 
 
 def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:
@@ -47,29 +45,73 @@ def lifted(trajectory: xarray.Dataset) -> xarray.DataArray:
     return xarray.concat([off[:, own.values].all("contact") for own in nodes], dim=bodies).T
 
 
+def intervals(times: np.ndarray, active: np.ndarray) -> list[tuple[float, float]]:
+    """Intervals in which a Boolean signal is true: their starts and ends (s).
+
+    `times` (samples,) in s, ascending; `active` (samples,). A sample holds the modes of the step
+    that ends there, so an interval begins at the sample before the first true one.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(int)))
+    ends = times[np.maximum(edges - 1, 0)]
+    return [(float(a), float(b)) for a, b in ends.reshape(-1, 2)]
+
+
 def share_of_time(active: xarray.DataArray) -> float:
-    """The share of the time, 0 to 1, in which `active` (time,) holds."""
+    """Share of the time, 0 to 1, in which a Boolean signal (time,) is true."""
     times = active.time.values
     length = sum(end - start for start, end in intervals(times, active.values))
     return length / float(times[-1] - times[0])
 
 
-def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:
-    """Start and end (s) of a typical step late in the trajectory, of one period of the signals.
+def shares_off_ground(trajectory: xarray.Dataset, *, since: float) -> dict[str, float]:
+    """Share of the time, 0 to 1, in which each tetrahedron is lifted, from `since` (s) on."""
+    off = lifted(trajectory.sel(time=slice(since, None)))
+    return {str(name): share_of_time(off.sel(tetrahedron=name)) for name in off.tetrahedron.values}
 
-    In the second half of the trajectory, it ends where the signal with the largest swing last
-    rises through its mean, and lasts as long as the median of that signal's periods. None
-    if no signal oscillates there.
+
+def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
+    """Frequency in Hz of the highest peak in the spectrum of a signal (samples,).
+
+    `times` (samples,) in s, ascending; where they are not evenly spaced, the signal is
+    interpolated. NaN for a signal that does not oscillate.
     """
-    times = trajectory.time.values
-    late = trajectory.signal.values[times >= times.mean()]
-    times = times[times >= times.mean()]
-    signal = late[:, np.ptp(late, axis=0).argmax()]
     if np.ptp(signal) <= _STEADY * np.abs(signal).max():
+        return math.nan
+    even = np.linspace(times[0], times[-1], len(times))
+    swing = np.interp(even, times, signal)
+    swing = (swing - swing.mean()) * np.hanning(len(even))
+    spectrum = np.abs(np.fft.rfft(swing, _PADDING * len(even)))
+    frequencies = np.fft.rfftfreq(_PADDING * len(even), even[1] - even[0])
+    return float(frequencies[spectrum.argmax()])
+
+
+def signal_frequencies(trajectory: xarray.Dataset, *, since: float) -> dict[str, float]:
+    """Frequency (Hz) of each junction's signal, from `since` (s) on; see dominant_frequency."""
+    signals = trajectory.signal.sel(time=slice(since, None))
+    return {
+        str(name): dominant_frequency(signals.time.values, signals.sel(junction=name).values)
+        for name in signals.junction.values
+    }
+
+
+def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:
+    """Start and end (s) of one period of the signals, late in the trajectory.
+
+    The period is that of the signal with the largest swing in the second half of the trajectory;
+    the step ends where this signal last rises through its mean. None if no signal oscillates, or
+    if the second half is shorter than two periods.
+    """
+    late = trajectory.signal.sel(time=slice(trajectory.time.values.mean(), None))
+    times, signal = late.time.values, late.values[:, np.ptp(late.values, axis=0).argmax()]
+    frequency = dominant_frequency(times, signal)
+    if not frequency * (times[-1] - times[0]) >= 2.0:
         return None
     y = signal - signal.mean()
-    i = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
-    crossings = times[i] - y[i] * (times[i + 1] - times[i]) / (y[i + 1] - y[i])
-    if crossings.size < 2:
-        return None
-    return float(crossings[-1] - np.median(np.diff(crossings))), float(crossings[-1])
+    i = int(np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))[-1])
+    end = times[i] - y[i] * (times[i + 1] - times[i]) / (y[i + 1] - y[i])
+    return float(end - 1.0 / frequency), float(end)
+
+
+def actuated_cable(junction: str) -> str:
+    """One of the two cables that the junction's signal drives; the other mirrors it."""
+    return f"{junction} outer bottom_left"
