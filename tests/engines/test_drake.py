@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import pickle
 from pathlib import Path
@@ -14,8 +13,8 @@ from pydrake.systems.analysis import Simulator
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import Diverged, StepBudgetExceeded
-from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
 from tetra_drake.robot.structure import (
     BOTTOM_LEFT,
     BOTTOM_RIGHT,
@@ -28,82 +27,29 @@ from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
-def with_settings(scenario: Scenario, **settings: Any) -> Scenario:
-    """The scenario with other simulation settings."""
-    return dataclasses.replace(
-        scenario, simulation=dataclasses.replace(scenario.simulation, **settings)
-    )
-
-
-def with_signals(scenario: Scenario, signals: str) -> Scenario:
-    return dataclasses.replace(scenario, cpg=dataclasses.replace(scenario.cpg, signals=signals))
-
-
 def shortly(scenario: Scenario, duration: float = 2.0, **settings: Any) -> Scenario:
     """The scenario cut short: the actuation starts at 1.25 s."""
-    return with_settings(scenario, duration=duration, steady_from=0.5 * duration, **settings)
+    changes = {"duration": duration, "steady_from": 0.5 * duration, **settings}
+    return scenario.with_changes({f"simulation.{key}": value for key, value in changes.items()})
 
 
 @pytest.fixture
-def gait(data: Path) -> Gait:
-    return load_gait(data / "gait_e.json", oscillators=4)
-
-
-@pytest.fixture
-def expected(data: Path) -> dict[str, Any]:
-    return json.loads((data / "expected.json").read_text())
-
-
-WELL_CONDITIONED = [f"gait_{letter}" for letter in "bcdefgh"]
-
-
-def distance_error(scenario: Scenario, data: Path, expected: dict[str, Any], name: str) -> float:
-    gait = load_gait(data / f"{name}.json", oscillators=4)
-    result = simulate(scenario=scenario, gait=gait)
-    return result.metrics.distance_in - expected["gaits"][name]["distance_in"]
-
-
-def test_default_settings_agree_with_the_independent_simulation(
-    scenario: Scenario, data: Path, expected: dict[str, Any]
-) -> None:
-    errors = [abs(distance_error(scenario, data, expected, name)) for name in WELL_CONDITIONED]
-    print(dict(zip(WELL_CONDITIONED, np.round(errors, 3), strict=True)))
-    assert np.median(errors) < 0.1
-    assert max(errors) < 0.25
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", WELL_CONDITIONED)
-def test_tight_settings_agree_with_the_independent_simulation(
-    scenario: Scenario, data: Path, expected: dict[str, Any], name: str
-) -> None:
-    tight = with_settings(scenario, scheme="runge_kutta3", accuracy=1e-3)
-    assert abs(distance_error(tight, data, expected, name)) < 0.1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", WELL_CONDITIONED)
-def test_witness_placement_agrees_with_the_independent_simulation(
-    scenario: Scenario, data: Path, expected: dict[str, Any], name: str
-) -> None:
-    exact = with_settings(scenario, mode_changes="witness", accuracy=1e-3)
-    assert abs(distance_error(exact, data, expected, name)) < 0.1
+def gait(scenario: Scenario, data: Path) -> Gait:
+    return load_gait(data / "gait_e.json", scenario)
 
 
 def test_settles_where_the_independent_simulation_does(
-    scenario: Scenario, gait: Gait, expected: dict[str, Any]
+    scenario: Scenario, gait: Gait, data: Path
 ) -> None:
-    still = dataclasses.replace(
-        shortly(scenario, duration=8.0), cpg=dataclasses.replace(scenario.cpg, start_up=100.0)
-    )
+    still = shortly(scenario, duration=8.0, max_step=1e-3).with_changes({"cpg.start_up": 100.0})
     structure = MakeStructure(still.robot, still.cables)
     diagram = MakeTensegrityDiagram(still, gait)
-    simulator = MakeSimulator(diagram, with_settings(still, max_step=1e-3).simulation)
+    simulator = MakeSimulator(diagram, still.simulation)
     simulator.AdvanceTo(8.0)
     context = simulator.get_context()
     p_WN = node_positions(structure, diagram.GetOutputPort("state").Eval(context))
     base = 0.5 * (p_WN[BOTTOM_LEFT::4, 0] + p_WN[BOTTOM_RIGHT::4, 0]) / INCH
-    settled = expected["settled"]
+    settled = json.loads((data / "expected.json").read_text())["settled"]
     np.testing.assert_allclose(np.diff(base), settled["spacing_in"], atol=0.005)
     assert p_WN[16 + TIP, 2] / INCH == pytest.approx(settled["tip5_height_in"], abs=0.005)
     normal = diagram.GetOutputPort("normal_forces").Eval(context) / POUND_FORCE
@@ -136,16 +82,10 @@ def test_a_live_network_walks_as_its_recording_does(scenario: Scenario, gait: Ga
     # One second of actuation at an accuracy of 1e-5: the live network's signals carry the
     # robot's error control, the recording's are exact, so they agree to about that accuracy.
     tight = shortly(scenario, duration=2.25, scheme="runge_kutta3", accuracy=1e-5, max_step=1e-4)
-    live = simulate(scenario=with_signals(tight, "live"), gait=gait)
-    recorded = simulate(scenario=with_signals(tight, "recorded"), gait=gait)
+    live = simulate(scenario=tight.with_changes({"cpg.signals": "live"}), gait=gait)
+    recorded = simulate(scenario=tight.with_changes({"cpg.signals": "recorded"}), gait=gait)
     assert abs(recorded.metrics.distance_in) > 0.05
     assert live.metrics.distance_in == pytest.approx(recorded.metrics.distance_in, abs=2e-3)
-
-
-def test_the_robot_goes_straight_by_its_symmetry(scenario: Scenario, gait: Gait) -> None:
-    metrics = simulate(scenario=scenario, gait=gait).metrics
-    assert metrics.heading_error_in < 1e-3
-    assert metrics.lateral_drift_in < 1e-3
 
 
 def test_a_step_ends_at_the_start_up_jump(scenario: Scenario, gait: Gait) -> None:
@@ -177,19 +117,23 @@ def test_momentum_changes_only_by_the_grounds_forces(scenario: Scenario, gait: G
 def test_energy_is_conserved_without_damping_and_ground(scenario: Scenario, gait: Gait) -> None:
     # Free flight without gravity, cables without damping, no signals: what remains is springs and
     # inertia; the spacing is off balance, so some of the springs' energy turns kinetic.
-    free = dataclasses.replace(
-        scenario,
-        robot=dataclasses.replace(scenario.robot, gravity=0.0, spacing=0.07),
-        cables=dataclasses.replace(scenario.cables, damping=0.0),
-        ground=dataclasses.replace(scenario.ground, stiffness=1e-12, damping=0.0),
-        friction=dataclasses.replace(
-            scenario.friction, stiction_damping=0.0, proportional_stiction=0.0
-        ),
+    free = scenario.with_changes(
+        {
+            "robot.gravity": 0.0,
+            "robot.spacing": 0.07,
+            "cables.damping": 0.0,
+            "ground.stiffness": 1e-12,
+            "ground.damping": 0.0,
+            "friction.stiction_damping": 0.0,
+            "friction.proportional_stiction": 0.0,
+            "simulation.scheme": "runge_kutta3",
+            "simulation.accuracy": 1e-9,
+            "simulation.max_step": 1e-3,
+        }
     )
     structure = MakeStructure(free.robot, free.cables)
     diagram = MakeTensegrityDiagram(free, gait)
-    tight = with_settings(free, scheme="runge_kutta3", accuracy=1e-9, max_step=1e-3)
-    simulator = MakeSimulator(diagram, tight.simulation)
+    simulator = MakeSimulator(diagram, free.simulation)
     plant = diagram.GetSubsystemByName("plant")
 
     def energies() -> tuple[float, float]:
@@ -205,22 +149,25 @@ def test_energy_is_conserved_without_damping_and_ground(scenario: Scenario, gait
     assert kinetic + elastic == pytest.approx(start, abs=1e-4 * kinetic)
 
 
-def test_a_diverging_simulation_says_when_and_why(scenario: Scenario, gait: Gait) -> None:
-    # Explicit Euler at 2 ms is far beyond its stability limit of about 0.15 ms.
-    unstable = shortly(scenario, scheme="explicit_euler", max_step=2e-3)
-    with pytest.raises(Diverged, match=r"failed at t = 0\.\d+ s: .*(velocity|NaN|nan)") as caught:
-        simulate(scenario=unstable, gait=gait)
+@pytest.mark.parametrize(
+    ("settings", "kind"),
+    [
+        # Explicit Euler at 2 ms is far beyond its stability limit of about 0.15 ms.
+        ({"scheme": "explicit_euler", "max_step": 2e-3}, Diverged),
+        ({"max_evaluations": 1000}, StepBudgetExceeded),
+    ],
+)
+def test_a_failed_simulation_says_when_and_why(
+    scenario: Scenario, gait: Gait, settings: dict[str, Any], kind: type[SimulationFailure]
+) -> None:
+    with pytest.raises(kind) as caught:
+        simulate(scenario=shortly(scenario, **settings), gait=gait)
     assert 0.0 < caught.value.time < 2.0
-
-
-def test_a_step_budget_ends_the_simulation(scenario: Scenario, gait: Gait) -> None:
-    with pytest.raises(StepBudgetExceeded, match="1000") as caught:
-        simulate(scenario=shortly(scenario, max_evaluations=1000), gait=gait)
-    assert 0.0 < caught.value.time < 2.0
+    assert caught.value.reason in str(caught.value)
 
 
 @pytest.mark.parametrize("kind", [Diverged, StepBudgetExceeded])
-def test_failures_cross_process_borders(kind: type[Diverged]) -> None:
+def test_failures_cross_process_borders(kind: type[SimulationFailure]) -> None:
     failure = pickle.loads(pickle.dumps(kind(time=1.5, reason="why")))
     assert type(failure) is kind
     assert (failure.time, failure.reason) == (1.5, "why")
@@ -228,19 +175,15 @@ def test_failures_cross_process_borders(kind: type[Diverged]) -> None:
 
 @pytest.mark.parametrize("tetrahedra", [2, 3, 8])
 def test_any_number_of_tetrahedra_walks(scenario: Scenario, tetrahedra: int) -> None:
-    other = shortly(
-        dataclasses.replace(
-            scenario, robot=dataclasses.replace(scenario.robot, tetrahedra=tetrahedra)
-        )
-    )
-    oscillators = tetrahedra - 1
-    weights = tuple(np.linspace(1.0, 3.4, 2 * oscillators * (oscillators - 1)))
-    gait = Gait(name="any", weights=weights, tau_a=0.3, tau_b=0.6)
-    result = simulate(scenario=other, gait=gait, record=True)
+    other = shortly(scenario, duration=4.0).with_changes({"robot.tetrahedra": tetrahedra})
+    result = simulate(scenario=other, gait=seeded_gait(other, 1), record=True)
     assert result.trajectory is not None
     assert result.trajectory.sizes["tetrahedron"] == tetrahedra
     assert result.trajectory.sizes["cable"] == 6 * (tetrahedra - 1)
-    assert abs(result.metrics.distance_in) < 5.0
+    # It settles until 1.25 s and walks after it: every tetrahedron moves to and fro by some
+    # thousandths of an inch at least, which one that stands still does not.
+    x = result.trajectory.p_WB.sel(axis="x", time=slice(2.0, None))
+    assert (np.ptp(x.values, axis=0) > 0.01 * INCH).all()
 
 
 def test_plain_drake_simulates_the_diagram_too(scenario: Scenario, gait: Gait) -> None:

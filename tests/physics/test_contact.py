@@ -26,9 +26,9 @@ from tetra_drake.physics.contact import (
 )
 from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
 from tetra_drake.physics.kinematics import node_motion
+from tetra_drake.robot.model import ground_law
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.systems.ground_contact import ground_law
 
 P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0
 FRICTION = (P0, SIGMA_1, A_C, SIGMA_0)

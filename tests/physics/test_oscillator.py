@@ -1,28 +1,20 @@
-"""The Matsuoka network against the thesis's listing and against its own fixed point."""
+"""The Matsuoka network: Eq. 7 by hand, its fixed point, and the order of its two integrators.
+
+Its agreement with the thesis's listing is tested in tests/robot/test_signals.py.
+"""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tetra_drake.physics.oscillator import inhibition_matrix, neuron_rates, oscillator_output
-from tetra_drake.robot.gait import load_gait
-from tetra_drake.robot.signals import listing_samples
-from tetra_drake.scenario.schema import Scenario
-
-
-@pytest.mark.parametrize("name", ["gait_a", "gait_b", "single_oscillators"])
-def test_stepped_as_the_listing_steps_it_gives_the_listings_output(
-    scenario: Scenario, data: Path, name: str
-) -> None:
-    reference = np.loadtxt(data / f"cpg_{name}.csv", delimiter=",", skiprows=1)
-    gait = load_gait(data / f"{name}.json", oscillators=4)
-    times, output = listing_samples(scenario.cpg, gait, oscillators=4, duration=15.0)
-    rows = np.round(reference[:, 0] / scenario.cpg.listing_step).astype(int)
-    np.testing.assert_allclose(times[rows], reference[:, 0], atol=1e-12)
-    np.testing.assert_allclose(output[rows], reference[:, 1:], rtol=0, atol=1e-9)
+from tetra_drake.physics.oscillator import (
+    inhibition_matrix,
+    listing_output,
+    network_output,
+    neuron_rates,
+    oscillator_output,
+)
 
 
 def test_weights_stand_in_the_listings_order() -> None:
@@ -73,3 +65,22 @@ def test_output_counts_only_firing_neurons() -> None:
     output = np.empty(2)
     oscillator_output(np.array([0.4, -0.3, -0.1, 0.2]), output)
     assert output.tolist() == [0.4, -0.2]
+
+
+@pytest.mark.parametrize(
+    ("integrate", "first_row", "order"), [(listing_output, 1, 1), (network_output, 0, 4)]
+)
+def test_integrators_have_their_order(integrate, first_row: int, order: int) -> None:
+    # While both neurons of one oscillator fire, Eq. 7 is linear, without kinks. Halving the
+    # step then divides the error by 2^order.
+    inhibition = np.array([[0.0, 0.4], [0.4, 0.0]])
+
+    def output_at_the_end(steps: int) -> float:
+        u, v = np.array([0.3, 0.25]), np.array([0.1, 0.12])
+        output = np.empty((steps + 1 - first_row, 1))
+        integrate(u, v, inhibition, 0.3, 0.6, 2.5, 0.5, 0.2 / steps, output)
+        return float(output[-1, 0])
+
+    exact = output_at_the_end(4096)
+    errors = [abs(output_at_the_end(steps) - exact) for steps in (4, 8)]
+    assert errors[0] / errors[1] == pytest.approx(2.0**order, rel=0.15)

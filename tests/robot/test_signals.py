@@ -1,4 +1,4 @@
-"""The signals computed beforehand: the thesis's listing and the converged network."""
+"""The precomputed signals: the thesis's listing, the converged network, and the CSV file."""
 
 from __future__ import annotations
 
@@ -6,84 +6,102 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.robot.gait import load_gait
-from tetra_drake.robot.signals import integrate_network, save_signals, signal_trajectory
+from tetra_drake.robot.signals import raw_output, save_signals, signal_samples
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import POUND_FORCE
+from tetra_drake.systems import MatsuokaCpg
+
+GAITS = ["gait_a", "gait_b", "single_oscillators"]
 
 
-def read(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    table = np.loadtxt(path, delimiter=",", skiprows=1)
-    return table[:, 0], table[:, 1:]
+def reference_output(data: Path, name: str) -> tuple[np.ndarray, np.ndarray]:
+    table = np.loadtxt(data / f"cpg_{name}.csv", delimiter=",", skiprows=1)
+    return np.round(table[:, 0] / 0.5e-3).astype(int), table[:, 1:]
 
 
-@pytest.mark.parametrize("name", ["gait_a", "gait_b", "single_oscillators"])
-def test_error_control_stays_near_the_listing(
-    scenario: Scenario, data: Path, tmp_path: Path, name: str
+@pytest.mark.parametrize("name", GAITS)
+def test_stepped_as_the_listing_steps_it_gives_the_listings_output(
+    scenario: Scenario, data: Path, name: str
 ) -> None:
-    # The difference is the listing's own Euler error: up to 1.4e-2 by 15 s on gait_a. The
-    # listing stamps a state one step early, so its rows belong to the following time here.
-    gait = load_gait(data / f"{name}.json", oscillators=4)
-    save_signals(tmp_path / "s.csv", scenario, gait, raw=True, listing=False)
-    times, signals = read(tmp_path / "s.csv")
-    reference_times, reference = read(data / f"cpg_{name}.csv")
-    rows = np.round(reference_times / scenario.cpg.listing_step).astype(int) + 1
-    np.testing.assert_allclose(times[rows - 1], reference_times, atol=1e-9)
-    error = np.abs(signals[rows] - reference).max(axis=1)
-    assert error[reference_times <= 3.0].max() < 2e-3
+    rows, reference = reference_output(data, name)
+    gait = load_gait(data / f"{name}.json", scenario)
+    output = raw_output(scenario.cpg, gait, oscillators=4, duration=15.0)
+    assert output.shape == (30_000, 4)
+    np.testing.assert_allclose(output[rows], reference, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_the_converged_network_stays_within_the_listings_own_error(
+    scenario: Scenario, data: Path, name: str
+) -> None:
+    # Euler's error reaches 1.4e-2 by 15 s on gait_a. The listing stamps a state one step early.
+    rows, reference = reference_output(data, name)
+    scenario.cpg.signals = "recorded"
+    gait = load_gait(data / f"{name}.json", scenario)
+    output = raw_output(scenario.cpg, gait, oscillators=4, duration=15.0)
+    error = np.abs(output[rows + 1] - reference).max(axis=1)
+    assert error[rows * 0.5e-3 <= 3.0].max() < 2e-3
     assert error.max() < 2e-2
 
 
-def test_the_csv_has_gain_and_start_up_applied_unless_raw(
-    scenario: Scenario, data: Path, tmp_path: Path
-) -> None:
-    gait = load_gait(data / "gait_b.json", oscillators=4)
-    save_signals(tmp_path / "raw.csv", scenario, gait, raw=True, listing=False)
-    save_signals(tmp_path / "lbf.csv", scenario, gait, raw=False, listing=False)
-    header = (tmp_path / "lbf.csv").read_text().splitlines()[0]
-    assert header == "time_s,signal_1,signal_2,signal_3,signal_4"
-    times, raw = read(tmp_path / "raw.csv")
-    _, signals = read(tmp_path / "lbf.csv")
-    assert times[0] == 0.0 and times[-1] == 15.0
-    started = times >= 1.25
-    np.testing.assert_array_equal(signals[~started], 0.0)
-    np.testing.assert_allclose(signals[started], 2.0 * raw[started], atol=1e-11)
-
-
-@pytest.mark.parametrize("signals", ["recorded", "listing"])
-def test_the_trajectory_is_in_newtons_and_covers_the_whole_time(
-    scenario: Scenario, data: Path, signals: str
-) -> None:
-    scenario.cpg.signals = signals
-    gait = load_gait(data / "gait_b.json", oscillators=4)
-    trajectory = signal_trajectory(scenario.cpg, gait, oscillators=4, duration=15.0)
-    assert trajectory.start_time() == 0.0 and trajectory.end_time() == 15.0
-    # Eq. 9 with a gain of 2 lbf: about a pound peak to peak or more, never beyond 2 lbf.
-    values = trajectory.vector_values(np.linspace(2.0, 15.0, 500))
-    assert 0.5 * POUND_FORCE < np.ptp(values) < 2.0 * POUND_FORCE
-
-
-def test_the_recording_loses_nothing_of_the_network(scenario: Scenario, data: Path) -> None:
-    # By Eq. 7 curvature is of the order of the signal over tau_A^2, 1 lbf / (0.1 s)^2 at most
-    # here: between knots 1 ms apart the signal leaves its chord by 100 * 1e-6 / 8 = 1.3e-5 lbf.
-    # Kinks have knots of their own; without, they would add 1e-3 lbf.
+def test_the_recorded_network_is_the_live_network(scenario: Scenario, data: Path) -> None:
+    # Drake's error-controlled integration of the same equations; RK4 in steps of 0.5 ms meets a
+    # kink of max(0, u) between samples, which costs it up to 1e-5.
     scenario.cpg.signals = "recorded"
-    gait = load_gait(data / "gait_b.json", oscillators=4)
-    recording = signal_trajectory(scenario.cpg, gait, oscillators=4, duration=4.0)
-    states = integrate_network(scenario.cpg, gait, oscillators=4, duration=4.0)
-    times = np.sort(np.random.default_rng(3).uniform(0.0, 4.0, 20_000))
-    y = np.maximum(0.0, states.vector_values(times)[:8])
-    exact = scenario.cpg.gain * (y[0::2] - y[1::2])
-    error = np.abs(recording.vector_values(times) - exact).max()
-    assert error / POUND_FORCE < 2e-5
+    gait = load_gait(data / "gait_b.json", scenario)
+    simulator = Simulator(MatsuokaCpg(scenario.cpg, gait, oscillators=4))
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.01).set_target_accuracy(1e-9)
+    samples = signal_samples(scenario, gait)
+    for time in (1.0, 2.5, 7.0):
+        simulator.AdvanceTo(time)
+        live = simulator.get_system().GetOutputPort("signals").Eval(simulator.get_context())
+        found = samples[round(time / scenario.cpg.listing_step)]
+        np.testing.assert_allclose(found, live, atol=1e-4)
 
 
 def test_without_weights_all_oscillators_give_the_same_signal(
     scenario: Scenario, data: Path
 ) -> None:
     scenario.cpg.signals = "recorded"
-    gait = load_gait(data / "single_oscillators.json", oscillators=4)
-    trajectory = signal_trajectory(scenario.cpg, gait, oscillators=4, duration=5.0)
-    values = trajectory.vector_values(np.linspace(0.0, 5.0, 100))
-    np.testing.assert_allclose(values, np.broadcast_to(values[0], values.shape), atol=1e-12)
+    samples = signal_samples(scenario, load_gait(data / "single_oscillators.json", scenario))
+    np.testing.assert_allclose(samples, samples[:, :1] * np.ones(4), atol=1e-12)
+    # Eq. 9 with a gain of 2 lbf: about a pound peak to peak.
+    assert 0.5 * 4.448 < np.ptp(samples[6000:]) < 2.0 * 4.448
+
+
+def read_csv(path: Path) -> tuple[list[str], np.ndarray]:
+    lines = path.read_text().splitlines()
+    assert lines[0].startswith("# ") and "thesis" in lines[0]
+    header = next(line for line in lines if not line.startswith("#"))
+    table = np.loadtxt(path, delimiter=",", skiprows=lines.index(header) + 1)
+    return header.split(","), table
+
+
+def test_the_csv_holds_what_the_cables_are_fed(
+    scenario: Scenario, data: Path, tmp_path: Path
+) -> None:
+    gait = load_gait(data / "gait_b.json", scenario)
+    save_signals(tmp_path / "lbf.csv", scenario, gait)
+    header, table = read_csv(tmp_path / "lbf.csv")
+    assert header == ["time_s", "signal_1", "signal_2", "signal_3", "signal_4"]
+    assert table[0, 0] == 0.0 and table[-1, 0] == 15.0 and len(table) == 30_001
+    started = table[:, 0] >= 1.25
+    fed = signal_samples(scenario, gait)[: len(table)] / 4.4482216152605
+    assert not table[~started, 1:].any()
+    np.testing.assert_allclose(table[started, 1:], fed[started], atol=1e-10)
+
+
+def test_the_csv_comes_in_other_units_and_rates(
+    scenario: Scenario, data: Path, tmp_path: Path
+) -> None:
+    gait = load_gait(data / "gait_b.json", scenario)
+    samples = signal_samples(scenario, gait)
+    save_signals(tmp_path / "newton.csv", scenario, gait, unit="N", rate=100.0)
+    _, newtons = read_csv(tmp_path / "newton.csv")
+    np.testing.assert_allclose(newtons[:, 0], 0.01 * np.arange(1501), atol=1e-9)
+    np.testing.assert_allclose(newtons[200:, 1:], samples[4000:30_001:20], atol=1e-9)
+    save_signals(tmp_path / "raw.csv", scenario, gait, raw=True)
+    _, raw = read_csv(tmp_path / "raw.csv")
+    np.testing.assert_allclose(raw[:, 1:], samples[:30_001] / scenario.cpg.gain, atol=1e-10)

@@ -15,8 +15,8 @@ from tetra_drake.systems import MatsuokaCpg
 
 
 @pytest.fixture
-def gait(data: Path) -> Gait:
-    return load_gait(data / "gait_b.json", oscillators=4)
+def gait(scenario: Scenario, data: Path) -> Gait:
+    return load_gait(data / "gait_b.json", scenario)
 
 
 def test_starts_at_the_values_of_table_4(scenario: Scenario, gait: Gait) -> None:

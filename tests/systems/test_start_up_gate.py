@@ -1,32 +1,28 @@
-"""The timer that starts the actuation."""
+"""The gate that keeps the actuation off at first."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import InputPortIndex
 
-from tetra_drake.systems import StartUpTimer
-
-BEFORE, AFTER = InputPortIndex(1), InputPortIndex(2)
+from tetra_drake.systems import StartUpGate
 
 
-def selected_at(time: float, *, start_up: float) -> InputPortIndex:
-    simulator = Simulator(StartUpTimer(start_up=start_up, before=BEFORE, after=AFTER))
+def signals_at(time: float, *, start_up: float) -> list[float]:
+    gate = StartUpGate(2, start_up=start_up)
+    simulator = Simulator(gate)
+    gate.GetInputPort("ungated").FixValue(simulator.get_mutable_context(), np.array([1.0, -2.0]))
     simulator.Initialize()
     simulator.AdvanceTo(time)
     simulator.AdvancePendingEvents()
-    return simulator.get_system().GetOutputPort("selector").Eval(simulator.get_context())
+    return gate.GetOutputPort("signals").Eval(simulator.get_context()).tolist()
 
 
-@pytest.mark.parametrize(
-    ("time", "selected"), [(0.0, BEFORE), (1.2499, BEFORE), (1.25, AFTER), (15.0, AFTER)]
-)
-def test_selects_the_signals_from_the_start_up_time_on(
-    time: float, selected: InputPortIndex
-) -> None:
-    assert selected_at(time, start_up=1.25) == selected
+@pytest.mark.parametrize(("time", "is_open"), [(0.0, 0), (1.2499, 0), (1.25, 1), (15.0, 1)])
+def test_passes_signals_from_the_start_up_time_on(time: float, is_open: int) -> None:
+    assert signals_at(time, start_up=1.25) == [is_open * 1.0, is_open * -2.0]
 
 
-def test_without_a_start_up_time_the_signals_are_on_at_once() -> None:
-    assert selected_at(0.0, start_up=0.0) == AFTER
+def test_without_a_start_up_time_the_gate_is_open_at_once() -> None:
+    assert signals_at(0.0, start_up=0.0) == [1.0, -2.0]

@@ -3,51 +3,61 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from helpers.changes import with_changes
 
-from tetra_drake.benchmark.work_precision import CONVERGED
-from tetra_drake.engines.compiled.engine import make_robot, prepare
+from tetra_drake.engines.compiled.engine import prepare
 from tetra_drake.engines.compiled.walk import DONE, walk
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import Diverged, StepBudgetExceeded
+from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.robot.gait import load_gait, seeded_gait
+from tetra_drake.robot.model import make_model
 from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
-from tetra_drake.scenario.load import with_engine
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
 
 def finely(scenario: Scenario, *, tetrahedra: int = 5, duration: float) -> Scenario:
     """The scenario with signals from the start, and settings at which both engines have
-    converged, mode changes placed exactly."""
-    return with_changes(
-        scenario,
-        robot={"tetrahedra": tetrahedra},
-        cpg={"start_up": 0.0},
-        simulation={
-            "duration": duration,
-            "steady_from": 0.5 * duration,
-            "scheme": "runge_kutta3",
-            "accuracy": 1e-6,
-            "max_step": 1e-4,
-            "mode_changes": "witness",
-            "witness_window": 1e-8,
-        },
-        compiled={"tolerance": 1e-8, "max_step": 3e-5, "look_ahead": 1e-8},
+    converged, mode changes placed to 1e-8 s."""
+    return scenario.with_changes(
+        {
+            "robot.tetrahedra": tetrahedra,
+            "cpg.start_up": 0.0,
+            "simulation.duration": duration,
+            "simulation.steady_from": 0.5 * duration,
+            "simulation.scheme": "runge_kutta3",
+            "simulation.accuracy": 1e-6,
+            "simulation.max_step": 1e-4,
+            "simulation.mode_changes": "witness",
+            "simulation.witness_window": 1e-8,
+            "compiled.tolerance": 1e-8,
+            "compiled.max_step": 3e-5,
+            "compiled.look_ahead": 1e-8,
+        }
     )
+
+
+SAME_PLACE = 5e-6
+"""Largest difference (m) of node positions on the two engines after 0.5 s.
+
+Each engine places a mode change to 1e-8 s. There friction jumps by up to sigma_1 v, that is
+70 N s/m * 0.05 m/s = 3.5 N on a body of 0.02 kg: a velocity error of 1.75e-6 m/s, and 0.9e-6 m
+after 0.5 s. Some such changes may add up.
+"""
 
 
 def ends(scenario: Scenario, seed: int) -> list[np.ndarray]:
     """Where the nodes are at the end, on the compiled engine and on the diagram."""
     gait, found = seeded_gait(scenario, seed), []
     for engine in ("compiled", "drake"):
-        result = simulate(scenario=with_engine(scenario, engine), gait=gait, record=True)
+        result = simulate(
+            scenario=scenario.with_changes({"simulation.engine": engine}), gait=gait, record=True
+        )
         assert result.trajectory is not None
         found.append(result.trajectory["p_WN"].values[-1])
     return found
@@ -58,12 +68,10 @@ def test_nodes_go_where_the_diagrams_nodes_go(compiled_scenario: Scenario, seed:
     # In 0.5 s the robot settles and starts to walk: some nodes slip, leave the ground, land.
     scenario = finely(compiled_scenario, duration=0.5)
     ours, drakes = ends(scenario, seed)
-    assert np.abs(ours - drakes).max() < 1e-6  # m
-    start = node_positions(
-        MakeStructure(scenario.robot, scenario.cables),
-        MakeStructure(scenario.robot, scenario.cables).initial_state,
-    )
-    assert np.abs(ours.reshape(-1, 3) - start).max() > 1e-3, "the robot has moved"
+    assert np.abs(ours - drakes).max() < SAME_PLACE
+    structure = MakeStructure(scenario.robot, scenario.cables)
+    start = node_positions(structure, structure.initial_state)
+    assert np.abs(ours.reshape(-1, 3) - start).max() > 200 * SAME_PLACE, "the robot has moved"
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 3, 8])
@@ -72,19 +80,7 @@ def test_any_number_of_tetrahedra_goes_where_the_diagrams_goes(
 ) -> None:
     ours, drakes = ends(finely(compiled_scenario, tetrahedra=tetrahedra, duration=0.3), 1)
     assert ours.shape == (tetrahedra, 4, 3)
-    assert np.abs(ours - drakes).max() < 1e-6  # m
-
-
-@pytest.mark.parametrize("letter", "bceg")
-def test_distances_are_those_of_the_independent_simulation(
-    compiled_scenario: Scenario, data: Path, letter: str
-) -> None:
-    expected = json.loads((data / "expected.json").read_text())["gaits"][f"gait_{letter}"]
-    gait = load_gait(data / f"gait_{letter}.json", oscillators=4)
-    result = simulate(scenario=compiled_scenario, gait=gait)
-    # expected.json's own error is about 0.03 in; that of the default settings 0.01 in.
-    assert result.metrics.distance_in == pytest.approx(expected["distance_in"], abs=0.15)
-    assert result.engine == "compiled"
+    assert np.abs(ours - drakes).max() < SAME_PLACE
 
 
 @pytest.mark.slow
@@ -92,18 +88,28 @@ def test_nine_of_ten_well_conditioned_random_gaits_end_where_the_diagrams_do(
     compiled_scenario: Scenario,
 ) -> None:
     # The diagram's default settings are themselves off by 0.2 in and more in every fourth gait.
-    diagram = CONVERGED.apply(with_engine(compiled_scenario, "drake"))
-    coarser = with_changes(compiled_scenario, compiled={"tolerance": 5e-6, "look_ahead": 2e-6})
-    finer = with_changes(compiled_scenario, compiled={"tolerance": 2e-6, "look_ahead": 1e-6})
+    diagram = compiled_scenario.with_changes(
+        {
+            "simulation.engine": "drake",
+            "simulation.scheme": "runge_kutta3",
+            "simulation.accuracy": 1e-5,
+            "simulation.max_step": 5e-5,
+            "simulation.look_ahead": 0.0,
+        }
+    )
+    coarser, finer = (
+        compiled_scenario.with_changes(
+            {"compiled.tolerance": tolerance, "compiled.look_ahead": look_ahead}
+        )
+        for tolerance, look_ahead in ((5e-6, 2e-6), (2e-6, 1e-6))
+    )
     close = compared = 0
     for seed in range(200, 230):
-        gait = seeded_gait(compiled_scenario, seed)
         spread = distance(coarser, seed) - distance(finer, seed)
         if abs(spread) > 0.05:
             continue  # ill-conditioned: two converged runs differ
         compared += 1
-        on_drake = simulate(scenario=diagram, gait=gait)
-        close += abs(on_drake.metrics.distance_in - distance(compiled_scenario, seed)) < 0.15
+        close += abs(distance(diagram, seed) - distance(compiled_scenario, seed)) < 0.15
         if compared == 10:
             break
     assert compared == 10
@@ -115,7 +121,7 @@ def distance(scenario: Scenario, seed: int) -> float:
 
 
 def test_a_gait_is_not_influenced_by_company_or_threads(compiled_scenario: Scenario) -> None:
-    scenario = with_changes(compiled_scenario, simulation={"duration": 4.0})
+    scenario = compiled_scenario.with_changes({"simulation.duration": 4.0})
     alone = [distance(scenario, seed) for seed in range(6)]
     with ThreadPoolExecutor(4) as threads:
         together = list(threads.map(lambda seed: distance(scenario, seed), [*range(6), *range(6)]))
@@ -123,7 +129,7 @@ def test_a_gait_is_not_influenced_by_company_or_threads(compiled_scenario: Scena
 
 
 def test_recording_changes_nothing(compiled_scenario: Scenario) -> None:
-    scenario = with_changes(compiled_scenario, simulation={"duration": 4.0})
+    scenario = compiled_scenario.with_changes({"simulation.duration": 4.0})
     gait = seeded_gait(scenario)
     bare = simulate(scenario=scenario, gait=gait)
     recorded = simulate(scenario=scenario, gait=gait, record=True)
@@ -136,10 +142,14 @@ def test_recording_changes_nothing(compiled_scenario: Scenario) -> None:
 def test_the_recording_has_the_forces_of_the_diagrams(compiled_scenario: Scenario) -> None:
     # At t = 0.2 s, before the actuation, both robots are at rest: the same tensions and
     # normal forces, whose sum is the weight.
-    scenario = with_changes(compiled_scenario, simulation={"duration": 0.8, "steady_from": 0.2})
+    scenario = compiled_scenario.with_changes(
+        {"simulation.duration": 0.8, "simulation.steady_from": 0.2}
+    )
     gait = seeded_gait(scenario)
     ours, drakes = (
-        simulate(scenario=with_engine(scenario, engine), gait=gait, record=True).trajectory
+        simulate(
+            scenario=scenario.with_changes({"simulation.engine": engine}), gait=gait, record=True
+        ).trajectory
         for engine in ("compiled", "drake")
     )
     assert ours is not None and drakes is not None
@@ -158,8 +168,8 @@ def test_signals_integrated_with_error_control_are_those_of_the_diagram(
     compiled_scenario: Scenario, data: Path, signals: str
 ) -> None:
     # Gait c goes 0.4 in farther than on the listing's signals (see the README).
-    scenario = with_changes(compiled_scenario, cpg={"signals": signals})
-    gait = load_gait(data / "gait_c.json", oscillators=4)
+    scenario = compiled_scenario.with_changes({"cpg.signals": signals})
+    gait = load_gait(data / "gait_c.json", scenario)
     assert simulate(scenario=scenario, gait=gait).metrics.distance_in == pytest.approx(
         2.22, abs=0.05
     )
@@ -167,12 +177,14 @@ def test_signals_integrated_with_error_control_are_those_of_the_diagram(
 
 def thrown(scenario: Scenario, *, gravity: float) -> tuple[Structure, Scenario, np.ndarray]:
     """A robot far above the ground whose bodies move at random."""
-    scenario = with_changes(
-        scenario,
-        robot={"gravity": gravity},
-        cpg={"gain": 0.0},
-        simulation={"duration": 0.5, "steady_from": 0.1},
-        compiled={"tolerance": 1e-7},
+    scenario = scenario.with_changes(
+        {
+            "robot.gravity": gravity,
+            "cpg.gain": 0.0,
+            "simulation.duration": 0.5,
+            "simulation.steady_from": 0.1,
+            "compiled.tolerance": 1e-7,
+        }
     )
     structure = MakeStructure(scenario.robot, scenario.cables)
     bodies = len(structure.bodies)
@@ -192,7 +204,7 @@ def flown(structure: Structure, scenario: Scenario, state: np.ndarray) -> np.nda
 
 def momenta(structure: Structure, scenario: Scenario, state: np.ndarray) -> np.ndarray:
     """Total angular momentum about the origin of World, and momentum."""
-    robot = make_robot(scenario, structure)
+    robot = make_model(scenario, structure)
     bodies = len(structure.bodies)
     p_WB = state[: 7 * bodies].reshape(bodies, 7)[:, 4:]
     velocities = state[7 * bodies :].reshape(bodies, 6)
@@ -223,9 +235,9 @@ def test_the_centre_of_mass_falls_as_galilei_says(compiled_scenario: Scenario) -
 
 def test_energy_stays_with_damping_off(compiled_scenario: Scenario) -> None:
     structure, scenario, state = thrown(compiled_scenario, gravity=0.0)
-    scenario = with_changes(scenario, cables={"damping": 0.0})
+    scenario = scenario.with_changes({"cables.damping": 0.0})
     structure = MakeStructure(scenario.robot, scenario.cables)
-    robot = make_robot(scenario, structure)
+    robot = make_model(scenario, structure)
 
     def energy(state: np.ndarray) -> float:
         velocities = state[35:].reshape(5, 6)
@@ -242,17 +254,22 @@ def test_energy_stays_with_damping_off(compiled_scenario: Scenario) -> None:
     assert energy(flown(structure, scenario, state)) == pytest.approx(start, rel=1e-5)
 
 
-def test_what_diverges_says_when_and_why(compiled_scenario: Scenario) -> None:
-    slow = with_changes(compiled_scenario, simulation={"max_speed": 1e-3})
-    with pytest.raises(Diverged, match="velocity exceeds the limit"):
-        simulate(scenario=slow, gait=seeded_gait(slow))
-    short = with_changes(compiled_scenario, simulation={"max_evaluations": 100})
-    with pytest.raises(StepBudgetExceeded, match="budget of 100"):
-        simulate(scenario=short, gait=seeded_gait(short))
-    # A pull that grows without bound: 1e9 lbf a unit of signal.
-    wild = with_changes(compiled_scenario, cpg={"gain": 4e9})
-    with pytest.raises(Diverged):
-        simulate(scenario=wild, gait=seeded_gait(wild))
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({"simulation.max_speed": 1e-3}, Diverged),
+        ({"simulation.max_evaluations": 100}, StepBudgetExceeded),
+        ({"cpg.gain": 4e9}, Diverged),  # a pull that grows without bound
+    ],
+)
+def test_a_failed_simulation_says_when_and_why(
+    compiled_scenario: Scenario, changes: dict[str, Any], kind: type[SimulationFailure]
+) -> None:
+    scenario = compiled_scenario.with_changes(changes)
+    with pytest.raises(kind) as caught:
+        simulate(scenario=scenario, gait=seeded_gait(scenario))
+    assert 0.0 <= caught.value.time < scenario.simulation.duration
+    assert caught.value.reason in str(caught.value)
 
 
 def test_structures_the_engine_cannot_simulate_are_refused(scenario: Scenario) -> None:
@@ -260,4 +277,4 @@ def test_structures_the_engine_cannot_simulate_are_refused(scenario: Scenario) -
     cables = structure.cables.copy()
     cables[0]["node_b"] += 4
     with pytest.raises(ValueError, match="does not join a body to the next one"):
-        make_robot(scenario, dataclasses.replace(structure, cables=cables))
+        make_model(scenario, dataclasses.replace(structure, cables=cables))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.changes import with_changes
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
 from tetra_drake.engines.compiled.dynamics import (
@@ -14,10 +13,10 @@ from tetra_drake.engines.compiled.dynamics import (
     make_forces,
     move_bodies,
 )
-from tetra_drake.engines.compiled.engine import make_robot
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.kinematics import node_motion
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.model import make_model
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -44,7 +43,7 @@ def test_accelerations_are_those_of_the_diagram(
     structure = MakeStructure(scenario.robot, scenario.cables)
     state = disturbed(structure, seed)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
-    robot = make_robot(scenario, structure)
+    robot = make_model(scenario, structure)
     update_modes(node_motion(state, structure.p_BN), robot.contacts, robot.ground, modes)
     forces = make_forces(robot, tetrahedra)
     acceleration = np.empty(6 * tetrahedra)
@@ -64,9 +63,9 @@ def test_accelerations_are_those_of_the_diagram(
 def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario: Scenario) -> None:
     # With stiffness left out (it enters squared in time) and the small dependence of bristles
     # on speed switched off, d force / d velocity is minus the damping matrix.
-    scenario = with_changes(scenario, friction={"proportional_stiction": 0.0})
+    scenario = scenario.with_changes({"friction.proportional_stiction": 0.0})
     structure = MakeStructure(scenario.robot, scenario.cables)
-    robot = make_robot(scenario, structure)
+    robot = make_model(scenario, structure)
     state, bodies = disturbed(structure, 0), 5
     state[7 * bodies :] = 0.0
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
