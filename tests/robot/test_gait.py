@@ -68,7 +68,7 @@ def test_a_gait_without_a_name_is_called_like_its_file(tmp_path):
 def test_weights_of_zero_are_legal(tmp_path, data):
     zero = load_gait(write(tmp_path, gait_file(weights=[0] * 24)), oscillators=4)
     assert zero.weights == (0.0,) * 24
-    assert load_gait(data / "single_oscillators.json", scenario).weights == (0.0,) * 24
+    assert load_gait(data / "single_oscillators.json", oscillators=4).weights == (0.0,) * 24
 
 
 def test_integers_are_numbers(tmp_path):
@@ -87,7 +87,7 @@ def test_a_gait_has_the_weights_of_its_robot(tmp_path, oscillators, refused):
 
 @pytest.mark.parametrize("name", [f"gait_{letter}" for letter in "abcdefgh"])
 def test_the_reference_gaits_load(data, name):
-    gait = load_gait(data / f"{name}.json", scenario)
+    gait = load_gait(data / f"{name}.json", oscillators=4)
     assert gait.name == name
     assert gait.tau_b == 2 * gait.tau_a
 
@@ -100,7 +100,7 @@ def test_a_saved_gait_loads_back_to_the_last_bit(tmp_path, tau_b):
     weights = tuple(np.random.default_rng(1).uniform(0, 5, 24).tolist())
     gait = Gait(name="λ „quoted“", weights=weights, tau_a=0.1 / 3, tau_b=tau_b)
     save_gait(gait, tmp_path / "gait.json")
-    assert load_gait(tmp_path / "gait.json", scenario) == gait
+    assert load_gait(tmp_path / "gait.json", oscillators=4) == gait
 
 
 def test_a_saved_gait_has_the_keys_of_a_gait_file(tmp_path):
@@ -172,29 +172,29 @@ def test_a_bad_gait_is_told_the_file_the_key_and_what_was_expected(
 ):
     file = write(tmp_path, content)
     with refused(file, key, problem):
-        load_gait(file, scenario)
+        load_gait(file, oscillators=4)
 
 
 def test_a_missing_file_is_named(tmp_path, refused):
     with refused(tmp_path / "missing.json", "", "no such gait file"):
-        load_gait(tmp_path / "missing.json", scenario)
+        load_gait(tmp_path / "missing.json", oscillators=4)
 
 
 def test_a_directory_is_not_a_gait_file(tmp_path, refused):
     with refused(tmp_path, "", "is a directory, expected a gait file"):
-        load_gait(tmp_path, scenario)
+        load_gait(tmp_path, oscillators=4)
 
 
 def test_a_path_below_a_file_is_not_a_gait_file(tmp_path, refused):
     path = write(tmp_path, gait_file()) / "below.json"
     with refused(path, "", "cannot be read"):
-        load_gait(path, scenario)
+        load_gait(path, oscillators=4)
 
 
 def test_a_binary_file_is_not_a_gait_file(tmp_path, refused):
     (tmp_path / "mine.json").write_bytes(b"\x89PNG\r\n\x1a\n\x00\xff")
     with refused(tmp_path / "mine.json", "", "cannot be read as a text file"):
-        load_gait(tmp_path / "mine.json", scenario)
+        load_gait(tmp_path / "mine.json", oscillators=4)
 
 
 # Random gaits

@@ -39,7 +39,7 @@ def disturbed(structure: Structure, seed: int) -> np.ndarray:
 def test_accelerations_are_those_of_the_diagram(
     scenario: Scenario, tetrahedra: int, seed: int
 ) -> None:
-    scenario = with_changes(scenario, robot={"tetrahedra": tetrahedra})
+    scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra})
     structure = MakeStructure(scenario.robot, scenario.cables)
     state = disturbed(structure, seed)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
