@@ -48,7 +48,7 @@ def report(gait: Gait, result: SimulationResult) -> str:
 def choose_gait(path: Path | None, scenario: Scenario) -> Gait:
     """The gait in the file, or without one a random one that walks."""
     if path is not None:
-        return load_gait(path, oscillators=scenario.oscillators)
+        return load_gait(path, scenario)
     return seeded_gait(scenario)
 
 

@@ -320,8 +320,8 @@ def test_the_result_holds_what_was_asked_for_and_done(result, scenario):
     assert 0 < result["integrator"]["steps"] < result["integrator"]["derivative_evaluations"]
 
 
-def test_the_result_holds_its_gait(result, gait_3):
-    assert gait_from_json(result["gait"], source="result.json", oscillators=4) == gait_3
+def test_the_result_holds_its_gait(result, gait_3, scenario):
+    assert gait_from_json(result["gait"], source="result.json", scenario=scenario) == gait_3
 
 
 def test_fitness_follows_from_the_result(result):

@@ -223,7 +223,7 @@ def _work_precision(options: argparse.Namespace) -> None:
     from tetra_drake.benchmark.work_precision import HEADER, format_row, measure
 
     scenario = with_engine(load_scenario(options.scenario), options.engine)
-    gaits = [load_gait(path, oscillators=scenario.oscillators) for path in options.gaits]
+    gaits = [load_gait(path, scenario) for path in options.gaits]
     print(HEADER)
     for row in measure(scenario, gaits, workers=options.workers):
         print(format_row(row, scenario.simulation.duration), flush=True)
@@ -243,7 +243,7 @@ def _add_gait(command: argparse.ArgumentParser) -> None:
 
 def _gait(options: argparse.Namespace, scenario: Scenario) -> Gait:
     if options.gait is not None:
-        return load_gait(options.gait, oscillators=scenario.oscillators)
+        return load_gait(options.gait, scenario)
     return seeded_gait(scenario, options.seed)
 
 

@@ -53,7 +53,7 @@ def test_errors_are_against_the_converged_run(
 ) -> None:
     scenario.simulation.duration, scenario.simulation.steady_from = 0.2, 0.1
     monkeypatch.setattr(work_precision, "settings_to_compare", lambda: [])
-    gaits = [load_gait(data / f"gait_{letter}.json", oscillators=4) for letter in "bc"]
+    gaits = [load_gait(data / f"gait_{letter}.json", scenario) for letter in "bc"]
     converged, default = measure(scenario, gaits)
     assert converged.setting == CONVERGED
     np.testing.assert_array_equal(converged.errors_in, 0.0)
@@ -85,7 +85,7 @@ def test_the_compiled_engine_has_settings_of_its_own(
     )
     coarse = CompiledSetting(1.0, 4.0, 0.05)
     monkeypatch.setattr(work_precision, "compiled_settings_to_compare", lambda: [coarse])
-    rows = list(measure(scenario, [load_gait(data / "gait_b.json", oscillators=4)]))
+    rows = list(measure(scenario, [load_gait(data / "gait_b.json", scenario)]))
     assert [row.setting for row in rows] == [
         CONVERGED_COMPILED,
         default_setting(scenario),

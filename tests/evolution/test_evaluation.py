@@ -98,7 +98,7 @@ def test_a_tiny_run_from_end_to_end(tmp_path):
     assert len(entries) == 8
     assert len({entry["fitness"] for entry in entries}) > 1
     best = json.loads((trial / "iterations.jsonl").read_text().splitlines()[-1])
-    gait = load_gait(trial / "best_gait.json", oscillators=4)
+    gait = load_gait(trial / "best_gait.json", scenario)
     result = simulate(scenario=read_manifest(tmp_path / "run").scenario, gait=gait, record=True)
     assert result.metrics.distance_in == best["best_distance_in"]
     assert result.fitness == best["best_fitness"]

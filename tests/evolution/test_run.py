@@ -72,9 +72,9 @@ def test_the_lines_of_the_iterations_follow_from_those_of_the_evaluations(run_sm
     assert [row["stop"] for row in iterations] == [None] * 15 + ["all iterations done"]
 
 
-def test_the_best_gait_is_that_of_the_best_evaluation(run_small):
+def test_the_best_gait_is_that_of_the_best_evaluation(run_small, scenario):
     trial = run_small() / "trial_00"
-    gait = load_gait(trial / "best_gait.json", oscillators=4)
+    gait = load_gait(trial / "best_gait.json", scenario)
     best = lines(trial / "iterations.jsonl")[-1]["best_evaluation"]
     assert genome_of(gait).tolist() == lines(trial / "evaluations.jsonl")[best]["genome"]
     assert gait.name == f"thesis, seed 5, trial 0, evaluation {best}"

@@ -25,7 +25,7 @@ def test_the_gaits_walk_as_they_did_in_the_run(tmp_path):
     study = study_run(tmp_path / "run")
     assert (study.best.deviation_in, study.initial.deviation_in) == (0.0, 0.0)
     best_gait = tmp_path / "run" / f"trial_0{study.best.trial}" / "best_gait.json"
-    assert study.best.gait == load_gait(best_gait, oscillators=2)
+    assert study.best.gait == load_gait(best_gait, scenario)
     assert study.best.result.fitness == max(status.best_fitness for status in study.statuses)
     assert study.best.trajectory.time.values[-1] == pytest.approx(0.3)
 

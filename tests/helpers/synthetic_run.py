@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tetra_drake.evolution.genome import random_genome
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.record import RunRecord, evaluation_entry
+from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -86,7 +86,7 @@ def _lines(iterations, scenario, *, ends):
 
 def _entry(index, iteration, fitness, scenario):
     seed = index if fitness is None else abs(hash(fitness)) % 2**32
-    genome = random_genome(scenario, np.random.default_rng(seed))
+    genome = ParameterSpace.of(scenario).random(np.random.default_rng(seed))
     evaluation = Evaluation.failed("fell over", wall_time=0.5)
     if fitness is not None:
         distances = {

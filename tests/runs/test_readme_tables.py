@@ -42,6 +42,6 @@ def test_the_best_gait_walks_again_as_recorded(experiment, name):
         pytest.skip("the run was recorded with other versions, on which last digits depend")
     trial = recorded.best_trial.number
     path = RECORDED / name / f"trial_{trial:02d}" / "best_gait.json"
-    gait = load_gait(path, oscillators=manifest.scenario.oscillators)
+    gait = load_gait(path, manifest.scenario)
     result = simulate(scenario=manifest.scenario, gait=gait)
     assert result.metrics.distance_in == recorded.best.loc[trial, "distance_in"]

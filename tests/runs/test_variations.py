@@ -7,7 +7,6 @@ import pytest
 from helpers.synthetic_run import tiny_scenario
 
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.genome import random_genome
 from tetra_drake.experiment.variations import (
     DEFAULT,
     DRAWS,
@@ -20,6 +19,7 @@ from tetra_drake.experiment.variations import (
     variations,
 )
 from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import with_engine
 from tetra_drake.scenario.schema import Scenario
 
@@ -85,7 +85,7 @@ def test_a_displaced_robot_starts_near_its_pose_and_not_in_the_ground(scenario, 
 
 def test_a_robot_displaced_by_nothing_walks_as_ever():
     scenario = with_engine(tiny_scenario(), "compiled")
-    genome = random_genome(scenario, np.random.default_rng(1))
+    genome = ParameterSpace.of(scenario).random(np.random.default_rng(1))
     displaced = DisplacedStart(scenario, 0.0, seed=0)(genome)
     plain = GaitEvaluation(scenario)(genome)
     assert (displaced.metrics, displaced.fitness) == (plain.metrics, plain.fitness)
@@ -96,7 +96,7 @@ def test_a_displaced_robot_that_fails_says_when():
     scenario = with_engine(tiny_scenario(), "compiled")
     scenario.simulation.max_evaluations = 100
     evaluation = DisplacedStart(scenario, 5.0, seed=0)(
-        random_genome(scenario, np.random.default_rng(1))
+        ParameterSpace.of(scenario).random(np.random.default_rng(1))
     )
     assert evaluation.failure.startswith("ended at ")
     assert np.isnan(evaluation.distance_in)

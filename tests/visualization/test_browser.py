@@ -65,7 +65,7 @@ def scenario() -> Scenario:
 
 @pytest.fixture(scope="module")
 def trajectory(scenario: Scenario, data: Path) -> xarray.Dataset:
-    gait = load_gait(data / "gait_g.json", oscillators=scenario.oscillators)
+    gait = load_gait(data / "gait_g.json", scenario)
     recorded = simulate(scenario=scenario, gait=gait, record=True).trajectory
     assert recorded is not None
     return recorded

@@ -68,7 +68,7 @@ def _gaits(options: argparse.Namespace, scenario: Scenario) -> list[Gait]:
         return [seeded_gait(scenario, seed) for seed in range(options.number or DEFAULT_GAITS)]
     if options.number is not None:
         raise InputError("--gaits", "", "not allowed with gait files")
-    return [load_gait(path, oscillators=scenario.oscillators) for path in options.gaits]
+    return [load_gait(path, scenario) for path in options.gaits]
 
 
 def _say(stage: str) -> None:

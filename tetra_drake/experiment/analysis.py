@@ -17,7 +17,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import EvaluationPool, process_executor, thread_executor
-from tetra_drake.evolution.genome import gait_of
+from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, Genome
 from tetra_drake.evolution.population import genome_columns
 from tetra_drake.evolution.reevaluation import best_gaits
@@ -179,7 +179,7 @@ _COLUMNS = {
 
 
 def _record_walk(scenario: Scenario, gait: BestGait) -> dict[str, Any]:
-    result = simulate(scenario=scenario, gait=gait_of(gait.genome, name="best gait"), record=True)
+    result = simulate(scenario=scenario, gait=ParameterSpace.of(scenario).gait(gait.genome, name="best gait"), record=True)
     assert result.trajectory is not None
     since = scenario.simulation.steady_from
     frequencies = signal_frequencies(result.trajectory, since=since)

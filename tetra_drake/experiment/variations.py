@@ -13,7 +13,7 @@ import numpy as np
 from tetra_drake.engines.compiled.engine import simulate_compiled
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.genome import gait_of
+from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, Genome
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import with_engine
@@ -80,7 +80,7 @@ class DisplacedStart:
 
     def __call__(self, genome: Genome) -> Evaluation:
         """Fitness and metrics of one genome, or why it has none."""
-        gait = gait_of(genome, name="candidate")
+        gait = ParameterSpace.of(self.scenario).gait(genome, name="candidate")
         try:
             result = simulate_compiled(
                 scenario=self.scenario, gait=gait, record=False, structure=self.structure()

@@ -61,7 +61,7 @@ def best_gait_file(run: Path, *, trials: int) -> Path:
 
 
 def _simulate(gait_file: Path, scenario: Scenario) -> Recording:
-    gait = load_gait(gait_file, oscillators=scenario.oscillators)
+    gait = load_gait(gait_file, scenario)
     trajectory = simulate(scenario=scenario, gait=gait, record=True).trajectory
     assert trajectory is not None
     return Recording(scenario=scenario, gait=gait, trajectory=trajectory)

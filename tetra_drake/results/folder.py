@@ -83,19 +83,19 @@ def load_result_folder(folder: Path) -> Recording:
     structure = MakeStructure(scenario.robot, scenario.cables)
     return Recording(
         scenario=scenario,
-        gait=_load_gait(folder / RESULT, oscillators=scenario.oscillators),
+        gait=_load_gait(folder / RESULT, scenario),
         trajectory=_load_trajectory(folder / TRAJECTORY, structure),
     )
 
 
-def _load_gait(path: Path, *, oscillators: int) -> Gait:
+def _load_gait(path: Path, scenario: Scenario) -> Gait:
     try:
         raw: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     if not isinstance(raw, dict) or "gait" not in raw:
         raise InputError(path, "gait", "is missing")
-    return gait_from_json(raw["gait"], source=str(path), oscillators=oscillators)
+    return gait_from_json(raw["gait"], source=str(path), scenario=scenario)
 
 
 def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:

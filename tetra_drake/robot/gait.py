@@ -1,4 +1,4 @@
-"""A gait: the inhibitory weights and time constants of the oscillator network."""
+"""A gait, its file, and the space of parameters that evolution searches."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
@@ -16,18 +17,25 @@ from tetra_drake.scenario.schema import Scenario
 
 SCHEMA = 1
 
+Vector = npt.NDArray[np.float64]
+"""The parameters of one gait in the order of ParameterSpace.names."""
+
 TAU_B_PER_TAU_A = 2.0
 """The thesis keeps tau_B = 2 tau_A, so that the output resembles a sine wave."""
 
+TAU_A, TAU_B = -2, -1
+"""Indices of the time constants in a vector."""
+
 
 def weight_count(oscillators: int) -> int:
-    """Inhibitory weights of n oscillators: 2 n (n - 1)."""
+    """Number of inhibitory weights of n oscillators: 2 n (n - 1)."""
     return 2 * oscillators * (oscillators - 1)
 
 
 @dataclass(frozen=True)
 class Gait:
-    """What the evolution varies. Weights in the listing's order (B.2), time constants in s."""
+    """The parameters of the oscillator network: weights in the listing's order (B.2), time
+    constants in s."""
 
     name: str
     weights: tuple[float, ...]
@@ -35,7 +43,7 @@ class Gait:
     tau_b: float
 
     def to_json(self) -> dict[str, Any]:
-        """The gait as a gait file holds it."""
+        """The content of a gait file."""
         gait: dict[str, Any] = {
             "schema": SCHEMA,
             "name": self.name,
@@ -47,19 +55,88 @@ class Gait:
         return gait
 
 
+@dataclass(frozen=True)
+class ParameterSpace:
+    """The parameters of a gait as one vector: weights in the listing's order, tau_A, tau_B (s)."""
+
+    names: tuple[str, ...]
+    """As "weight 3->1 extensor" (from oscillator 3 onto oscillator 1), "tau_A", "tau_B"."""
+    low: Vector
+    high: Vector
+    """Bounds of random gaits (Table 5)."""
+    steps: Vector
+    """Largest change of each parameter in one mutation (Table 6); 0 where it does not mutate."""
+    floors: Vector
+    """A parameter reduced by mutation must stay above this (listing A.3.3, A.3.4)."""
+    couples_tau_b: bool
+    """Whether tau_B is kept at 2 tau_A."""
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> ParameterSpace:
+        """The space of a scenario.
+
+        With equal bounds of tau_A it is fixed. With `tau_mutation: listing` it does not mutate:
+        the listing's index 26 is that of tau_B. An independent tau_B has twice tau_A's numbers.
+        """
+        settings, bounds = scenario.evolution, scenario.gait_bounds
+        weights = weight_count(scenario.oscillators)
+        tau_step = 0.0 if bounds.tau_a_min == bounds.tau_a_max else settings.tau_mutation_range
+        tau_a_step = 0.0 if settings.tau_mutation == "listing" else tau_step
+
+        def vector(weight: float, tau_a: float, twice: float) -> Vector:
+            return np.array([weight] * weights + [tau_a, TAU_B_PER_TAU_A * twice])
+
+        return cls(
+            names=(*_weight_names(scenario.oscillators), "tau_A", "tau_B"),
+            low=vector(bounds.weight_min, bounds.tau_a_min, bounds.tau_a_min),
+            high=vector(bounds.weight_max, bounds.tau_a_max, bounds.tau_a_max),
+            steps=vector(settings.weight_mutation, tau_a_step, tau_step),
+            floors=vector(0.0, bounds.tau_a_min, bounds.tau_a_min),
+            couples_tau_b=not settings.independent_tau_b,
+        )
+
+    def gait(self, vector: Vector, *, name: str) -> Gait:
+        """The gait of a vector."""
+        *weights, tau_a, tau_b = vector.tolist()
+        return Gait(name=name, weights=tuple(weights), tau_a=tau_a, tau_b=tau_b)
+
+    def vector(self, gait: Gait) -> Vector:
+        """The vector of a gait."""
+        return np.array([*gait.weights, gait.tau_a, gait.tau_b])
+
+    def random(self, generator: np.random.Generator) -> Vector:
+        """A vector drawn uniformly within the bounds, with tau_B = 2 tau_A."""
+        drawn = generator.uniform(self.low[:TAU_B], self.high[:TAU_B])
+        return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
+
+    def repair(self, vector: Vector) -> Vector:
+        """A copy of the vector with tau_B = 2 tau_A, unless tau_B is independent."""
+        repaired = vector.copy()
+        if self.couples_tau_b:
+            repaired[TAU_B] = TAU_B_PER_TAU_A * vector[TAU_A]
+        return repaired
+
+
+def _weight_names(oscillators: int) -> list[str]:
+    """In the listing's order: onto extensor 1 from all others, onto flexor 1, onto extensor 2 ..."""
+    numbers = range(1, oscillators + 1)
+    return [
+        f"weight {source}->{target} {neuron}"
+        for target in numbers
+        for neuron in ("extensor", "flexor")
+        for source in numbers
+        if source != target
+    ]
+
+
 def random_gait(scenario: Scenario, generator: np.random.Generator, *, name: str) -> Gait:
     """A gait drawn uniformly from the scenario's bounds (Table 5)."""
-    bounds = scenario.gait_bounds
-    count = weight_count(scenario.oscillators)
-    weights = generator.uniform(bounds.weight_min, bounds.weight_max, count)
-    tau_a = float(generator.uniform(bounds.tau_a_min, bounds.tau_a_max))
-    return Gait(
-        name=name, weights=tuple(weights.tolist()), tau_a=tau_a, tau_b=TAU_B_PER_TAU_A * tau_a
-    )
+    space = ParameterSpace.of(scenario)
+    return space.gait(space.random(generator), name=name)
 
 
 WALKING_SEED = 80
-"""Of a random gait of the thesis's scenario that walks forward, for want of a better one."""
+"""Seed of a random gait that walks forward on the thesis's scenario: the default gait."""
 
 
 def seeded_gait(scenario: Scenario, seed: int = WALKING_SEED) -> Gait:
@@ -72,8 +149,8 @@ def save_gait(gait: Gait, path: str | Path) -> None:
     write_whole(path, json.dumps(gait.to_json(), indent=1) + "\n")
 
 
-def load_gait(path: str | Path, *, oscillators: int) -> Gait:
-    """Reads a gait file for a robot with this many oscillators.
+def load_gait(path: str | Path, scenario: Scenario) -> Gait:
+    """Reads a gait file for the scenario's robot.
 
     Raises InputError, naming file and key, for whatever is wrong in the file.
     """
@@ -89,10 +166,10 @@ def load_gait(path: str | Path, *, oscillators: int) -> Gait:
         raw = json.loads(text, object_pairs_hook=_unique_keys)
     except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"is not JSON: {error}") from error
-    return gait_from_json(raw, source=str(path), oscillators=oscillators)
+    return gait_from_json(raw, source=str(path), scenario=scenario)
 
 
-def gait_from_json(raw: Any, *, source: str, oscillators: int) -> Gait:
+def gait_from_json(raw: Any, *, source: str, scenario: Scenario) -> Gait:
     """Checks the content of a gait file; raises InputError that names `source` and key."""
     if not isinstance(raw, dict):
         raise InputError(source, "", "expected a JSON object with the keys of a gait")
@@ -112,9 +189,8 @@ def gait_from_json(raw: Any, *, source: str, oscillators: int) -> Gait:
         raise InputError(source, "name", f"found {json.dumps(name)}, expected text")
     tau_a = _number(raw["tau_a_s"], source, "tau_a_s", above=0.0)
     tau_b = _number(raw.get("tau_b_s", TAU_B_PER_TAU_A * tau_a), source, "tau_b_s", above=0.0)
-    return Gait(
-        name=name, weights=_weights(raw["weights"], source, oscillators), tau_a=tau_a, tau_b=tau_b
-    )
+    weights = _weights(raw["weights"], source, scenario.oscillators)
+    return Gait(name=name, weights=weights, tau_a=tau_a, tau_b=tau_b)
 
 
 def _weights(raw: Any, source: str, oscillators: int) -> tuple[float, ...]:
