@@ -18,8 +18,8 @@ from tetra_drake.experiment.variations import (
     resimulations,
     variations,
 )
-from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.load import with_engine
 from tetra_drake.scenario.schema import Scenario
 

@@ -17,7 +17,6 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import EvaluationPool, process_executor, thread_executor
-from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, Genome
 from tetra_drake.evolution.population import genome_columns
 from tetra_drake.evolution.reevaluation import best_gaits
@@ -27,6 +26,7 @@ from tetra_drake.files import write_whole
 from tetra_drake.parts.single_oscillator import TAU_A, frequency, oscillate
 from tetra_drake.results.measures import shares_off_ground, signal_frequencies
 from tetra_drake.results.result import versions
+from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -179,7 +179,11 @@ _COLUMNS = {
 
 
 def _record_walk(scenario: Scenario, gait: BestGait) -> dict[str, Any]:
-    result = simulate(scenario=scenario, gait=ParameterSpace.of(scenario).gait(gait.genome, name="best gait"), record=True)
+    result = simulate(
+        scenario=scenario,
+        gait=ParameterSpace.of(scenario).gait(gait.genome, name="best gait"),
+        record=True,
+    )
     assert result.trajectory is not None
     since = scenario.simulation.steady_from
     frequencies = signal_frequencies(result.trajectory, since=since)

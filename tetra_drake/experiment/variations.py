@@ -13,8 +13,8 @@ import numpy as np
 from tetra_drake.engines.compiled.engine import simulate_compiled
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, Genome
+from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import with_engine
 from tetra_drake.scenario.schema import Scenario

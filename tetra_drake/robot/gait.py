@@ -118,7 +118,7 @@ class ParameterSpace:
 
 
 def _weight_names(oscillators: int) -> list[str]:
-    """In the listing's order: onto extensor 1 from all others, onto flexor 1, onto extensor 2 ..."""
+    """Onto extensor 1 from all others, onto flexor 1, onto extensor 2 ... (the listing's order)."""
     numbers = range(1, oscillators + 1)
     return [
         f"weight {source}->{target} {neuron}"
