@@ -66,20 +66,35 @@ def test_without_any_folder_for_a_cache_kernels_still_work(
     assert float(run(read_only_package, nowhere / "cache").stdout) == pytest.approx(2.0)
 
 
-def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(
-    read_only_package: Path, tmp_path: Path
+@pytest.mark.parametrize("folder", ["physics", "elsewhere/deeper"])
+def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(
+    read_only_package: Path, tmp_path: Path, folder: str
 ) -> None:
-    kernels = read_only_package / "tetra_drake" / "physics"
+    # outer() calls inner(), which uses a constant of a third module; they may be in any folder.
+    kernels = read_only_package / "tetra_drake" / folder
+    kernels.mkdir(parents=True, exist_ok=True)
+    name = f"tetra_drake.{folder.replace('/', '.')}"
     begin = "from tetra_drake.physics.compiling import compiled\n"
-    (kernels / "inner.py").write_text(f"{begin}@compiled\ndef inner():\n    return 1.0\n")
-    (kernels / "outer.py").write_text(
-        f"{begin}from tetra_drake.physics.inner import inner\n"
-        "@compiled\ndef outer():\n    return inner()\n"
+    (kernels / "constant.py").write_text("VALUE = 1.0\n")
+    (kernels / "inner.py").write_text(
+        f"{begin}from {name}.constant import VALUE\n@compiled\ndef inner():\n    return VALUE\n"
     )
-    program = "from tetra_drake.physics.outer import outer; print(outer())"
+    (kernels / "outer.py").write_text(
+        f"{begin}from {name}.inner import inner\n@compiled\ndef outer():\n    return inner()\n"
+    )
+    program = (
+        f"from {name}.outer import outer;"
+        "print(outer(), sum(outer.stats.cache_hits.values()))"
+    )
     cache_home = tmp_path / "cache"
     cache_home.mkdir()
-    assert float(run(read_only_package, cache_home, program).stdout) == 1.0
-    assert list(cache_home.rglob("outer.outer*.nbi")), "the outer kernel is cached"
-    (kernels / "inner.py").write_text(f"{begin}@compiled\ndef inner():\n    return 2.0\n")
-    assert float(run(read_only_package, cache_home, program).stdout) == 2.0
+    if folder != "physics":  # keeps numba from writing beside the sources, as there
+        (kernels / "__pycache__").write_text("in the way")
+
+    def value_and_hits() -> list[str]:
+        return run(read_only_package, cache_home, program).stdout.split()
+
+    assert value_and_hits() == ["1.0", "0"]
+    assert value_and_hits() == ["1.0", "1"]
+    (kernels / "constant.py").write_text("VALUE = 2.0\n")
+    assert value_and_hits() == ["2.0", "0"]

@@ -6,7 +6,7 @@ import functools
 import hashlib
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -34,7 +34,7 @@ def compiled(function: F, *, nogil: bool = False) -> F:
 
 
 def source_stamp(file: str) -> str:
-    """A digest of a module's source and of all modules of its package that it imports."""
+    """A digest of a module's source and of all modules of this package that it imports."""
     seen: set[Path] = set()
     pending = [Path(file).resolve()]
     while pending:
@@ -47,18 +47,10 @@ def source_stamp(file: str) -> str:
 
 @functools.cache
 def _imported(path: Path) -> tuple[Path, ...]:
-    """The files of the modules of its own package that a module's source names in imports."""
-    root = path.parent
-    while (root.parent / "__init__.py").is_file():
-        root = root.parent
-    names = re.findall(
-        rf"^\s*(?:from|import)\s+({root.name}(?:\.\w+)+)", path.read_text(encoding="utf-8"), re.M
-    )
-    return tuple(_files(root.parent, names))
-
-
-def _files(folder: Path, names: list[str]) -> Iterator[Path]:
-    for name in names:
-        file = folder.joinpath(*name.split(".")).with_suffix(".py")
-        if file.is_file():
-            yield file
+    """The files of the modules of this package that a module's source names in imports."""
+    package = __name__.partition(".")[0]
+    root = Path(__file__).resolve().parents[__name__.count(".")]
+    imports = rf"^\s*(?:from|import)\s+({package}(?:\.\w+)+)"
+    names = re.findall(imports, path.read_text(encoding="utf-8"), re.MULTILINE)
+    files = (root.joinpath(*name.split(".")).with_suffix(".py") for name in names)
+    return tuple(file for file in files if file.is_file())
