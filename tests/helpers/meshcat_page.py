@@ -49,6 +49,9 @@ def _unpack(data: bytes, at: int) -> tuple[Any, int]:
         kind, size = ("list", code - 0x90) if code >= 0x90 else ("dict", code - 0x80)
     if kind == "text":
         return data[at : at + size].decode(), at + size
+    if kind == "extension":  # here always an array of 32-bit floats
+        numbers = struct.unpack_from(f"<{size // 4}f", data, at + 1)
+        return list(numbers), at + 1 + size
     items = []
     for _ in range(size if kind == "list" else 2 * size):
         item, at = _unpack(data, at)
@@ -58,6 +61,9 @@ def _unpack(data: bytes, at: int) -> tuple[Any, int]:
 
 _NUMBERS = {0xCA: ">f", 0xCB: ">d", 0xCC: ">B", 0xCD: ">H", 0xCE: ">I", 0xCF: ">Q"}
 _SIZES = {
+    0xC7: ("extension", ">B"),
+    0xC8: ("extension", ">H"),
+    0xC9: ("extension", ">I"),
     0xD9: ("text", ">B"),
     0xDA: ("text", ">H"),
     0xDC: ("list", ">H"),

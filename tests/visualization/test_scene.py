@@ -1,39 +1,19 @@
-"""The robot as a Meshcat scene: poses from nodes, arrows, floor and camera."""
+"""The robot as a Meshcat scene: arrows, floor and camera."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RollPitchYaw, RotationMatrix
+from pydrake.math import RotationMatrix
 
-from tetra_drake.robot.structure import MakeStructure, Structure
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.visualization.scene import (
     ASPECT,
     FIELD_OF_VIEW,
     Motion,
     aligning_quaternions,
-    body_poses,
     camera_position,
     floor_corners,
 )
-
-
-@pytest.fixture
-def structure(scenario: Scenario) -> Structure:
-    return MakeStructure(scenario.robot, scenario.cables)
-
-
-def test_poses_are_recovered_exactly(structure: Structure) -> None:
-    random = np.random.default_rng(2)
-    angles = random.uniform(-np.pi, np.pi, (40, 3))
-    R_WB = np.array([RollPitchYaw(a).ToRotationMatrix().matrix() for a in angles])
-    p_WB = random.uniform(-1.0, 1.0, (40, 3))
-    p_WN = p_WB[:, np.newaxis] + structure.p_BN @ np.swapaxes(R_WB, 1, 2)
-    R, p = body_poses(structure, p_WN.reshape(8, 5, 4, 3))
-    np.testing.assert_allclose(R.reshape(40, 3, 3), R_WB, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(p.reshape(40, 3), p_WB, rtol=0, atol=1e-9)
 
 
 def test_aligning_quaternions_turn_z_into_the_direction() -> None:

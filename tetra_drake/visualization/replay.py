@@ -1,10 +1,13 @@
-"""A recorded trajectory as one HTML page that plays it in any browser, with no server."""
+"""The replay page: one HTML file that plays a trajectory in any browser, without a server."""
 
 from __future__ import annotations
 
+import base64
+import gzip
 import html
 import logging
 import re
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +17,10 @@ from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams
 from pydrake.math import RigidTransform
 
 from tetra_drake.files import write_whole
-from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, NODES, MakeStructure, Structure
+from tetra_drake.formatting import fixed
+from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, MakeStructure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
-from tetra_drake.visualization.packed_page import pack_page
 from tetra_drake.visualization.scene import (
     ASPECT,
     COLOURS,
@@ -32,13 +35,16 @@ if TYPE_CHECKING:
     import xarray
 
 FRAMES_PER_SECOND = 25.0
-"""Key frames per second of motion, at most; 15 s then make a page of 2.5 MB."""
+"""Key frames per second of motion, at most; 15 s of motion give a page of 2.5 MB."""
+
+TRACE_FRAMES = 5
+"""Key frames per piece of the traces, each of which becomes visible when it ends."""
 
 TICKS_PER_SECOND = 100_000
-"""Resolution of a key frame's time: Meshcat counts in integers."""
+"""Resolution of the time of key frames: Meshcat counts in integers."""
 
 REPETITIONS = 1_000_000
-"""How often the page plays the motion before it stops: as good as for ever."""
+"""How often the page plays the motion before it stops."""
 
 LEGEND = {
     "actuated": "actuated cable",
@@ -47,57 +53,52 @@ LEGEND = {
     "normal": "normal force",
     "friction": "friction force",
     "trace": "path of the bottom nodes",
+    "forward": "arrow on the floor: forward (+x)",
 }
 
 
 def save_replay(
     path: str | Path, *, scenario: Scenario, trajectory: xarray.Dataset, title: str
 ) -> None:
-    """Writes the page that replays a trajectory (see trajectory.make_dataset).
+    """Writes the page that replays a trajectory.
 
-    Every key frame is a sample of the trajectory, at that sample's time; nothing is
-    simulated again. Browsers show at their own rate what lies between two key frames.
+    Every key frame is a sample of the trajectory; browsers interpolate between key frames.
 
     Raises InputError if `path` cannot be written.
     """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     add_robot(meshcat, MakeStructure(scenario.robot, scenario.cables))
     show_replay(meshcat, scenario=scenario, trajectory=trajectory)
-    write_whole(path, pack_page(_with_title(meshcat.StaticHtml(), title), title=title))
+    write_whole(path, pack_page(_with_overlay(meshcat.StaticHtml(), title), title=title))
 
 
 def replay_title(gait: str, trajectory: xarray.Dataset) -> str:
-    """A gait's name, and how far the trajectory goes in which time."""
-    x1 = trajectory["p_WN"].values[:, 0, BOTTOM_LEFT, 0]
+    """Name of a gait, and the distance and duration of its trajectory."""
+    x1 = trajectory["p_WN"].values[[0, -1], 0, BOTTOM_LEFT, 0]
     times = trajectory["time"].values
-    return f"{gait}: {(x1[-1] - x1[0]) / INCH:.2f} inches in {times[-1] - times[0]:g} s"
+    return f"{gait}: {fixed((x1[1] - x1[0]) / INCH)} inches in {times[-1] - times[0]:g} s"
 
 
 def show_replay(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset) -> None:
     """Lets a Meshcat that shows the scenario's robot (scene.add_robot) play a trajectory."""
     structure = MakeStructure(scenario.robot, scenario.cables)
-    p_WN = trajectory["p_WN"].values
-    _add_traces(meshcat, structure, p_WN)
-    set_surroundings(meshcat, structure, p_WN)
+    set_surroundings(meshcat, structure, trajectory["p_WN"].values)
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     film = _Film(meshcat, frames["time"].values)
+    film.add_traces(frames["p_WN"].values[:, :, [BOTTOM_LEFT, BOTTOM_RIGHT]])
     for motion in motions(structure, frames):
         film.add(motion)
     film.publish()
 
 
 def frame_samples(times: np.ndarray, rate: float = FRAMES_PER_SECOND) -> np.ndarray:
-    """Indices of the samples to show: those nearest to `rate` instants a second.
+    """Indices of the samples to show, at most `rate` per second, the first and the last included.
 
-    `times` (samples,) in s, ascending; the first and the last sample are always shown.
+    `times` (samples,) in s, evenly spaced.
     """
-    if len(times) == 1:
-        return np.array([0])
-    instants = np.linspace(times[0], times[-1], int((times[-1] - times[0]) * rate) + 1)
-    after = np.searchsorted(times, instants).clip(min=1)
-    before = after - 1
-    nearest = np.where(instants - times[before] <= times[after] - instants, before, after)
-    return np.unique(nearest)
+    frames = min(int((times[-1] - times[0]) * rate + 1e-9) + 1, len(times))
+    chosen = np.linspace(0, len(times) - 1, max(frames, min(len(times), 2)))
+    return chosen.round().astype(int)
 
 
 def quiet_meshcat(params: MeshcatParams) -> Meshcat:
@@ -112,7 +113,7 @@ def quiet_meshcat(params: MeshcatParams) -> Meshcat:
 
 
 class _Film:
-    """Key frames of motions, one for each of `times` (s), for Meshcat to play."""
+    """Key frames of an animation, one for each of `times` (s)."""
 
     def __init__(self, meshcat: Meshcat, times: np.ndarray) -> None:
         self._meshcat = meshcat
@@ -121,8 +122,19 @@ class _Film:
         self._animation.set_repetitions(REPETITIONS)
         self._ticks = np.rint((times - times[0]) * TICKS_PER_SECOND).astype(int).tolist()
 
+    def add_traces(self, paths: np.ndarray) -> None:
+        """Paths (frames, ..., 3) in m of nodes, in pieces that are shown once walked."""
+        steps = np.stack([paths[:-1], paths[1:]]).reshape(2, len(paths) - 1, -1, 3)
+        for first in range(0, len(paths) - 1, TRACE_FRAMES):
+            last = min(first + TRACE_FRAMES, len(paths) - 1)
+            start, end = steps[:, first:last].reshape(2, -1, 3).swapaxes(1, 2)
+            path = f"/traces/{self._ticks[last] / TICKS_PER_SECOND:g} s"
+            self._meshcat.SetLineSegments(path, start, end, rgba=rgba("trace"))
+            self._animation.SetProperty(0, path, "visible", False)
+            self._animation.SetProperty(self._ticks[last], path, "visible", True)
+
     def add(self, motion: Motion) -> None:
-        """Key frames of one object's motion, which stands at the first of them meanwhile."""
+        """Key frames of one object's motion; without animation it stands in the first."""
         self._meshcat.SetTransform(motion.path, motion.matrix(0))
         if motion.quaternions is None:
             self._vectors(motion.path, "position", motion.positions)
@@ -144,64 +156,25 @@ class _Film:
             self._animation.SetProperty(tick, path, name, row)
 
 
-def _add_traces(meshcat: Meshcat, structure: Structure, p_WN: np.ndarray) -> None:
-    """The whole paths of all bottom nodes; p_WN (samples, bodies, 4, 3) in m."""
-    for i, body in enumerate(structure.bodies):
-        for node in (BOTTOM_LEFT, BOTTOM_RIGHT):
-            path = f"/traces/{body} {NODES[node]}"
-            meshcat.SetLine(path, p_WN[:, i, node].T, rgba=rgba("trace"))
+def pack_page(page: str, *, title: str) -> str:
+    """A page that holds `page` compressed and unpacks it in the browser; `title` is plain text."""
+    packed = base64.b64encode(gzip.compress(page.encode("utf-8"), mtime=0)).decode("ascii")
+    return _render("packed_page.html.jinja", title=title, packed=packed)
 
 
-_HEADING = """
-<style>
-  #heading {{ position: fixed; left: 16px; top: 12px; right: 270px; pointer-events: none;
-    font: 13px sans-serif; color: #222 }}
-  #heading h1 {{ margin: 0; font-size: 20px; font-weight: 600 }}
-  #heading p {{ margin: 6px 0; font-variant-numeric: tabular-nums }}
-  #heading ul {{ margin: 0; padding: 0; list-style: none }}
-  #heading li span {{ display: inline-block; width: 22px; height: 4px; margin: 3px 8px 3px 0 }}
-  @media (max-width: 700px) {{ #heading {{ top: 28px; right: 16px }} }}  /* below the controls */
-</style>
-<div id="heading">
-  <h1>{title}</h1>
-  <p>Grid: 1 in, darker lines every 6 in. The harder a cable pulls, the thicker it is; an arrow of
-    6 in is 0.2 lbf. Open Controls to pause, for time and speed (Animations), and to hide forces,
-    cables or traces (Scene).</p>
-  <ul>{legend}</ul>
-  <p>t = <output id="clock"></output> s</p>
-</div>
-"""
-
-_LEGEND_ITEM = """
-    <li><span style="background: {colour}"></span>{meaning}</li>"""
-
-_SCRIPT = """
-<script>
-  // The camera is placed for windows of some width to height; narrower ones must not cut the sides.
-  function fit() {{
-    viewer.camera.zoom = Math.min(1, window.innerWidth / window.innerHeight / {aspect});
-    viewer.set_dirty();
-  }}
-  window.addEventListener("resize", fit);
-  fit();
-  function show_time() {{
-    document.getElementById("clock").value = viewer.animator.time.toFixed(2);
-    requestAnimationFrame(show_time);
-  }}
-  show_time();
-</script>
-"""
-
-
-def _with_title(page: str, title: str) -> str:
+def _with_overlay(page: str, title: str) -> str:
     """Meshcat's page with a title, and over the scene a heading, a legend and a clock."""
-    escaped = html.escape(title)
-    legend = "".join(
-        _LEGEND_ITEM.format(colour=COLOURS[name], meaning=meaning)
-        for name, meaning in LEGEND.items()
-    )
-    heading = _HEADING.format(title=escaped, legend=legend)
+    legend = [(COLOURS[name], meaning) for name, meaning in LEGEND.items()]
+    overlay = _render("overlay.html.jinja", title=title, legend=legend, aspect=ASPECT)
     # Functions, as backslashes in a replacement text would mean something.
-    page = re.sub(r"<title>.*?</title>", lambda _: f"<title>{escaped}</title>", page, count=1)
-    page = re.sub(r"<body[^>]*>", lambda tag: tag[0] + heading, page, count=1)
-    return page.replace("</body>", _SCRIPT.format(aspect=ASPECT) + "</body>")
+    named = f"<title>{html.escape(title)}</title>"
+    page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
+    return re.sub(r"<body[^>]*>", lambda tag: tag[0] + overlay, page, count=1)
+
+
+def _render(template: str, **values: object) -> str:
+    from jinja2 import Environment, StrictUndefined
+
+    source = (resources.files("tetra_drake") / "visualization" / template).read_text("utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined)
+    return environment.from_string(source).render(values)

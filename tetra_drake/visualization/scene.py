@@ -26,37 +26,41 @@ COLOURS = {
     "normal": "#0072b2",
     "friction": "#cc79a7",
     "trace": "#222222",
+    "forward": "#444444",
     "odd": "#5d6672",
     "even": "#b4bbc3",
     "floor": "#f2f1ec",
     "inch": "#d3d2cb",
     "six_inches": "#8f8e87",
 }
-"""What is drawn in which colour (those of cables and forces after Okabe and Ito, who chose
-them for colour-blind people); neighbouring tetrahedra alternate between odd and even."""
+"""Colours of what is drawn (those of cables and forces are Okabe and Ito's, for colour-blind
+people); neighbouring tetrahedra alternate between odd and even."""
 
 CABLE_RADIUS, HAIRLINE = 0.0003, 0.0001
-"""Drawn radius of a cable: m for each N of tension, and the least, in m."""
+"""Drawn radius of a cable: m per N of tension, and the least, in m."""
 
 ARROW_LENGTH = 30.0 * INCH / POUND_FORCE
-"""Length of a force's arrow in m for each N: 6 in are 0.2 lbf."""
+"""Length of a force's arrow in m per N: 6 in are 0.2 lbf."""
 
 ARROW_WIDTH = 0.06
-"""Length in m from which on an arrow grows no thicker."""
+"""Length in m above which an arrow grows no thicker."""
 
 HIDDEN = 1e-6
-"""Drawn force in N where there is none; a scale of 0 would make matrices singular."""
+"""Drawn force in N where there is none: a scale of 0 would make matrices singular."""
+
+FORWARD_LENGTH = 6.0 * INCH
+"""Length of the arrow on the floor that shows the direction of travel."""
 
 FIELD_OF_VIEW, ASPECT = 35.0, 1.7
 """Of the camera: degrees top to bottom, and the width to height of a window it is placed for."""
 
 VIEW = -0.35, 1.0, -0.4
-"""The direction the camera looks in: from the robot's right and front, down on it."""
+"""Direction in which the camera looks: from the robot's right and front, down on it."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """How the object at a path of the scene moves over some frames."""
+    """Motion of the object at a path of the scene over some frames."""
 
     path: str
     positions: np.ndarray
@@ -67,7 +71,7 @@ class Motion:
     """(frames, 3); None for an object that keeps its size."""
 
     def matrix(self, frame: int) -> np.ndarray:
-        """The (4, 4) matrix that moves, turns and stretches the object to a frame at once."""
+        """(4, 4): the transformation, with scaling, of the object in one frame."""
         matrix = np.eye(4)
         if self.quaternions is not None:
             matrix[:3, :3] = RotationMatrix(Quaternion(self.quaternions[frame])).matrix()
@@ -78,7 +82,7 @@ class Motion:
 
 
 def add_robot(meshcat: Meshcat, structure: Structure) -> None:
-    """Makes the objects that motions() moves: tetrahedra, cables, and arrows for forces."""
+    """Adds the objects that motions() moves: tetrahedra, cables, and arrows for forces."""
     for i, body in enumerate(structure.bodies):
         _add_tetrahedron(meshcat, structure, f"/robot/{body}", rgba("even" if i % 2 else "odd"))
     for cable, name in zip(structure.cables, structure.cable_names, strict=True):
@@ -91,23 +95,10 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
 
 
 def motions(structure: Structure, frames: xarray.Dataset) -> Iterator[Motion]:
-    """How everything moves over `frames`, samples of a trajectory (see make_dataset)."""
+    """Motions of all objects over `frames`, samples of a trajectory."""
     yield from _tetrahedron_motions(structure, frames)
     yield from _cable_motions(structure, frames)
     yield from _force_motions(structure, frames)
-
-
-def body_poses(structure: Structure, p_WN: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """R_WB (..., 3, 3) and p_WB (..., 3) of bodies whose nodes are at p_WN (..., 4, 3), in m.
-
-    The best fit (Kabsch), which is exact as the nodes are fixed in the body.
-    """
-    centre_B, centre_W = structure.p_BN.mean(axis=0), p_WN.mean(axis=-2)
-    spread = np.swapaxes(p_WN - centre_W[..., np.newaxis, :], -1, -2)
-    U, _, Vt = np.linalg.svd(spread @ (structure.p_BN - centre_B))
-    U[..., 2] *= np.sign(np.linalg.det(U @ Vt))[..., np.newaxis]  # a rotation, never a reflection
-    R_WB = U @ Vt
-    return R_WB, centre_W - R_WB @ centre_B
 
 
 def aligning_quaternions(directions: np.ndarray) -> np.ndarray:
@@ -127,7 +118,7 @@ def aligning_quaternions(directions: np.ndarray) -> np.ndarray:
 
 
 def set_surroundings(meshcat: Meshcat, structure: Structure, points: np.ndarray) -> None:
-    """Floor, light and camera for a robot whose nodes stay around `points` (..., 3), in m."""
+    """Sets floor, light and camera for a robot whose nodes stay around `points` (..., 3), in m."""
     corners = floor_corners(points)
     height = -structure.node_radius
     _add_floor(meshcat, corners, height=height)
@@ -138,6 +129,11 @@ def set_surroundings(meshcat: Meshcat, structure: Structure, points: np.ndarray)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 0.9)
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
     (x, y), (X, Y) = corners * INCH
+    _add_unit_arrow(meshcat, "/floor/forward", rgba("forward"))
+    start = np.array([[(x + X - FORWARD_LENGTH) / 2, y + INCH, height]])
+    size = np.full((1, 3), FORWARD_LENGTH)
+    forward = Motion("/floor/forward", start, aligning_quaternions(np.eye(3)[:1]), size)
+    meshcat.SetTransform(forward.path, forward.matrix(0))
     floor = [(a, b, height) for a in (x, X) for b in (y, Y)]
     seen = np.vstack([points.reshape(-1, 3), floor])
     target = (seen.min(axis=0) + seen.max(axis=0)) / 2
@@ -153,7 +149,7 @@ def floor_corners(points: np.ndarray) -> np.ndarray:
 
 
 def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Where a camera aimed at `target` (3,) sees all `points` (points, 3) with some margin."""
+    """Position from which a camera aimed at `target` (3,) sees all `points` (points, 3)."""
     forward = np.array(VIEW) / np.linalg.norm(VIEW)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -184,7 +180,7 @@ def _add_tetrahedron(meshcat: Meshcat, structure: Structure, path: str, colour: 
 
 
 def _cable_path(cable: np.void, name: str) -> str:
-    """Where a cable is in the scene: in a folder for each kind."""
+    """Path of a cable in the scene, in one folder per kind."""
     if cable["signal"] != PASSIVE:
         kind = "actuated"
     else:
@@ -205,14 +201,14 @@ def _add_unit_arrow(meshcat: Meshcat, path: str, colour: Rgba) -> None:
 
 
 def _tetrahedron_motions(structure: Structure, frames: xarray.Dataset) -> Iterator[Motion]:
-    R_WB, p_WB = body_poses(structure, frames["p_WN"].values)
+    q_WB = frames["q_WB"].values
+    q_WB = q_WB / np.linalg.norm(q_WB, axis=-1, keepdims=True)
     for i, body in enumerate(structure.bodies):
-        quaternions = np.array([RotationMatrix(R).ToQuaternion().wxyz() for R in R_WB[:, i]])
-        yield Motion(f"/robot/{body}", p_WB[:, i], quaternions)
+        yield Motion(f"/robot/{body}", frames["p_WB"].values[:, i], q_WB[:, i])
 
 
 def _cable_motions(structure: Structure, frames: xarray.Dataset) -> Iterator[Motion]:
-    """Unit cylinders scaled to reach from node to node, as thick as they pull."""
+    """Unit cylinders scaled to reach from node to node, with radii proportional to tension."""
     p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
     radius = (CABLE_RADIUS * frames["tension"].values).clip(min=HAIRLINE)
     for c, (cable, name) in enumerate(zip(structure.cables, structure.cable_names, strict=True)):
