@@ -18,7 +18,7 @@ from tetra_drake.experiment.command import add_analyse, add_tables
 from tetra_drake.figures.command import add_figures
 from tetra_drake.report.replay_command import add_replay
 from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, seeded_gait
-from tetra_drake.scenario.load import load_scenario, with_engine
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:

@@ -25,7 +25,6 @@ from tetra_drake.benchmark.work_precision import (
     measure,
 )
 from tetra_drake.robot.gait import load_gait
-from tetra_drake.scenario.load import with_engine
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -78,7 +77,7 @@ def test_a_row_says_how_many_gaits_failed() -> None:
 def test_the_compiled_engine_has_settings_of_its_own(
     scenario: Scenario, data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scenario = with_engine(scenario, "compiled")
+    scenario = scenario.with_changes({"simulation.engine": "compiled"})
     scenario.simulation.duration, scenario.simulation.steady_from = 0.2, 0.1
     assert default_setting(scenario).apply(scenario).compiled.max_step == pytest.approx(
         scenario.compiled.max_step

@@ -12,7 +12,6 @@ from tetra_drake.experiment import analysis
 from tetra_drake.experiment.analysis import ANALYSIS, analyse, best_of_trials, load_analysis
 from tetra_drake.experiment.variations import DEFAULT, NOTHING, resimulations, variations
 from tetra_drake.results.result import versions
-from tetra_drake.scenario.load import with_engine
 
 TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1)]]]
 """Trial 1 has no gait with a fitness."""
@@ -21,7 +20,7 @@ TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1
 @pytest.fixture(scope="module")
 def analysed(tmp_path_factory):
     """The directory of an analysed run of a robot of three tetrahedra."""
-    scenario = with_engine(tiny_scenario(), "compiled")
+    scenario = tiny_scenario().with_changes({"simulation.engine": "compiled"})
     run = write_run(tmp_path_factory.mktemp("runs") / "thesis", TRIALS, scenario=scenario)
     analyse(run, workers=1, make_executor=ThreadPoolExecutor)
     return run
@@ -44,7 +43,7 @@ def test_each_setting_is_simulated_on_the_diagram(analysed):
     settings = resimulations(run.manifest.scenario)
     assert list(again["setting"]) == [name for name in settings for _ in range(2)]
     assert again["failure"].isna().all()
-    evaluate = GaitEvaluation(with_engine(run.manifest.scenario, "drake"))
+    evaluate = GaitEvaluation(run.manifest.scenario.with_changes({"simulation.engine": "drake"}))
     distances = [evaluate(gait.genome).distance_in for gait in best_of_trials(run)]
     assert again[again["setting"] == DEFAULT]["distance_in"].tolist() == distances
     assert again["distance_in"].nunique() > len(distances)

@@ -32,7 +32,6 @@ from tetra_drake.engines.compiled.engine import compile_engine
 from tetra_drake.engines.compiled.walk import walk
 from tetra_drake.evolution.executors import thread_executor
 from tetra_drake.robot.gait import Gait, seeded_gait
-from tetra_drake.scenario.load import with_engine
 from tetra_drake.scenario.schema import Scenario
 
 CHECK = CompiledSetting(2e-3, 1.0, 2e-3)
@@ -201,8 +200,8 @@ def _our_methods(
     scenario: Scenario, exact_in: np.ndarray, cores: int
 ) -> tuple[list[Method], Method]:
     """Those that walk one gait at a time, and the one that walks many."""
-    drake = with_engine(scenario, "drake")
-    compiled = with_engine(scenario, "compiled")
+    drake = scenario.with_changes({"simulation.engine": "drake"})
+    compiled = scenario.with_changes({"simulation.engine": "compiled"})
     rows: list[tuple[str, AnySetting]] = [
         ("Drake diagram, default", default_setting(drake)),
         ("Drake diagram", Setting("runge_kutta3", 1e-3, 2.0, STEP_END)),
@@ -266,7 +265,7 @@ def _text(setting: AnySetting) -> str:
 def _walk_with(scenario: Scenario, setting: AnySetting) -> Callable[[Gait], float]:
     """How far (in) a gait goes with a setting of the engine that the setting is for."""
     engine = "compiled" if isinstance(setting, CompiledSetting) else "drake"
-    chosen = with_engine(scenario, engine)
+    chosen = scenario.with_changes({"simulation.engine": engine})
     return lambda gait: run_setting(chosen, gait, setting).distance_in
 
 

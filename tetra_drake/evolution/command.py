@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.scenario.load import load_scenario, shipped_scenarios, with_engine
+from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:

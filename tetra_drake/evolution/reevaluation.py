@@ -21,7 +21,6 @@ from tetra_drake.evolution.population import genome_columns
 from tetra_drake.evolution.record import REEVALUATIONS, evaluation_entry, trial_folder
 from tetra_drake.evolution.tables import RunTables, load_run
 from tetra_drake.evolution.trial import Assignment
-from tetra_drake.scenario.load import with_engine
 
 if TYPE_CHECKING:
     import pandas
@@ -69,7 +68,7 @@ def reevaluate(
     missing = [assignment for assignment in chosen if assignment not in done]
     rows = run.evaluations.set_index(["trial", "index"])
     columns = genome_columns(run.evaluations)
-    evaluate = evaluate or GaitEvaluation(with_engine(run.manifest.scenario, "drake"))
+    evaluate = evaluate or GaitEvaluation(run.manifest.scenario.with_changes({"simulation.engine": "drake"}))
     pool = EvaluationPool[Assignment](evaluate, workers=workers, make_executor=make_executor)
     genomes = {
         each: rows.loc[(each.trial, each.index), columns].to_numpy(dtype=np.float64)

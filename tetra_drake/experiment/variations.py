@@ -16,7 +16,6 @@ from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, Genome
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.robot.structure import MakeStructure, Structure
-from tetra_drake.scenario.load import with_engine
 from tetra_drake.scenario.schema import Scenario
 
 DEFAULT = "default"
@@ -96,7 +95,7 @@ class DisplacedStart:
 
 def resimulations(scenario: Scenario) -> dict[str, Scenario]:
     """The scenario on the Drake diagram, integrated in other ways, by their names."""
-    scenario = with_engine(scenario, "drake")
+    scenario = scenario.with_changes({"simulation.engine": "drake"})
     accuracy = scenario.simulation.accuracy
     explicit = {"scheme": "runge_kutta3", "accuracy": 1e-3, "max_step": 2e-3}
     changes: dict[str, dict[str, Any]] = {
@@ -117,7 +116,7 @@ def resimulations(scenario: Scenario) -> dict[str, Scenario]:
 
 def variations(scenario: Scenario) -> Iterator[Variation]:
     """All changes, beginning with none at all."""
-    scenario = with_engine(scenario, "compiled")
+    scenario = scenario.with_changes({"simulation.engine": "compiled"})
     yield Variation(NOTHING, 0.0, GaitEvaluation(scenario))
     signed = [sign * percent for percent in PERCENTS for sign in (-1.0, 1.0)]
     for what, keys in SCALED.items():
