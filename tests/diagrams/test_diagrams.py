@@ -68,7 +68,7 @@ def test_script_refuses_a_file_for_a_folder(
 def test_robot_writes_its_pictures(
     scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scenario.simulation = dataclasses.replace(scenario.simulation, duration=2.0, steady_from=1.0)
+    scenario = scenario.with_changes({"simulation.duration": 2.0, "simulation.steady_from": 1.0})
     monkeypatch.setattr(robot, "load_scenario", lambda name: scenario)
     assert robot.main(["--out", str(tmp_path)]) == 0
     written = {path.name for path in tmp_path.iterdir()}
@@ -76,7 +76,7 @@ def test_robot_writes_its_pictures(
 
 
 def test_robot_reports_distance_and_forces(scenario: Scenario) -> None:
-    scenario.simulation = dataclasses.replace(scenario.simulation, duration=2.0, steady_from=1.0)
+    scenario = scenario.with_changes({"simulation.duration": 2.0, "simulation.steady_from": 1.0})
     gait = dataclasses.replace(seeded_gait(scenario), name="short walk")
     result = simulate(scenario=scenario, gait=gait, record=True)
     report = robot.report(gait, result)

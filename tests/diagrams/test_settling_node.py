@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -64,7 +63,7 @@ def test_nothing_meets_the_ground_before_it_fell(scenario: Scenario) -> None:
 
 
 def test_without_gravity_nothing_falls(scenario: Scenario) -> None:
-    scenario.robot = dataclasses.replace(scenario.robot, gravity=0.0)
+    scenario = scenario.with_changes({"robot.gravity": 0.0})
     motion = settle(scenario, duration=5e-3)
     np.testing.assert_array_equal(motion.normal_forces, 0.0)
     impact, _ = first_contact(bounce(scenario, duration=5e-3))

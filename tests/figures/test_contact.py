@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -97,7 +96,7 @@ class TestFigure6:
 
     def test_one_that_never_slips_can_be_drawn(self, scenario: Scenario, tmp_path: Path) -> None:
         wide = 20.0 * scenario.friction.stiction_range
-        scenario.friction = dataclasses.replace(scenario.friction, stiction_range=wide)
+        scenario = scenario.with_changes({"friction.stiction_range": wide})
         motion = slide(scenario, duration=0.01)
         assert slips(motion, LEADING) == []
         figure = figure_06_sliding(motion, stiction_range=wide)

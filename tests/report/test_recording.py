@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import shutil
 from collections.abc import Callable
@@ -27,12 +26,14 @@ from tetra_drake.scenario.schema import Scenario
 def short() -> Scenario:
     """A robot of three tetrahedra, for a moment."""
     thesis = load_scenario()
-    return dataclasses.replace(
-        thesis,
-        name="short",
-        robot=dataclasses.replace(thesis.robot, tetrahedra=3),
-        simulation=dataclasses.replace(thesis.simulation, duration=0.1, steady_from=0.05),
-        evolution=dataclasses.replace(thesis.evolution, trials=3),
+    return thesis.with_changes(
+        {
+            "name": "short",
+            "robot.tetrahedra": 3,
+            "simulation.duration": 0.1,
+            "simulation.steady_from": 0.05,
+            "evolution.trials": 3,
+        }
     )
 
 

@@ -1,6 +1,5 @@
 """Scenario files: the thesis's numbers, files based on files, and what a bad file is told."""
 
-import dataclasses
 import math
 from pathlib import Path
 
@@ -167,11 +166,14 @@ def test_a_file_changes_only_what_it_gives(tmp_path, scenario):
         simulation: {duration: 500 ms, steady_from: 0 s}
         """,
     )
-    expected = dataclasses.replace(
-        scenario,
-        name="stiff",
-        cables=dataclasses.replace(scenario.cables, outer_stiffness=LBF / IN, slack=True),
-        simulation=dataclasses.replace(scenario.simulation, duration=0.5, steady_from=0.0),
+    expected = scenario.with_changes(
+        {
+            "name": "stiff",
+            "cables.outer_stiffness": LBF / IN,
+            "cables.slack": True,
+            "simulation.duration": 0.5,
+            "simulation.steady_from": 0.0,
+        }
     )
     loaded = load_scenario(file)
     assert loaded.cables.outer_stiffness == pytest.approx(LBF / IN, rel=1e-12)

@@ -25,7 +25,7 @@ FACE = (0, 1, 3)
 @pytest.fixture
 def structure(scenario: Scenario) -> Structure:
     """One tetrahedron (of two), standing on a face: three contact nodes at height 0."""
-    pair = MakeStructure(dataclasses.replace(scenario.robot, tetrahedra=2), scenario.cables)
+    pair = MakeStructure(scenario.with_changes({"robot.tetrahedra": 2}).robot, scenario.cables)
     return dataclasses.replace(
         pair,
         bodies=("T1",),

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import contextlib
-import dataclasses
 import importlib.util
 import io
 import json
@@ -58,8 +57,7 @@ WINDOW = 600, 400  # small, as it is drawn again and again in software
 def scenario() -> Scenario:
     """Long enough to get somewhere."""
     thesis = load_scenario()
-    settings = dataclasses.replace(thesis.simulation, duration=5.0)
-    return dataclasses.replace(thesis, simulation=settings)
+    return thesis.with_changes({"simulation.duration": 5.0})
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import socket
 from collections.abc import Iterator
 
@@ -41,8 +40,7 @@ class FakeTime:
 
 @pytest.fixture
 def short(scenario: Scenario) -> Scenario:
-    settings = dataclasses.replace(scenario.simulation, duration=0.3, steady_from=0.1)
-    return dataclasses.replace(scenario, simulation=settings)
+    return scenario.with_changes({"simulation.duration": 0.3, "simulation.steady_from": 0.1})
 
 
 @pytest.fixture

@@ -185,8 +185,9 @@ def measure_step_costs(scenario: Scenario, sizes: Sequence[int]) -> list[StepCos
     runs: dict[int, list[Run]] = {size: [] for size in sizes}
     for _ in range(_REPETITIONS):
         for size in sizes:
-            robot = dataclasses.replace(scenario.robot, tetrahedra=size)
-            sized = with_engine(dataclasses.replace(scenario, robot=robot), "compiled")
+            sized = scenario.with_changes(
+                {"robot.tetrahedra": size, "simulation.engine": "compiled"}
+            )
             runs[size].append(run_setting(sized, seeded_gait(sized, 0), default_setting(sized)))
     costs = []
     for size, repeated in runs.items():
@@ -271,6 +272,11 @@ def _walk_with(scenario: Scenario, setting: AnySetting) -> Callable[[Gait], floa
 
 def _warm_up(scenario: Scenario, gait: Gait) -> None:
     """Loads what the diagram calls, which belongs to no gait's wall time."""
-    simulation = dataclasses.replace(scenario.simulation, duration=0.02, steady_from=0.01)
-    instant = with_engine(dataclasses.replace(scenario, simulation=simulation), "drake")
+    instant = scenario.with_changes(
+        {
+            "simulation.engine": "drake",
+            "simulation.duration": 0.02,
+            "simulation.steady_from": 0.01,
+        }
+    )
     run_setting(instant, gait, default_setting(instant))

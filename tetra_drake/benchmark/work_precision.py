@@ -209,8 +209,8 @@ def run_gaits(
 
 def _warm_up(scenario: Scenario, gait: Gait) -> None:
     """Loads or compiles the kernels, which belongs to no run's wall time."""
-    instant = dataclasses.replace(scenario.simulation, duration=0.02, steady_from=0.01)
-    run_setting(dataclasses.replace(scenario, simulation=instant), gait, default_setting(scenario))
+    instant = scenario.with_changes({"simulation.duration": 0.02, "simulation.steady_from": 0.01})
+    run_setting(instant, gait, default_setting(scenario))
 
 
 def format_row(row: Row, duration: float) -> str:

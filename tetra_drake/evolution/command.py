@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import math
 import sys
 from pathlib import Path
@@ -180,12 +179,12 @@ def _scenario_to_compare(options: argparse.Namespace) -> Scenario | None:
 
 def _with_options(scenario: Scenario, options: argparse.Namespace) -> Scenario:
     """The scenario with the engine and the numbers of trials and iterations asked for."""
-    scenario = with_engine(scenario, options.engine)
-    asked = {"trials": options.trials, "max_iterations": options.iterations}
-    changes = {name: value for name, value in asked.items() if value is not None}
-    return dataclasses.replace(
-        scenario, evolution=dataclasses.replace(scenario.evolution, **changes)
-    )
+    asked = {
+        "simulation.engine": options.engine,
+        "evolution.trials": options.trials,
+        "evolution.max_iterations": options.iterations,
+    }
+    return scenario.with_changes({key: value for key, value in asked.items() if value is not None})
 
 
 def _reevaluate_best(directory: Path, workers: int) -> None:

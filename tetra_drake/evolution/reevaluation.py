@@ -68,7 +68,9 @@ def reevaluate(
     missing = [assignment for assignment in chosen if assignment not in done]
     rows = run.evaluations.set_index(["trial", "index"])
     columns = genome_columns(run.evaluations)
-    evaluate = evaluate or GaitEvaluation(run.manifest.scenario.with_changes({"simulation.engine": "drake"}))
+    evaluate = evaluate or GaitEvaluation(
+        run.manifest.scenario.with_changes({"simulation.engine": "drake"})
+    )
     pool = EvaluationPool[Assignment](evaluate, workers=workers, make_executor=make_executor)
     genomes = {
         each: rows.loc[(each.trial, each.index), columns].to_numpy(dtype=np.float64)

@@ -107,9 +107,7 @@ def resimulations(scenario: Scenario) -> dict[str, Scenario]:
         "runge_kutta3, witness": explicit | {"mode_changes": "witness"},
     }
     return {
-        name: dataclasses.replace(
-            scenario, simulation=dataclasses.replace(scenario.simulation, **change)
-        )
+        name: scenario.with_changes({f"simulation.{key}": value for key, value in change.items()})
         for name, change in changes.items()
     }
 

@@ -1,8 +1,8 @@
 """Settings as dataclasses: fields with units and limits, checked, built and written back.
 
-Everything here works on any dataclass whose fields come from the helpers below. Their types may be
-float, int, str, bool, another dataclass, `X | None`, lists and maps (`list[X]`, `dict[str, X]`), and
-tagged kinds: a union of dataclasses, written `!Name {...}` as Drake's YAML does.
+Everything here works on any dataclass whose fields come from the helpers below. Their types:
+float, int, str, bool, another dataclass, `X | None`, lists and maps (`list[X]`, `dict[str, X]`),
+and tagged kinds: a union of dataclasses, written `!Name {...}` as Drake's YAML does.
 
 A *tree* is what YAML holds, with all numbers in SI: dicts, lists and scalars; the dict of a tagged
 kind has its tag under the key "_tag", as in pydrake.common.yaml.
@@ -277,11 +277,11 @@ _Loader.add_multi_constructor("!", _Loader.construct_kind)
 class _Dumper(yaml.SafeDumper):
     """YAML with tagged kinds, and lists of scalars on one line."""
 
-    def represent_dict(self, data: Any) -> yaml.Node:
+    def represent_dict(self, data: Any) -> yaml.MappingNode:
         entries = {name: value for name, value in data.items() if name != TAG}
         return self.represent_mapping(data.get(TAG, "tag:yaml.org,2002:map"), entries)
 
-    def represent_list(self, data: Any) -> yaml.Node:
+    def represent_list(self, data: Any) -> yaml.SequenceNode:
         flat = not any(isinstance(item, (list, dict)) for item in data)
         return self.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=flat)
 
@@ -341,7 +341,7 @@ def _finite_number(kind: type, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (kind, int)):
         wanted = "an integer" if kind is int else "a number"
         raise ValueError(f"found {describe(value)}, expected {wanted}")
-    found: float = value
+    found = typing.cast(float, value)
     if not abs(found) < 1e300:  # NaN, infinity, and integers beyond floating point
         raise ValueError(f"found {str(found)[:40]}, expected a finite number")
     return found
