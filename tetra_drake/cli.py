@@ -99,12 +99,19 @@ def _add_simulate(commands: argparse._SubParsersAction) -> None:
     command.set_defaults(run=_simulate)
 
 
+def _scenario(options: argparse.Namespace) -> Scenario:
+    """The scenario of the options, on the engine that they ask for."""
+    scenario = load_scenario(options.scenario)
+    engine = options.engine or scenario.simulation.engine
+    return scenario.with_changes({"simulation.engine": engine})
+
+
 def _simulate(options: argparse.Namespace) -> None:
     from tetra_drake.engines.simulate import simulate
     from tetra_drake.results.folder import check_result_folder, save_result_folder
     from tetra_drake.results.result import summary
 
-    scenario = with_engine(load_scenario(options.scenario), options.engine)
+    scenario = _scenario(options)
     gait = _gait(options, scenario)
     check_result_folder(options.out)
     if scenario.simulation.engine == "compiled":
@@ -222,7 +229,7 @@ def _add_work_precision(commands: argparse._SubParsersAction) -> None:
 def _work_precision(options: argparse.Namespace) -> None:
     from tetra_drake.benchmark.work_precision import HEADER, format_row, measure
 
-    scenario = with_engine(load_scenario(options.scenario), options.engine)
+    scenario = _scenario(options)
     gaits = [load_gait(path, scenario) for path in options.gaits]
     print(HEADER)
     for row in measure(scenario, gaits, workers=options.workers):

@@ -20,7 +20,6 @@ from tetra_drake.experiment.variations import (
 )
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.load import with_engine
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -43,7 +42,7 @@ def is_localised(scenario):
 
 
 def test_a_variation_scales_its_keys_and_nothing_else(scenario):
-    compiled = with_engine(scenario, "compiled")
+    compiled = scenario.with_changes({"simulation.engine": "compiled"})
     scaled = [each for each in variations(scenario) if each.what in SCALED]
     assert len(scaled) == len(SCALED) * len(PERCENTS) * 2
     for each in scaled:
@@ -55,7 +54,9 @@ def test_a_variation_scales_its_keys_and_nothing_else(scenario):
 
 def test_one_variation_changes_nothing(scenario):
     (unchanged,) = [each for each in variations(scenario) if each.what == NOTHING]
-    assert unchanged.evaluate == GaitEvaluation(with_engine(scenario, "compiled"))
+    assert unchanged.evaluate == GaitEvaluation(
+        scenario.with_changes({"simulation.engine": "compiled"})
+    )
 
 
 def test_variations_leave_the_scenario_as_it_is(scenario):
@@ -84,7 +85,7 @@ def test_a_displaced_robot_starts_near_its_pose_and_not_in_the_ground(scenario, 
 
 
 def test_a_robot_displaced_by_nothing_walks_as_ever():
-    scenario = with_engine(tiny_scenario(), "compiled")
+    scenario = tiny_scenario().with_changes({"simulation.engine": "compiled"})
     genome = ParameterSpace.of(scenario).random(np.random.default_rng(1))
     displaced = DisplacedStart(scenario, 0.0, seed=0)(genome)
     plain = GaitEvaluation(scenario)(genome)
@@ -93,7 +94,7 @@ def test_a_robot_displaced_by_nothing_walks_as_ever():
 
 
 def test_a_displaced_robot_that_fails_says_when():
-    scenario = with_engine(tiny_scenario(), "compiled")
+    scenario = tiny_scenario().with_changes({"simulation.engine": "compiled"})
     scenario.simulation.max_evaluations = 100
     evaluation = DisplacedStart(scenario, 5.0, seed=0)(
         ParameterSpace.of(scenario).random(np.random.default_rng(1))
@@ -103,8 +104,8 @@ def test_a_displaced_robot_that_fails_says_when():
 
 
 def test_resimulations_are_of_the_diagram_and_differ_as_their_names_say(scenario):
-    drake = with_engine(scenario, "drake")
-    settings = resimulations(with_engine(scenario, "compiled"))
+    drake = scenario.with_changes({"simulation.engine": "drake"})
+    settings = resimulations(scenario.with_changes({"simulation.engine": "compiled"}))
     assert settings[DEFAULT] == drake
     assert differences(drake, settings["accuracy × 10"]) == {
         "simulation.accuracy": pytest.approx(0.1)
