@@ -82,10 +82,7 @@ def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(
     (kernels / "outer.py").write_text(
         f"{begin}from {name}.inner import inner\n@compiled\ndef outer():\n    return inner()\n"
     )
-    program = (
-        f"from {name}.outer import outer;"
-        "print(outer(), sum(outer.stats.cache_hits.values()))"
-    )
+    program = f"from {name}.outer import outer;print(outer(), sum(outer.stats.cache_hits.values()))"
     cache_home = tmp_path / "cache"
     cache_home.mkdir()
     if folder != "physics":  # keeps numba from writing beside the sources, as there

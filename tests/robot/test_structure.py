@@ -21,7 +21,6 @@ from tetra_drake.robot.bodies import (
 from tetra_drake.robot.structure import (
     NODES,
     STRUTS,
-    TIP,
     MakeStructure,
     Structure,
     node_positions,
@@ -72,16 +71,10 @@ def plant_with(structure: Structure) -> MultibodyPlant:
 # The tetrahedron
 
 
-def test_every_edge_is_six_inches(structure):
+def test_struts_of_six_inches_join_all_nodes_around_the_centre_of_mass(structure):
+    assert sorted(STRUTS) == list(itertools.combinations(range(4), 2))
     edges = [np.linalg.norm(structure.p_BN[i] - structure.p_BN[j]) for i, j in STRUTS]
     assert edges == pytest.approx([6 * IN] * 6, rel=1e-14)
-
-
-def test_there_is_a_strut_between_any_two_nodes():
-    assert sorted(STRUTS) == list(itertools.combinations(range(4), 2))
-
-
-def test_the_body_frame_is_at_the_centre_of_mass(structure):
     assert structure.p_BN.mean(axis=0) == pytest.approx(np.zeros(3), abs=1e-17)
 
 
@@ -155,17 +148,6 @@ def test_a_strut_lies_between_its_nodes(structure):
         assert ends[1] == pytest.approx(structure.p_BN[j], abs=1e-15)
 
 
-def test_the_tetrahedron_follows_the_scenario(scenario):
-    scenario.robot.strut_length = 1.0
-    scenario.robot.strut_diameter = 0.02
-    scenario.robot.node_diameter = 0.06
-    scenario.robot.density = 1000.0
-    structure = MakeStructure(scenario.robot, scenario.cables)
-    mass = 1000 * math.pi * (6 * 0.01**2 * 1.0 + 4 * (4 / 3) * 0.03**3)
-    assert tetrahedron_inertia(structure).get_mass() == pytest.approx(mass, rel=1e-14)
-    assert np.linalg.norm(structure.p_BN[0] - structure.p_BN[3]) == pytest.approx(1.0, rel=1e-14)
-
-
 # Any number of tetrahedra
 
 
@@ -197,13 +179,6 @@ def test_base_triangles_are_parallel_and_spaced_evenly_from_zero_on(make, scenar
 
 
 @pytest.mark.parametrize("n", NUMBERS)
-def test_tips_nest_in_the_next_tetrahedron(make, n):
-    x = start(make(n))[:, :, 0]
-    assert np.all(x[:-1, TIP] > x[1:, 0])
-    assert np.all(x[:-1, TIP] < x[1:, TIP])
-
-
-@pytest.mark.parametrize("n", NUMBERS)
 def test_the_robot_starts_left_right_symmetric(make, n):
     p_WN = start(make(n))
     mirrored = p_WN[:, [1, 0, 2, 3]] * [1, -1, 1]
@@ -211,23 +186,16 @@ def test_the_robot_starts_left_right_symmetric(make, n):
 
 
 @pytest.mark.parametrize("n", NUMBERS)
-def test_each_junction_has_three_outer_and_three_inner_cables(make, n):
+def test_each_junction_has_three_outer_and_three_inner_cables_named_by_their_ends(make, n):
     structure = make(n)
-    ends = {
-        (structure.node_names[cable["node_a"]], structure.node_names[cable["node_b"]])
-        for cable in structure.cables
-    }
-    expected = set()
-    for i in range(1, n):
-        for node in ("bottom_left", "bottom_right", "top"):
-            expected.add((f"T{i} {node}", f"T{i + 1} {node}"))
-            expected.add((f"T{i} tip", f"T{i + 1} {node}"))
-    assert ends == expected
-
-
-@pytest.mark.parametrize("n", NUMBERS)
-def test_a_cable_is_called_after_what_it_joins(make, n):
-    structure = make(n)
+    base = ("bottom_left", "bottom_right", "top")
+    junctions = [
+        (f"T{i}-T{i + 1}", role, node)
+        for i in range(1, n)
+        for role in ("outer", "inner")
+        for node in base
+    ]
+    assert structure.cable_names == tuple(" ".join(names) for names in junctions)
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
         a, b = (structure.node_names[cable[end]].split() for end in ("node_a", "node_b"))
         kind = "inner" if a[1] == "tip" else "outer"
@@ -281,20 +249,10 @@ def test_the_ground_touches_all_bottom_nodes_and_the_lead_tip(make, n):
 
 
 @pytest.mark.parametrize("n", NUMBERS)
-def test_the_plant_holds_free_bodies_alone(make, n):
-    plant = plant_with(make(n))
-    assert plant.num_bodies() == n + 1  # with World
-    assert (plant.num_positions(), plant.num_velocities()) == (7 * n, 6 * n)
-    assert plant.num_actuators() == 0
-    assert plant.CalcTotalMass(plant.CreateDefaultContext()) == pytest.approx(
-        n * tetrahedron_inertia(make(n)).get_mass(), rel=1e-14
-    )
-
-
-@pytest.mark.parametrize("n", NUMBERS)
 def test_the_plants_state_runs_body_by_body(make, n):
     structure = make(n)
     plant = plant_with(structure)
+    assert (plant.num_positions(), plant.num_velocities()) == (7 * n, 6 * n)
     context = plant.CreateDefaultContext()
     state = random_state(structure, seed=n)
     plant.SetPositionsAndVelocities(context, state)
@@ -302,6 +260,8 @@ def test_the_plants_state_runs_body_by_body(make, n):
         body = plant.GetBodyByName(name)
         assert body.floating_positions_start() == 7 * i
         assert body.floating_velocities_start_in_v() == 6 * i
+        inertia = body.default_spatial_inertia().CopyToFullMatrix6()
+        assert np.array_equal(inertia, tetrahedron_inertia(structure).CopyToFullMatrix6())
         quaternion, p_WB = state[7 * i : 7 * i + 4], state[7 * i + 4 : 7 * i + 7]
         w_WB, v_WB = state[7 * n + 6 * i :][:3], state[7 * n + 6 * i :][3:6]
         X_WB = RigidTransform(Quaternion(quaternion), p_WB)
@@ -311,8 +271,7 @@ def test_the_plants_state_runs_body_by_body(make, n):
         assert V_WB.translational() == pytest.approx(v_WB, abs=1e-15)
 
 
-@pytest.mark.parametrize("n", NUMBERS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("n", "seed"), [(2, 0), (5, 1), (8, 2)])
 def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(make, n, seed):
     structure = make(n)
     plant = MultibodyPlant(time_step=0.0)
@@ -340,19 +299,3 @@ def test_a_quaternion_that_drifted_off_unit_length_still_is_a_rotation(structure
     assert node_positions(structure, drifted) == pytest.approx(
         node_positions(structure, state), abs=1e-12
     )
-
-
-def test_every_body_of_the_plant_has_the_tetrahedrons_inertia(structure):
-    plant = plant_with(structure)
-    expected = tetrahedron_inertia(structure).CopyToFullMatrix6()
-    for name in structure.bodies:
-        inertia = plant.GetBodyByName(name).default_spatial_inertia()
-        assert np.array_equal(inertia.CopyToFullMatrix6(), expected)
-
-
-def test_no_scene_graph_is_needed(structure):
-    plant = plant_with(structure)
-    assert not plant.geometry_source_is_registered()
-    # Falls freely: no geometry is asked for.
-    derivatives = plant.EvalTimeDerivatives(plant.CreateDefaultContext()).CopyToVector()
-    assert derivatives[-1] == pytest.approx(-9.81, abs=0.01)
