@@ -63,7 +63,7 @@ def ends(scenario: Scenario, seed: int) -> list[np.ndarray]:
     return found
 
 
-@pytest.mark.parametrize("seed", [0, 2, 3])
+@pytest.mark.parametrize("seed", [2, 3])
 def test_nodes_go_where_the_diagrams_nodes_go(compiled_scenario: Scenario, seed: int) -> None:
     # In 0.5 s the robot settles and starts to walk: some nodes slip, leave the ground, land.
     scenario = finely(compiled_scenario, duration=0.5)
