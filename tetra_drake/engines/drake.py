@@ -11,8 +11,7 @@ from pydrake.systems.framework import Context, Diagram, EventStatus
 from tetra_drake.engines.recorder import Recorder, Sample, make_dataset
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
-from tetra_drake.results.metrics import compute_fitness, compute_metrics
-from tetra_drake.results.result import IntegratorWork, SimulationResult
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import MakeStructure, node_positions
@@ -58,15 +57,12 @@ def simulate_drake(
         positions.append(node_positions(structure, state))
     wall_time = time.perf_counter() - started
 
-    start, steady, end = positions
-    metrics = compute_metrics(structure, start=start, steady=steady, end=end)
-    return SimulationResult(
-        metrics=metrics,
-        fitness=compute_fitness(metrics, scenario.fitness),
-        duration=settings.duration,
+    return make_result(
+        scenario,
+        structure,
+        positions=positions,
         wall_time=wall_time,
         integrator=_integrator_work(simulator.get_integrator(), settings),
-        engine="drake",
         trajectory=recorder.dataset(diagram, structure) if record else None,
     )
 

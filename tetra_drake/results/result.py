@@ -6,15 +6,19 @@ import dataclasses
 import json
 import math
 import platform
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from tetra_drake import __version__, thesis
 from tetra_drake.files import write_whole
-from tetra_drake.results.metrics import Metrics
+from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -50,6 +54,33 @@ class SimulationResult:
     """Of the scenario: "drake" or "compiled"."""
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
     """See trajectory.make_dataset; None unless asked for."""
+
+
+def make_result(
+    scenario: Scenario,
+    structure: Structure,
+    *,
+    positions: Sequence[np.ndarray],
+    wall_time: float,
+    integrator: IntegratorWork,
+    trajectory: xarray.Dataset | None,
+) -> SimulationResult:
+    """The result of a simulation on the scenario's engine.
+
+    `positions` are p_WN (nodes, 3) in m at t = 0, at the start of the steady stretch, and at the
+    end; `wall_time` in s.
+    """
+    start, steady, end = positions
+    metrics = compute_metrics(structure, start=start, steady=steady, end=end)
+    return SimulationResult(
+        metrics=metrics,
+        fitness=compute_fitness(metrics, scenario.fitness),
+        duration=scenario.simulation.duration,
+        wall_time=wall_time,
+        integrator=integrator,
+        engine=scenario.simulation.engine,
+        trajectory=trajectory,
+    )
 
 
 def versions() -> dict[str, str]:

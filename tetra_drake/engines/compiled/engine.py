@@ -23,8 +23,7 @@ from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import cable_forces
 from tetra_drake.physics.contact import MODE_COLUMNS, STICK_POINT, ground_forces
-from tetra_drake.results.metrics import compute_fitness, compute_metrics
-from tetra_drake.results.result import IntegratorWork, SimulationResult
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.model import Model, make_model
@@ -85,13 +84,10 @@ def simulate_compiled(
         for i, instant in enumerate(trajectory["time"].values):
             if viewer.wants(instant):
                 viewer.show(trajectory.isel(time=[i]))
-    metrics = compute_metrics(
-        structure, start=start, steady=positions[steady_from], end=positions[duration]
-    )
-    return SimulationResult(
-        metrics=metrics,
-        fitness=compute_fitness(metrics, scenario.fitness),
-        duration=duration,
+    return make_result(
+        scenario,
+        structure,
+        positions=(start, positions[steady_from], positions[duration]),
         wall_time=wall_time,
         integrator=IntegratorWork(
             scheme=SCHEME,
@@ -100,7 +96,6 @@ def simulate_compiled(
             derivative_evaluations=evaluations,
             jacobian_evaluations=0,
         ),
-        engine="compiled",
         trajectory=trajectory if record else None,
     )
 

@@ -1,0 +1,88 @@
+"""The layout: which folder may import which, and what stays out of an import."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tetra_drake
+
+PACKAGE = Path(tetra_drake.__file__).parent
+ORDER = (
+    *("errors", "files", "formatting", "physics", "scenario", "robot", "systems"),
+    *("visualization", "results", "engines", "evolution", "figures", "report", "benchmark"),
+    *("run", "cli"),
+)
+"""A folder, or a module beside the folders, imports only those before it."""
+
+
+def imports(file: Path) -> set[str]:
+    """The modules that a file imports anywhere, as dotted names."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def modules() -> dict[str, set[str]]:
+    """The modules of the package with what they import of it, names below "tetra_drake."."""
+    names = {}
+    for file in PACKAGE.rglob("*.py"):
+        parts = file.relative_to(PACKAGE).with_suffix("").parts
+        if parts[0] not in ("__init__", "__main__"):
+            name = ".".join(part for part in parts if part != "__init__")
+            own = {i.removeprefix("tetra_drake.") for i in imports(file) if "tetra_drake." in i}
+            names[name] = own
+    return {name: {i for i in found if i in names} for name, found in names.items()}
+
+
+def test_data_flows_one_way() -> None:
+    for name, imported in modules().items():
+        place = ORDER.index(name.split(".")[0])
+        upward = [other for other in imported if ORDER.index(other.split(".")[0]) > place]
+        assert not upward, f"{name} imports {upward}"
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    graph = modules()
+    settled: set[str] = set()
+    while rest := graph.keys() - settled:
+        free = {name for name in rest if graph[name] - {name} <= settled}
+        assert free, f"a circle among {sorted(rest)}"
+        settled |= free
+
+
+def test_the_laws_know_neither_drake_nor_the_rest() -> None:
+    for file in (PACKAGE / "physics").glob("*.py"):
+        for name in imports(file):
+            assert not name.startswith("pydrake")
+            assert not name.startswith("tetra_drake") or "tetra_drake.physics" in name, file
+
+
+def test_the_compiled_engine_uses_no_drake_system_and_no_simulator() -> None:
+    for file in (PACKAGE / "engines" / "compiled").glob("*.py"):
+        for name in imports(file):
+            assert not name.startswith(("pydrake", "tetra_drake.systems")), file
+
+
+@pytest.mark.parametrize("statement", ["import tetra_drake", "import tetra_drake.formatting"])
+def test_an_import_of_the_package_is_light(statement: str) -> None:
+    program = f"import sys; {statement}; print(*sorted(sys.modules))"
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert not {"pydrake", "numba", "numpy", "matplotlib"} & set(loaded.stdout.split())
+    assert "tetra_drake" in loaded.stdout.split()
+
+
+def test_the_public_names_are_there() -> None:
+    for name in ("load_scenario", "load_gait", "simulate", "evolve", "load_run"):
+        assert callable(getattr(tetra_drake, name))
+        assert name in dir(tetra_drake)
+    with pytest.raises(AttributeError):
+        getattr(tetra_drake, "nothing")  # noqa: B009
