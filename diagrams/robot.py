@@ -1,80 +1,125 @@
-"""The robot walking: how its tetrahedra move against each other (thesis Fig. 14), and the signals
-and tensions of its actuated cables (Fig. 19).
+"""The robot: build its diagram, simulate one gait, write a page on which it walks.
 
-Writes the block diagram and the figures, and prints distance and signals beside the thesis's.
+    python diagrams/robot.py [--gait FILE] [--duration S] [--out DIR]
+
+    cpg ──→ start_up ──→ cables ──┬──→ forces ──→ plant ──┬──→ state
+                           ↑      │                       │
+                           │    ground                    │
+                           │      ↑                       │
+                           └──────┴───────────────────────┘
+
+cpg       the signals of the central pattern generator, computed beforehand (it has no feedback)
+start_up  zeros until 1.25 s, then the signals
+cables    the tension of 24 cables, from their length, its rate, and the signals
+ground    normal force and friction at 11 nodes; contact and stiction are discrete state
+plant     five tetrahedra, free bodies without joints and without contact geometry
+
+Writes robot.svg, the block diagram, and robot.html, the page. `tetra-drake simulate` does the
+same, with the diagram of tetra_drake/systems/diagram.py and adaptive steps.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.primitives import Adder, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
 
-from tetra_drake import thesis
-from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.engines.recorder import Recorder
 from tetra_drake.figures.block_diagram import save_block_diagram
-from tetra_drake.figures.forces import figure_19_signal_and_tension
-from tetra_drake.figures.motion import figure_14_relative_distances
-from tetra_drake.figures.style import save_figure
-from tetra_drake.results.measures import actuated_cable
-from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
+from tetra_drake.results.trajectory import sample_times
+from tetra_drake.robot.bodies import AddTetrahedra
+from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.signals import signal_samples
+from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import POUND_FORCE
-from tetra_drake.systems.diagram import MakeTensegrityDiagram
+from tetra_drake.systems import CableNetwork, GroundContact, MatsuokaCpg, StartUpGate
+from tetra_drake.visualization.replay import replay_title, save_replay
+
+DIAGRAMS = Path(__file__).parent
+BEST_GAIT = DIAGRAMS.parent / "runs" / "thesis" / "trial_05" / "best_gait.json"
 
 
-def report(gait: Gait, result: SimulationResult) -> str:
-    """Distance, signals and tensions, the thesis's numbers beside ours."""
-    trajectory = result.trajectory
-    assert trajectory is not None
-    cables = [actuated_cable(junction) for junction in trajectory.junction.values]
-    tension = trajectory.tension.sel(cable=cables) / POUND_FORCE
-    signal = np.ptp(trajectory.signal.values, axis=0).max() / POUND_FORCE
-    return (
-        f"{gait.name}: {result.metrics.distance_in:.2f} in in {result.duration:g} s (thesis: "
-        f"{thesis.BEST_INITIAL_DISTANCE_IN:g} in for the best random gait, "
-        f"{thesis.BEST_EVOLVED_DISTANCE_IN:g} in for the best evolved one)\n"
-        f"largest signal, peak to peak: {signal:.2f} lbf (thesis: one pound); "
-        f"tensions: {float(tension.min()):.2f} to {float(tension.max()):.2f} lbf"
-    )
+def make_diagram(scenario: Scenario, gait: Gait) -> Diagram:
+    """The robot, at rest where the scenario places it."""
+    structure = MakeStructure(scenario.robot, scenario.cables)
+    builder = DiagramBuilder()
+
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+    AddTetrahedra(plant, structure)
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
+    plant.Finalize()
+    plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
+
+    if scenario.cpg.signals == "live":
+        network: System = MatsuokaCpg(scenario.cpg, gait, oscillators=scenario.oscillators)
+    else:
+        signals = signal_samples(scenario, gait)
+        times = scenario.cpg.listing_step * np.arange(len(signals))
+        network = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, signals.T))
+    cpg = builder.AddNamedSystem("cpg", network)
+    gate = StartUpGate(scenario.oscillators, start_up=scenario.cpg.start_up)
+    start_up = builder.AddNamedSystem("start_up", gate)
+    cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
+    contact = GroundContact(structure, scenario.ground, scenario.friction)
+    ground = builder.AddNamedSystem("ground", contact)
+    forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
+
+    state = plant.get_state_output_port()
+    builder.Connect(cpg.get_output_port(0), start_up.GetInputPort("ungated"))
+    builder.Connect(start_up.GetOutputPort("signals"), cables.GetInputPort("signals"))
+    builder.Connect(state, cables.GetInputPort("state"))
+    builder.Connect(state, ground.GetInputPort("state"))
+    builder.Connect(cables.GetOutputPort("generalized_force"), forces.get_input_port(0))
+    builder.Connect(ground.GetOutputPort("generalized_force"), forces.get_input_port(1))
+    builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
+
+    builder.ExportOutput(state, "state")
+    for system, ports in (
+        (start_up, ["signals"]),
+        (cables, ["tensions", "lengths"]),
+        (ground, ["normal_forces", "friction_forces", "modes"]),
+    ):
+        for port in ports:
+            builder.ExportOutput(system.GetOutputPort(port), port)
+    diagram = builder.Build()
+    diagram.set_name("tensegrity_robot")
+    return diagram
 
 
-def choose_gait(path: Path | None, scenario: Scenario) -> Gait:
-    """The gait in the file, or without one a random one that walks."""
-    if path is not None:
-        return load_gait(path, scenario)
-    return seeded_gait(scenario)
+def main() -> None:
+    """Simulates a gait and writes the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--gait", metavar="FILE", type=Path, default=BEST_GAIT)
+    parser.add_argument("--duration", metavar="S", type=float, default=15.0)
+    parser.add_argument("--out", metavar="DIR", type=Path, default=DIAGRAMS)
+    options = parser.parse_args()
 
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Writes the pictures and prints the numbers."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--gait", metavar="FILE", type=Path, help="default: a random gait")
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(__file__).parent)
-    options = parser.parse_args(arguments)
     scenario = load_scenario("thesis")
-    try:
-        gait = choose_gait(options.gait, scenario)
-        save_block_diagram(MakeTensegrityDiagram(scenario, gait), options.out / "robot.svg")
-        result = simulate(scenario=scenario, gait=gait, record=True)
-        assert result.trajectory is not None
-        distances = figure_14_relative_distances(result.trajectory)
-        tensions = figure_19_signal_and_tension(result.trajectory)
-        save_figure(distances, options.out, "figure_14", kinds=["svg"])
-        save_figure(tensions, options.out, "figure_19", kinds=["svg"])
-    except InputError as error:
-        parser.error(str(error))
-    except SimulationFailure as error:
-        parser.exit(1, f"{error}\n")
-    print(report(gait, result))
-    return 0
+    scenario.simulation.duration = options.duration
+    gait = load_gait(options.gait, scenario)
+    diagram = make_diagram(scenario, gait)
+    save_block_diagram(diagram, options.out / "robot.svg")
+
+    # Contact and stiction change where a step ends, so no step may be long.
+    simulator = Simulator(diagram)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.001)
+    recorder = Recorder(sample_times(options.duration, 0.01))
+    simulator.set_monitor(recorder.after_step)
+    simulator.AdvanceTo(options.duration)
+
+    trajectory = recorder.dataset(diagram, MakeStructure(scenario.robot, scenario.cables))
+    title = replay_title(gait.name, trajectory)
+    save_replay(options.out / "robot.html", scenario=scenario, trajectory=trajectory, title=title)
+    print(title)
+    print(f"open {options.out / 'robot.html'} in a browser to see it walk")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -1,66 +1,124 @@
-"""One neural oscillator: what the weight between its two neurons (thesis Fig. 10) and the
-ratio of its time constants (Fig. 9) make of its signal.
+"""One Matsuoka oscillator: its signal for several weights and ratios of time constants.
 
-Writes the block diagram and the figures, and prints the frequency beside the thesis's.
+    python diagrams/single_oscillator.py [--out DIR]
+
+An oscillator is two neurons, extensor and flexor, that inhibit each other with the weight w (thesis
+Eq. 7). While both fire, their equations are linear; the differences d of the two u and e of the
+two v follow
+
+    tau_A d' = (w - 1) d - beta e,    tau_B e' = d - e.
+
+This oscillates at sqrt((beta + 1 - w) / (tau_A tau_B) - D^2) rad/s with the damping
+D = (1 / tau_B - (w - 1) / tau_A) / 2. The thesis's choice, w = 1.5 and tau_B = 2 tau_A, is just
+where D vanishes: a sine of frequency 1 / (2 pi tau_A). A smaller ratio tau_B / tau_A damps it
+(thesis Figure 9); a greater ratio or weight lets it grow until neurons fall silent (Figure 10).
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Sequence
+import math
 from pathlib import Path
 
-from tetra_drake import thesis
-from tetra_drake.errors import InputError
+import numpy as np
+from matplotlib.figure import Figure
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput
+
 from tetra_drake.figures.block_diagram import save_block_diagram
-from tetra_drake.figures.oscillators import figure_09_time_constants, figure_10_weights
-from tetra_drake.figures.style import save_figure
-from tetra_drake.parts.single_oscillator import (
-    SINE_WEIGHT,
-    TAU_A,
-    MakeOscillatorDiagram,
-    Oscillation,
-    frequency,
-    linear_frequency,
-    oscillations_by_factor,
-    oscillations_by_weight,
-    peak_to_peak,
-)
+from tetra_drake.figures.style import common_style, make_figure, save_figure
+from tetra_drake.results.measures import dominant_frequency
+from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import POUND_FORCE
+from tetra_drake.systems import MatsuokaCpg
+
+TAU_A = 0.3  # s, as in the thesis's figures
+WEIGHT, RATIO = 1.5, 2.0  # w and tau_B / tau_A, the thesis's choice
+WEIGHTS, RATIOS = (WEIGHT, 2.0), (1.5, RATIO, 3.0)  # those it compares
+THESIS_FREQUENCY = 0.7  # Hz
+TRANSIENT = 5.0  # s
 
 
-def report(scenario: Scenario, oscillation: Oscillation) -> str:
-    """The thesis's choice in numbers, the thesis's beside ours."""
-    hertz = thesis.OSCILLATOR_FREQUENCY_HZ
-    ours, linear = frequency(oscillation), linear_frequency(scenario)
-    pounds = peak_to_peak(oscillation) / POUND_FORCE
-    return (
-        f"frequency at tau_A = {TAU_A:g} s: {ours:.3f} Hz (linear theory: {linear:.3f} Hz; "
-        f"thesis: about {hertz:g} Hz, which needs tau_A = {TAU_A * ours / hertz:.3f} s)\n"
-        f"peak to peak: {pounds:.2f} lbf (thesis: twice the external input, or one pound)"
-    )
+def make_diagram(
+    scenario: Scenario, *, weight: float = WEIGHT, tau_a: float = TAU_A, ratio: float = RATIO
+) -> Diagram:
+    """A network of one oscillator, and a log of its signal."""
+    cpg = scenario.with_changes({"cpg.partner_weight": weight}).cpg
+    gait = Gait(name="one oscillator", weights=(), tau_a=tau_a, tau_b=ratio * tau_a)
+    builder = DiagramBuilder()
+    oscillator = builder.AddNamedSystem("oscillator", MatsuokaCpg(cpg, gait, oscillators=1))
+    LogVectorOutput(oscillator.GetOutputPort("signals"), builder).set_name("log")
+    diagram = builder.Build()
+    diagram.set_name("single_oscillator")
+    return diagram
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Writes the pictures and prints the numbers."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def simulate(diagram: Diagram, duration: float = 15.0) -> tuple[np.ndarray, np.ndarray]:
+    """Times (samples,) in s and signal (samples,) in N."""
+    simulator = Simulator(diagram)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.01).set_target_accuracy(1e-6)
+    simulator.AdvanceTo(duration)
+    log = diagram.GetSubsystemByName("log").FindLog(simulator.get_context())
+    return log.sample_times(), log.data()[0]
+
+
+def linear_frequency(
+    scenario: Scenario, *, weight: float = WEIGHT, tau_a: float = TAU_A, ratio: float = RATIO
+) -> float:
+    """Frequency in Hz while both neurons fire."""
+    tau_b = ratio * tau_a
+    damping = (1.0 / tau_b - (weight - 1.0) / tau_a) / 2.0
+    stiffness = (scenario.cpg.self_inhibition_weight + 1.0 - weight) / (tau_a * tau_b)
+    return math.sqrt(stiffness - damping**2) / (2.0 * math.pi)
+
+
+@common_style()
+def draw(signals: dict[str, tuple[np.ndarray, np.ndarray]], title: str) -> Figure:
+    """A panel per signal, with its frequency after the transient and its swing at the end."""
+    rows = len(signals)
+    height = 0.8 + 1.5 * rows
+    figure, axes = make_figure(width_in=7, height_in=height, rows=rows, sharex=True, sharey=True)
+    for panel, (label, (times, signal)) in zip(axes[:, 0], signals.items(), strict=True):
+        late = times > TRANSIENT
+        frequency = dominant_frequency(times[late], signal[late])
+        swing = np.ptp(signal[times > times[-1] - TRANSIENT]) / POUND_FORCE
+        panel.plot(times, signal / POUND_FORCE)
+        panel.set_title(f"{label}: {frequency:.2f} Hz, in the end {swing:.2f} lbf peak to peak")
+        panel.set_ylabel("signal (lbf)")
+    axes[-1, 0].set_xlabel("time (s)")
+    figure.suptitle(title)
+    return figure
+
+
+def main() -> None:
+    """Simulates the oscillators and writes the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path(__file__).parent)
-    options = parser.parse_args(arguments)
+    out = parser.parse_args().out
+
     scenario = load_scenario("thesis")
-    by_weight = oscillations_by_weight(scenario)
-    by_factor = oscillations_by_factor(scenario)
-    try:
-        save_block_diagram(MakeOscillatorDiagram(scenario), options.out / "single_oscillator.svg")
-        save_figure(figure_09_time_constants(by_factor), options.out, "figure_09", kinds=["svg"])
-        save_figure(figure_10_weights(by_weight), options.out, "figure_10", kinds=["svg"])
-    except InputError as error:
-        parser.error(str(error))
-    print(report(scenario, by_weight[SINE_WEIGHT]))
-    return 0
+    save_block_diagram(make_diagram(scenario), out / "single_oscillator.svg")
+
+    by_weight = {
+        f"$w = {weight:g}$": simulate(make_diagram(scenario, weight=weight)) for weight in WEIGHTS
+    }
+    title = "Weight between the neurons of an oscillator (thesis Fig. 10)"
+    save_figure(draw(by_weight, title), out, "single_oscillator_weights", kinds=["svg"])
+
+    by_ratio = {
+        rf"$\tau_B = {ratio:g}\,\tau_A$": simulate(make_diagram(scenario, ratio=ratio))
+        for ratio in RATIOS
+    }
+    title = "Time constants of an oscillator (thesis Fig. 9)"
+    save_figure(draw(by_ratio, title), out, "single_oscillator_time_constants", kinds=["svg"])
+
+    ours = linear_frequency(scenario)
+    print(f"tau_A = {TAU_A:g} s gives {ours:.3f} Hz; the thesis's {THESIS_FREQUENCY:g} Hz needs")
+    print(f"tau_A = {TAU_A * ours / THESIS_FREQUENCY:.3f} s")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

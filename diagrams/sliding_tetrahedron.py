@@ -1,65 +1,110 @@
-"""One tetrahedron sliding on the ground until it comes to rest (thesis Fig. 6).
+"""A tetrahedron sliding to rest: its nodes break free, slip, and stick again (thesis Figure 6).
 
-It stands on its base triangle, one node ahead of the other two, and starts fast: a node that
-sticks is braked within a millisecond, so that it takes 23 in/s to break one free. Writes
-the block diagram and the figure, and prints when which node slips.
+    python diagrams/sliding_tetrahedron.py [--out DIR]
+
+The diagram is that of one_tetrahedron.py. The tetrahedron starts at 30 in/s. Stiction brakes it to
+1 in/s within a millisecond and tips it, so that its two trailing nodes lift off. The leading node
+reaches the stiction range, 0.004 in, after 0.9 ms and breaks free. It slips for 49 ms, faster
+and faster, as the tetrahedron falls back: friction in slip is three hundred times weaker than in
+stick. Where the trailing nodes land, they stick, which turns the leading node round, so that it
+sticks again. Below 23 in/s no node breaks free.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
-from tetra_drake.errors import InputError
+import numpy as np
+from matplotlib.figure import Figure
+from one_tetrahedron import LEADING, TRAILING, MakeDiagram, Motion, let_go, weight
+
 from tetra_drake.figures.block_diagram import save_block_diagram
-from tetra_drake.figures.contact import figure_06_sliding
-from tetra_drake.figures.style import save_figure
-from tetra_drake.parts.single_tetrahedron import MakeTetrahedronDiagram, Motion
-from tetra_drake.parts.sliding_tetrahedron import LEADING, flights, slide, slips, travel
+from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
+from tetra_drake.results.measures import intervals
 from tetra_drake.robot.structure import BASE, NODES
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH, POUND_FORCE
+
+INITIAL_SPEED = 30.0 * INCH  # m/s
 
 
-def report(motion: Motion) -> str:
-    """When each node slips and flies, and where the tetrahedron comes to rest."""
-    lines = []
-    for node in BASE:
-        spans = {"slips": slips(motion, node), "is off the ground": flights(motion, node)}
-        parts = [
-            f"{what} from {1e3 * start:.1f} to {1e3 * end:.1f} ms"
-            for what, times in spans.items()
-            for start, end in times
-        ]
-        lines.append(f"{NODES[node]}: {', '.join(parts) or 'sticks throughout'}")
-    speed = motion.v_WN[0, LEADING, 0] / INCH
-    distance = travel(motion, LEADING)[-1] / INCH
-    lines.append(
-        f"from {speed:g} in/s to rest in {distance:.3f} in; thesis: 'breaks free of, and "
-        "re-enters static friction before coming to a rest', without numbers"
+def slide(scenario: Scenario, *, speed: float = INITIAL_SPEED, duration: float = 0.1) -> Motion:
+    """A start at the forward `speed` (m/s) from where the ground bears the weight."""
+    depth = weight(scenario) / (len(BASE) * scenario.ground.stiffness)
+    return let_go(scenario, height=-depth, velocity=[speed, 0.0, 0.0], duration=duration)
+
+
+def slips(motion: Motion, node: int) -> list[tuple[float, float]]:
+    """Intervals (s) in which a contact node slips along x."""
+    return intervals(motion.times, motion.modes[:, node, 1] != 0.0)
+
+
+def flights(motion: Motion, node: int) -> list[tuple[float, float]]:
+    """Intervals (s) in which a contact node is off the ground."""
+    return intervals(motion.times, motion.modes[:, node, 0] == 0.0)
+
+
+def travel(motion: Motion, node: int) -> np.ndarray:
+    """(samples,): displacement of a node along x in m."""
+    return motion.p_WN[:, node, 0] - motion.p_WN[0, node, 0]
+
+
+@common_style()
+def draw(motion: Motion, *, stiction_range: float) -> Figure:
+    """Velocity, friction and travel of two nodes: at the start, and all the way to rest."""
+    figure, axes = make_figure(width_in=8.0, height_in=6.5, rows=3, columns=2, sharex="col")
+    milliseconds = 1e3 * motion.times
+    for node, label in ((LEADING, "leading node"), (TRAILING, "trailing node")):
+        rows = (
+            ("velocity (in/s)", motion.v_WN[:, node, 0] / INCH),
+            ("friction force (lbf)", motion.friction_forces[:, node, 0] / POUND_FORCE),
+            ("travel (0.001 in)", 1e3 * travel(motion, node) / INCH),
+        )
+        for (name, values), panels in zip(rows, axes, strict=True):
+            panels[0].set_ylabel(name)
+            for panel in panels:
+                panel.plot(milliseconds, values, label=label)
+    for panel in axes.flat:
+        for start, end in slips(motion, LEADING):
+            panel.axvspan(1e3 * start, 1e3 * end, color=SHADE, label="leading node slips")
+    for panel in axes[1]:
+        panel.set_yscale("symlog", linthresh=1e-3)
+        panel.set_yticks([-10.0, -0.1, -1e-3, 0.0, 1e-3, 0.1], minor=False)
+    axes[2, 0].axhline(
+        1e3 * stiction_range / INCH, color="black", linestyle=":", label="stiction range"
     )
-    return "\n".join(lines)
+    axes[2, 0].legend(handles=axes[2, 0].lines[-1:])
+    axes[2, 0].set_ylim(0.0, 2e3 * stiction_range / INCH)
+    axes[0, 1].set_ylim(-2.0, 10.0)
+    for column, (title, end) in enumerate((("breaking free", 2.0), ("the whole motion", 80.0))):
+        axes[0, column].set_title(title)
+        axes[2, column].set_xlim(0.0, end)
+        axes[2, column].set_xlabel("time (ms)")
+    axes[0, 0].legend()
+    figure.align_ylabels()
+    figure.suptitle("Friction on the nodes of a sliding tetrahedron (thesis Fig. 6)")
+    return figure
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Writes the pictures and prints the numbers."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def main() -> None:
+    """Simulates the motion, prints when which node slips, and writes the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path(__file__).parent)
-    options = parser.parse_args(arguments)
+    out = parser.parse_args().out
+
     scenario = load_scenario("thesis")
+    save_block_diagram(MakeDiagram(scenario), out / "one_tetrahedron.svg")
     motion = slide(scenario)
-    figure = figure_06_sliding(motion, stiction_range=scenario.friction.stiction_range)
-    try:
-        diagram = MakeTetrahedronDiagram(scenario)
-        save_block_diagram(diagram, options.out / "sliding_tetrahedron.svg")
-        save_figure(figure, options.out, "figure_06", kinds=["svg"])
-    except InputError as error:
-        parser.error(str(error))
-    print(report(motion))
-    return 0
+    figure = draw(motion, stiction_range=scenario.friction.stiction_range)
+    save_figure(figure, out, "sliding_tetrahedron_motion", kinds=["svg"])
+    for node in BASE:
+        for what, spans in (("slips", slips(motion, node)), ("flies", flights(motion, node))):
+            for start, end in spans:
+                print(f"{NODES[node]} {what} from {1e3 * start:.1f} to {1e3 * end:.1f} ms")
+    print(f"all come to rest after {travel(motion, LEADING)[-1] / INCH:.3f} in")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -1,4 +1,4 @@
-"""The wiring: the diagram that mirrors the thesis's Simulink model (appendix C)."""
+"""The wiring: the robot as one Drake diagram, after the thesis's Simulink model (appendix C)."""
 
 from __future__ import annotations
 
@@ -11,35 +11,51 @@ from pydrake.trajectories import PiecewisePolynomial
 from tetra_drake.robot.bodies import AddTetrahedra
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import CableNetwork, GroundContact, MatsuokaCpg, StartUpGate
 
 
 def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
-    """The robot walking by one gait, with its default context at the scenario's start.
+    """The robot walking by a gait; its default context is the scenario's start.
 
-        cpg -> start_up -> cables -> forces -> plant -> state -> (cables, ground)
-                           ground -> forces
+        cpg ──→ start_up ──→ cables ──┬──→ forces ──→ plant ──┬──→ state
+                               ↑      │                       │
+                               │    ground                    │
+                               │      ↑                       │
+                               └──────┴───────────────────────┘
 
-    Subsystems: cpg, start_up, cables, ground, forces, plant. There is no SceneGraph: pictures
-    are made from trajectories (see scene.py).
-    Output ports: state, signals, tensions, lengths, normal_forces, friction_forces, modes.
-    Shapes and units are those of the systems the ports come from.
+    Output ports: state (plant), signals (start_up), tensions and lengths (cables), normal_forces,
+    friction_forces and modes (ground); the systems' docstrings give shapes and units. There is
+    no SceneGraph: pictures are made from trajectories.
     """
     structure = MakeStructure(scenario.robot, scenario.cables)
     builder = DiagramBuilder()
-    plant = AddPlant(builder, scenario, structure)
-    cpg = AddCpg(builder, scenario, gait)
-    gate = builder.AddNamedSystem(
+
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+    AddTetrahedra(plant, structure)
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
+    plant.Finalize()
+    plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
+
+    cpg = builder.AddNamedSystem("cpg", _make_cpg(scenario, gait))
+    start_up = builder.AddNamedSystem(
         "start_up", StartUpGate(scenario.oscillators, start_up=scenario.cpg.start_up)
     )
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
-    ground = AddGround(builder, scenario, structure)
+    ground = builder.AddNamedSystem(
+        "ground",
+        GroundContact(
+            structure,
+            scenario.ground,
+            scenario.friction,
+            witness=scenario.simulation.mode_changes == "witness",
+        ),
+    )
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
 
-    state, signals = plant.get_state_output_port(), gate.GetOutputPort("signals")
-    builder.Connect(cpg.get_output_port(0), gate.GetInputPort("ungated"))
+    state, signals = plant.get_state_output_port(), start_up.GetOutputPort("signals")
+    builder.Connect(cpg.get_output_port(0), start_up.GetInputPort("ungated"))
     builder.Connect(signals, cables.GetInputPort("signals"))
     builder.Connect(state, cables.GetInputPort("state"))
     builder.Connect(state, ground.GetInputPort("state"))
@@ -49,44 +65,19 @@ def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
 
     builder.ExportOutput(state, "state")
     builder.ExportOutput(signals, "signals")
-    for system, port in (
-        (cables, "tensions"),
-        (cables, "lengths"),
-        (ground, "normal_forces"),
-        (ground, "friction_forces"),
-        (ground, "modes"),
-    ):
-        builder.ExportOutput(system.GetOutputPort(port), port)
+    for name in ("tensions", "lengths"):
+        builder.ExportOutput(cables.GetOutputPort(name), name)
+    for name in ("normal_forces", "friction_forces", "modes"):
+        builder.ExportOutput(ground.GetOutputPort(name), name)
     diagram = builder.Build()
     diagram.set_name("tensegrity_robot")
     return diagram
 
 
-def AddPlant(builder: DiagramBuilder, scenario: Scenario, structure: Structure) -> MultibodyPlant:
-    """Adds the continuous-time plant "plant" with the tetrahedra at their start."""
-    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-    AddTetrahedra(plant, structure)
-    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
-    plant.Finalize()
-    plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
-    return plant
-
-
-def AddCpg(builder: DiagramBuilder, scenario: Scenario, gait: Gait) -> System:
-    """Adds "cpg", whose output port 0 gives the signals: the network itself if the scenario
-    asks for it live, else a recording of it."""
-    oscillators = scenario.oscillators
+def _make_cpg(scenario: Scenario, gait: Gait) -> System:
+    """The oscillator network itself if `cpg.signals` is `live`, else its precomputed signals."""
     if scenario.cpg.signals == "live":
-        cpg: System = MatsuokaCpg(scenario.cpg, gait, oscillators=oscillators)
-    else:
-        samples = signal_samples(scenario, gait)
-        times = scenario.cpg.listing_step * np.arange(len(samples))
-        cpg = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))
-    return builder.AddNamedSystem("cpg", cpg)
-
-
-def AddGround(builder: DiagramBuilder, scenario: Scenario, structure: Structure) -> GroundContact:
-    """Adds the ground under the contact nodes as "ground"."""
-    witness = scenario.simulation.mode_changes == "witness"
-    ground = GroundContact(structure, scenario.ground, scenario.friction, witness=witness)
-    return builder.AddNamedSystem("ground", ground)
+        return MatsuokaCpg(scenario.cpg, gait, oscillators=scenario.oscillators)
+    samples = signal_samples(scenario, gait)
+    times = scenario.cpg.listing_step * np.arange(len(samples))
+    return TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))

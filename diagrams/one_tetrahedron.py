@@ -1,0 +1,129 @@
+"""One tetrahedron on the ground: the diagram of settling_node.py and sliding_tetrahedron.py.
+
+    ground ──→ plant ──┬──→ state
+      ↑                │
+      └────────────────┘
+
+It stands on its base triangle, `top` in front and the two bottom nodes behind, which move alike.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput
+
+from tetra_drake.robot.bodies import AddTetrahedra, tetrahedron_inertia
+from tetra_drake.robot.structure import (
+    BASE,
+    BOTTOM_LEFT,
+    TOP,
+    MakeStructure,
+    Structure,
+    node_positions,
+    node_velocities,
+)
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.systems import GroundContact
+
+LEADING, TRAILING = TOP, BOTTOM_LEFT
+R_WB = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+"""Turns a tetrahedron as it lies in the robot so that it stands on its base."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Samples at the ends of steps, in SI units; contact nodes in the order of BASE."""
+
+    times: np.ndarray
+    """(samples,)."""
+    p_WN: np.ndarray
+    v_WN: np.ndarray
+    """(samples, 4, 3): positions and velocities of the nodes."""
+    normal_forces: np.ndarray
+    """(samples, 3)."""
+    friction_forces: np.ndarray
+    """(samples, 3, 2): along x and y."""
+    modes: np.ndarray
+    """(samples, 3, 3): contact, and friction modes along x and y, as GroundContact has them."""
+
+
+def MakeStandingTetrahedron(scenario: Scenario) -> Structure:
+    """One tetrahedron of the robot, without cables, with its base at height 0.
+
+    Its body frame is turned with it, which its inertia, the same about all axes, allows.
+    """
+    robot = MakeStructure(scenario.robot, scenario.cables)
+    p_BN = robot.p_BN @ R_WB.T
+    return dataclasses.replace(
+        robot,
+        bodies=("T1",),
+        p_BN=p_BN,
+        p_WB=np.array([[0.0, 0.0, -p_BN[TRAILING, 2]]]),
+        cables=robot.cables[:0],
+        cable_names=(),
+        contacts=np.array(BASE),
+    )
+
+
+def MakeDiagram(scenario: Scenario) -> Diagram:
+    """The tetrahedron and the ground under it, with logs of their outputs."""
+    tetrahedron = MakeStandingTetrahedron(scenario)
+    builder = DiagramBuilder()
+    plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
+    AddTetrahedra(plant, tetrahedron)
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
+    plant.Finalize()
+    contact = GroundContact(tetrahedron, scenario.ground, scenario.friction, witness=True)
+    ground = builder.AddNamedSystem("ground", contact)
+
+    state, force = plant.get_state_output_port(), ground.GetOutputPort("generalized_force")
+    builder.Connect(state, ground.GetInputPort("state"))
+    builder.Connect(force, plant.get_applied_generalized_force_input_port())
+    LogVectorOutput(state, builder).set_name("state_log")
+    for port in ("normal_forces", "friction_forces", "modes"):
+        LogVectorOutput(ground.GetOutputPort(port), builder).set_name(f"{port}_log")
+    return builder.Build()
+
+
+def let_go(
+    scenario: Scenario, *, height: float, velocity: Sequence[float], duration: float
+) -> Motion:
+    """Simulates the tetrahedron from `height` (m) of its base and `velocity` (3,) in m/s."""
+    tetrahedron, diagram = MakeStandingTetrahedron(scenario), MakeDiagram(scenario)
+    simulator = Simulator(diagram)
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-4).set_target_accuracy(1e-4)
+    context = simulator.get_mutable_context()
+    context.SetAccuracy(1e-4)  # localises contact and stiction changes to 1e-4 times 0.01 s
+
+    start = tetrahedron.initial_state  # [q; v]: quaternion, position, angular velocity, velocity
+    start[6] += height
+    start[10:] = velocity
+    plant = diagram.GetSubsystemByName("plant")
+    plant.SetPositionsAndVelocities(plant.GetMyMutableContextFromRoot(context), start)
+    simulator.AdvanceTo(duration)
+
+    def logged(port: str) -> np.ndarray:
+        return diagram.GetSubsystemByName(f"{port}_log").FindLog(context).data().T
+
+    return Motion(
+        times=diagram.GetSubsystemByName("state_log").FindLog(context).sample_times(),
+        p_WN=np.array([node_positions(tetrahedron, state) for state in logged("state")]),
+        v_WN=np.array([node_velocities(tetrahedron, state) for state in logged("state")]),
+        normal_forces=logged("normal_forces"),
+        friction_forces=logged("friction_forces").reshape(-1, len(BASE), 2),
+        modes=logged("modes").reshape(-1, len(BASE), 3),
+    )
+
+
+def weight(scenario: Scenario) -> float:
+    """Weight of one tetrahedron in N."""
+    return (
+        tetrahedron_inertia(MakeStandingTetrahedron(scenario)).get_mass() * scenario.robot.gravity
+    )
