@@ -81,6 +81,8 @@ def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
     )
     bodies = tuple(f"T{i + 1}" for i in range(n))
     p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
+    if robot.offsets:
+        p_WB += np.array(robot.offsets)
     rows, names = [], []
     for i in range(n - 1):
         junction = f"{bodies[i]}-{bodies[i + 1]}"

@@ -1,35 +1,24 @@
-"""Scenario files: read, merged with their bases, checked, and written."""
+"""Scenario files: read, merged with their bases, checked, written, and compared."""
 
 from __future__ import annotations
 
+import json
 import os
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario import rules
-from tetra_drake.scenario.fields import (
-    TAG,
-    Check,
-    Tree,
-    describe,
-    dump_yaml,
-    merge,
-    parse_yaml,
-    tree_of,
-)
+from tetra_drake.scenario.fields import TAG, Check, Tree, dump_yaml, merge, parse_yaml, tree_of
 from tetra_drake.scenario.schema import Scenario
 
 
 def shipped_scenarios() -> list[str]:
     """The names of the scenarios that come with the package."""
-    folder = resources.files("tetra_drake") / "scenario"
-    return sorted(
-        entry.name.removesuffix(".yaml")
-        for entry in folder.iterdir()
-        if entry.name.endswith(".yaml")
-    )
+    entries = (resources.files("tetra_drake") / "scenario").iterdir()
+    names = (entry.name for entry in entries if entry.name.endswith(".yaml"))
+    return sorted(name.removesuffix(".yaml") for name in names)
 
 
 def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
@@ -43,41 +32,26 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
 
 def dump_scenario(scenario: Scenario) -> str:
     """The scenario as a complete scenario file: SI units, loads back to the same numbers."""
-    return dump_yaml(tree_of(scenario, lambda value, unit: f"{value!r} {unit}"))
+    return dump_yaml(tree_of(scenario, lambda number, unit: f"{number!r} {unit}"))
 
 
 def differences(scenario: Scenario, base: Scenario) -> list[tuple[str, str]]:
-    """Keys and values, as text with units, in which a scenario differs from another one.
-
-    Name and reference are left out.
-    """
+    """(key, value as text) of what a scenario has other than `base`, name and reference aside."""
     ours, theirs = (
-        _flat(tree_of(s, lambda value, unit: f"{value:.6g} {unit}")) for s in (scenario, base)
+        dict(_texts(tree_of(each, lambda number, unit: f"{number:.6g} {unit}"), ""))
+        for each in (scenario, base)
     )
-    changed = {
-        key: ours.get(key, "none") for key in (*ours, *theirs) if ours.get(key) != theirs.get(key)
-    }
-    return [(k, v) for k, v in changed.items() if k != "name" and not k.startswith("reference")]
+    changed = [(key, text) for key, text in ours.items() if theirs.get(key) != text]
+    return [(k, text) for k, text in changed if k.split(".")[0] not in ("name", "reference")]
 
 
-def _flat(tree: Tree, prefix: str = "") -> dict[str, str]:
-    flat: dict[str, str] = {}
+def _texts(tree: Tree, prefix: str) -> Iterator[tuple[str, str]]:
     for name, value in tree.items():
         if isinstance(value, dict):
-            flat |= {prefix + name: value[TAG]} if TAG in value else {}
-            flat |= _flat(value, f"{prefix}{name}.")
-        elif name != TAG:
-            flat[prefix + name] = _shown(value)
-    return flat
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, dict):
-        entries = ", ".join(f"{name}: {_shown(v)}" for name, v in value.items() if name != TAG)
-        return f"{value.get(TAG, '')} {{{entries}}}".strip()
-    if isinstance(value, list):
-        return f"[{', '.join(map(_shown, value))}]"
-    return f"{value:.6g}" if isinstance(value, float) else describe(value).strip("'")
+            yield from _texts(value, f"{prefix}{name}.")
+        else:
+            text = f"{value:.6g}" if isinstance(value, float) else json.dumps(value)
+            yield (prefix + name).removesuffix(f".{TAG}"), text.replace('"', "")
 
 
 def _load_tree(
@@ -97,7 +71,7 @@ def _load_tree(
     if base is None:
         return given, source
     if not isinstance(base, str) or not base:
-        raise InputError(source, "base", f"found {describe(base)}, expected the name of a scenario")
+        raise InputError(source, "base", f"found {base!r}, expected the name of a scenario")
     if base not in shipped_scenarios():
         base = str(Path(source).parent / base)
     base_tree, _ = _load_tree(base, asked_by=source, seen=(*seen, identity))
@@ -106,21 +80,19 @@ def _load_tree(
 
 
 def _read(name_or_file: str, asked_by: str | None) -> tuple[str, str]:
-    shipped = shipped_scenarios()
-    if name_or_file in shipped:
+    """The text of a scenario, and the name of its source."""
+    if name_or_file in shipped_scenarios():
         resource = resources.files("tetra_drake") / "scenario" / f"{name_or_file}.yaml"
         return resource.read_text(encoding="utf-8"), str(resource)
     path = Path(name_or_file)
-    source, key, what = str(path), "", ""
-    if asked_by:
-        source, key, what = asked_by, "base", f" '{os.path.relpath(path, Path(asked_by).parent)}'"
+    what = f"'{os.path.relpath(path, Path(asked_by).parent)}' " if asked_by else ""
     try:
         return path.read_text(encoding="utf-8"), str(path)
-    except FileNotFoundError as error:
-        problem = f"no such scenario file{what}, and no shipped scenario ({', '.join(shipped)})"
-        raise InputError(source, key, problem) from error
-    except IsADirectoryError as error:
-        problem = f"{what} is a directory, expected a scenario file"
-        raise InputError(source, key, problem.strip()) from error
     except (OSError, ValueError) as error:
-        raise InputError(source, key, f"{what} cannot be read as text: {error}".strip()) from error
+        problem = f"cannot be read as text: {error}"
+        if isinstance(error, FileNotFoundError):
+            shipped = ", ".join(shipped_scenarios())
+            problem = f"no such scenario file, and no shipped scenario ({shipped})"
+        elif isinstance(error, IsADirectoryError):
+            problem = "is a directory, expected a scenario file"
+        raise InputError(asked_by or path, "base" if asked_by else "", what + problem) from error

@@ -1,4 +1,4 @@
-"""Rules between values of a scenario: balanced spacing, reference, relations. They act on trees."""
+"""Rules between the values of a scenario: balanced spacing, reference, relations; all on trees."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario.fields import Tree
 
 BALANCED = "balanced"
-"""The word for the spacing at which the cables of a junction balance."""
+"""Written as robot.spacing: the spacing at which the cables of a junction balance."""
 
 BALANCE_KEYS = (
-    ("robot", "strut_length"),
-    ("cables", "outer_stiffness"),
-    ("cables", "inner_stiffness"),
-    ("cables", "free_length"),
+    *(("robot", "strut_length"), ("cables", "free_length")),
+    *(("cables", "outer_stiffness"), ("cables", "inner_stiffness")),
 )
-"""What the balanced spacing follows from."""
+"""What decides the balance. Masses hardly do: twice the density moves T1 by 0.002 in."""
+
+NOT_IN_REFERENCE = ("name", "reference", "simulation", "compiled", "evolution")
+"""Sections on which the numbers of a reference do not depend, duration and steady_from aside."""
 
 
 def balanced_spacing(
-    *, strut_length: float, outer_stiffness: float, inner_stiffness: float, free_length: float
+    *, strut_length: float, free_length: float, outer_stiffness: float, inner_stiffness: float
 ) -> float:
     """Spacing (m) of base triangles at which outer and inner cables balance along x.
 
     Three outer cables of length s pull two tetrahedra together. Three inner ones, from a tip at
-    the height h of a tetrahedron to base nodes at s along and R across, push them apart while
-    s < h. Raises ValueError if there is no such spacing.
+    height h to base nodes at s along and R across, push them apart while s < h. Raises ValueError.
     """
     height, radius = strut_length * math.sqrt(2.0 / 3.0), strut_length / math.sqrt(3.0)
 
@@ -45,43 +45,34 @@ def balanced_spacing(
 
 
 def with_balance(tree: Tree, source: str) -> Tree:
-    """A complete tree, with the balanced spacing as a number if it is asked for."""
+    """A complete tree, with a number for a balanced spacing."""
     if tree["robot"]["spacing"] != BALANCED:
         return tree
     try:
         spacing = balanced_spacing(**{name: tree[part][name] for part, name in BALANCE_KEYS})
     except ValueError as error:
         raise InputError(source, "robot.spacing", str(error)) from error
-    return {**tree, "robot": {**tree["robot"], "spacing": spacing}}
+    return tree | {"robot": tree["robot"] | {"spacing": spacing}}
 
 
 def rebalanced(tree: Tree, *, base: Tree, given: Tree) -> Tree:
-    """The tree of a file on its base: balanced again if the file changes what decides the balance
-    and gives no spacing."""
-
-    def decides(tree: Tree) -> list[Any]:
-        return [tree.get(part, {}).get(name) for part, name in BALANCE_KEYS]
-
-    if "spacing" in given.get("robot", {}) or decides(tree) == decides(base):
+    """The tree of a file on its base; balanced if the file decides the balance but no spacing."""
+    decisive = [(tree.get(a, {}).get(b), base.get(a, {}).get(b)) for a, b in BALANCE_KEYS]
+    if "spacing" in given.get("robot", {}) or all(ours == theirs for ours, theirs in decisive):
         return tree
-    return {**tree, "robot": {**tree.get("robot", {}), "spacing": BALANCED}}
+    return tree | {"robot": tree.get("robot", {}) | {"spacing": BALANCED}}
 
 
 def with_valid_reference(tree: Tree, *, base: Tree, given: Tree) -> Tree:
-    """The changed tree without its base's reference, if that is for another robot or experiment."""
-    if _experiment(tree) == _experiment(base):
-        return tree
-    return {**tree, "reference": given.get("reference")}
+    """The changed tree, without its base's reference if that is for another experiment."""
 
+    def experiment(tree: Tree) -> list[Any]:
+        simulation = tree.get("simulation", {})
+        rest = {name: value for name, value in tree.items() if name not in NOT_IN_REFERENCE}
+        return [rest, simulation.get("duration"), simulation.get("steady_from")]
 
-def _experiment(tree: Tree) -> Tree:
-    """The part of a tree that the numbers of a reference depend on."""
-    without = ("name", "reference", "evolution", "compiled", "simulation")
-    simulation = tree.get("simulation", {})
-    return {
-        **{name: value for name, value in tree.items() if name not in without},
-        "simulation": [simulation.get(name) for name in ("duration", "steady_from")],
-    }
+    same = experiment(tree) == experiment(base)
+    return tree if same else tree | {"reference": given.get("reference")}
 
 
 def check_relations(tree: Tree, source: str) -> None:
@@ -96,7 +87,7 @@ def check_relations(tree: Tree, source: str) -> None:
     if start >= duration:
         problem = f"found {start} s, expected less than the duration, {duration} s"
         raise InputError(source, "simulation.steady_from", problem)
-    offsets, tetrahedra = robot.get("offsets", []), robot["tetrahedra"]
-    if len(offsets) not in (0, tetrahedra):
-        problem = f"found {len(offsets)}, expected none or one for each of {tetrahedra} tetrahedra"
+    offsets, n = len(robot.get("offsets", [])), robot["tetrahedra"]
+    if offsets not in (0, n):
+        problem = f"found {offsets} items, expected none or {n}, one for each tetrahedron"
         raise InputError(source, "robot.offsets", problem)

@@ -7,18 +7,12 @@ import math
 import re
 from typing import Any
 
-INCH = 0.0254
-"""Metres in an inch (exact)."""
-
-POUND_FORCE = 4.4482216152605
-"""Newtons in a pound-force (exact)."""
-
+INCH = 0.0254  # m, exact
+POUND_FORCE = 4.4482216152605  # N, exact
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
-_QUANTITY = re.compile(
-    rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*)\s*"
-)
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*({_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*)\s*")
 
 
 @functools.cache
@@ -31,8 +25,7 @@ def _registry() -> Any:
 def quantity_to_si(text: str, unit: str) -> float:
     """Reads a quantity such as "25 lbf/in" as a number in the SI unit `unit` ("N/m").
 
-    Raises ValueError, with a sentence that fits after "found ...", if the text
-    is not a quantity, has the wrong dimension, or is not finite.
+    Raises ValueError if the text is no quantity, has another dimension, or is not finite.
     """
     import pint
 
@@ -41,8 +34,7 @@ def quantity_to_si(text: str, unit: str) -> float:
     if match is None:
         raise ValueError(f"found '{text}', which is not a quantity; {example}")
     try:
-        quantity = _registry().Quantity(float(match["number"]), match["unit"])
-        value = float(quantity.to(unit).magnitude)
+        value = float(_registry().Quantity(float(match[1]), match[2]).to(unit).magnitude)
     except pint.DimensionalityError as error:
         raise ValueError(f"found '{text}', {example}") from error
     except Exception as error:  # pint raises tokenizer, syntax and type errors of many kinds

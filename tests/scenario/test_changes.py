@@ -1,0 +1,174 @@
+"""Scenarios made from others: changed values, balanced spacing, references, perturbations."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.load import differences, load_scenario
+from tetra_drake.scenario.perturb import displaced, scaled
+from tetra_drake.scenario.schema import ReferenceScenario, RobotScenario, Scenario
+
+IN = 0.0254
+
+
+def derived(folder: Path, text: str, base: str = "thesis") -> Scenario:
+    file = folder / "mine.yaml"
+    file.write_text(f"base: {base}\n{text}\n")
+    return load_scenario(file)
+
+
+def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
+    changed = scenario.with_changes({"cables.outer_stiffness": "45 N/m", "robot.tetrahedra": 7})
+    assert (changed.cables.outer_stiffness, changed.robot.tetrahedra) == (45.0, 7)
+    changed.ground.stiffness = 1.0
+    assert scenario == load_scenario()
+    assert scenario.with_changes({}) == scenario
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "found"),
+    [
+        ({"robot.tetrahedrons": 7}, "robot.tetrahedrons", "'tetrahedra'"),
+        ({"robots.tetrahedra": 7}, "robots", "'robot'"),
+        ({"robot.spacing.x": 1.0}, "robot.spacing.x", "'spacing'"),
+        ({"robot.spacing": -1.0}, "robot.spacing", "-1.0"),
+        ({"robot.spacing": "3 s"}, "robot.spacing", "'3 s'"),
+        ({"simulation.duration": 2.0}, "simulation.steady_from", "3.0 s"),
+        ({"robot": RobotScenario()}, "robot.tetrahedra", "nothing"),
+        ({"reference.duration": 3.0, "reference.source": 5}, "reference.source", "5"),
+    ],
+)
+def test_bad_changes_are_refused(scenario, changes, key, found, refused):
+    with refused("scenario thesis", key, found):
+        scenario.with_changes(changes)
+
+
+# Balanced spacing
+
+STIFF = "cables: {outer_stiffness: 0.4 lbf/in}"
+
+
+def axial_force(scenario: Scenario) -> float:
+    """Of the cables between two tetrahedra as they start, relative to that of the outer ones."""
+    structure = MakeStructure(scenario.robot, scenario.cables)
+    p_WN = (structure.p_WB[:, None] + structure.p_BN).reshape(-1, 3)
+    cables = structure.cables[:6]
+    spans = p_WN[cables["node_b"]] - p_WN[cables["node_a"]]
+    lengths = np.linalg.norm(spans, axis=1)
+    stretch = lengths - cables["free_length"]
+    forces = cables["stiffness"] * stretch * spans[:, 0] / lengths
+    return float(forces.sum() / forces[:3].sum())
+
+
+@pytest.mark.parametrize(
+    ("text", "balanced"),
+    [
+        ("robot: {spacing: balanced}", True),
+        (STIFF, True),
+        ("cables: {inner_stiffness: 0.5 lbf/in}", True),
+        ("cables: {free_length: 1 in}", True),
+        ("robot: {strut_length: 8 in}", True),
+        (f"{STIFF}\nrobot: {{spacing: 2.5 in}}", False),
+        ("robot: {tetrahedra: 7, density: 5 g/cm^3}", False),
+        ("cables: {outer_stiffness: 0.2 lbf/in}", False),
+    ],
+)
+def test_a_file_that_changes_what_decides_the_balance_is_balanced(tmp_path, text, balanced):
+    # The thesis rounds its balance, 2.9436 in, to 2.94 in.
+    assert (abs(axial_force(derived(tmp_path, text))) < 1e-9) == balanced
+
+
+def test_the_balance_is_computed_again_from_file_to_file(tmp_path):
+    first = derived(tmp_path, STIFF)
+    (tmp_path / "stiff.yaml").write_text(f"base: thesis\n{STIFF}")
+    second = derived(tmp_path, "cables: {inner_stiffness: 0.6 lbf/in}", base="stiff.yaml")
+    assert second.robot.spacing == pytest.approx(load_scenario().robot.spacing, rel=2e-3)
+    assert first.robot.spacing == pytest.approx(2.1117 * IN, rel=1e-4)
+
+
+def test_a_changed_scenario_keeps_its_spacing_unless_it_is_given(scenario):
+    stiff = {"cables.outer_stiffness": "0.4 lbf/in"}
+    assert scenario.with_changes(stiff).robot.spacing == scenario.robot.spacing
+    assert axial_force(scenario.with_changes(stiff | {"robot.spacing": "balanced"})) < 1e-9
+
+
+def test_a_balanced_robot_stays_where_it_stands_until_it_is_actuated(scenario):
+    # At 2.94 in, seven tetrahedra with outer cables twice as stiff shrink: T1 moves 1.96 in.
+    robot = scenario.with_changes(
+        {
+            "robot.tetrahedra": 7,
+            "cables.outer_stiffness": "0.4 lbf/in",
+            "robot.spacing": "balanced",
+            "simulation.engine": "compiled",
+            "simulation.duration": scenario.cpg.start_up,
+            "simulation.steady_from": 0.0,
+        }
+    )
+    result = simulate(scenario=robot, gait=seeded_gait(robot, 0))
+    assert abs(result.metrics.distance) < 0.005 * IN
+
+
+# The reference
+
+
+@pytest.mark.parametrize(
+    ("text", "kept"),
+    [
+        ("name: mine\nevolution: {population: 9}\ncompiled: {max_step: 1 ms}", True),
+        ("simulation: {engine: compiled, accuracy: 0.1}", True),
+        ("robot: {tetrahedra: 5}", True),
+        ("robot: {tetrahedra: 6}", False),
+        ("simulation: {duration: 10 s}", False),
+        ("fitness: {drift: 0}", False),
+        (STIFF, False),
+        ("reference:", False),
+    ],
+)
+def test_the_reference_is_inherited_while_it_is_for_the_same_experiment(tmp_path, text, kept):
+    assert (derived(tmp_path, text).reference == load_scenario().reference) == kept
+
+
+def test_a_file_may_give_its_own_reference(tmp_path, scenario):
+    own = "reference: {source: mine, best_distance: 1 m}"
+    assert derived(tmp_path, f"{STIFF}\n{own}").reference == ReferenceScenario(
+        source="mine", best_distance=1.0
+    )
+    merged = derived(tmp_path, own).reference
+    assert (merged.source, merged.duration) == ("mine", scenario.reference.duration)
+
+
+def test_changes_keep_the_reference_by_the_same_rule(scenario):
+    kept = scenario.with_changes({"name": "mine", "evolution.trials": 2})
+    assert kept.reference == scenario.reference
+    assert scenario.with_changes({"robot.tetrahedra": 4}).reference is None
+    assert scenario.with_changes({"reference": None}).reference is None
+    own = {"robot.tetrahedra": 4, "reference": ReferenceScenario(source="mine")}
+    assert scenario.with_changes(own).reference == ReferenceScenario(source="mine")
+
+
+# Perturbations
+
+
+def test_scaled_values(scenario):
+    keys = ("cables.outer_stiffness", "cables.inner_stiffness")
+    changed = scaled(scenario, keys, 1.05)
+    assert changed.cables.outer_stiffness == scenario.cables.outer_stiffness * 1.05
+    assert [key for key, _ in differences(changed, scenario)] == list(keys)
+
+
+def test_displaced_starts_are_seeded_and_move_every_tetrahedron(scenario):
+    structure, moved = (
+        MakeStructure(each.robot, each.cables)
+        for each in (scenario, displaced(scenario, percent=5, seed=3))
+    )
+    reach = 0.05 * scenario.robot.spacing
+    moves = np.random.default_rng(3).uniform(-reach, reach, (5, 3))
+    moves[:, 2] = np.abs(moves[:, 2])
+    assert np.array_equal(moved.p_WB, structure.p_WB + moves)
+    assert displaced(scenario, percent=5, seed=3) == displaced(scenario, percent=5, seed=3)
+    assert math.isclose(np.ptp(moved.p_BN), np.ptp(structure.p_BN))

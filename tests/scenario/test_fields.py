@@ -1,0 +1,195 @@
+"""Lists, maps, optional sections and tagged kinds: checked, built, written and merged.
+
+(The annotations below are read as types, so they are not postponed.)
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.fields import (
+    Check,
+    build,
+    choice,
+    dump_yaml,
+    merge,
+    parse_yaml,
+    quantity,
+    setting,
+    tree_of,
+    with_values,
+)
+
+
+@dataclass
+class Flat:
+    """A kind without fields."""
+
+
+@dataclass
+class Incline:
+    slope: float = quantity("rad", at_least=0)
+    surface: str = choice("rough", "smooth", default="rough")
+
+
+@dataclass
+class Cells:
+    cells: list[float] = quantity("m", above=-1)
+    grid: list[list[float]] = setting(default=[], length=2)
+
+
+@dataclass
+class Probe:
+    at: list[float] = quantity("m", length=3)
+    active: bool = setting(default=True)
+
+
+@dataclass
+class Settings:
+    count: int = setting(at_least=1)
+    terrain: Flat | Incline | Cells = setting(default=Flat())
+    weights: dict[str, float] = setting(default={"distance": 1.0})
+    limits: dict[str, float] = quantity("N", default={})
+    probes: list[Probe] = setting(default=[])
+    ramps: list[Incline | Flat] = setting(default=[])
+    probe: Probe | None = setting(default=None)
+    inner: Incline = field(default_factory=Incline)
+
+
+def load(text: str) -> Settings:
+    raw = parse_yaml(f"{{count: 2, inner: {{slope: 0 rad}}, {text} }}")
+    tree = Check("file").section(Settings, raw)
+    return build(
+        Settings, Check("file", numbers_are_si=True, complete=True).section(Settings, tree)
+    )
+
+
+def shown(settings: Settings) -> str:
+    return dump_yaml(tree_of(settings, lambda number, unit: f"{number!r} {unit}"))
+
+
+GOOD: list[tuple[str, str, Any]] = [
+    ("terrain: !Flat {}", "terrain", Flat()),
+    ("terrain: !Flat", "terrain", Flat()),
+    ("terrain: !Incline {slope: 180 deg}", "terrain", Incline(slope=np.pi, surface="rough")),
+    (
+        "terrain: !Cells {cells: [1 m, 50 cm], grid: [[1, 2], [3e-1, 4]]}",
+        "terrain",
+        Cells(cells=[1.0, 0.5], grid=[[1.0, 2.0], [0.3, 4.0]]),
+    ),
+    ("weights: {twist: -10}", "weights", {"twist": -10.0}),
+    ("limits: {a: 1 kN}", "limits", {"a": 1000.0}),
+    ("probes: [{at: [0 m, 1 m, 2 m]}]", "probes", [Probe(at=[0.0, 1.0, 2.0])]),
+    ("ramps: [!Flat , !Incline {slope: 1 rad}]", "ramps", [Flat(), Incline(slope=1.0)]),
+    ("probe: {at: [0 m, 0 m, 0 m], active: false}", "probe", Probe(at=[0.0] * 3, active=False)),
+    ("probe:", "probe", None),
+    ("", "terrain", Flat()),
+]
+
+
+@pytest.mark.parametrize(("text", "name", "value"), GOOD, ids=[row[0] or "-" for row in GOOD])
+def test_values_of_every_type_load_and_dump_back(text, name, value):
+    settings = load(text)
+    assert getattr(settings, name) == value
+    tree = Check("dump").section(Settings, parse_yaml(shown(settings)))
+    assert build(Settings, tree) == settings
+
+
+def test_defaults_and_missing_fields_are_not_shared_or_dumped():
+    settings = load("")
+    settings.weights["twist"] = 1.0
+    assert load("").weights == {"distance": 1.0}
+    assert parse_yaml(shown(load(""))) == {"count": 2, "inner": {"slope": "0.0 rad"}}
+
+
+BAD = [
+    ("terrain: !Inclin {slope: 1 rad}", "terrain", "'!Incline'"),
+    ("terrain: !Sea {}", "terrain", "!Flat, !Incline, !Cells"),
+    ("terrain: {slope: 1 rad}", "terrain", "a mapping"),
+    ("terrain: 5", "terrain", "5"),
+    ("terrain:", "terrain", "nothing"),
+    ("terrain: !Incline {slop: 1 rad}", "terrain.slop", "'slope'"),
+    ("terrain: !Incline {slope: 1 m}", "terrain.slope", "'1 m'"),
+    ("terrain: !Incline {}", "terrain.slope", "missing"),
+    ("terrain: !Incline {slope: 1 rad, surface: wet}", "terrain.surface", "'wet'"),
+    ("terrain: !Cells {cells: [1 m, 1 m, 1 m, one]}", "terrain.cells[3]", "'one'"),
+    ("terrain: !Cells {cells: [1 m, -2 m]}", "terrain.cells[1]", "'-2 m'"),
+    ("terrain: !Cells {cells: 1 m}", "terrain.cells", "'1 m'"),
+    ("terrain: !Cells {cells: [], grid: [[1, 2], [1]]}", "terrain.grid[1]", "1 items"),
+    ("terrain: !Cells {cells: [], grid: [[1, a]]}", "terrain.grid[0][1]", "'a'"),
+    ("weights: {twist: ten}", "weights.twist", "'ten'"),
+    ("weights: [1]", "weights", "a list"),
+    ("weights: {1: 1}", "weights", "a mapping"),
+    ("limits: {a: 1}", "limits.a", "1 without a unit"),
+    ("probes: [{at: [0 m, 0 m, 0 m]}, {active: true}]", "probes[1].at", "missing"),
+    ("probes: [5]", "probes[0]", "5"),
+    ("ramps: [!Cells {}]", "ramps[0]", "!Cells"),
+    ("probe: {at: [0 m]}", "probe.at", "1 items"),
+]
+
+
+@pytest.mark.parametrize(("text", "key", "found"), BAD, ids=[row[0] for row in BAD])
+def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
+    with refused("file", key, found):
+        load(text)
+
+
+@pytest.mark.parametrize("text", ["!Flat 5", "!Flat [1]", "!Flat {a: 1, a: 2}"])
+def test_a_kind_has_a_mapping_of_different_keys(text):
+    with pytest.raises(ValueError):
+        parse_yaml(f"terrain: {text}")
+
+
+@pytest.mark.parametrize(
+    ("base", "changes", "result"),
+    [
+        ("a: {b: 1, c: 2}", "a: {c: 3}", "a: {b: 1, c: 3}"),
+        ("a: [1, 2]", "a: [3]", "a: [3]"),
+        ("a: !X {b: 1}", "a: !X {c: 2}", "a: !X {b: 1, c: 2}"),
+        ("a: !X {b: 1}", "a: !Y {c: 2}", "a: !Y {c: 2}"),
+        ("a: {b: 1}", "a: null", "a: null"),
+        ("a: 1", "b: !X", "a: 1, b: !X"),
+    ],
+)
+def test_a_file_is_merged_with_its_base(base, changes, result):
+    trees = [parse_yaml(f"{{{text} }}") for text in (base, changes, result)]
+    assert merge(trees[0], trees[1]) == trees[2]
+
+
+def changed(settings: Settings, changes: dict[str, Any]) -> Settings:
+    tree = with_values(tree_of(settings), changes, "changes")
+    tree = Check("changes", numbers_are_si=True, complete=True).section(Settings, tree)
+    return build(Settings, tree)
+
+
+@pytest.mark.parametrize(
+    ("changes", "name", "value"),
+    [
+        ({"terrain": Incline(slope=0.5)}, "terrain", Incline(slope=0.5)),
+        ({"terrain": Cells(cells=[1.0])}, "terrain", Cells(cells=[1.0])),
+        ({"terrain": Incline(slope=0.5), "terrain.slope": "90 deg"}, "terrain", None),
+        ({"ramps": (Flat(), Incline(slope=1))}, "ramps", [Flat(), Incline(slope=1.0)]),
+        ({"probe.at": np.array([1, 2, 3])}, "probe", Probe(at=[1.0, 2.0, 3.0])),
+        ({"count": np.int64(3)}, "count", 3),
+        ({"weights.twist": 2}, "weights", {"distance": 1.0, "twist": 2.0}),
+    ],
+)
+def test_values_may_be_changed_from_python(changes, name, value):
+    if value is None:
+        with pytest.raises(InputError):  # a dataclass has no dotted keys yet
+            changed(load(""), changes)
+    else:
+        assert getattr(changed(load(""), changes), name) == value
+
+
+def test_fields_of_a_tagged_kind_are_changed_by_dotted_keys(refused):
+    inclined = load("terrain: !Incline {slope: 1 rad}")
+    assert changed(inclined, {"terrain.slope": 0.2}).terrain == Incline(slope=0.2)
+    assert inclined.terrain == Incline(slope=1.0)
+    with refused("changes", "terrain.slope", "-1"):
+        changed(inclined, {"terrain.slope": -1})
+    with refused("changes", "terrain.slope.x", "'slope'"):
+        changed(inclined, {"terrain.slope.x": 1})
