@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import contextlib
-import importlib.util
 import io
 import json
 import os
@@ -18,12 +17,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import animation
 import numpy as np
 import pytest
 import xarray
 from helpers.meshcat_page import unpack
 from matplotlib.colors import hex2color, rgb_to_hsv
 from matplotlib.image import imread
+from PIL import Image
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
@@ -36,15 +37,9 @@ from tetra_drake.visualization.scene import COLOURS
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-DIAGRAMS = Path(__file__).parents[2] / "diagrams"
-_spec = importlib.util.spec_from_file_location("still", DIAGRAMS / "still.py")
-assert _spec is not None and _spec.loader is not None
-still = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(still)
-
 if not os.environ.get("CI"):
     pytest.importorskip("playwright")
-    if still.find_browser() is None:
+    if animation.find_browser() is None:
         pytest.skip("neither Chromium nor Chrome is installed", allow_module_level=True)
 
 CABLES = ("actuated", "outer", "inner")
@@ -80,7 +75,7 @@ def replay(
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with still.launch_browser() as launched:
+    with animation.launch_browser() as launched:
         yield launched
 
 
@@ -117,8 +112,8 @@ def opened(browser: Browser, path: Path, size: tuple[int, int] = WINDOW) -> Iter
 def page(browser: Browser, replay: Path) -> Iterator[Page]:
     """The replay page, for tests that leave it as it was but for the time it shows."""
     with opened(browser, replay) as loaded:
-        still.wait_until_loaded(loaded)
-        still.show_instant(loaded, 0.0)
+        animation.wait_until_loaded(loaded)
+        animation.show_instant(loaded, 0.0)
         yield loaded
 
 
@@ -153,7 +148,7 @@ def test_loads_and_says_who_goes_how_far(page: Page, trajectory: xarray.Dataset)
 
 def test_plays_by_itself_at_real_speed(browser: Browser, replay: Path) -> None:
     with opened(browser, replay) as page:
-        still.wait_until_loaded(page)
+        animation.wait_until_loaded(page)
         page.wait_for_function("viewer.animator.playing && viewer.animator.time > 0.1")
         assert page.evaluate("[viewer.animator.mixer.timeScale, viewer.animator.duration]") == [
             pytest.approx(1.0),
@@ -163,7 +158,7 @@ def test_plays_by_itself_at_real_speed(browser: Browser, replay: Path) -> None:
 
 
 def test_shows_all_kinds_of_cables_apart(page: Page) -> None:
-    still.show_instant(page, 1.0)
+    animation.show_instant(page, 1.0)
     image = picture(page)
     assert image.shape == (CANVAS[1], CANVAS[0], 3)
     assert image.std() > 0.05, "not blank"
@@ -174,7 +169,7 @@ def test_shows_all_kinds_of_cables_apart(page: Page) -> None:
 def test_a_later_time_shows_the_robot_elsewhere(page: Page) -> None:
     columns = []
     for time in (0.0, 5.0):
-        still.show_instant(page, time)
+        animation.show_instant(page, time)
         columns.append(pixels_of(picture(page), "inner")[:, 1].mean())
     assert columns[1] > columns[0] + 10, "it walks to the right"
 
@@ -184,7 +179,7 @@ def test_the_browser_puts_the_bodies_where_they_were(
 ) -> None:
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     for frame in (0, 60, -1):
-        still.show_instant(page, float(frames["time"].values[frame]))
+        animation.show_instant(page, float(frames["time"].values[frame]))
         for body in frames["tetrahedron"].values:
             shown = position_of(page, f"robot/{body}")
             recorded = frames["p_WB"].sel(tetrahedron=body).values[frame]
@@ -194,7 +189,7 @@ def test_the_browser_puts_the_bodies_where_they_were(
 
 def test_traces_end_where_the_robot_is(page: Page) -> None:
     for time in (1.0, 4.0):
-        still.show_instant(page, time)
+        animation.show_instant(page, time)
         shown = page.evaluate(
             """viewer.scene_tree.find(['traces']).object.children
                 .filter(trace => trace.visible).map(trace => parseFloat(trace.name))"""
@@ -209,7 +204,7 @@ def test_a_lifted_foot_has_no_arrow(page: Page, trajectory: xarray.Dataset) -> N
     standing = np.flatnonzero(force > 0.05)
     assert len(lifted) and len(standing)
     for frame, length in ((lifted[-1], 0.0), (standing[-1], 0.17 * force[standing[-1]])):
-        still.show_instant(page, float(frames["time"].values[frame]))
+        animation.show_instant(page, float(frames["time"].values[frame]))
         scale = page.evaluate(
             "viewer.scene_tree.find(['forces', 'normal', 'T2 bottom_left']).object.scale.z"
         )
@@ -218,8 +213,8 @@ def test_a_lifted_foot_has_no_arrow(page: Page, trajectory: xarray.Dataset) -> N
 
 def test_forces_can_be_hidden_in_the_controls(browser: Browser, replay: Path) -> None:
     with opened(browser, replay) as page:
-        still.wait_until_loaded(page)
-        still.show_instant(page, 1.0)
+        animation.wait_until_loaded(page)
+        animation.show_instant(page, 1.0)
         assert len(pixels_of(picture(page), "normal")) > 50
         page.get_by_text("Open Controls", exact=True).click()
         page.locator("//li[.='forces']/../../div/input[@type='checkbox']").uncheck()
@@ -232,7 +227,7 @@ def test_every_window_shows_the_whole_robot_and_its_path(
 ) -> None:
     points = trajectory["p_WN"].values[::50].reshape(-1, 3).tolist()
     with opened(browser, replay, (500, 700)) as page:
-        still.wait_until_loaded(page)
+        animation.wait_until_loaded(page)
         for width, height in ((500, 700), (640, 360), (300, 600), (1000, 300)):
             page.set_viewport_size({"width": width, "height": height})
             page.wait_for_function(f"viewer.renderer.domElement.width == {width}")
@@ -250,14 +245,24 @@ def test_every_window_shows_the_whole_robot_and_its_path(
             assert 0.5 < extent < 1.0, f"in a window of {width} to {height}"
 
 
-def test_the_still_is_a_picture_of_the_page(replay: Path, tmp_path: Path) -> None:
-    path = tmp_path / "still.png"
-    arguments = [str(replay), "--time", "1", "--out", str(path)]
-    subprocess.run([sys.executable, still.__file__, *arguments], check=True)
-    image = imread(path)
-    assert image.shape[:2] == still.SIZE[::-1]
-    for name in CABLES:
-        assert len(pixels_of(image[200:, :, :3], name)) > 200, "below the legend"
+def test_a_page_is_filmed(
+    browser: Browser, replay: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(animation, "STEP", 1.5)
+    with opened(browser, replay, size=(animation.WIDTH, animation.HEIGHT)) as page:
+        animation.wait_until_loaded(page)
+        animation.save_gif(list(animation.film(page)), tmp_path / "walking.gif")
+    with Image.open(tmp_path / "walking.gif") as gif:
+        assert gif.size == (animation.WIDTH, animation.HEIGHT)
+        shots = []
+        for frame in range(gif.n_frames):
+            gif.seek(frame)
+            shots.append(np.asarray(gif.convert("RGB")) / 255)
+    assert len(shots) == 3  # at 1, 2.5 and 4 s of 5
+    assert len(pixels_of(shots[-1], "inner")) > 100
+    assert (shots[0][:5] == 1.0).all()  # no sky, no texts
+    odd = [pixels_of(shot, "odd")[:, 1].mean() for shot in (shots[0], shots[-1])]
+    assert odd[0] < odd[1]  # it walks to the right
 
 
 SHORT = "base: thesis\nname: short\nsimulation: {duration: 1 s, steady_from: 0.5 s}\n"
@@ -324,7 +329,7 @@ def test_the_report_shows_its_figures(browser: Browser, report: Path) -> None:
 def test_the_reports_link_leads_to_the_replay(browser: Browser, report: Path) -> None:
     with opened(browser, report) as page:
         page.get_by_role("link", name="See it walk").click()
-        still.wait_until_loaded(page)
+        animation.wait_until_loaded(page)
         assert page.evaluate("viewer.animator.duration") == pytest.approx(2.0)
 
 
