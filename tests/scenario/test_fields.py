@@ -62,9 +62,7 @@ class Settings:
 def load(text: str) -> Settings:
     raw = parse_yaml(f"{{count: 2, inner: {{slope: 0 rad}}, {text} }}")
     tree = Check("file").section(Settings, raw)
-    return build(
-        Settings, Check("file", numbers_are_si=True, complete=True).section(Settings, tree)
-    )
+    return build(Settings, Check("file", complete=True).section(Settings, tree))
 
 
 def shown(settings: Settings) -> str:
@@ -161,7 +159,7 @@ def test_a_file_is_merged_with_its_base(base, changes, result):
 
 def changed(settings: Settings, changes: dict[str, Any]) -> Settings:
     tree = with_values(tree_of(settings), changes, "changes")
-    tree = Check("changes", numbers_are_si=True, complete=True).section(Settings, tree)
+    tree = Check("changes", complete=True).section(Settings, tree)
     return build(Settings, tree)
 
 

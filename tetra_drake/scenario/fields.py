@@ -65,13 +65,11 @@ def choice(*choices: str, default: Any = REQUIRED) -> Any:
 class Check:
     """Checks raw trees against dataclasses and turns them into SI trees.
 
-    Raises InputError: the source and key at fault, what was found, what was expected. Quantities
-    are texts with units, or plain numbers if `numbers_are_si`. With `complete`, every required
-    field must be there.
+    Quantities are texts with units. A `complete` tree has every required field, and its quantities
+    may be numbers, in SI. Raises InputError: source and key, what was found and expected.
     """
 
     source: str
-    numbers_are_si: bool = False
     complete: bool = False
 
     def section(self, schema: Any, raw: Any, key: str = "") -> Tree:
@@ -138,7 +136,7 @@ class Check:
             return value
         if "unit" in limits and isinstance(value, str):
             return _within(limits, quantity_to_si(value, limits["unit"]), shown=f"'{value}'")
-        if "unit" in limits and not self.numbers_are_si:
+        if "unit" in limits and not self.complete:
             wanted = f"a quantity that converts to {limits['unit']}"
             raise ValueError(f"found {_describe(value)} without a unit, expected {wanted}")
         if kind is float and isinstance(value, str):  # YAML 1.1 takes 1e-3 for text

@@ -76,7 +76,9 @@ def _load_tree(
         base = str(Path(source).parent / base)
     base_tree, _ = _load_tree(base, asked_by=source, seen=(*seen, identity))
     tree = rules.rebalanced(merge(base_tree, given), base=base_tree, given=given)
-    return rules.with_valid_reference(tree, base=base_tree, given=given), source
+    if not rules.same_experiment(tree, base_tree):
+        tree["reference"] = given.get("reference")
+    return tree, source
 
 
 def _read(name_or_file: str, asked_by: str | None) -> tuple[str, str]:

@@ -225,21 +225,21 @@ class Scenario:
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
         """A checked copy with other values: {"robot.tetrahedra": 7, "cables.damping": "8 N*s/m"}.
 
-        Values are SI numbers, text with units, or dataclasses for tagged kinds. The spacing
-        stays what it is unless it is given; it may be "balanced". The reference goes if the
-        changes concern what it depends on. Raises InputError, naming the key.
+        Values are SI numbers, text with units, or dataclasses for tagged kinds. The spacing stays
+        what it is unless it is given; it may be "balanced". As in files, changes of robot or
+        experiment drop the reference. Raises InputError, naming the key.
         """
         source, base = f"scenario {self.name}", tree_of(self)
-        tree = with_values(base, changes, source=source)
-        tree = Check(source, numbers_are_si=True).section(type(self), tree)
-        given = tree if any(key.split(".")[0] == "reference" for key in changes) else {}
-        tree = rules.with_valid_reference(tree, base=base, given=given)
-        return self.from_tree(tree, source)
+        changed = self.from_tree(with_values(base, changes, source), source)
+        given = any(key.split(".")[0] == "reference" for key in changes)
+        if not given and not rules.same_experiment(tree_of(changed), base):
+            changed.reference = None
+        return changed
 
     @classmethod
     def from_tree(cls, tree: dict[str, Any], source: str) -> Self:
         """The scenario of an SI tree; raises InputError that names `source` and key."""
-        check = Check(source, numbers_are_si=True, complete=True)
-        tree = rules.with_balance(check.section(cls, tree), source)
+        tree = Check(source, complete=True).section(cls, tree)
+        tree = rules.with_balance(tree, source)
         rules.check_relations(tree, source)
         return build(cls, tree)
