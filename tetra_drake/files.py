@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Text files: read with one-line errors, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -52,6 +52,18 @@ def check_folder(folder: str | Path) -> None:
         raise InputError(folder, "", f"{what}, expected a folder to write to")
     if not os.access(existing, os.W_OK | os.X_OK):
         raise InputError(folder, "", f"'{existing}' is not writable")
+
+
+def read_text(path: str | Path, what: str) -> str:
+    """The text of a file; `what` says in errors what was expected. Raises InputError."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise InputError(path, "", f"no such {what}") from error
+    except IsADirectoryError as error:
+        raise InputError(path, "", f"is a directory, expected a {what}") from error
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", f"cannot be read as text: {error}") from error
 
 
 def write_whole(path: str | Path, text: str) -> None:

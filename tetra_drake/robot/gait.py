@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import write_whole
+from tetra_drake.files import read_text, write_whole
 from tetra_drake.scenario.schema import Scenario
 
 SCHEMA = 1
@@ -154,14 +154,7 @@ def load_gait(path: str | Path, scenario: Scenario) -> Gait:
 
     Raises InputError, naming file and key, for whatever is wrong in the file.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise InputError(path, "", "no such gait file") from error
-    except IsADirectoryError as error:
-        raise InputError(path, "", "is a directory, expected a gait file") from error
-    except (OSError, ValueError) as error:
-        raise InputError(path, "", f"cannot be read as a text file: {error}") from error
+    text = read_text(path, "gait file")
     try:
         raw = json.loads(text, object_pairs_hook=_unique_keys)
     except (ValueError, RecursionError) as error:

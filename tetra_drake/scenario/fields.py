@@ -95,7 +95,7 @@ class Check:
 
     def value(self, kind: Any, limits: Mapping[str, Any], value: Any, key: str) -> Any:
         """The tree of a value of type `kind`."""
-        if dataclasses.is_dataclass(value):
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
             value = {TAG: f"!{type(value).__name__}", **tree_of(value)}
         elif hasattr(value, "tolist"):  # numpy's arrays and numbers
             value = value.tolist()

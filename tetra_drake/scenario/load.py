@@ -9,6 +9,7 @@ from importlib import resources
 from pathlib import Path
 
 from tetra_drake.errors import InputError
+from tetra_drake.files import read_text
 from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import TAG, Check, Tree, dump_yaml, merge, parse_yaml, tree_of
 from tetra_drake.scenario.schema import Scenario
@@ -86,15 +87,11 @@ def _read(name_or_file: str, asked_by: str | None) -> tuple[str, str]:
     if name_or_file in shipped_scenarios():
         resource = resources.files("tetra_drake") / "scenario" / f"{name_or_file}.yaml"
         return resource.read_text(encoding="utf-8"), str(resource)
-    path = Path(name_or_file)
-    what = f"'{os.path.relpath(path, Path(asked_by).parent)}' " if asked_by else ""
     try:
-        return path.read_text(encoding="utf-8"), str(path)
-    except (OSError, ValueError) as error:
-        problem = f"cannot be read as text: {error}"
-        if isinstance(error, FileNotFoundError):
-            shipped = ", ".join(shipped_scenarios())
-            problem = f"no such scenario file, and no shipped scenario ({shipped})"
-        elif isinstance(error, IsADirectoryError):
-            problem = "is a directory, expected a scenario file"
-        raise InputError(asked_by or path, "base" if asked_by else "", what + problem) from error
+        return read_text(name_or_file, "scenario file"), name_or_file
+    except InputError as error:
+        problem = f"{error.problem} (shipped: {', '.join(shipped_scenarios())})"
+        if asked_by is None:
+            raise InputError(name_or_file, "", problem) from error
+        name = os.path.relpath(name_or_file, Path(asked_by).parent)
+        raise InputError(asked_by, "base", f"'{name}': {problem}") from error
