@@ -87,7 +87,7 @@ BAD_SCENARIOS = {
     "key.yaml": "robot.tetrahedron: unknown key; did you mean 'tetrahedra'?",
     "unit.yaml": "robot.spacing: found '3 lbf', expected a quantity that converts to m",
     "nan.yaml": "fitness.drift: found nan, expected a finite number",
-    "base.yaml": "base: no such scenario file 'thesies'",
+    "base.yaml": "base: 'thesies': no such scenario file",
     "broken.yaml": "is not YAML",
     "missing.yaml": "no such scenario file",
     "folder": "is a directory, expected a scenario file",
