@@ -12,6 +12,7 @@ contact with a cone of friction, calibrated as closely as that allows:
 
 from __future__ import annotations
 
+import functools
 import importlib
 import time
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE, cable_forces
 from tetra_drake.results.metrics import compute_fitness, compute_metrics
 from tetra_drake.results.result import IntegratorWork, SimulationResult
-from tetra_drake.results.trajectory import assemble_dataset
+from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.signals import signals_at
@@ -50,48 +51,40 @@ _MAX_SPEED = 1.0
 """Of a body (m/s), where the scenario allows more: too long a step throws a robot about for ever,
 far forward at times. In a walking robot it is below 0.2 m/s."""
 
-_STRETCH = 1.0
-"""Simulated time (s) between two checks of whether a simulation is still stable."""
+_STRETCH = 5000
+"""Steps between two checks of whether a simulation is still stable."""
 
 
 def simulate_mujoco(
-    *,
-    scenario: Scenario,
-    gait: Gait,
-    record: bool = False,
-    viewer: Viewer | None = None,
-    structure: Structure | None = None,
+    *, scenario: Scenario, gait: Gait, record: bool = False, viewer: Viewer | None = None
 ) -> SimulationResult:
     """Simulates a gait as simulate() does, in MuJoCo, in steps of `scenario.mujoco.step`.
 
-    `structure` replaces the scenario's own, as for a robot that starts elsewhere. The steady
-    stretch, the end and the samples are at the steps nearest to the times asked for. Other threads
-    run meanwhile. The viewer is shown the recording.
+    Instants asked for, as of samples, are those of the nearest steps. Other threads run meanwhile.
+    The viewer is shown the recording.
 
     Raises Diverged or StepBudgetExceeded; InputError if MuJoCo is missing or cannot do it.
     """
     _check(scenario)
     settings, simulation = scenario.mujoco, scenario.simulation
-    structure = structure or MakeStructure(scenario.robot, scenario.cables)
     steps = max(1, round(simulation.duration / settings.step))
     if steps > simulation.max_evaluations:
         reason = f"{steps} steps exceed the budget of {simulation.max_evaluations} evaluations"
         raise StepBudgetExceeded(time=0.0, reason=reason)
 
-    recording = record or viewer is not None
-    every = max(1, round(simulation.sample_period / settings.step))
-    steady = round(simulation.steady_from / settings.step)
-    samples = sorted({*range(0, steps, every), steps}) if recording else []
-    robot = _Robot(scenario, gait, structure, steps=steps)
+    times = sample_times(simulation.duration, simulation.sample_period)
+    times = times if record or viewer is not None else times[:0]
+    instants = np.array([0.0, simulation.steady_from, simulation.duration, *times])
+    robot = _Robot(scenario, gait, steps=steps)
     started = time.perf_counter()
-    kept = robot.walk({0, steady, steps}.union(samples))
+    found = robot.walk(np.rint(instants / settings.step).astype(int))
     wall_time = time.perf_counter() - started
 
-    start, middle, end = (
-        node_positions(structure, robot.state(kept[step])) for step in (0, steady, steps)
+    start, steady, end = (
+        node_positions(robot.structure, state) for state in robot.states(found[:3])
     )
-    metrics = compute_metrics(structure, start=start, steady=middle, end=end)
-    trajectory = robot.dataset(samples, [kept[step] for step in samples]) if recording else None
+    metrics = compute_metrics(robot.structure, start=start, steady=steady, end=end)
+    trajectory = robot.dataset(times, found[3:]) if times.size else None
     if viewer is not None and trajectory is not None:
         show_recording(viewer, trajectory)
     return SimulationResult(
@@ -121,10 +114,11 @@ def installed() -> bool:
     return hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE")
 
 
-def make_mjcf(scenario: Scenario, structure: Structure) -> str:
+def make_mjcf(scenario: Scenario) -> str:
     """The robot in MuJoCo's format, with one motor per driven cable."""
     model = ElementTree.Element("mujoco", model=scenario.name)
-    robot, settings = make_model(scenario, structure), scenario.mujoco
+    structure, settings = MakeStructure(scenario.robot, scenario.cables), scenario.mujoco
+    robot = make_model(scenario, structure)
     _add(model, "compiler", inertiafromgeom="false")
     options = {"integrator": settings.integrator, "timestep": settings.step, "cone": "elliptic"}
     _add(model, "option", gravity=[0.0, 0.0, -robot.gravity], **options)
@@ -134,84 +128,80 @@ def make_mjcf(scenario: Scenario, structure: Structure) -> str:
 
 
 class _Robot:
-    """MuJoCo's model of the robot, walking by the signals of one gait."""
+    """MuJoCo's model of the robot, driven by the signals of one gait."""
 
-    def __init__(self, scenario: Scenario, gait: Gait, structure: Structure, *, steps: int) -> None:
+    def __init__(self, scenario: Scenario, gait: Gait, *, steps: int) -> None:
         import mujoco
 
         if mujoco.get_mju_user_warning() is None:
             # MuJoCo would print that a simulation is unstable, and append it to a file in the
             # working folder. Not set back: other threads may be simulating.
-            mujoco.set_mju_user_warning(_ignore)
+            mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
-        self._scenario = scenario
-        self._structure = structure
-        self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario, structure))
+        self.structure = MakeStructure(scenario.robot, scenario.cables)
+        self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario))
         self._data = mujoco.MjData(self._model)
-        self._times = scenario.mujoco.step * np.arange(steps + 1)
-        self._signals = signals_at(scenario, gait, self._times)
-        driven = structure.cables["signal"]
-        self._control = self._signals[:, driven[driven != PASSIVE]]
+        self._max_speed = min(scenario.simulation.max_speed, _MAX_SPEED)
+        driven = self.structure.cables["signal"]
+        self._motors = driven[driven != PASSIVE]  # the signal of each motor
+        starts = scenario.mujoco.step * np.arange(steps)
+        self._control = signals_at(scenario, gait, starts)[:, self._motors]
+        self._signals = functools.partial(signals_at, scenario, gait)
 
-    def walk(self, wanted: set[int]) -> dict[int, Array]:
-        """Simulates all steps; MuJoCo's states (time, qpos, qvel) after the `wanted` steps."""
+    def walk(self, wanted: Array) -> Array:
+        """Simulates all steps; MuJoCo's states (time, qpos, qvel) after each of the `wanted`."""
         from mujoco.rollout import Rollout
 
         kind = self._mujoco.mjtState.mjSTATE_FULLPHYSICS
         state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
         self._mujoco.mj_getState(self._model, self._data, state, kind)
-        kept = {0: state}
-        steps = len(self._times) - 1
-        stretch = max(1, round(_STRETCH / self._scenario.mujoco.step))
+        found = np.tile(state, (len(wanted), 1))
         with Rollout(nthread=0) as rollout:
-            for first in range(0, steps, stretch):
-                last = min(first + stretch, steps)
-                control = self._control[None, first:last]
+            for first in range(0, len(self._control), _STRETCH):
+                control = self._control[None, first : first + _STRETCH]
                 (states,), _ = rollout.rollout(self._model, self._data, state[None], control)
                 self._check_stability(states)
                 state = states[-1]
-                for step in wanted.intersection(range(first + 1, last + 1)):
-                    kept[step] = states[step - first - 1].copy()
-        return kept
+                here = (first < wanted) & (wanted <= first + len(states))
+                found[here] = states[wanted[here] - first - 1]
+        return found
 
     def _check_stability(self, states: Array) -> None:
-        limit = self._scenario.simulation.max_speed
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
-        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= limit)
+        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
         if fast.any():
-            reason = f"a body's velocity exceeds the limit of {limit:g} m/s"
+            reason = f"a body's velocity exceeds the limit of {self._max_speed:g} m/s"
             raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
         if any(warning.number for warning in self._data.warning):
             raise Diverged(time=float(states[-1, 0]), reason="MuJoCo warns of instability")
 
-    def state(self, kept: Array) -> Array:
-        """[q; v] (13 bodies,) from MuJoCo's state, whose angular velocities are in the bodies."""
-        q, v = np.split(kept[1:], [self._model.nq])
-        pose, velocity = q.reshape(-1, 7), v.reshape(-1, 6)
-        w, u, w_WB_B = pose[:, 3:4], pose[:, 4:], velocity[:, 3:]
-        turned = 2.0 * np.cross(u, w_WB_B)
-        w_WB = w_WB_B + w * turned + np.cross(u, turned)
-        q, v = np.hstack([pose[:, 3:], pose[:, :3]]), np.hstack([w_WB, velocity[:, :3]])
-        return np.concatenate([q.ravel(), v.ravel()])
+    def states(self, found: Array) -> Array:
+        """[q; v] (rows, 13 bodies) of MuJoCo's states, where w is given in the body's frame."""
+        rows, nq = len(found), 1 + self._model.nq
+        pose, velocity = found[:, 1:nq].reshape(rows, -1, 7), found[:, nq:].reshape(rows, -1, 6)
+        scalar, vector, w_WB_B = pose[..., 3:4], pose[..., 4:], velocity[..., 3:]
+        turn = 2.0 * np.cross(vector, w_WB_B)
+        w_WB = w_WB_B + scalar * turn + np.cross(vector, turn)
+        q = np.concatenate([pose[..., 3:], pose[..., :3]], axis=2)
+        v = np.concatenate([w_WB, velocity[..., :3]], axis=2)
+        return np.hstack([q.reshape(rows, -1), v.reshape(rows, -1)])
 
-    def dataset(self, steps: list[int], kept: list[Array]) -> xarray.Dataset:
-        """The trajectory, with the forces at MuJoCo's states after these steps."""
-        structure = self._structure
-        states = np.array([self.state(row) for row in kept])
-        signals = self._signals[steps]
+    def dataset(self, times: Array, found: Array) -> xarray.Dataset:
+        """The trajectory: MuJoCo's states at `times` (s), and the forces there."""
+        structure, rows = self.structure, len(times)
+        states, signals = self.states(found), self._signals(times)
         force = np.empty(6 * len(structure.bodies))
-        tensions, lengths = np.empty((2, len(steps), len(structure.cables)))
-        for i, state in enumerate(states):
-            laws = structure.p_BN, structure.cables, False
-            cable_forces(state, signals[i], *laws, force, tensions[i], lengths[i])
-        ground = np.array(
-            [self._ground_forces(row, self._control[i]) for i, row in zip(steps, kept, strict=True)]
-        )
-        modes = np.zeros_like(ground)  # of friction: 0, for MuJoCo's has no modes
+        tensions, lengths = np.empty((2, rows, len(structure.cables)))
+        ground = np.empty((rows, len(structure.contacts), 3))
+        laws = structure.p_BN, structure.cables, False
+        for i in range(rows):
+            cable_forces(states[i], signals[i], *laws, force, tensions[i], lengths[i])
+            ground[i] = self._ground_forces(found[i], signals[i])
+        modes = np.zeros_like(ground)  # of friction: 0, as MuJoCo's has none
         modes[:, :, 0] = ground[:, :, 2] > 0.0
         return assemble_dataset(
             structure,
-            times=self._times[steps],
+            times=times,
             states=states,
             signals=signals,
             tensions=tensions,
@@ -221,13 +211,13 @@ class _Robot:
             modes=modes,
         )
 
-    def _ground_forces(self, kept: Array, control: Array) -> Array:
+    def _ground_forces(self, found: Array, signals: Array) -> Array:
         """(contacts, 3): MuJoCo's contact forces on the nodes in World, in N."""
         mujoco, model, data = self._mujoco, self._model, self._data
-        mujoco.mj_setState(model, data, kept, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        data.ctrl[:] = control
+        mujoco.mj_setState(model, data, found, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        data.ctrl[:] = signals[self._motors]
         mujoco.mj_forward(model, data)
-        forces, wrench = np.zeros((len(self._structure.contacts), 3)), np.zeros(6)
+        forces, wrench = np.zeros((len(self.structure.contacts), 3)), np.zeros(6)
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(model, data, i, wrench)
             # The floor is geom 0; those of the contact nodes follow in their order.
@@ -301,7 +291,3 @@ def _add(parent: ElementTree.Element, tag: str, **attributes: Any) -> ElementTre
         for name, value in attributes.items()
     }
     return ElementTree.SubElement(parent, tag, text)
-
-
-def _ignore(message: str) -> None:
-    """Takes MuJoCo's warnings, which its data count."""
