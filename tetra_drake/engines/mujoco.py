@@ -65,7 +65,7 @@ def simulate_mujoco(
 
     Raises Diverged or StepBudgetExceeded; InputError if MuJoCo is missing or cannot do it.
     """
-    _check(scenario)
+    check_mujoco(scenario)
     settings, simulation = scenario.mujoco, scenario.simulation
     steps = max(1, round(simulation.duration / settings.step))
     if steps > simulation.max_evaluations:
@@ -225,7 +225,7 @@ class _Robot:
         return forces
 
 
-def _check(scenario: Scenario) -> None:
+def check_mujoco(scenario: Scenario) -> None:
     """Raises InputError if MuJoCo cannot simulate the scenario."""
     if not installed():
         raise InputError(scenario.name, "simulation.engine", f"mujoco is not installed: {INSTALL}")
