@@ -455,14 +455,6 @@ def test_diagram_refuses_a_kind_of_file_it_cannot_draw(inputs, work, capsys):
     assert os.listdir(work) == []
 
 
-# work-precision
-
-
-def test_work_precision_refuses_a_missing_gait(work, capsys):
-    assert main(["work-precision", "missing.json"]) == 2
-    assert_refused_in_one_line(capsys.readouterr(), "missing.json: no such gait file")
-
-
 def test_a_result_folder_below_a_file_is_refused_before_simulating(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert main(["simulate", "--out", str(tmp_path / "file" / "sub")]) == 2

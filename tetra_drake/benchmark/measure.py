@@ -151,7 +151,7 @@ def measure(
         "schema": SCHEMA,
         "scenario": scenario.name,
         "duration_s": scenario.simulation.duration,
-        "versions": versions(),
+        "versions": versions("mujoco" if "mujoco" in engines else ""),
         "cores": available_cores(),
         "converged": describe(scenario.with_changes(CONVERGED)),
         "gaits": [

@@ -23,8 +23,7 @@ import numpy as np
 from tetra_drake.engines.viewer import Viewer, show_recording
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE, cable_forces
-from tetra_drake.results.metrics import compute_fitness, compute_metrics
-from tetra_drake.results.result import IntegratorWork, SimulationResult
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import Model, make_model
@@ -80,17 +79,13 @@ def simulate_mujoco(
     found = robot.walk(np.rint(instants / settings.step).astype(int))
     wall_time = time.perf_counter() - started
 
-    start, steady, end = (
-        node_positions(robot.structure, state) for state in robot.states(found[:3])
-    )
-    metrics = compute_metrics(robot.structure, start=start, steady=steady, end=end)
     trajectory = robot.dataset(times, found[3:]) if times.size else None
     if viewer is not None and trajectory is not None:
         show_recording(viewer, trajectory)
-    return SimulationResult(
-        metrics=metrics,
-        fitness=compute_fitness(metrics, scenario.fitness),
-        duration=simulation.duration,
+    return make_result(
+        scenario,
+        robot.structure,
+        positions=[node_positions(robot.structure, state) for state in robot.states(found[:3])],
         wall_time=wall_time,
         integrator=IntegratorWork(
             scheme=settings.integrator,
@@ -99,7 +94,6 @@ def simulate_mujoco(
             derivative_evaluations=steps,
             jacobian_evaluations=0,
         ),
-        engine="mujoco",
         trajectory=trajectory if record else None,
     )
 
