@@ -3,7 +3,6 @@
 A module of its own so that worker processes can import it.
 """
 
-import copy
 import json
 import os
 import signal
@@ -52,7 +51,7 @@ def small_scenario(
     *, oscillators: int = 4, population: int = 12, iterations: int = 15, trials: int = 2
 ) -> Scenario:
     """The thesis with little to do."""
-    scenario = copy.deepcopy(load_scenario("thesis"))
+    scenario = load_scenario("thesis")
     scenario.robot.tetrahedra = oscillators + 1
     scenario.evolution.population = population
     scenario.evolution.max_iterations = iterations
