@@ -16,13 +16,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tetra_drake.engines.simulate import simulate as simulate
+    from tetra_drake.evolution.tables import load_run as load_run
     from tetra_drake.robot.gait import load_gait as load_gait
+    from tetra_drake.run import evolve as evolve
     from tetra_drake.scenario.load import load_scenario as load_scenario
 
 __version__ = "0.1.0"
 
 _HOMES = {
+    "evolve": "tetra_drake.run",
     "load_gait": "tetra_drake.robot.gait",
+    "load_run": "tetra_drake.evolution.tables",
     "load_scenario": "tetra_drake.scenario.load",
     "simulate": "tetra_drake.engines.simulate",
 }

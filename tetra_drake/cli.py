@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -12,20 +11,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
+from tetra_drake.benchmark.command import add_bench
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.evolution.command import add_evolve, add_reevaluate
 from tetra_drake.experiment.command import add_analyse, add_tables
 from tetra_drake.figures.command import add_figures
-from tetra_drake.files import whole_file
 from tetra_drake.report.replay_command import add_replay
 from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, seeded_gait
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     from tetra_drake.visualization.live import LiveView
-
-BENCHMARK_GAITS = 12
 
 BAD_INPUT, FAILED = 2, 1
 """Exit statuses: the input cannot be used; the simulation failed."""
@@ -61,15 +57,16 @@ def make_parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_simulate(commands)
-    add_evolve(commands)
-    add_reevaluate(commands)
+    _add_evolve(commands)
+    _add_reevaluate(commands)
     add_replay(commands)
     add_figures(commands)
     add_analyse(commands)
     add_tables(commands)
-    _add_benchmark(commands)
+    add_bench(commands)
     _add_cpg(commands)
     _add_diagram(commands)
+    _add_work_precision(commands)
     return parser
 
 
@@ -143,6 +140,121 @@ def _open_view(scenario: Scenario) -> LiveView:
     return LiveView(meshcat, scenario)
 
 
+FIRST_SCENARIO = "quick"
+"""The scenario that `evolve` starts without another: it ends in minutes."""
+
+
+def _add_evolve(commands: argparse._SubParsersAction) -> None:
+    command = commands.add_parser(
+        "evolve",
+        help="evolve gaits that walk far",
+        description="Evolves gaits by the thesis's evolutionary algorithm, one simulation per "
+        "candidate, and records every evaluation in a run directory. Ctrl-C ends it; the same "
+        "command with --resume continues it. The result depends on scenario and seed only. At the "
+        "end it writes report.html, replay.html and figures/ into the run directory.",
+    )
+    command.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
+        f"(default: {FIRST_SCENARIO}, which takes minutes; with --resume, the run's)",
+    )
+    command.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="the run directory, as runs/NAME"
+    )
+    arguments.add_engine(command)
+    command.add_argument(
+        "--trials",
+        metavar="N",
+        type=arguments.count,
+        help="number of independent trials, instead of the scenario's",
+    )
+    command.add_argument(
+        "--iterations",
+        metavar="N",
+        type=arguments.count,
+        help="greatest number of iterations per trial, instead of the scenario's",
+    )
+    command.add_argument(
+        "--seed", metavar="N", type=arguments.seed, help="random seed (default: 0)"
+    )
+    arguments.add_workers(command)
+    command.add_argument(
+        "--resume", action="store_true", help="continue an interrupted run; needs only --out"
+    )
+    command.set_defaults(run=_evolve)
+
+
+def _evolve(options: argparse.Namespace) -> None:
+    from tetra_drake.evolution.progress import make_progress
+    from tetra_drake.evolution.summary import summary, whole_experiment
+    from tetra_drake.run import evolve
+
+    if options.scenario is None and not options.resume:
+        print(whole_experiment(load_scenario("thesis"), seconds=0.2), flush=True)
+    try:
+        run = evolve(
+            _scenario_to_evolve(options),
+            options.out,
+            seed=options.seed,
+            workers=options.workers,
+            resume=options.resume,
+            progress=make_progress(sys.stdout),
+        )
+    except KeyboardInterrupt:
+        resume = f"tetra-drake evolve --out {options.out} --resume"
+        print(f"\nnothing is lost; continue with: {resume}", file=sys.stderr)
+        raise
+    print(summary(run))
+
+
+def _scenario_to_evolve(options: argparse.Namespace) -> Scenario | None:
+    """The scenario with the options' changes; None if they leave a run to resume as it is."""
+    from tetra_drake.evolution.record import read_manifest
+
+    asked = {
+        "simulation.engine": options.engine,
+        "evolution.trials": options.trials,
+        "evolution.max_iterations": options.iterations,
+    }
+    changes = {key: value for key, value in asked.items() if value is not None}
+    if options.scenario is None and options.resume:
+        return read_manifest(options.out).scenario.with_changes(changes) if changes else None
+    return load_scenario(options.scenario or FIRST_SCENARIO).with_changes(changes)
+
+
+def _add_reevaluate(commands: argparse._SubParsersAction) -> None:
+    command = commands.add_parser(
+        "reevaluate",
+        help="evaluate gaits of a run once more, on the Drake diagram",
+        description="Evaluates gaits of a run made on another engine once more, on the Drake "
+        "diagram, and adds them to the run's record (reevaluations.jsonl of each trial): the best "
+        "gaits of each trial, which evolve itself does at its end, or all initial gaits. Gaits "
+        "that have been evaluated so already are skipped.",
+    )
+    command.add_argument("run_directory", metavar="RUN", type=Path, help="the run directory")
+    command.add_argument(
+        "--initial", action="store_true", help="the initial gaits instead of the best"
+    )
+    arguments.add_workers(command)
+    command.set_defaults(run=_reevaluate)
+
+
+def _reevaluate(options: argparse.Namespace) -> None:
+    from tetra_drake.evolution.progress import make_progress
+    from tetra_drake.evolution.reevaluation import reevaluate
+    from tetra_drake.evolution.summary import summary
+
+    with make_progress(sys.stdout) as progress:
+        run = reevaluate(
+            options.run_directory,
+            initial=options.initial,
+            workers=options.workers,
+            progress=progress,
+        )
+    print(summary(run))
+
+
 def _add_cpg(commands: argparse._SubParsersAction) -> None:
     command = commands.add_parser(
         "cpg",
@@ -207,72 +319,35 @@ def _diagram(options: argparse.Namespace) -> None:
     save_block_diagram(MakeTensegrityDiagram(scenario, seeded_gait(scenario)), options.out)
 
 
-def _add_benchmark(commands: argparse._SubParsersAction) -> None:
+def _add_work_precision(commands: argparse._SubParsersAction) -> None:
     command = commands.add_parser(
-        "benchmark",
-        help="measure speed and accuracy of the engines and their settings",
-        description="Simulates gaits on the engines with different settings and prints how many "
-        "times faster than real time each is, how far its distances are from converged ones, and "
-        "the compiled engine's cost per step by number of tetrahedra. Takes some minutes, the set "
-        "integrators longer. Times are meaningful on an idle machine only.",
-    )
-    command.add_argument(
-        "gaits", metavar="GAIT", type=Path, nargs="*", help="gait files (default: random gaits)"
-    )
-    command.add_argument(
-        "--gaits",
-        dest="number",
-        metavar="N",
-        type=arguments.count,
-        help=f"number of random gaits, of seeds 0, 1 ... (default: {BENCHMARK_GAITS})",
-    )
-    command.add_argument(
-        "--settings",
-        metavar="SET",
-        nargs="+",
-        choices=("default", "integrators", "compiled", "mujoco"),
-        default=["default"],
-        help="sets of settings: default (all engines), integrators (of the Drake diagram), "
-        "compiled, mujoco (default: default)",
-    )
-    command.add_argument(
-        "--sizes",
-        metavar="N",
-        nargs="*",
-        type=arguments.count,
-        help="numbers of tetrahedra to measure the cost per step for (default: 5 10 20 40 with "
-        "the default settings, else none)",
+        "work-precision",
+        help="measure what each integrator setting costs and how exact it is",
+        description="Simulates gaits with many integrator settings and prints, for each, the "
+        "distance error against a converged run, derivative evaluations and wall time.",
     )
     arguments.add_scenario(command)
-    command.add_argument("--json", metavar="FILE", type=Path, help="also write a JSON file")
-    command.set_defaults(run=_benchmark)
+    arguments.add_engine(command)
+    command.add_argument(
+        "gaits", metavar="GAIT", type=Path, nargs="+", help="gait files; at least six say something"
+    )
+    command.add_argument(
+        "--workers",
+        type=arguments.count,
+        default=1,
+        help="processes; 1 for times that mean something",
+    )
+    command.set_defaults(run=_work_precision)
 
 
-def _benchmark(options: argparse.Namespace) -> None:
-    scenario = load_scenario(options.scenario)
-    if options.gaits and options.number is not None:
-        raise InputError("--gaits", "", "not allowed with gait files")
-    gaits = [load_gait(path, scenario) for path in options.gaits] or [
-        seeded_gait(scenario, seed) for seed in range(options.number or BENCHMARK_GAITS)
-    ]
-    with contextlib.ExitStack() as stack:
-        # Opened first: a path that cannot be written is refused before minutes are spent.
-        file = stack.enter_context(whole_file(options.json)) if options.json else None
+def _work_precision(options: argparse.Namespace) -> None:
+    from tetra_drake.benchmark.work_precision import HEADER, format_row, measure
 
-        from tetra_drake.benchmark.measure import SIZES, measure
-        from tetra_drake.benchmark.tables import to_markdown
-
-        sizes = options.sizes
-        if sizes is None:
-            sizes = SIZES if options.settings == ["default"] else ()
-        found = measure(scenario, gaits, sets=options.settings, sizes=sizes, say=_say)
-        print(to_markdown(found))
-        if file is not None:
-            file.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def _say(stage: str) -> None:
-    print(f"{stage} ...", file=sys.stderr, flush=True)
+    scenario = _scenario(options)
+    gaits = [load_gait(path, scenario) for path in options.gaits]
+    print(HEADER)
+    for row in measure(scenario, gaits, workers=options.workers):
+        print(format_row(row, scenario.simulation.duration), flush=True)
 
 
 def _add_gait(command: argparse.ArgumentParser) -> None:

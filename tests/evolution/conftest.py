@@ -6,7 +6,7 @@ import pytest
 from helpers.analytic import Bowl, small_scenario
 
 from tetra_drake.evolution.record import RunRecord
-from tetra_drake.evolution.run import evolve
+from tetra_drake.evolution.trials import run_trials
 
 
 @pytest.fixture
@@ -20,11 +20,11 @@ def run_small(tmp_path):
         else:
             record = RunRecord.create(directory, scenario=small_scenario(**options), seed=seed)
         with record:
-            evolve(
+            run_trials(
                 record,
                 evaluate=evaluate or Bowl(),
                 workers=workers,
-                make_executor=ThreadPoolExecutor,
+                executor=ThreadPoolExecutor,
             )
         return directory
 

@@ -15,10 +15,9 @@ from tetra_drake.errors import Diverged
 from tetra_drake.evolution import evaluation
 from tetra_drake.evolution.evaluation import GaitEvaluation, TimeBudgetExceeded, time_limit
 from tetra_drake.evolution.executors import process_executor
-from tetra_drake.evolution.genome import random_genome
 from tetra_drake.evolution.record import RunRecord, read_manifest
-from tetra_drake.evolution.run import evolve
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.evolution.trials import run_trials
+from tetra_drake.robot.gait import ParameterSpace, load_gait
 
 
 def tiny_scenario():
@@ -31,7 +30,7 @@ def tiny_scenario():
 
 @pytest.fixture
 def genome():
-    return random_genome(tiny_scenario(), np.random.default_rng(1))
+    return ParameterSpace.of(tiny_scenario()).random(np.random.default_rng(1))
 
 
 def test_failures_say_why_and_have_the_worst_fitness(genome):
@@ -64,11 +63,16 @@ def test_the_time_limit_is_gone_after_its_block():
         time.sleep(1.0)
 
 
-def test_a_fitness_that_is_not_finite_is_a_failure(genome, monkeypatch):
-    result = simulate(scenario=tiny_scenario(), gait=evaluation.gait_of(genome, name=""))
-    broken = dataclasses.replace(result, fitness=math.nan)
-    monkeypatch.setattr(evaluation, "simulate", lambda **_: broken)
-    assert GaitEvaluation(tiny_scenario())(genome).failure == "diverged: the fitness is not finite"
+def test_a_fitness_that_is_not_finite_is_a_failure(genome):
+    failed = GaitEvaluation(tiny_scenario(), lambda result: math.nan)(genome)
+    assert failed.failure.startswith("diverged: ")
+
+
+def test_an_objective_takes_the_place_of_the_scenarios_fitness(genome):
+    plain = GaitEvaluation(tiny_scenario())(genome)
+    own = GaitEvaluation(tiny_scenario(), lambda result: -result.metrics.twist - 1.0)(genome)
+    assert own.fitness == -plain.metrics["twist"] - 1.0
+    assert own.metrics == plain.metrics
 
 
 def test_the_reason_of_a_failed_simulation_is_kept(genome, monkeypatch):
@@ -82,13 +86,13 @@ def test_the_reason_of_a_failed_simulation_is_kept(genome, monkeypatch):
 
 def test_a_tiny_run_from_end_to_end(tmp_path):
     scenario = tiny_scenario()
-    for name, make_executor in (("run", process_executor), ("here", ThreadPoolExecutor)):
+    for name, executor in (("run", process_executor), ("here", ThreadPoolExecutor)):
         with RunRecord.create(tmp_path / name, scenario=scenario, seed=1) as record:
-            evolve(
+            run_trials(
                 record,
                 evaluate=GaitEvaluation(scenario),
                 workers=2 if name == "run" else 1,
-                make_executor=make_executor,
+                executor=executor,
             )
     # Bit for bit, whichever process evaluates.
     assert read_record(tmp_path / "run") == read_record(tmp_path / "here")
@@ -100,5 +104,5 @@ def test_a_tiny_run_from_end_to_end(tmp_path):
     best = json.loads((trial / "iterations.jsonl").read_text().splitlines()[-1])
     gait = load_gait(trial / "best_gait.json", scenario)
     result = simulate(scenario=read_manifest(tmp_path / "run").scenario, gait=gait, record=True)
-    assert result.metrics.distance_in == best["best_distance_in"]
     assert result.fitness == best["best_fitness"]
+    assert dataclasses.asdict(result.metrics) == entries[best["best_evaluation"]]["metrics"]

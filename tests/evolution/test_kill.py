@@ -13,7 +13,7 @@ import pytest
 from helpers.analytic import Bowl, read_record, small_scenario
 
 from tetra_drake.evolution.record import RunRecord
-from tetra_drake.evolution.run import evolve
+from tetra_drake.evolution.trials import run_trials
 
 PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
 
@@ -53,7 +53,7 @@ def uninterrupted(tmp_path):
     with RunRecord.create(
         tmp_path / "whole", scenario=small_scenario(iterations=150), seed=9
     ) as record:
-        evolve(record, evaluate=Bowl(), workers=2, make_executor=ThreadPoolExecutor)
+        run_trials(record, evaluate=Bowl(), workers=2, executor=ThreadPoolExecutor)
     return read_record(tmp_path / "whole")
 
 

@@ -5,15 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from tetra_drake.evolution.genome import (
-    TAU_A,
-    TAU_B,
-    couple_tau_b,
-    gait_of,
-    genome_of,
-    mutation_limits,
-    random_genome,
-)
 from tetra_drake.evolution.optimizers.operators import (
     cross_over,
     draw_mutation,
@@ -24,7 +15,7 @@ from tetra_drake.evolution.optimizers.operators import (
     select_parent,
     select_victim,
 )
-from tetra_drake.robot.gait import random_gait
+from tetra_drake.robot.gait import TAU_A, ParameterSpace
 
 DRAWS = 2000
 
@@ -55,33 +46,6 @@ class Script:
 @pytest.fixture
 def generator():
     return np.random.default_rng(7)
-
-
-# Genome
-
-
-@pytest.mark.parametrize("oscillators", [1, 2, 4, 8])
-def test_a_genome_is_a_gait_in_one_row(scenario, generator, oscillators):
-    scenario.robot.tetrahedra = oscillators + 1
-    genome = random_genome(scenario, generator)
-    assert genome.shape == (2 * oscillators * (oscillators - 1) + 2,)
-    gait = gait_of(genome, name="mine")
-    assert gait == random_gait(scenario, np.random.default_rng(7), name="mine")
-    np.testing.assert_array_equal(genome_of(gait), genome)
-
-
-def test_random_genomes_fill_the_bounds(scenario, generator):
-    genomes = np.array([random_genome(scenario, generator) for _ in range(DRAWS)])
-    weights, tau_a = genomes[:, :-2], genomes[:, TAU_A]
-    assert weights.min() >= 1.0
-    assert weights.max() <= 3.4
-    assert weights.min() < 1.01
-    assert weights.max() > 3.39
-    assert weights.mean() == pytest.approx(2.2, abs=0.02)
-    assert tau_a.min() >= 0.2
-    assert tau_a.max() <= 0.5
-    assert tau_a.mean() == pytest.approx(0.35, abs=0.01)
-    np.testing.assert_array_equal(genomes[:, TAU_B], 2.0 * tau_a)
 
 
 # Selection
@@ -139,21 +103,19 @@ def test_never_and_always_are_exact(generator, probability, swapped):
 # Mutation
 
 
-def test_seven_tenths_of_the_parameters_move_by_up_to_their_reach(scenario, generator):
-    reach = mutation_limits(scenario).reach
+def test_seven_tenths_of_the_parameters_move_by_up_to_their_step(scenario, generator):
+    steps = ParameterSpace.of(scenario).steps
     rows = np.array(
-        [draw_mutation(reach, probability=0.7, generator=generator) for _ in range(DRAWS)]
+        [draw_mutation(steps, probability=0.7, generator=generator) for _ in range(DRAWS)]
     )
     moved = rows != 0.0
     assert moved.mean() == pytest.approx(0.7, abs=0.006)
     np.testing.assert_allclose(moved.mean(axis=0), 0.7, atol=0.04)
     assert (rows[moved] > 0.0).mean() == pytest.approx(0.5, abs=0.01)
-    sizes = np.abs(rows) / reach
+    sizes = np.abs(rows) / steps
     assert sizes.max() <= 1.0
     assert sizes.max() > 0.999
     assert sizes[moved].mean() == pytest.approx(0.5, abs=0.01)
-    assert reach[0] == 0.2
-    assert reach[TAU_A] == 0.05
 
 
 def test_a_parameter_that_a_mutation_would_take_to_its_floor_stays():
@@ -169,28 +131,15 @@ def test_a_parameter_below_its_floor_can_still_grow():
 
 
 def test_mutations_keep_weights_above_zero_and_tau_above_its_floor(scenario, generator):
-    limits = mutation_limits(scenario)
-    genome = random_genome(scenario, generator)
+    space = ParameterSpace.of(scenario)
+    genome = space.random(generator)
     for _ in range(DRAWS):
-        row = draw_mutation(limits.reach, probability=0.7, generator=generator)
+        row = draw_mutation(space.steps, probability=0.7, generator=generator)
         row = -np.abs(row)
-        genome = couple_tau_b(mutate(genome, mutation=row, floors=limits.floors))
+        genome = space.repair(mutate(genome, mutation=row, floors=space.floors))
         assert (genome[:-2] > 0.0).all()
         assert genome[TAU_A] > 0.2
     assert genome[:-2].max() < 0.01
-
-
-def test_in_the_listing_mutation_does_not_reach_tau_a(scenario):
-    scenario.evolution.tau_mutation = "listing"
-    reach = mutation_limits(scenario).reach
-    assert reach[TAU_A] == 0.0
-    assert reach[TAU_B] > 0.0
-
-
-def test_equal_bounds_fix_tau(scenario):
-    scenario.gait_bounds.tau_a_min = scenario.gait_bounds.tau_a_max = 0.3
-    reach = mutation_limits(scenario).reach
-    np.testing.assert_array_equal(reach[[TAU_A, TAU_B]], 0.0)
 
 
 # Replacement
@@ -247,7 +196,7 @@ def test_the_stop_rule_waits_for_a_whole_window():
 # The listing by hand
 
 
-def test_one_iteration_as_the_listing_goes_through_it():
+def test_one_iteration_as_the_listing_goes_through_it(scenario):
     """A.3 for two weights and tau: two tournaments, crossover, one set of mutation numbers."""
     population = np.array([[1.0, 2.0, 0.30, 0.60], [1.5, 2.5, 0.21, 0.42], [3.0, 0.1, 0.50, 1.00]])
     fitnesses = np.array([4.0, 6.0, 5.0])
@@ -265,12 +214,13 @@ def test_one_iteration_as_the_listing_goes_through_it():
     first, second = cross_over(first, second, probability=0.2, generator=script)
     np.testing.assert_array_equal(first, [1.5, 0.1, 0.21, 1.00])
     np.testing.assert_array_equal(second, [3.0, 2.5, 0.50, 0.42])
-    reach, floors = np.array([0.2, 0.2, 0.05, 0.1]), np.array([0.0, 0.0, 0.2, 0.4])
-    row = draw_mutation(reach, probability=0.7, generator=script)
+    steps, floors = np.array([0.2, 0.2, 0.05, 0.1]), np.array([0.0, 0.0, 0.2, 0.4])
+    row = draw_mutation(steps, probability=0.7, generator=script)
     np.testing.assert_allclose(row, [0.1, -0.2, -0.04, 0.0])
     assert script.is_used_up()
+    space = ParameterSpace.of(scenario)
     first, second = (
-        couple_tau_b(mutate(child, mutation=row, floors=floors)) for child in (first, second)
+        space.repair(mutate(child, mutation=row, floors=floors)) for child in (first, second)
     )
     # Child 1: weight 2 would be negative and tau below 0.2, so both stay.
     np.testing.assert_allclose(first, [1.6, 0.1, 0.21, 0.42])

@@ -1,7 +1,7 @@
-"""Run directories: what is refused, repaired and reported, and what resuming makes of it."""
+"""Run directories: what is refused, repaired and reported, and how runs are resumed."""
 
+import hashlib
 import json
-import lzma
 import math
 import subprocess
 import sys
@@ -11,10 +11,9 @@ import pytest
 from helpers.analytic import Bowl, read_record, small_scenario
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.json_lines import append_lines
+from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.record import RunRecord, TrialRecord, read_manifest
-from tetra_drake.evolution.tables import load_run
 from tetra_drake.results.result import versions
 
 
@@ -42,47 +41,57 @@ def interrupted_after(count):
 # Manifest
 
 
-def test_the_manifest_holds_scenario_seed_and_versions(run_small):
+def test_the_manifest_holds_seed_versions_and_method_and_the_scenario_its_own_file(run_small):
     run = run_small(seed=11)
     manifest = read_manifest(run)
     assert manifest.scenario == small_scenario()
     assert manifest.seed == 11
     assert manifest.versions == versions()
+    assert manifest.method == Method.of(small_scenario())
     raw = json.loads((run / "manifest.json").read_text())
-    assert raw["scenario"]["evolution"]["population"] == 12
+    text = (run / "scenario.yaml").read_bytes()
+    assert raw["scenario_sha256"] == hashlib.sha256(text).hexdigest()
+    assert "scenario" not in raw
 
 
-def test_a_run_directory_without_manifest_is_no_run(tmp_path, refused):
-    with refused(tmp_path, "", "holds no manifest.json"):
+def test_a_directory_without_manifest_is_no_run(tmp_path, refused):
+    with refused(tmp_path, "", "manifest.json"):
         RunRecord.resume(tmp_path)
+    with refused(tmp_path / "none", "", "manifest.json"):
+        RunRecord.resume(tmp_path / "none")
+    assert not (tmp_path / "none").exists()
 
 
-def test_a_damaged_manifest_is_reported(run_small, refused):
-    run = run_small()
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("seed", "x"), ("schema", 3), ("scenario_sha256", None), ("versions", []), ("objective", 7)],
+)
+def test_a_damaged_manifest_is_reported(run_small, refused, key, value):
+    run = run_small(population=4, iterations=1)
     manifest = run / "manifest.json"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {key: value}))
+    with refused(manifest, key, ""):
+        RunRecord.resume(run)
     cut(manifest, 50)
     with refused(manifest, "", "cannot be read"):
         RunRecord.resume(run)
-    manifest.write_text('{"schema": 1, "scenario": {}, "versions": {}}')
-    with refused(manifest, "seed", "is missing"):
-        RunRecord.resume(run)
 
 
-def test_a_scenario_changed_behind_the_manifest_is_reported(run_small, refused):
+def test_a_scenario_changed_after_the_run_began_is_reported(run_small, refused):
     run = run_small()
     scenario = run / "scenario.yaml"
     scenario.write_text(scenario.read_text().replace("population: 12", "population: 13"))
-    with refused(scenario, "evolution.population", "is not as in manifest.json"):
+    with refused(scenario, "", "changed"):
         RunRecord.resume(run)
 
 
 # What is refused
 
 
-def test_an_existing_run_is_refused(run_small, refused, tmp_path):
+def test_an_existing_run_is_refused(run_small, refused):
     run = run_small()
     before = read_record(run)
-    with refused(run, "", "--resume goes on with it"):
+    with refused(run, "", "--resume"):
         RunRecord.create(run, scenario=small_scenario(), seed=5)
     assert read_record(run) == before
 
@@ -105,19 +114,18 @@ def test_what_a_kill_in_the_first_moment_leaves_is_an_empty_directory(tmp_path):
     assert not (tmp_path / ".manifest.x1.json").exists()
 
 
-def test_nothing_is_resumed_where_nothing_is(tmp_path, refused):
-    with refused(tmp_path / "none", "", "no such run directory"):
-        RunRecord.resume(tmp_path / "none")
-    assert not (tmp_path / "none").exists()
-
-
 def test_another_seed_or_scenario_is_refused(run_small, refused):
     run = run_small(seed=5)
     with refused(run, "seed", "the run has seed 5, not 6"):
         RunRecord.resume(run, seed=6)
     with refused(run, "evolution.population", "the run has 12, not 13"):
         RunRecord.resume(run, scenario=small_scenario(population=13))
-    with RunRecord.resume(run, scenario=small_scenario(), seed=5):
+    other = Method.of(small_scenario(), objective=Bowl())
+    with refused(run, "objective", "Bowl"):
+        RunRecord.resume(run, method=other)
+    with RunRecord.resume(
+        run, scenario=small_scenario(), seed=5, method=Method.of(small_scenario())
+    ):
         pass
 
 
@@ -182,7 +190,7 @@ def test_a_damaged_line_is_reported(run_small, refused, line, content, problem):
         ("genome", [2.0] * 26, 20, "the genome is not the one"),
         ("placed", 77, 20, "placed is not what"),
         ("index", 77, 20, "index is 77, expected 19"),
-        ("fitness", "high", 20, "fitness is missing or no good"),
+        ("fitness", "high", 20, "fitness is missing"),
         ("iteration", 3, 20, "iteration is not what"),
     ],
 )
@@ -256,69 +264,3 @@ def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, 
     assert record.recall(4, genome) is None
     with refused(tmp_path / "in_progress.jsonl", "line 1", "the genome is not the one"):
         record.recall(3, genome + 1.0)
-
-
-# Tables
-
-
-def test_a_run_loads_as_tables(run_small):
-    run = load_run(run_small(seed=11))
-    assert run.manifest.seed == 11
-    assert len(run.evaluations) == 2 * 42
-    assert len(run.iterations) == 2 * 16
-    row = run.evaluations.iloc[20]
-    gait_columns = [*(f"weight_{i}" for i in range(1, 25)), "tau_a_s", "tau_b_s"]
-    expected = Bowl()(row[gait_columns].to_numpy(dtype=float))
-    assert expected.failure or row["fitness"] == expected.fitness
-    failed = run.evaluations["failure"].notna()
-    assert failed.any()
-    assert run.evaluations["fitness"][failed].isna().all()
-    assert run.evaluations["distance_in"][~failed].notna().all()
-    means = run.iterations.pivot(index="iteration", columns="trial", values="mean_fitness")
-    assert means.shape == (16, 2)
-
-
-def test_a_run_in_progress_loads_and_is_left_alone(run_small):
-    run = run_small()
-    path = run / "trial_00" / "evaluations.jsonl"
-    cut(path, len(path.read_bytes()) - 10)
-    torn = path.read_bytes()
-    assert len(load_run(run).evaluations) == 2 * 42 - 1
-    assert path.read_bytes() == torn
-    for trial in ("trial_00", "trial_01"):
-        for file in (run / trial).iterdir():
-            file.unlink()
-    assert load_run(run).evaluations.empty
-
-
-def test_a_compressed_record_reads_alike_and_is_not_added_to(run_small, refused):
-    run = run_small()
-    plain = load_run(run)
-    for path in run.rglob("*.jsonl"):
-        path.with_name(path.name + ".xz").write_bytes(lzma.compress(path.read_bytes()))
-        path.unlink()
-    packed = load_run(run)
-    assert packed.evaluations.equals(plain.evaluations)
-    assert packed.iterations.equals(plain.iterations)
-    path = run / "trial_00" / "iterations.jsonl"
-    with refused(f"{path}.xz", "", "decompress it first"):
-        append_lines(path, [{}])
-    path.with_name("iterations.jsonl.xz").write_bytes(b"no xz")
-    with refused(f"{path}.xz", "", "cannot be read"):
-        load_run(run)
-
-
-@pytest.mark.parametrize(
-    ("name", "entry", "key"),
-    [
-        ("evaluations.jsonl", {"index": 0}, "iteration"),
-        ("iterations.jsonl", {"iteration": "first"}, "iteration"),
-        ("reevaluations.jsonl", {"index": 0, "iteration": 0, "genome": 3}, "genome"),
-    ],
-)
-def test_tables_report_a_line_that_is_no_entry(run_small, refused, name, entry, key):
-    run = run_small()
-    path = run / "trial_01" / name
-    path.write_text(json.dumps(entry) + "\n")
-    with refused(path, "line 1", f"{key} is missing or no good"):
-        load_run(run)

@@ -29,7 +29,7 @@ class Bowl:
         if chance % self.fails_every == 0:
             return Evaluation.failed("fell off the table", wall_time=self.delay)
         fitness = -float(((genome[:-2] - 2.0) ** 2).sum())
-        return Evaluation(fitness, {"distance_in": 10.0 + fitness}, wall_time=self.delay)
+        return Evaluation(fitness, {"distance": 10.0 + fitness}, wall_time=self.delay)
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,14 @@ def small_scenario(
     *, oscillators: int = 4, population: int = 12, iterations: int = 15, trials: int = 2
 ) -> Scenario:
     """The thesis with little to do."""
-    scenario = load_scenario("thesis")
-    scenario.robot.tetrahedra = oscillators + 1
-    scenario.evolution.population = population
-    scenario.evolution.max_iterations = iterations
-    scenario.evolution.trials = trials
-    return scenario
+    return load_scenario("thesis").with_changes(
+        {
+            "robot.tetrahedra": oscillators + 1,
+            "evolution.population": population,
+            "evolution.max_iterations": iterations,
+            "evolution.trials": trials,
+        }
+    )
 
 
 def read_record(directory: Path) -> dict[str, object]:

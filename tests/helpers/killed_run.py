@@ -7,7 +7,7 @@ from pathlib import Path
 from helpers.analytic import Bowl, small_scenario
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.record import MANIFEST, RunRecord
-from tetra_drake.evolution.run import evolve
+from tetra_drake.evolution.trials import run_trials
 
 if __name__ == "__main__":
     directory = Path(sys.argv[1])
@@ -17,9 +17,9 @@ if __name__ == "__main__":
         opened = RunRecord.create(directory, scenario=small_scenario(iterations=150), seed=9)
     with opened as record:
         print("begun", flush=True)
-        evolve(
+        run_trials(
             record,
             evaluate=Bowl(delay=float(sys.argv[3])),
             workers=2,
-            make_executor=process_executor if sys.argv[2] == "processes" else ThreadPoolExecutor,
+            executor=process_executor if sys.argv[2] == "processes" else ThreadPoolExecutor,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +14,7 @@ from tetra_drake.evolution.record import RunRecord, evaluation_entry
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 Child = tuple[float | None, int | None]
 """Fitness, None where the gait failed, and the place it took, None where it took none."""
@@ -23,7 +25,7 @@ PER_DISTANCE = 2.0
 
 def tiny_scenario(*, trials: int = 1, name: str = "tiny") -> Scenario:
     """A robot of three tetrahedra that walks for a moment."""
-    scenario = load_scenario("thesis")
+    scenario = copy.deepcopy(load_scenario("thesis"))
     scenario.name = name
     scenario.robot.tetrahedra = 3
     scenario.simulation.duration = 0.3
@@ -76,7 +78,6 @@ def _lines(iterations, scenario, *, ends):
                 "evaluations": count,
                 "mean_fitness": sum(finite) / len(finite) if finite else None,
                 "best_fitness": best[0] if best else None,
-                "best_distance_in": best[0] / PER_DISTANCE if best else None,
                 "best_evaluation": best[1] if best else None,
                 "stop": "all iterations done" if last and ends else None,
             },
@@ -89,11 +90,11 @@ def _entry(index, iteration, fitness, scenario):
     evaluation = Evaluation.failed("fell over", wall_time=0.5)
     if fitness is not None:
         distances = {
-            "distance_in": fitness / PER_DISTANCE,
-            "steady_distance_in": fitness,
-            "heading_error_in": 0.0,
-            "direction_in": 9.0,
-            "lateral_drift_in": 0.0,
+            "distance": fitness / PER_DISTANCE * INCH,
+            "steady_distance": fitness * INCH,
+            "twist": 0.0,
+            "lead": 9.0 * INCH,
+            "lateral_drift": 0.0,
         }
         evaluation = Evaluation(fitness, distances, wall_time=0.5)
     return evaluation_entry(index, iteration, genome, evaluation)

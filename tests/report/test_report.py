@@ -16,7 +16,7 @@ from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import make_parser
 from tetra_drake.evolution.study import Study, study_run
-from tetra_drake.evolution.summary import comparisons, recorded_statuses
+from tetra_drake.evolution.summary import comparisons
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.figures.evolution import table_8_two_best
 from tetra_drake.report.run_page import render_report, write_report
@@ -149,12 +149,12 @@ def test_it_is_a_whole_page_of_moderate_size(source: str, page: Page) -> None:
 
 def test_results_are_those_that_evolve_prints(run: Path, page: Page) -> None:
     headings, cells = page.texts["th"], page.texts["td"]
-    rows = comparisons(recorded_statuses(load_run(run)))
+    rows = comparisons(load_run(run)).statuses
     assert len(rows) == 5
     for row in rows:
         assert row.name in headings
         place = cells.index(row.ours)
-        assert row.thesis in cells[place : place + 2]
+        assert row.reference in cells[place : place + 2]
 
 
 def test_each_trial_has_a_row(page: Page) -> None:

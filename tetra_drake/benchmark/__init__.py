@@ -1,1 +1,1 @@
-"""Benchmark of the engines and their settings: speed, accuracy, and cost by size of the robot."""
+"""What each way of simulating the robot costs and how exact it is, in one table."""

@@ -1,5 +1,7 @@
-"""Evolving gaits: operators, the optimiser, the trial loop and its record on disk.
+"""Evolving gaits.
 
-`command` is the outermost layer, `run` the loop; `evaluation` is the only module that
-simulates. Read a run's results with `tables.load_run`.
+optimizers/ ask for vectors and are told evaluations; evaluation: a vector's, by simulation
+executors: many evaluations at once; trial, trials: the loop, fed by the workers
+method, record, json_lines: what a run is, on disk; tables: `load_run`, to read it as pandas tables
+reevaluation: best gaits on the Drake diagram; summary, progress: what is printed
 """

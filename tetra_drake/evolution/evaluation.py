@@ -1,4 +1,4 @@
-"""From a genome to its evaluation: one diagram, one simulation."""
+"""GaitEvaluation: from a vector of parameters to its evaluation, by one simulation."""
 
 from __future__ import annotations
 
@@ -8,34 +8,41 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import FrameType
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import SimulationFailure
-from tetra_drake.evolution.genome import gait_of
-from tetra_drake.evolution.optimizers.base import Evaluation, Genome
+from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.schema import Scenario
+
+Objective = Callable[[SimulationResult], float]
+"""What evolution maximises; the result has no trajectory. -inf or NaN counts as a failure."""
 
 
 @dataclass(frozen=True)
 class GaitEvaluation:
-    """Evaluates genomes by simulating their gaits on a scenario.
+    """Evaluates vectors by simulating their gaits on a scenario.
 
-    The same genome gives the same numbers, bit for bit, in any process; only the time
+    The same vector gives the same numbers, bit for bit, in any process; only the time
     budget depends on the machine, and is meant to be far beyond any simulation's time.
     """
 
     scenario: Scenario
+    objective: Objective | None = None
+    """None for the scenario's fitness."""
 
-    def __call__(self, genome: Genome) -> Evaluation:
-        """Fitness and metrics of one genome, or why it has none."""
+    def __call__(self, vector: Vector) -> Evaluation:
+        """Fitness and metrics of one vector, or the reason of a failure."""
         started = time.perf_counter()
         engine = self.scenario.simulation.engine
+        gait = ParameterSpace.of(self.scenario).gait(vector, name="candidate")
         try:
             with time_limit(self.scenario.evolution.time_budget):
-                result = simulate(scenario=self.scenario, gait=gait_of(genome, name="candidate"))
+                result = simulate(scenario=self.scenario, gait=gait)
         except (SimulationFailure, TimeBudgetExceeded) as error:
             return Evaluation.failed(
                 f"{_KINDS.get(type(error).__name__, 'failed')}: {error}",
@@ -43,11 +50,12 @@ class GaitEvaluation:
                 engine=engine,
             )
         wall_time = time.perf_counter() - started
-        if not math.isfinite(result.fitness):
+        fitness = result.fitness if self.objective is None else float(self.objective(result))
+        if not math.isfinite(fitness):
             reason = "diverged: the fitness is not finite"
             return Evaluation.failed(reason, wall_time=wall_time, engine=engine)
         return Evaluation(
-            fitness=result.fitness,
+            fitness=fitness,
             metrics=dataclasses.asdict(result.metrics),
             wall_time=wall_time,
             engine=engine,
@@ -70,7 +78,7 @@ _KINDS = {
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Ends the block with TimeBudgetExceeded after this wall time.
+    """A block that ends with TimeBudgetExceeded after this wall time.
 
     Works in a process's main thread, where worker processes run their tasks; elsewhere
     there is no limit.

@@ -1,13 +1,16 @@
-"""Where evaluations run: any concurrent.futures executor, by default worker processes."""
+"""Evaluating many vectors at once, on any concurrent.futures executor."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
+import sys
+import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -20,9 +23,14 @@ from concurrent.futures import (
 from dataclasses import dataclass
 from multiprocessing.connection import wait as wait_for_any
 from multiprocessing.context import SpawnContext, SpawnProcess
-from typing import Generic, TypeVar
+from types import TracebackType
+from typing import Any, Generic, TypeVar
 
-from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, Genome
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.optimizers.base import Evaluation
+
+MakeExecutor = Callable[[int], Executor]
+"""Makes an executor with this many workers."""
 
 TASKS_PER_WORKER = 150
 """A worker ends after this many evaluations and a fresh one takes its place: Drake before
@@ -76,8 +84,12 @@ def _do_nothing() -> None:
     """The first task of each worker."""
 
 
+def _receive(*_: object) -> None:
+    """Does nothing with what it was sent."""
+
+
 def _end_with_parent() -> None:
-    """Lets this worker die when its parent does; it would wait for work for ever otherwise."""
+    """Ends this worker when its parent ends; it would wait for work for ever otherwise."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return
@@ -90,44 +102,74 @@ def _end_with_parent() -> None:
 
 
 JobT = TypeVar("JobT", bound=Hashable)
+TaskT = TypeVar("TaskT")
+
+_HOPELESS = 3
+"""Tasks that end their workers before any other has succeeded: then no task can run."""
+
+
+class EvaluationImpossible(InputError):
+    """No evaluation can run at all: workers that do not start, or a function they cannot load."""
 
 
 @dataclass(frozen=True)
 class _Task(Generic[JobT]):
     job: JobT
-    genome: Genome
+    task: Any
     suspect: bool = False
     """Whether it was under way when a worker died."""
 
 
 class EvaluationPool(Generic[JobT]):
-    """Evaluates genomes, at most `workers` at a time; `job` says which is which.
+    """Evaluates tasks (mostly vectors), at most `workers` at a time; `job` identifies each.
 
     The queue is kept here, and an executor never has more tasks than workers: with a
     backlog, Python's process pool can forget to replace recycled workers and then hangs.
-    If a worker dies, what was under way runs again, one at a time; what kills a worker by
-    itself counts as failed.
+    If a worker dies, what was under way runs again, one at a time; a task that ends its worker
+    when alone counts as failed. While no task has succeeded yet such failures are held back, as
+    the cause may be that none can run: then EvaluationImpossible is raised.
     """
 
     def __init__(
-        self, evaluate: Evaluate, *, workers: int, make_executor: Callable[[int], Executor]
+        self,
+        evaluate: Callable[[Any], Evaluation],
+        *,
+        workers: int,
+        executor: MakeExecutor = process_executor,
     ) -> None:
         self._evaluate = evaluate
         self._workers = workers
-        self._make_executor = make_executor
-        self._executor = make_executor(workers)
+        self._make_executor = executor
+        if executor is process_executor:
+            _check_sendable(evaluate)
+        self._executor = executor(workers)
         self._queue: deque[_Task[JobT]] = deque()
         self._suspects: deque[_Task[JobT]] = deque()
         self._running: dict[Future[Evaluation], _Task[JobT]] = {}
+        self._proven = False
+        self._held: list[tuple[JobT, Evaluation]] = []
+
+    def __enter__(self) -> EvaluationPool[JobT]:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._executor.shutdown(wait=kind is None, cancel_futures=True)
+        if kind is not None:
+            _terminate_workers()
 
     @property
     def busy(self) -> bool:
         """Whether anything is under way or waiting."""
         return bool(self._running or self._queue or self._suspects)
 
-    def submit(self, job: JobT, genome: Genome) -> None:
-        """Puts a genome in the queue."""
-        self._queue.append(_Task(job, genome))
+    def submit(self, job: JobT, task: object) -> None:
+        """Puts a task in the queue."""
+        self._queue.append(_Task(job, task))
 
     def wait(self, timeout: float | None = None) -> list[tuple[JobT, Evaluation]]:
         """Whatever has been evaluated, as soon as there is something or time (s) is up."""
@@ -141,24 +183,23 @@ class EvaluationPool(Generic[JobT]):
                 finished.append((task.job, future.result()))
             except BrokenExecutor:
                 broken.append(task)
+        self._proven = self._proven or bool(finished)
         if broken:
-            finished += self._recover(broken)
+            self._recover(broken)
+        if self._proven:
+            finished, self._held = self._held + finished, []
+        elif self._held and (len(self._held) == _HOPELESS or not self.busy):
+            raise EvaluationImpossible(_SOURCE, "", "every evaluation ends its worker process")
         return finished
-
-    def close(self, *, at_once: bool) -> None:
-        """Ends the workers; at once, or after what is under way."""
-        self._executor.shutdown(wait=not at_once, cancel_futures=True)
-        if at_once:
-            _terminate_workers()
 
     def _fill(self) -> None:
         while self._suspects or self._queue:
-            # A suspect runs alone: if a worker dies again it is known of what.
+            # A suspect runs alone: if a worker dies again the culprit is known.
             if len(self._running) >= (1 if self._has_suspects() else self._workers):
                 return
             task = self._suspects.popleft() if self._suspects else self._queue.popleft()
             try:
-                future = self._executor.submit(self._evaluate, task.genome)
+                future = self._executor.submit(self._evaluate, task.task)
             except BrokenExecutor:
                 self._suspects.appendleft(task)
                 self._renew()
@@ -168,20 +209,83 @@ class EvaluationPool(Generic[JobT]):
     def _has_suspects(self) -> bool:
         return bool(self._suspects) or any(task.suspect for task in self._running.values())
 
-    def _recover(self, broken: list[_Task[JobT]]) -> list[tuple[JobT, Evaluation]]:
+    def _recover(self, broken: list[_Task[JobT]]) -> None:
         """Starts new workers; what was under way with the old ones is suspect now."""
         broken += self._running.values()
         self._running.clear()
         self._renew()
         if len(broken) == 1 and broken[0].suspect:
-            return [(broken[0].job, Evaluation.failed("its process died"))]
-        self._suspects.extend(_Task(task.job, task.genome, suspect=True) for task in broken)
-        return []
+            self._held.append((broken[0].job, Evaluation.failed("its process died")))
+            return
+        self._suspects.extend(_Task(task.job, task.task, suspect=True) for task in broken)
 
     def _renew(self) -> None:
         self._executor.shutdown(wait=False)
         _terminate_workers()  # a broken pool may wait for ever for one it has not told to end
+        if not self._proven and self._make_executor is process_executor:
+            _check_worker(self._evaluate)
         self._executor = self._make_executor(self._workers)
+
+
+def evaluate_all(
+    evaluate: Callable[[TaskT], Evaluation],
+    tasks: Sequence[TaskT],
+    *,
+    workers: int,
+    executor: MakeExecutor = process_executor,
+) -> Iterator[tuple[int, Evaluation]]:
+    """Evaluates tasks (mostly vectors) and yields each one's index and evaluation when ready.
+
+    Raises EvaluationImpossible, and whatever `evaluate` raises.
+    """
+    if not tasks:
+        return
+    with EvaluationPool[int](evaluate, workers=workers, executor=executor) as pool:
+        for index, task in enumerate(tasks):
+            pool.submit(index, task)
+        while pool.busy:
+            yield from pool.wait()
+
+
+_SOURCE = "worker processes"
+
+
+def _check_sendable(evaluate: object) -> None:
+    """Raises EvaluationImpossible if worker processes cannot get the function."""
+    try:
+        pickled = pickle.dumps(evaluate)
+    except Exception as error:
+        problem = f"cannot be sent the evaluation: {error}; define it at the top of a module"
+        raise EvaluationImpossible(_SOURCE, "", problem) from error
+    program = sys.modules["__main__"]
+    main = getattr(program, "__file__", None)
+    if main is not None and program.__spec__ is None and not os.path.exists(main):
+        problem = f"import the program they belong to, and '{main}' is no file: save it as one"
+        raise EvaluationImpossible(_SOURCE, "", problem)
+    if main is None and b"__main__" in pickled:
+        problem = "cannot import what was defined interactively: define it in a module"
+        raise EvaluationImpossible(_SOURCE, "", problem)
+
+
+def _check_worker(evaluate: object) -> None:
+    """Raises EvaluationImpossible if a new worker ends before it can evaluate anything."""
+    worker = _Worker(target=_receive, args=(evaluate,))
+    with tempfile.TemporaryFile("w+") as messages:
+        ours = os.dup(2)
+        os.dup2(messages.fileno(), 2)  # which the worker inherits
+        try:
+            worker.start()
+            worker.join()
+        finally:
+            os.dup2(ours, 2)
+            os.close(ours)
+        messages.seek(0)
+        lines = [line for line in messages.read().splitlines() if line.strip()]
+    if worker.exitcode:
+        cause = lines[-1].strip() if lines else f"exit status {worker.exitcode}"
+        if any("_check_not_importing_main" in line for line in lines):
+            cause = 'the program lacks `if __name__ == "__main__":` around what it does'
+        raise EvaluationImpossible(_SOURCE, "", f"do not start: {cause}")
 
 
 def _terminate_workers() -> None:

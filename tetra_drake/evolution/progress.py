@@ -1,57 +1,29 @@
-"""Showing a run while it lasts: a live table on a terminal, plain lines elsewhere."""
+"""Progress of a run: a bar on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
-import math
+import sys
 import time
+import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from tetra_drake.evolution.trial import TrialStatus
+from tetra_drake.formatting import duration, fixed
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.progress import TaskID
 
-_LINE_PERIOD = 10.0  # s, between plain lines of one trial
-_FRAME_PERIOD = 0.5  # s, between frames of the live table
-
-_COLUMNS = (
-    "trial",
-    "iteration",
-    "mean fitness",
-    "best fitness",
-    "best distance",
-    "evaluations per s",
-    "time left",
-    "failed",
-)
+_LINE_PERIOD = 10.0  # s, between plain lines
 
 
-class Progress(Protocol):
-    """Is entered when a run begins and then shown where the trials stand, again and again."""
+class Progress:
+    """Is told what a run does. This one shows nothing; warnings become Python's warnings.
 
-    def __enter__(self) -> Progress: ...
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None: ...
-
-    def show(self, statuses: Sequence[TrialStatus]) -> None:
-        """Called about once a second and whenever something was evaluated."""
-        ...
-
-
-def make_progress(stream: TextIO) -> Progress:
-    """The display that suits the stream."""
-    return LiveProgress() if stream.isatty() else PlainProgress(stream)
-
-
-class SilentProgress:
-    """Shows nothing."""
+    A context manager: entered when a run begins.
+    """
 
     def __enter__(self) -> Progress:
         return self
@@ -64,44 +36,112 @@ class SilentProgress:
     ) -> None:
         return None
 
+    def say(self, text: str) -> None:
+        """Something the user may like to know."""
+
+    def warn(self, text: str) -> None:
+        """Something the user should know."""
+        warnings.warn(text, RuntimeWarning, stacklevel=3)
+
     def show(self, statuses: Sequence[TrialStatus]) -> None:
-        """Does nothing."""
+        """The state of all trials: about once per second and after every evaluation."""
+
+    def stage(self, title: str, done: int, total: int) -> None:
+        """How far something other than the trials has come."""
 
 
-class PlainProgress(SilentProgress):
-    """A line for each trial every ten seconds, and when it ends."""
+def make_progress(stream: TextIO) -> Progress:
+    """The display that suits the stream."""
+    return BarProgress() if stream.isatty() else LineProgress(stream)
+
+
+@dataclass(frozen=True)
+class Overview:
+    """A run in one line."""
+
+    done: int
+    total: int
+    """Evaluations, of all trials; of those that have ended, what they took."""
+    made: int
+    """Evaluations made now, not taken from the record."""
+    parts: list[str]
+    """Fitness and distance of the fittest gait, trials that have ended, failures."""
+
+    @classmethod
+    def of(cls, statuses: Sequence[TrialStatus]) -> Overview:
+        """The overview of all trials."""
+        done = sum(status.evaluations for status in statuses)
+        most = [s.evaluations if s.stop else s.evaluations_at_most for s in statuses]
+        parts = []
+        fittest = max(statuses, key=lambda status: status.best_fitness)
+        if fittest.best_fitness > -float("inf"):
+            parts.append(f"best fitness {fixed(fittest.best_fitness)}")
+            parts.append(f"fittest gait's distance {fixed(fittest.best_distance_in)} in")
+        if len(statuses) > 1:
+            ended = sum(status.stop is not None for status in statuses)
+            parts.append(f"{ended} of {len(statuses)} trials ended")
+        failures = sum(status.failures for status in statuses)
+        parts += [f"{failures} failed"] if failures else []
+        made = done - sum(status.recalled for status in statuses)
+        return cls(done, sum(most), made, parts)
+
+
+class LineProgress(Progress):
+    """Prints a line every ten seconds, and when a stage ends."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._started = time.monotonic()
-        self._shown: dict[int, tuple[float, int, bool]] = {}
+        self._began = self._printed = time.monotonic()
+        self._last = ""
+
+    def say(self, text: str) -> None:
+        """Prints the text."""
+        print(text, file=self._stream, flush=True)
+
+    def warn(self, text: str) -> None:
+        """Prints the text to stderr."""
+        print(f"tetra-drake: {text}", file=sys.stderr, flush=True)
 
     def show(self, statuses: Sequence[TrialStatus]) -> None:
-        """Prints the trials of which there is news."""
+        """Prints how far the run is, and one time left for all of it."""
+        now, run = time.monotonic(), Overview.of(statuses)
+        if run.done == run.made == 0:
+            self._began = now
+        left = (run.total - run.done) * (now - self._began) / run.made if run.made else 0.0
+        parts = [f"{run.done} of {run.total} evaluations", *run.parts]
+        if run.made and run.done < run.total:
+            parts.append(f"{duration(left)} left")
+        self._print(", ".join(parts), due=run.done == run.total)
+
+    def stage(self, title: str, done: int, total: int) -> None:
+        """Prints how far a stage is."""
+        self._print(f"{title}: {done} of {total}", due=done in (0, total))
+
+    def _print(self, text: str, *, due: bool) -> None:
         now = time.monotonic()
-        for status in statuses:
-            last, evaluations, over = self._shown.get(status.number, (now, -1, False))
-            ended = status.stop is not None
-            due = now - last >= _LINE_PERIOD and status.evaluations != evaluations
-            if status.number not in self._shown:
-                self._shown[status.number] = now, status.evaluations, ended
-            elif (due or ended) and not over:
-                self._shown[status.number] = now, status.evaluations, ended
-                print(plain_line(status, now - self._started), file=self._stream, flush=True)
+        if text != self._last and (due or now - self._printed >= _LINE_PERIOD):
+            self._printed, self._last = now, text
+            self.say(text)
 
 
-class LiveProgress(SilentProgress):
-    """A table that is redrawn in place."""
+class BarProgress(Progress):
+    """A bar of rich for the run, and one for each stage."""
 
     def __init__(self) -> None:
-        from rich.live import Live
+        from rich import progress
 
-        self._live = Live(auto_refresh=False)
-        self._started = self._drawn = time.monotonic()
-        self._statuses: Sequence[TrialStatus] = ()
+        self._bars = progress.Progress(
+            progress.TextColumn("{task.description}"),
+            progress.BarColumn(bar_width=20),
+            progress.MofNCompleteColumn(),
+            progress.TimeRemainingColumn(),
+            progress.TextColumn("{task.fields[text]}"),
+            refresh_per_second=4,
+        )
+        self._tasks: dict[str, TaskID] = {}
 
     def __enter__(self) -> Progress:
-        self._live.start()
+        self._bars.start()
         return self
 
     def __exit__(
@@ -110,72 +150,27 @@ class LiveProgress(SilentProgress):
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._draw()
-        self._live.stop()
+        self._bars.stop()
+
+    def say(self, text: str) -> None:
+        """Prints the text above the bars."""
+        self._bars.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def warn(self, text: str) -> None:
+        """Prints the text above the bars."""
+        self.say(f"tetra-drake: {text}")
 
     def show(self, statuses: Sequence[TrialStatus]) -> None:
-        """Redraws the table, not more often than is of use."""
-        self._statuses = statuses
-        if time.monotonic() - self._drawn >= _FRAME_PERIOD:
-            self._draw()
+        """Moves the run's bar."""
+        run = Overview.of(statuses)
+        self._update("evaluations", run.done, run.total, ", ".join(run.parts))
 
-    def _draw(self) -> None:
-        self._drawn = time.monotonic()
-        self._live.update(_table(self._statuses, self._drawn - self._started), refresh=True)
+    def stage(self, title: str, done: int, total: int) -> None:
+        """Moves the bar of a stage."""
+        self._update(title, done, total, "")
 
-
-def cells(status: TrialStatus, elapsed: float) -> list[str]:
-    """A trial's row of the table. `elapsed` is the time in s since this process began."""
-    made = status.evaluations - status.recalled
-    rate = made / elapsed if elapsed > 0.0 else 0.0
-    if status.stop is not None:
-        left = status.stop
-    elif rate > 0.0:
-        left = duration((status.evaluations_at_most - status.evaluations) / rate)
-    else:
-        left = "-"
-    iteration = str(status.iteration)
-    if status.iteration < 0:
-        iteration = f"0 ({status.evaluations} done)"
-    return [
-        f"{status.number}",
-        iteration,
-        number(status.mean_fitness),
-        number(status.best_fitness),
-        f"{number(status.best_distance_in)} in",
-        f"{rate:.2f}",
-        left,
-        f"{status.failures}",
-    ]
-
-
-def plain_line(status: TrialStatus, elapsed: float) -> str:
-    """The same row as a line of text."""
-    trial, iteration, mean, best, distance, rate, left, failed = cells(status, elapsed)
-    line = f"trial {trial}: iteration {iteration}, mean fitness {mean}, best {best}, "
-    line += f"best distance {distance}, {rate} evaluations/s, "
-    line += left if status.stop is not None else f"{left} left"
-    return line + (f", {failed} failed" if status.failures else "")
-
-
-def number(value: float) -> str:
-    """Two decimals, or a dash for what is not there yet."""
-    return f"{value:.2f}" if math.isfinite(value) else "-"
-
-
-def duration(seconds: float) -> str:
-    """A time as hours, minutes and seconds: 1:02:03."""
-    minutes, second = divmod(round(seconds), 60)
-    hour, minute = divmod(minutes, 60)
-    return f"{hour}:{minute:02d}:{second:02d}"
-
-
-def _table(statuses: Sequence[TrialStatus], elapsed: float) -> Table:
-    from rich.table import Table
-
-    table = Table()
-    for column in _COLUMNS:
-        table.add_column(column, justify="right")
-    for status in statuses:
-        table.add_row(*cells(status, elapsed))
-    return table
+    def _update(self, title: str, done: int, total: int, text: str) -> None:
+        if title not in self._tasks:
+            # Begun with what is done, so that the speed counts what is made now only.
+            self._tasks[title] = self._bars.add_task(title, completed=done, total=total, text=text)
+        self._bars.update(self._tasks[title], completed=done, total=total, text=text)

@@ -1,24 +1,25 @@
-"""A run's record on disk: what is written when, and how it is taken up again.
+"""A run's record on disk: its files, their checks, and how a run is resumed.
 
-    manifest.json             scenario in full, seed, versions
-    scenario.yaml             the same scenario, for `--scenario`
+    manifest.json             seed, versions, method (evaluator, objective, optimiser), SHA-256 of
+    scenario.yaml             the scenario in full
     .lock                     locked while a process is at work on the run
     trial_00/
-      evaluations.jsonl       a line an evaluation, in the order asked
-      iterations.jsonl        a line an iteration: mean and best fitness, best distance
-      in_progress.jsonl       while an iteration lasts: what of it is evaluated already
+      evaluations.jsonl       one line per evaluation, in the order asked; metrics in SI
+      iterations.jsonl        one line per iteration: best fitness, the optimiser's report
+      in_progress.jsonl       during an iteration: those of its evaluations that are done
       best_gait.json          the fittest gait so far, a gait file
-      reevaluations.jsonl     gaits evaluated once more on the Drake diagram (see reevaluation.py)
+      reevaluations.jsonl     gaits evaluated once more on the Drake diagram
 
 Evaluations become final lines iteration by iteration, so the record does not depend on
-which of them was ready first. A record is resumed by going through the whole run again with
-recorded fitnesses in place of simulations; every genome and every line must come out as
-recorded.
+which of them was ready first. A run is resumed by repeating it from the start with recorded
+fitnesses in place of simulations; every vector and every line must come out as recorded.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import fcntl
+import hashlib
 import json
 import math
 import os
@@ -32,14 +33,16 @@ import yaml
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
-from tetra_drake.evolution.optimizers.base import Evaluation, Genome
+from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.files import write_whole
 from tetra_drake.results.result import versions
-from tetra_drake.robot.gait import Gait, save_gait
+from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
-SCHEMA = 1
+SCHEMA, FIRST_SCHEMA = 2, 1
 MANIFEST, SCENARIO, LOCK = "manifest.json", "scenario.yaml", ".lock"
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
@@ -58,16 +61,22 @@ _EVALUATION_KEYS = {
 _ITERATION_KEYS = {
     "iteration": (int,),
     "evaluations": (int,),
-    "mean_fitness": (int, float, type(None)),
     "best_fitness": (int, float, type(None)),
-    "best_distance_in": (int, float, type(None)),
     "best_evaluation": (int, type(None)),
     "stop": (str, type(None)),
 }
+_FIRST_METRICS = {
+    "distance_in": "distance",
+    "steady_distance_in": "steady_distance",
+    "heading_error_in": "twist",
+    "direction_in": "lead",
+    "lateral_drift_in": "lateral_drift",
+}
+"""Metrics of schema 1, in inches, by their names today."""
 
 
 def trial_folder(directory: Path, number: int) -> Path:
-    """Where a run keeps a trial."""
+    """The folder of a trial."""
     return directory / f"trial_{number:02d}"
 
 
@@ -78,29 +87,39 @@ class Manifest:
     scenario: Scenario
     seed: int
     versions: Mapping[str, str]
+    method: Method
 
 
 def read_manifest(directory: Path) -> Manifest:
-    """The manifest of a run directory; InputError if there is none or it makes no sense."""
-    path = directory / MANIFEST
+    """The manifest of a run directory; InputError if there is none or it is damaged."""
+    path, scenario_file = directory / MANIFEST, directory / SCENARIO
     try:
         raw = json.loads(path.read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise InputError(directory, "", f"holds no {MANIFEST}, so is no run") from error
+        raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run") from error
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     if not isinstance(raw, dict):
         raise InputError(path, "", "expected a JSON object")
-    for key, kind in (("scenario", dict), ("seed", int), ("versions", dict)):
+    schema = raw.get("schema")
+    if schema not in (SCHEMA, FIRST_SCHEMA):
+        raise InputError(path, "schema", f"found {schema!r}, expected {FIRST_SCHEMA} or {SCHEMA}")
+    scenario_key = ("scenario", dict) if schema == FIRST_SCHEMA else ("scenario_sha256", str)
+    for key, kind in (scenario_key, ("seed", int), ("versions", dict)):
         if not isinstance(raw.get(key), kind):
             raise InputError(path, key, "is missing or damaged")
-    if raw.get("schema") != SCHEMA:
-        raise InputError(path, "schema", f"found {raw.get('schema')!r}, expected {SCHEMA}")
-    scenario = load_scenario(directory / SCENARIO)
-    difference = _first_difference(raw["scenario"], _tree(scenario))
-    if difference:
-        raise InputError(directory / SCENARIO, difference.key, f"is not as in {MANIFEST}")
-    return Manifest(scenario=scenario, seed=raw["seed"], versions=raw["versions"])
+    scenario = load_scenario(scenario_file)
+    text = scenario_file.read_text(encoding="utf-8")
+    if schema == FIRST_SCHEMA:
+        difference = _first_difference(raw["scenario"], yaml.safe_load(text))
+        if difference:
+            raise InputError(scenario_file, difference.key, f"is not as in {MANIFEST}")
+        method = Method.of(scenario)
+    else:
+        if _sha256(text) != raw["scenario_sha256"]:
+            raise InputError(scenario_file, "", "was changed after the run had begun")
+        method = Method.from_json(raw, path)
+    return Manifest(scenario=scenario, seed=raw["seed"], versions=raw["versions"], method=method)
 
 
 class RunRecord:
@@ -108,18 +127,16 @@ class RunRecord:
 
     def __init__(self, directory: Path, manifest: Manifest, lock: int) -> None:
         self.directory = directory
-        self.scenario = manifest.scenario
-        self.seed = manifest.seed
-        self.versions_then = manifest.versions
+        self.manifest = manifest
         self._lock = lock
 
     @classmethod
-    def create(cls, directory: Path, *, scenario: Scenario, seed: int) -> RunRecord:
+    def create(
+        cls, directory: Path, *, scenario: Scenario, seed: int, method: Method | None = None
+    ) -> RunRecord:
         """Begins a run in a directory that does not exist or is empty."""
         if directory.exists() and not directory.is_dir():
             raise InputError(directory, "", "is a file, expected a run directory")
-        if directory.is_dir() and (directory / MANIFEST).exists():
-            raise InputError(directory, "", "holds a run already; --resume goes on with it")
         if directory.is_dir() and not _is_untouched(directory):
             raise InputError(directory, "", "is not empty, expected a new directory")
         try:
@@ -128,11 +145,11 @@ class RunRecord:
             raise InputError(directory, "", f"cannot be made: {error.strerror}") from error
         lock = _lock(directory)
         try:
-            if (directory / MANIFEST).exists():  # Another process was faster.
-                raise InputError(directory, "", "holds a run already; --resume goes on with it")
+            _refuse_a_run(directory)  # Another process may have been faster.
             for leftover in (*directory.glob(".manifest.*"), *directory.glob(".scenario.*")):
                 leftover.unlink()
-            manifest = Manifest(scenario=scenario, seed=seed, versions=versions())
+            method = method or Method.of(scenario)
+            manifest = Manifest(scenario=scenario, seed=seed, versions=versions(), method=method)
             _write_manifest(directory, manifest)
         except BaseException:
             os.close(lock)
@@ -141,11 +158,14 @@ class RunRecord:
 
     @classmethod
     def resume(
-        cls, directory: Path, *, scenario: Scenario | None = None, seed: int | None = None
+        cls,
+        directory: Path,
+        *,
+        scenario: Scenario | None = None,
+        seed: int | None = None,
+        method: Method | None = None,
     ) -> RunRecord:
-        """Opens a run to go on with it. Scenario and seed, where given, must be the run's."""
-        if not directory.is_dir():
-            raise InputError(directory, "", "no such run directory, nothing to resume")
+        """Opens a run to go on with it. What is given must be the run's."""
         manifest = read_manifest(directory)
         if seed is not None and seed != manifest.seed:
             problem = f"the run has seed {manifest.seed}, not {seed}; leave the seed out to resume"
@@ -157,6 +177,8 @@ class RunRecord:
                 raise InputError(
                     directory, difference.key, f"{problem}; a run is resumed with its own scenario"
                 )
+        if method is not None:
+            manifest.method.check_same(method, directory)
         return cls(directory, manifest, _lock(directory))
 
     def open_trial(self, number: int) -> TrialRecord:
@@ -185,26 +207,18 @@ class TrialRecord:
             leftover.unlink()
         for name in (EVALUATIONS, ITERATIONS, IN_PROGRESS):
             repair_torn_line(folder / name)
-        self._evaluations = read_lines(folder / EVALUATIONS)
+        self._evaluations = read_evaluations(folder / EVALUATIONS)
         for index, entry in enumerate(self._evaluations):
-            check_evaluation(entry, self._folder / EVALUATIONS, index + 1)
             if entry["index"] != index:
                 self._refuse(EVALUATIONS, index, f"index is {entry['index']}, expected {index}")
-        self._iterations = read_lines(folder / ITERATIONS)
-        self._in_progress: dict[int, tuple[int, dict[str, Any]]] = {}
-        for row, entry in enumerate(read_lines(folder / IN_PROGRESS)):
-            check_evaluation(entry, self._folder / IN_PROGRESS, row + 1)
-            self._in_progress[entry["index"]] = row, entry
+        self._iterations = read_iterations(folder / ITERATIONS)
+        in_progress = read_evaluations(folder / IN_PROGRESS)
+        self._in_progress = {entry["index"]: (i, entry) for i, entry in enumerate(in_progress)}
 
-    @property
-    def recorded(self) -> int:
-        """How many evaluations the record held when it was opened."""
-        return len(self._evaluations)
-
-    def recall(self, index: int, genome: Genome) -> Evaluation | None:
+    def recall(self, index: int, vector: Vector) -> Evaluation | None:
         """The recorded evaluation of this index, None if there is none.
 
-        Raises InputError if it is of another genome.
+        Raises InputError if it is of another vector.
         """
         if index < len(self._evaluations):
             name, row, entry = EVALUATIONS, index, self._evaluations[index]
@@ -212,7 +226,7 @@ class TrialRecord:
             name, (row, entry) = IN_PROGRESS, self._in_progress[index]
         else:
             return None
-        if entry["genome"] != genome.tolist():
+        if entry["genome"] != vector.tolist():
             self._refuse(name, row, "the genome is not the one that scenario and seed lead to")
         fitness = entry["fitness"]
         return Evaluation(
@@ -223,16 +237,15 @@ class TrialRecord:
             engine=entry["engine"],
         )
 
-    def keep(self, index: int, iteration: int, genome: Genome, evaluation: Evaluation) -> None:
+    def keep(self, index: int, iteration: int, vector: Vector, evaluation: Evaluation) -> None:
         """Saves an evaluation whose iteration is not complete yet."""
-        entry = evaluation_entry(index, iteration, genome, evaluation)
+        entry = evaluation_entry(index, iteration, vector, evaluation)
         append_lines(self._folder / IN_PROGRESS, [entry])
 
     def complete(self, evaluations: Sequence[dict[str, Any]], iteration: dict[str, Any]) -> None:
         """Writes an iteration's lines, or checks those that are there.
 
-        In this order: a kill in between leaves nothing that going through the run again
-        would not complete.
+        In this order: a kill in between leaves nothing that repeating the run would not complete.
         """
         self._write(EVALUATIONS, self._evaluations, evaluations, first=evaluations[0]["index"])
         self._write(ITERATIONS, self._iterations, [iteration], first=iteration["iteration"])
@@ -271,13 +284,13 @@ class TrialRecord:
 
 
 def evaluation_entry(
-    index: int, iteration: int, genome: Genome, evaluation: Evaluation
+    index: int, iteration: int, vector: Vector, evaluation: Evaluation
 ) -> dict[str, Any]:
     """An evaluation as a line of the record; the fitness of a failure is null."""
     return {
         "index": index,
         "iteration": iteration,
-        "genome": genome.tolist(),
+        "genome": vector.tolist(),
         "metrics": dict(evaluation.metrics),
         "fitness": evaluation.fitness if math.isfinite(evaluation.fitness) else None,
         "failure": evaluation.failure,
@@ -286,49 +299,82 @@ def evaluation_entry(
     }
 
 
-def check_evaluation(entry: Mapping[str, Any], path: Path, line: int) -> None:
-    """Raises InputError, naming file and line, where an entry is no evaluation."""
-    _check_keys(_EVALUATION_KEYS, entry, path, line)
+def read_evaluations(path: Path) -> list[dict[str, Any]]:
+    """The lines of a file of evaluations; InputError, with file and line, where one is none."""
+    return [_upgraded(entry) for entry in _checked(path, _EVALUATION_KEYS)]
 
 
-def check_iteration(entry: Mapping[str, Any], path: Path, line: int) -> None:
-    """Raises InputError, naming file and line, where an entry is no iteration."""
-    _check_keys(_ITERATION_KEYS, entry, path, line)
+def read_iterations(path: Path) -> list[dict[str, Any]]:
+    """The lines of a file of iterations; InputError, with file and line, where one is none."""
+    return [_upgraded(entry) for entry in _checked(path, _ITERATION_KEYS)]
 
 
-def _check_keys(
-    keys: Mapping[str, tuple[type, ...]], entry: Mapping[str, Any], path: Path, line: int
-) -> None:
-    for key, kinds in keys.items():
-        if key not in entry or not isinstance(entry[key], kinds):
-            raise InputError(path, f"line {line}", f"is damaged: {key} is missing or no good")
+def _checked(path: Path, keys: Mapping[str, tuple[type, ...]]) -> list[dict[str, Any]]:
+    entries = read_lines(path)
+    for line, entry in enumerate(entries, start=1):
+        for key, kinds in keys.items():
+            if key not in entry or not isinstance(entry[key], kinds):
+                raise InputError(path, f"line {line}", f"is damaged: {key} is missing or invalid")
+    return entries
+
+
+def _upgraded(entry: dict[str, Any]) -> dict[str, Any]:
+    """A line of either schema in the form of today's."""
+    entry.pop("best_distance_in", None)
+    metrics = entry.get("metrics", {})
+    if "distance_in" in metrics:
+        entry["metrics"] = {
+            _FIRST_METRICS[name]: _from_inches(value) for name, value in metrics.items()
+        }
+    return entry
+
+
+def _from_inches(value: float) -> float:
+    """The length in m that gives this number of inches to the last digit, where there is one."""
+    near = value * INCH
+    nearest = (near, math.nextafter(near, -math.inf), math.nextafter(near, math.inf))
+    return next((length for length in nearest if length / INCH == value), near)
 
 
 def _write_manifest(directory: Path, manifest: Manifest) -> None:
     # The manifest comes last: it makes the directory a run.
-    write_whole(directory / SCENARIO, dump_scenario(manifest.scenario))
+    text = dump_scenario(manifest.scenario)
+    write_whole(directory / SCENARIO, text)
     content = {
         "schema": SCHEMA,
         "seed": manifest.seed,
         "versions": dict(manifest.versions),
-        "scenario": _tree(manifest.scenario),
+        "scenario_sha256": _sha256(text),
+        **manifest.method.to_json(),
     }
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 def _tree(scenario: Scenario) -> dict[str, Any]:
-    tree: dict[str, Any] = yaml.safe_load(dump_scenario(scenario))
+    tree = dataclasses.asdict(scenario)
+    tree.pop("reference", None)  # changes no evaluation
     return tree
+
+
+def _refuse_a_run(directory: Path) -> None:
+    if (directory / MANIFEST).exists():
+        problem = "holds a run already; to go on with it, use --resume (in Python, resume=True)"
+        raise InputError(directory, "", problem)
 
 
 def _is_untouched(directory: Path) -> bool:
     """Whether nothing is there but what a run killed in its first moment leaves."""
+    _refuse_a_run(directory)
     ours = (LOCK, SCENARIO, ".manifest.", ".scenario.")
     return all(entry.name.startswith(ours) for entry in directory.iterdir())
 
 
 def _lock(directory: Path) -> int:
-    """Takes the run's lock, which the system lets go of whenever this process ends."""
+    """Takes the run's lock, which the system releases whenever this process ends."""
     try:
         lock = os.open(directory / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:

@@ -5,117 +5,78 @@ trial_00/reevaluations.jsonl    lines as in evaluations.jsonl, with the engine t
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Callable, Iterable
-from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.executors import EvaluationPool, process_executor
-from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
+from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
+from tetra_drake.evolution.executors import (
+    MakeExecutor,
+    available_cores,
+    evaluate_all,
+    process_executor,
+)
+from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
+from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers.base import Evaluate
-from tetra_drake.evolution.population import genome_columns
+from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import REEVALUATIONS, evaluation_entry, trial_folder
-from tetra_drake.evolution.tables import RunTables, load_run
-from tetra_drake.evolution.trial import Assignment
-
-if TYPE_CHECKING:
-    import pandas
+from tetra_drake.evolution.tables import Run, load_run
 
 BEST_GAITS = 5
-"""How many gaits of a trial are worth a second evaluation."""
-
-
-def best_gaits(run: RunTables, count: int = BEST_GAITS) -> list[Assignment]:
-    """The fittest gaits of each trial, no genome twice, best first."""
-    columns = genome_columns(run.evaluations)
-    ranked = run.evaluations.dropna(subset="fitness").sort_values(
-        ["trial", "fitness", "index"], ascending=[True, False, True]
-    )
-    best = ranked.drop_duplicates(["trial", *columns]).groupby("trial").head(count)
-    return _assignments(best)
-
-
-def initial_gaits(run: RunTables) -> list[Assignment]:
-    """The initial population of each trial."""
-    return _assignments(run.evaluations[run.evaluations["iteration"] == 0])
+"""Number of best gaits per trial that are evaluated once more."""
 
 
 def reevaluate(
-    directory: Path,
-    choose: Callable[[RunTables], Iterable[Assignment]],
+    directory: str | Path,
     *,
-    workers: int,
+    initial: bool = False,
+    workers: int | None = None,
+    executor: MakeExecutor = process_executor,
+    objective: Objective | None = None,
     evaluate: Evaluate | None = None,
-    make_executor: Callable[[int], Executor] = process_executor,
-    progress: Callable[[int, int], None] = lambda done, total: None,
-) -> None:
-    """Evaluates the chosen gaits of a run on the Drake diagram and adds them to its record.
+    progress: Progress | None = None,
+) -> Run:
+    """Evaluates a run's best gaits, or all initial ones, on the Drake diagram, adds them to its
+    record and returns it.
 
-    What is in the record already is not done again. `progress` is told how many of how many
-    are done.
+    Gaits that have been evaluated so already are skipped. `objective` must be the run's, if it
+    had one from Python. Raises InputError where it is not, or where there is no run.
     """
     run = load_run(directory)
-    chosen = list(choose(run))
-    done = {
-        Assignment(trial, entry["index"])
-        for trial in range(run.manifest.scenario.evolution.trials)
-        for entry in _recorded(directory, trial)
-    }
-    missing = [assignment for assignment in chosen if assignment not in done]
-    rows = run.evaluations.set_index(["trial", "index"])
-    columns = genome_columns(run.evaluations)
-    evaluate = evaluate or GaitEvaluation(
-        run.manifest.scenario.with_changes({"simulation.engine": "drake"})
+    scenario = run.manifest.scenario.with_changes({"simulation.engine": "drake"})
+    given = dataclasses.replace(
+        run.manifest.method, objective=Method.of(scenario, objective=objective).objective
     )
-    pool = EvaluationPool[Assignment](evaluate, workers=workers, make_executor=make_executor)
-    genomes = {
-        each: rows.loc[(each.trial, each.index), columns].to_numpy(dtype=np.float64)
-        for each in missing
-    }
-    completed = False
-    try:
-        for assignment in missing:
-            pool.submit(assignment, genomes[assignment])
-        finished = 0
-        while pool.busy:
-            for assignment, evaluation in pool.wait():
-                iteration = int(rows.loc[(assignment.trial, assignment.index), "iteration"])
-                genome = genomes[assignment]
-                entry = evaluation_entry(assignment.index, iteration, genome, evaluation)
-                append_lines(trial_folder(directory, assignment.trial) / REEVALUATIONS, [entry])
-                finished += 1
-                progress(finished, len(missing))
-        completed = True
-    finally:
-        pool.close(at_once=not completed)
+    run.manifest.method.check_same(given, run.directory)
+    for trial in range(scenario.evolution.trials):
+        repair_torn_line(trial_folder(run.directory, trial) / REEVALUATIONS)
+    done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
+    chosen = run.initial() if initial else run.best(BEST_GAITS)
+    rows = chosen[["trial", "index", "iteration"]].itertuples(index=False, name=None)
+    missing = [row for row in rows if row[:2] not in done]
+    vectors = [run.vector(trial, index) for trial, index, _ in missing]
+    progress = progress or Progress()
+    title = "initial gaits on the Drake diagram" if initial else "best gaits on the Drake diagram"
+    progress.stage(title, 0, len(missing))
+    results = evaluate_all(
+        evaluate or GaitEvaluation(scenario, objective),
+        vectors,
+        workers=workers or available_cores(),
+        executor=executor,
+    )
+    for finished, (i, evaluation) in enumerate(results, start=1):
+        trial, index, iteration = missing[i]
+        entry = evaluation_entry(index, iteration, vectors[i], evaluation)
+        append_lines(trial_folder(run.directory, trial) / REEVALUATIONS, [entry])
+        progress.stage(title, finished, len(missing))
+    return load_run(directory) if missing else run
 
 
-def best_distances(run: RunTables) -> list[tuple[int, float, float]]:
+def best_distances(run: Run) -> list[tuple[int, float, float]]:
     """For each trial, the distances (in) of its fittest gait: recorded, and on the diagram;
     NaN for what there is not."""
-    recorded = run.evaluations.set_index(["trial", "index"])["distance_in"]
-    again: dict[tuple[int, int], float] = {}
-    if not run.reevaluations.empty:
-        again = run.reevaluations.set_index(["trial", "index"])["distance_in"].to_dict()
-    distances = []
-    for best in best_gaits(run, count=1):
-        key = (best.trial, best.index)
-        distances.append((best.trial, float(recorded[key]), again.get(key, math.nan)))
-    return distances
-
-
-def _recorded(directory: Path, trial: int) -> list[dict[str, Any]]:
-    path = trial_folder(directory, trial) / REEVALUATIONS
-    repair_torn_line(path)
-    return read_lines(path)
-
-
-def _assignments(rows: pandas.DataFrame) -> list[Assignment]:
-    return [
-        Assignment(int(trial), int(index))
-        for trial, index in zip(rows["trial"], rows["index"], strict=True)
-    ]
+    key = ["trial", "index"]
+    again = run.reevaluations.set_index(key)["distance_in"].to_dict()
+    best = run.best()[[*key, "distance_in"]].itertuples(index=False, name=None)
+    return [(int(t), float(ours), again.get((t, i), math.nan)) for t, i, ours in best]

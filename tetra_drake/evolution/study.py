@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import InputError
-from tetra_drake.evolution.genome import gait_of
-from tetra_drake.evolution.population import genome_columns
-from tetra_drake.evolution.summary import recorded_statuses
-from tetra_drake.evolution.tables import RunTables, load_run
+from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.evolution.trial import TrialStatus
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 
@@ -57,7 +49,7 @@ class Walk:
 class Study:
     """What there is to show of a run. The best trial is the one with the fittest gait."""
 
-    run: RunTables
+    run: Run
     statuses: list[TrialStatus]
     initial: Walk
     """The fittest gait of the best trial's initial population (should that have failed as a
@@ -73,32 +65,22 @@ def study_run(directory: Path) -> Study:
     it has a fitness yet; SimulationFailure if other versions make such a gait fail.
     """
     run = load_run(directory)
-    statuses = recorded_statuses(run)
-    best_trial = max(statuses, key=lambda status: status.best_fitness)
-    if not math.isfinite(best_trial.best_fitness):
-        raise InputError(directory, "", "no gait of this run has a fitness yet, nothing to show")
-    evaluations = run.evaluations[run.evaluations["trial"] == best_trial.number]
-    evaluations = evaluations.dropna(subset="fitness")
-    best = _walk(run, _fittest(evaluations))
-    initial_row = _fittest(evaluations[evaluations["iteration"] == evaluations["iteration"].min()])
-    initial = best if initial_row["index"] == best.evaluation else _walk(run, initial_row)
-    return Study(run=run, statuses=statuses, initial=initial, best=best)
+    trial, index = run.fittest()
+    rows = run.evaluations[run.evaluations["trial"] == trial].dropna(subset="fitness")
+    first = rows[rows["iteration"] == rows["iteration"].min()]
+    initial_index = int(first.loc[first["fitness"].idxmax(), "index"])
+    best = _walk(run, trial, index)
+    initial = best if initial_index == index else _walk(run, trial, initial_index)
+    return Study(run=run, statuses=run.statuses, initial=initial, best=best)
 
 
-def _fittest(evaluations: pandas.DataFrame) -> pandas.Series:
-    """The row of the highest fitness, the first of equals."""
-    return evaluations.loc[evaluations["fitness"].idxmax()]
-
-
-def _walk(run: RunTables, row: pandas.Series) -> Walk:
-    scenario, trial, evaluation = run.manifest.scenario, int(row["trial"]), int(row["index"])
-    name = f"{scenario.name}, seed {run.manifest.seed}, trial {trial}, evaluation {evaluation}"
-    genome = row[genome_columns(run.evaluations)].to_numpy(dtype=np.float64)
-    gait = gait_of(genome, name=name)
+def _walk(run: Run, trial: int, index: int) -> Walk:
+    rows = run.evaluations.set_index(["trial", "index"])
+    gait = run.gait(trial, index)
     return Walk(
         trial=trial,
-        evaluation=evaluation,
+        evaluation=index,
         gait=gait,
-        recorded_distance_in=float(row["distance_in"]),
-        result=simulate(scenario=scenario, gait=gait, record=True),
+        recorded_distance_in=float(rows.loc[(trial, index), "distance_in"]),
+        result=simulate(scenario=run.manifest.scenario, gait=gait, record=True),
     )

@@ -1,119 +1,98 @@
-"""What came out of a run, the thesis's numbers beside it."""
+"""The results of a run in a few lines, beside its scenario's reference."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake import thesis
+from tetra_drake.evolution.executors import available_cores
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
-from tetra_drake.evolution.progress import number
-from tetra_drake.evolution.tables import RunTables
-from tetra_drake.evolution.trial import TrialStatus
-
-if TYPE_CHECKING:
-    import pandas
+from tetra_drake.evolution.reevaluation import best_distances
+from tetra_drake.evolution.tables import Run
+from tetra_drake.formatting import duration, fixed
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A number of ours and what the thesis has in its place, with units."""
+    """A number of ours and the reference's, with units; "" where the reference has none."""
 
     name: str
     ours: str
-    thesis: str
+    reference: str
 
 
-def summary(statuses: Sequence[TrialStatus]) -> str:
+def summary(run: Run) -> str:
     """The lines printed at the end of a run. Distances are those of the fittest gaits."""
     lines = [
         f"trial {status.number}: {status.stop or 'not ended'} after iteration {status.iteration}, "
         f"{status.evaluations} evaluations, {status.failures} failed; mean fitness "
-        f"{number(status.initial_mean_fitness)} -> {number(status.mean_fitness)}, best distance "
-        f"{number(status.initial_best_distance_in)} -> {number(status.best_distance_in)} in"
-        for status in statuses
+        f"{fixed(status.initial_mean_fitness)} -> {fixed(status.mean_fitness)}, best distance "
+        f"{fixed(status.initial_best_distance_in)} -> {fixed(status.best_distance_in)} in"
+        for status in run.statuses
     ]
-    lines.append(f"{'':<32}{'ours':>10}{'thesis':>12}")
-    lines += [f"{row.name:<32}{row.ours:>10}{row.thesis:>12}" for row in comparisons(statuses)]
-    return "\n".join(lines)
+    for trial, _, on_diagram in best_distances(run):
+        if math.isfinite(on_diagram):
+            lines[trial] += f" ({fixed(on_diagram)} in on the Drake diagram)"
+    reference = run.manifest.scenario.reference
+    source = reference.source if reference else ""
+    rows = [("", "this run", source)]
+    rows += [(row.name, row.ours, row.reference) for row in comparisons(run)]
+    return "\n".join([*lines, *(f"{name:<32}{o:>10}   {r}".rstrip() for name, o, r in rows)])
 
 
-def comparisons(statuses: Sequence[TrialStatus]) -> list[Comparison]:
-    """The results of a run beside the thesis's. Distances are those of the fittest gaits; the
-    best trial is the one with the fittest gait of all, as in the thesis (section 3.2)."""
-    rises = [improvement_percent(status) for status in statuses]
-    fittest = sorted(statuses, key=lambda status: status.best_fitness)[-1:]
+def whole_experiment(scenario: Scenario, *, seconds: float) -> str:
+    """What evolving on a whole scenario takes on this machine's cores, and its command.
+
+    seconds: wall time per evaluation on the compiled engine.
+    """
+    settings = scenario.evolution
+    evaluations = settings.trials * (settings.population + CHILDREN * settings.max_iterations)
+    cores = available_cores()
+    time = duration(evaluations * seconds / cores)
+    name = scenario.name
+    return (
+        f"this is a first look; scenario {name}, {settings.trials} trials of at most "
+        f"{settings.max_iterations} iterations, takes about {time} (h:mm:ss) on the {cores} cores "
+        f"here: tetra-drake evolve --scenario {name} --engine compiled --out runs/{name}"
+    )
+
+
+def comparisons(run: Run) -> list[Comparison]:
+    """The results of a run beside the reference's. Distances are those of the fittest gaits; the
+    best trial is the one with the fittest gait of all."""
+    statuses, reference = run.statuses, run.manifest.scenario.reference
+    rises = [status.improvement_percent for status in statuses]
+    best_trial = max(statuses, key=lambda status: status.best_fitness)
+
+    def row(name: str, ours: float, key: str, unit: str, scale: float = 1.0) -> Comparison:
+        theirs = getattr(reference, key, None)
+        shown = "" if theirs is None else f"{theirs / scale:.4g} {unit}"
+        return Comparison(name, f"{fixed(ours)} {unit}", shown)
+
     initial = _largest([status.initial_best_distance_in for status in statuses])
     best = _largest([status.best_distance_in for status in statuses])
-    return [
-        Comparison("best initial gait", f"{initial} in", f"{thesis.BEST_INITIAL_DISTANCE_IN} in"),
-        Comparison("best evolved gait", f"{best} in", f"{thesis.BEST_EVOLVED_DISTANCE_IN} in"),
-        Comparison(
-            "improvement, mean of trials",
-            f"{_mean(rises)} %",
-            f"{thesis.MEAN_IMPROVEMENT_PERCENT:g} %",
-        ),
-        Comparison(
-            "improvement, best trial",
-            f"{_mean([improvement_percent(status) for status in fittest])} %",
-            f"{thesis.BEST_IMPROVEMENT_PERCENT:g} %",
-        ),
-        Comparison(
-            "simulation time per iteration",
-            f"{_seconds_per_iteration(statuses)} s",
-            f"{thesis.SECONDS_PER_ITERATION:g} s",
-        ),
-    ]
-
-
-def recorded_statuses(run: RunTables) -> list[TrialStatus]:
-    """Where the trials of a recorded run stand, finished or not."""
-    settings = run.manifest.scenario.evolution
-    statuses = [
-        TrialStatus(trial, settings.population + CHILDREN * settings.max_iterations)
-        for trial in range(settings.trials)
-    ]
-    for trial, rows in _by_trial(run.evaluations):
-        statuses[trial].evaluations = statuses[trial].recalled = len(rows)
-        statuses[trial].failures = int(rows["failure"].notna().sum())
-        statuses[trial].wall_time = float(rows["wall_time_s"].sum())
-    for trial, rows in _by_trial(run.iterations):
-        status, first, last = statuses[trial], rows.iloc[0], rows.iloc[-1]
-        status.iteration = int(last["iteration"])
-        status.initial_mean_fitness = float(first["mean_fitness"])
-        status.initial_best_distance_in = float(first["best_distance_in"])
-        status.mean_fitness = float(last["mean_fitness"])
-        if math.isfinite(last["best_fitness"]):
-            status.best_fitness = float(last["best_fitness"])
-        status.best_distance_in = float(last["best_distance_in"])
-        status.stop = last["stop"] if isinstance(last["stop"], str) else None
-    return statuses
-
-
-def _by_trial(table: pandas.DataFrame) -> list[tuple[int, pandas.DataFrame]]:
-    return [] if table.empty else [(int(trial), rows) for trial, rows in table.groupby("trial")]
-
-
-def improvement_percent(status: TrialStatus) -> float:
-    """Rise of the best distance by evolution, in %; NaN where the first did not walk forward."""
-    initial = status.initial_best_distance_in
-    return 100.0 * (status.best_distance_in / initial - 1.0) if initial > 0.0 else math.nan
-
-
-def _largest(values: Sequence[float]) -> str:
-    return number(max((value for value in values if math.isfinite(value)), default=math.nan))
-
-
-def _mean(values: Sequence[float]) -> str:
-    finite = [value for value in values if math.isfinite(value)]
-    return number(float(np.mean(finite))) if finite else "-"
-
-
-def _seconds_per_iteration(statuses: Sequence[TrialStatus]) -> str:
     evaluations = sum(status.evaluations for status in statuses)
     wall_time = sum(status.wall_time for status in statuses)
-    return number(CHILDREN * wall_time / evaluations) if evaluations else "-"
+    iteration_time = CHILDREN * wall_time / evaluations if evaluations else math.nan
+    rise = best_trial.improvement_percent
+    return [
+        row("best initial gait", initial, "best_initial_distance", "in", INCH),
+        row("best evolved gait", best, "best_distance", "in", INCH),
+        row("improvement, mean of trials", _mean(rises), "mean_improvement", "%"),
+        row("improvement, best trial", rise, "best_improvement", "%"),
+        row("time per two simulations", iteration_time, "iteration_time", "s"),
+    ]
+
+
+def _largest(values: Sequence[float]) -> float:
+    return max((value for value in values if math.isfinite(value)), default=math.nan)
+
+
+def _mean(values: Sequence[float]) -> float:
+    finite = [value for value in values if math.isfinite(value)]
+    return float(np.mean(finite)) if finite else math.nan

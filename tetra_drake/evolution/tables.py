@@ -1,47 +1,133 @@
-"""A run's record as tables: `load_run`."""
+"""A recorded run as tables: `load_run`."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tetra_drake.evolution.json_lines import read_lines
+import numpy as np
+
+from tetra_drake.errors import InputError
 from tetra_drake.evolution.record import (
     EVALUATIONS,
     ITERATIONS,
     REEVALUATIONS,
     Manifest,
-    check_evaluation,
-    check_iteration,
+    read_evaluations,
+    read_iterations,
     read_manifest,
     trial_folder,
 )
+from tetra_drake.evolution.trial import TrialStatus
+from tetra_drake.results.metrics import Metrics
+from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
+from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
     import pandas
 
+_EMPTY = ["trial", "index", "iteration", "fitness", "failure", "wall_time_s", "distance_in"]
+"""Columns of an empty table."""
+_METRICS = [f.name for f in dataclasses.fields(Metrics)]
+
 
 @dataclass(frozen=True)
-class RunTables:
-    """A run as tables; lengths in inches, times in s."""
+class Run:
+    """A recorded run, finished or not; metrics in SI, times in s."""
 
+    directory: Path
     manifest: Manifest
-    """Scenario, seed and versions."""
+    """Scenario, seed, versions, and the method: evaluator, objective, optimiser."""
     evaluations: pandas.DataFrame
-    """A row an evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
-    wall_time_s, engine, placed (index in the population; missing if dropped), a column for each
-    metric (distance_in ...), weight_1 ... in the listing's order, tau_a_s, tau_b_s."""
+    """One row per evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
+    wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
+    have one), the metrics (distance ...), distance_in, weight_1 ... in the listing's order,
+    tau_a_s, tau_b_s."""
     iterations: pandas.DataFrame
-    """A row an iteration, 0 being the initial population: trial, iteration, evaluations so
-    far, mean_fitness, best_fitness, best_distance_in, best_evaluation (its index), stop."""
+    """One row per iteration, 0 being the initial one: trial, iteration, evaluations so far,
+    best_fitness, best_evaluation (its index), best_distance_in (that gait's), stop, and the
+    optimiser's report (mean_fitness)."""
     reevaluations: pandas.DataFrame
     """Gaits evaluated once more on the Drake diagram: columns as in evaluations, without
     `placed`; empty if there are none."""
 
+    @cached_property
+    def statuses(self) -> list[TrialStatus]:
+        """The state of each trial."""
+        return [self._status(trial) for trial in range(self.manifest.scenario.evolution.trials)]
 
-def load_run(path: str | Path) -> RunTables:
+    def best(self, count: int = 1) -> pandas.DataFrame:
+        """The fittest different gaits of each trial, best first: rows of `evaluations`."""
+        ranked = self.evaluations.dropna(subset="fitness").sort_values(
+            ["trial", "fitness", "index"], ascending=[True, False, True]
+        )
+        return ranked.drop_duplicates(["trial", *self._columns]).groupby("trial").head(count)
+
+    def fittest(self) -> tuple[int, int]:
+        """Trial and index of the run's fittest gait; InputError while no gait has a fitness."""
+        best = self.best()
+        if best.empty:
+            raise InputError(self.directory, "", "no gait of this run has a fitness yet")
+        row = best.loc[best["fitness"].idxmax()]
+        return int(row["trial"]), int(row["index"])
+
+    def initial(self) -> pandas.DataFrame:
+        """The evaluations of iteration 0."""
+        return self.evaluations[self.evaluations["iteration"] == 0]
+
+    def last_population(self, trial: int) -> pandas.DataFrame:
+        """The members of a trial's population after its last iteration: rows of `evaluations`.
+
+        Each row says in `placed` which place it took, so the last row of a place is its member.
+        """
+        rows = self.evaluations[self.evaluations["trial"] == trial]
+        placed = rows[rows["placed"].notna()] if "placed" in rows else rows.iloc[:0]
+        if placed.empty:
+            return placed
+        return placed.drop_duplicates("placed", keep="last").sort_values("placed")
+
+    def vector(self, trial: int, index: int) -> Vector:
+        """The parameters of an evaluation."""
+        row = self._by_index.loc[(trial, index), self._columns]
+        return row.to_numpy(dtype=np.float64)
+
+    def gait(self, trial: int, index: int) -> Gait:
+        """The gait of an evaluation."""
+        scenario, seed = self.manifest.scenario, self.manifest.seed
+        name = f"{scenario.name}, seed {seed}, trial {trial}, evaluation {index}"
+        return ParameterSpace.of(scenario).gait(self.vector(trial, index), name=name)
+
+    @property
+    def _columns(self) -> list[str]:
+        weights = [name for name in self.evaluations if name.startswith("weight_")]
+        return [*weights, "tau_a_s", "tau_b_s"]
+
+    @cached_property
+    def _by_index(self) -> pandas.DataFrame:
+        return self.evaluations.set_index(["trial", "index"])
+
+    def _status(self, trial: int) -> TrialStatus:
+        status = TrialStatus(trial)
+        rows = self.evaluations[self.evaluations["trial"] == trial]
+        status.count(
+            evaluations=len(rows),
+            failures=int(rows["failure"].notna().sum()),
+            wall_time=float(rows["wall_time_s"].sum()),
+        )
+        status.recalled = status.evaluations
+        lines = self.iterations[self.iterations["trial"] == trial]
+        for line in (lines.iloc[0], lines.iloc[-1]) if len(lines) else ():
+            values = line.drop(["trial", "best_distance_in"]).to_dict()
+            status.complete(values, best_distance_in=float(line["best_distance_in"]))
+        return status
+
+
+def load_run(path: str | Path) -> Run:
     """Loads a run directory, finished or not, as pandas tables.
 
         run = load_run("runs/demo")
@@ -51,38 +137,57 @@ def load_run(path: str | Path) -> RunTables:
     """
     directory = Path(path)
     manifest = read_manifest(directory)
-    trials = range(manifest.scenario.evolution.trials)
-    return RunTables(
+    evaluations = _table(directory, manifest, EVALUATIONS, read_evaluations, _flat)
+    iterations = _table(directory, manifest, ITERATIONS, read_iterations, dict)
+    return Run(
+        directory=directory,
         manifest=manifest,
-        evaluations=_frame(directory, EVALUATIONS, trials, check_evaluation, _flatten),
-        iterations=_frame(directory, ITERATIONS, trials, check_iteration, dict),
-        reevaluations=_frame(directory, REEVALUATIONS, trials, check_evaluation, _flatten),
+        evaluations=evaluations,
+        iterations=_with_best_distance(iterations, evaluations),
+        reevaluations=_table(directory, manifest, REEVALUATIONS, read_evaluations, _flat),
     )
 
 
-def _frame(
+def _table(
     directory: Path,
+    manifest: Manifest,
     name: str,
-    trials: range,
-    check: Callable[[dict[str, Any], Path, int], None],
+    read: Callable[[Path], list[dict[str, Any]]],
     row: Callable[[dict[str, Any]], dict[str, Any]],
 ) -> pandas.DataFrame:
     import pandas
 
-    rows = []
-    for trial in trials:
-        path = trial_folder(directory, trial) / name
-        for line, entry in enumerate(read_lines(path), start=1):
-            check(entry, path, line)
-            rows.append({"trial": trial, **row(entry)})
-    table = pandas.DataFrame(rows)
+    rows = [
+        {"trial": trial, **row(entry)}
+        for trial in range(manifest.scenario.evolution.trials)
+        for entry in read(trial_folder(directory, trial) / name)
+    ]
+    columns = None if rows else _EMPTY
+    table = pandas.DataFrame(rows, columns=columns)
     whole = [column for column in ("placed", "best_evaluation") if column in table]
-    numbers = [column for column in table if column.endswith(("fitness", "_in"))]
+    numbers = [
+        column for column in table if column in (*_METRICS, "distance_in") or "fitness" in column
+    ]
     return table.astype({column: "Int64" for column in whole} | dict.fromkeys(numbers, float))
 
 
-def _flatten(entry: dict[str, Any]) -> dict[str, Any]:
+def _flat(entry: dict[str, Any]) -> dict[str, Any]:
     *weights, tau_a, tau_b = entry["genome"]
     plain = {key: value for key, value in entry.items() if key not in ("genome", "metrics")}
+    metrics = dict.fromkeys(_METRICS, math.nan) | entry["metrics"]
     numbered = {f"weight_{i}": weight for i, weight in enumerate(weights, start=1)}
-    return plain | entry["metrics"] | numbered | {"tau_a_s": tau_a, "tau_b_s": tau_b}
+    inches = {"distance_in": metrics["distance"] / INCH}
+    return plain | metrics | inches | numbered | {"tau_a_s": tau_a, "tau_b_s": tau_b}
+
+
+def _with_best_distance(
+    iterations: pandas.DataFrame, evaluations: pandas.DataFrame
+) -> pandas.DataFrame:
+    """The iterations with the distance of each one's best evaluation."""
+    if iterations.empty:
+        return iterations
+    found = evaluations[["trial", "index", "distance_in"]].rename(
+        columns={"index": "best_evaluation", "distance_in": "best_distance_in"}
+    )
+    found["best_evaluation"] = found["best_evaluation"].astype("Int64")
+    return iterations.merge(found, how="left", on=["trial", "best_evaluation"])

@@ -12,11 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tetra_drake import thesis
-from tetra_drake.evolution.population import two_best
 from tetra_drake.figures.style import OKABE_ITO, REFERENCE, common_style, line_style, make_figure
 
 if TYPE_CHECKING:
-    from tetra_drake.evolution.tables import RunTables
+    from tetra_drake.evolution.tables import Run
 
 _WIDTH = 7.0
 _LEGEND_ROWS = 14
@@ -30,7 +29,7 @@ _LAST_DOT: dict[str, Any] = {"marker": "o", "markevery": [-1]}
 """Marks where a line ends, and makes one of a single point visible."""
 
 
-def initial_extremes(run: RunTables) -> pandas.DataFrame:
+def initial_extremes(run: Run) -> pandas.DataFrame:
     """Fittest and least fit initial gait of each trial, of those that have not failed.
 
     Index: trial. Columns best_distance_in and worst_distance_in.
@@ -43,7 +42,7 @@ def initial_extremes(run: RunTables) -> pandas.DataFrame:
 
 
 @common_style()
-def figure_16_initial_distances(run: RunTables) -> Figure:
+def figure_16_initial_distances(run: Run) -> Figure:
     """How far the fittest and the least fit initial gait of each trial go.
 
     The thesis's Fig. 16: a pair of bars for each trial, distance in inches.
@@ -78,7 +77,7 @@ def figure_16_initial_distances(run: RunTables) -> Figure:
     return figure
 
 
-def share_backward(run: RunTables, trial: int) -> float:
+def share_backward(run: Run, trial: int) -> float:
     """The share, 0 to 1, of a trial's initial gaits that end behind their start.
 
     Of those that have not failed; NaN if all have.
@@ -88,7 +87,7 @@ def share_backward(run: RunTables, trial: int) -> float:
 
 
 @common_style()
-def figure_17_initial_fitness(run: RunTables, trial: int) -> Figure:
+def figure_17_initial_fitness(run: Run, trial: int) -> Figure:
     """How the fitness of one trial's initial population is distributed.
 
     The thesis's Fig. 17: a histogram of gaits over fitness (in inches); those that go
@@ -128,7 +127,7 @@ def figure_17_initial_fitness(run: RunTables, trial: int) -> Figure:
     return figure
 
 
-def mean_fitness(run: RunTables) -> pandas.DataFrame:
+def mean_fitness(run: Run) -> pandas.DataFrame:
     """Mean fitness of each trial's population. Index: iteration, columns: trial.
 
     NaN after a trial's last iteration, and while all its population has failed; trials
@@ -138,7 +137,7 @@ def mean_fitness(run: RunTables) -> pandas.DataFrame:
     return table.dropna(axis="columns", how="all")
 
 
-def average_over_trials(run: RunTables) -> pandas.DataFrame:
+def average_over_trials(run: Run) -> pandas.DataFrame:
     """Mean and standard deviation over trials of their mean fitness. Index: iteration.
 
     A trial that has ended counts with its last mean fitness, as its population stays what it
@@ -155,7 +154,7 @@ def average_over_trials(run: RunTables) -> pandas.DataFrame:
 
 
 @common_style()
-def figure_22_mean_fitness(run: RunTables) -> Figure:
+def figure_22_mean_fitness(run: Run) -> Figure:
     """How the mean fitness of each trial's population rises.
 
     The thesis's Fig. 22: a line for each trial over iterations, fitness in inches. The
@@ -179,7 +178,7 @@ def figure_22_mean_fitness(run: RunTables) -> Figure:
 
 
 @common_style()
-def figure_23_best_worst_average(run: RunTables) -> Figure:
+def figure_23_best_worst_average(run: Run) -> Figure:
     """Mean fitness of the best and the worst trial and the average of all.
 
     The thesis's Fig. 23: over iterations, fitness in inches, with the standard deviation
@@ -205,17 +204,18 @@ def figure_23_best_worst_average(run: RunTables) -> Figure:
     return figure
 
 
-def table_8_two_best(run: RunTables, trial: int) -> pandas.DataFrame | None:
+def table_8_two_best(run: Run, trial: int) -> pandas.DataFrame | None:
     """How far apart the two fittest different gaits of a trial's last population are.
 
     The thesis's Table 8. Index: fitness, w1, w2 ..., tau_A, tau_B (fitness in inches, times in
     s). Columns best, second, difference (absolute) and thesis (NaN for a robot of another
     size). None if there are no two such gaits.
     """
-    pair = two_best(run.evaluations[run.evaluations["trial"] == trial])
-    if pair is None:
+    pair = run.best(2).query("trial == @trial")
+    if len(pair) < 2:
         return None
-    best, second = (np.array([member.fitness, *member.genome]) for member in pair)
+    rows = zip(pair["fitness"], pair["index"], strict=True)
+    best, second = (np.array([fitness, *run.vector(trial, i)]) for fitness, i in rows)
     weights = len(best) - 3
     theirs = [thesis.TWO_BEST_FITNESS, *thesis.TWO_BEST_WEIGHTS, *2 * [thesis.TWO_BEST_TAU_S]]
     names = ["fitness", *(f"w{i}" for i in range(1, weights + 1)), "tau_A", "tau_B"]
@@ -230,7 +230,7 @@ def table_8_two_best(run: RunTables, trial: int) -> pandas.DataFrame | None:
     )
 
 
-def _initial(run: RunTables, trial: int | None = None) -> pandas.DataFrame:
+def _initial(run: Run, trial: int | None = None) -> pandas.DataFrame:
     initial = run.evaluations[run.evaluations["iteration"] == 0]
     return initial if trial is None else initial[initial["trial"] == trial]
 

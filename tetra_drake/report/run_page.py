@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from tetra_drake.evolution.progress import duration, number
 from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.study import Study, Walk, study_run
-from tetra_drake.evolution.summary import comparisons, improvement_percent
+from tetra_drake.evolution.summary import comparisons
 from tetra_drake.figures.book import TABLE_8, Picture, draw_run
 from tetra_drake.figures.evolution import table_8_two_best
 from tetra_drake.files import write_whole
+from tetra_drake.formatting import duration
+from tetra_drake.formatting import fixed as number
 from tetra_drake.results.result import versions
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.visualization.replay import replay_title, save_replay
@@ -60,7 +61,7 @@ def render_report(study: Study, pictures: Sequence[Picture], *, folder: Path) ->
         f"{number(best.result.metrics.distance_in)} inches in {seconds}",
         notes=_notes(study),
         facts=_run_facts(study),
-        comparisons=comparisons(study.statuses),
+        comparisons=comparisons(study.run),
         duration=seconds,
         trials=_trial_table(study),
         best=_best_gait(best, seconds),
@@ -117,7 +118,7 @@ def _run_facts(study: Study) -> list[tuple[str, str]]:
 def _trial_table(study: Study) -> dict[str, list[str]]:
     """The cells of each column, by its heading."""
     statuses = study.statuses
-    rises = [improvement_percent(status) for status in statuses]
+    rises = [status.improvement_percent for status in statuses]
     columns = {
         "trial": [f"{status.number}" for status in statuses],
         "best distance": [

@@ -33,7 +33,6 @@ class IntegratorWork:
 
     scheme: str
     accuracy: float
-    """Drake's target accuracy, the compiled engine's tolerance (m/s), or MuJoCo's step (s)."""
     steps: int
     derivative_evaluations: int
     jacobian_evaluations: int
@@ -52,7 +51,7 @@ class SimulationResult:
     """Time from the start of the integration to its end, in s; building is not in it."""
     integrator: IntegratorWork
     engine: str
-    """That of the scenario."""
+    """Of the scenario: "drake" or "compiled"."""
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
     """See trajectory.make_dataset; None unless asked for."""
 
@@ -84,10 +83,9 @@ def make_result(
     )
 
 
-def versions(engine: str = "") -> dict[str, str]:
-    """The versions on which the last digits of a result of an engine depend."""
-    names = ["drake", "numpy", "numba"] + (["mujoco"] if engine == "mujoco" else [])
-    libraries = {name: metadata.version(name) for name in names}
+def versions() -> dict[str, str]:
+    """What decides the last digits of a result."""
+    libraries = {name: metadata.version(name) for name in ("drake", "numpy", "numba")}
     return {"tetra_drake": __version__, "python": platform.python_version(), **libraries}
 
 
@@ -104,7 +102,7 @@ def result_to_json(scenario: Scenario, gait: Gait, result: SimulationResult) -> 
         "real_time_factor": result.duration / result.wall_time,
         "engine": result.engine,
         "integrator": dataclasses.asdict(result.integrator),
-        "versions": versions(result.engine),
+        "versions": versions(),
         "gait": gait.to_json(),
     }
 

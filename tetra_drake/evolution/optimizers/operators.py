@@ -1,8 +1,8 @@
-"""The evolutionary operators of the thesis (section 2.3, listing A.3), each by itself.
+"""Evolutionary operators of the thesis (section 2.3, listing A.3).
 
-Pure functions on genomes, rows of numbers, with the random generator as an argument. The
-comparisons are the listing's: a chance p comes true when a number drawn from [0, 1) is
-beyond 1 - p.
+Pure functions on vectors of parameters, with the random generator as an argument. The
+comparisons are the listing's: an event of probability p happens if a number drawn from [0, 1)
+is at least 1 - p.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.evolution.optimizers.base import Genome
+from tetra_drake.robot.gait import Vector
 
 Fitnesses = npt.NDArray[np.float64]
 
@@ -37,39 +37,39 @@ def select_victim(fitnesses: Fitnesses, *, tournament: int, generator: np.random
 
 
 def cross_over(
-    first: Genome, second: Genome, *, probability: float, generator: np.random.Generator
-) -> tuple[Genome, Genome]:
-    """Two children, which are the parents with each parameter swapped at this probability."""
+    first: Vector, second: Vector, *, probability: float, generator: np.random.Generator
+) -> tuple[Vector, Vector]:
+    """Two children: the parents with each parameter swapped at this probability."""
     swapped = generator.random(len(first)) >= 1.0 - probability
     return np.where(swapped, second, first), np.where(swapped, first, second)
 
 
-def draw_mutation(reach: Genome, *, probability: float, generator: np.random.Generator) -> Genome:
-    """What to add to each parameter: 0, or up to its reach with either sign.
+def draw_mutation(steps: Vector, *, probability: float, generator: np.random.Generator) -> Vector:
+    """Changes of all parameters: 0, or up to the parameter's step with either sign.
 
-    One such row serves both children of an iteration, as in the listing.
+    One draw serves both children of an iteration, as in the listing.
     """
-    sign = np.where(generator.random(len(reach)) > 0.5, 1.0, -1.0)
-    moved = generator.random(len(reach)) >= 1.0 - probability
-    size = reach * generator.random(len(reach))
+    sign = np.where(generator.random(len(steps)) > 0.5, 1.0, -1.0)
+    moved = generator.random(len(steps)) >= 1.0 - probability
+    size = steps * generator.random(len(steps))
     return np.where(moved, sign * size, 0.0)
 
 
-def mutate(genome: Genome, *, mutation: Genome, floors: Genome) -> Genome:
-    """The genome with the mutation added; a parameter it would take to its floor or below stays.
+def mutate(vector: Vector, *, mutation: Vector, floors: Vector) -> Vector:
+    """The vector with the mutation added; a parameter that would fall to its floor stays.
 
     Only reductions are checked, as in the listing (A.3.3, A.3.4).
     """
-    moved = genome + mutation
+    moved = vector + mutation
     refused = (mutation < 0.0) & ~(moved > floors)
-    return np.where(refused, genome, moved)
+    return np.where(refused, vector, moved)
 
 
 def find_place(
     fitnesses: Fitnesses, child: float, *, tournament: int, generator: np.random.Generator
 ) -> int | None:
-    """Whom a child of this fitness replaces: the worst of a tournament if the child is fitter,
-    else the worst of all if it is fitter than that, else nobody.
+    """Index of the member that a child of this fitness replaces: the worst of a tournament if the
+    child is fitter, else the worst of all if it is fitter than that, else None.
     """
     victim = select_victim(fitnesses, tournament=tournament, generator=generator)
     if child > fitnesses[victim]:

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from tetra_drake.evolution.genome import (
-    couple_tau_b,
-    mutation_limits,
-    random_genome,
-)
-from tetra_drake.evolution.optimizers.base import Genome, Iteration
+from tetra_drake.evolution.optimizers.base import Evaluation, Iteration
 from tetra_drake.evolution.optimizers.operators import (
     cross_over,
     draw_mutation,
@@ -21,62 +17,65 @@ from tetra_drake.evolution.optimizers.operators import (
     mutate,
     select_parent,
 )
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.scenario.schema import EvolutionScenario
 
 CHILDREN = 2
 
 
 class SteadyState:
-    """An Optimizer: first the random population, then two children an iteration.
+    """An Optimizer: first the random population, then two children per iteration.
 
     Both children of an iteration come from the same two parents and the same mutation
-    numbers, before either is placed; that is why they can be evaluated at once.
+    numbers, before either is placed, so they can be evaluated at once. It reports mean_fitness,
+    the mean over the population's members that have not failed.
     """
 
-    def __init__(self, scenario: Scenario, generator: np.random.Generator) -> None:
-        self._scenario = scenario
-        self._settings = scenario.evolution
-        self._limits = mutation_limits(scenario)
-        self._couples_tau_b = not scenario.evolution.independent_tau_b
+    def __init__(
+        self, space: ParameterSpace, settings: EvolutionScenario, generator: np.random.Generator
+    ) -> None:
+        self._space = space
+        self._settings = settings
         self._generator = generator
-        self._asked: list[Genome] = []
-        self._genomes: list[Genome] = []
+        self._asked: list[Vector] = []
+        self._population: list[Vector] = []
         self._fitnesses = np.empty(0)
         self._means: list[float] = []
 
     @property
     def evaluations_at_most(self) -> int:
-        """How many evaluations a trial has if it is not stopped early."""
+        """Number of evaluations of a trial that is not stopped early."""
         return self._settings.population + CHILDREN * self._settings.max_iterations
 
-    def ask(self) -> list[Genome]:
+    def ask(self) -> list[Vector]:
         """The initial population, then two children at a time."""
-        if not self._genomes:
+        if not self._population:
             count = self._settings.population
-            self._asked = [random_genome(self._scenario, self._generator) for _ in range(count)]
+            self._asked = [self._space.random(self._generator) for _ in range(count)]
         else:
-            self._asked = list(self._breed())
-        return [genome.copy() for genome in self._asked]
+            self._asked = self._breed()
+        return [vector.copy() for vector in self._asked]
 
-    def tell(self, fitnesses: Sequence[float]) -> Iteration:
-        """Takes in the initial population, or places the children one after the other."""
-        if len(fitnesses) != len(self._asked):
-            raise ValueError(f"told {len(fitnesses)} fitnesses for {len(self._asked)} genomes")
+    def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
+        """Takes the initial population, or places the children one after the other."""
+        fitnesses = [evaluation.fitness for evaluation in evaluations]
         placed: tuple[int | None, ...]
-        if not self._genomes:
-            self._genomes = self._asked
+        if not self._population:
+            self._population = self._asked
             self._fitnesses = np.array(fitnesses, dtype=float)
             placed = tuple(range(len(fitnesses)))
         else:
             children = zip(self._asked, fitnesses, strict=True)
-            placed = tuple(self._place(genome, fitness) for genome, fitness in children)
-        self._means.append(mean_fitness(self._fitnesses))
-        return Iteration(mean_fitness=self._means[-1], placed=placed, stop=self._stop())
+            placed = tuple(self._place(vector, fitness) for vector, fitness in children)
+        mean = mean_fitness(self._fitnesses)
+        self._means.append(mean)
+        report = {"mean_fitness": mean if math.isfinite(mean) else None}
+        return Iteration(report=report, placed=placed, stop=self._stop())
 
-    def _breed(self) -> tuple[Genome, Genome]:
+    def _breed(self) -> list[Vector]:
         settings, generator = self._settings, self._generator
         parents = [
-            self._genomes[
+            self._population[
                 select_parent(self._fitnesses, tournament=settings.tournament, generator=generator)
             ]
             for _ in range(2)
@@ -85,16 +84,14 @@ class SteadyState:
             *parents, probability=settings.crossover_probability, generator=generator
         )
         mutation = draw_mutation(
-            self._limits.reach, probability=settings.mutation_probability, generator=generator
+            self._space.steps, probability=settings.mutation_probability, generator=generator
         )
-        first, second = (
-            mutate(child, mutation=mutation, floors=self._limits.floors) for child in crossed
-        )
-        if self._couples_tau_b:
-            return couple_tau_b(first), couple_tau_b(second)
-        return first, second
+        return [
+            self._space.repair(mutate(child, mutation=mutation, floors=self._space.floors))
+            for child in crossed
+        ]
 
-    def _place(self, genome: Genome, fitness: float) -> int | None:
+    def _place(self, vector: Vector, fitness: float) -> int | None:
         place = find_place(
             self._fitnesses,
             fitness,
@@ -102,7 +99,7 @@ class SteadyState:
             generator=self._generator,
         )
         if place is not None:
-            self._genomes[place] = genome
+            self._population[place] = vector
             self._fitnesses[place] = fitness
         return place
 

@@ -1,4 +1,4 @@
-"""The loop on a cheap fitness: what it records, and that only scenario and seed decide it."""
+"""The trial loop on a cheap fitness: what it records, and that only scenario and seed decide it."""
 
 import json
 import time
@@ -6,15 +6,14 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from helpers.analytic import Bowl, Deadly, is_deadly, read_record, small_scenario
+from helpers.analytic import Bowl, read_record, small_scenario
 
 from tetra_drake.evolution.executors import process_executor
-from tetra_drake.evolution.genome import genome_of
 from tetra_drake.evolution.optimizers.base import Evaluation, Iteration
 from tetra_drake.evolution.record import RunRecord
-from tetra_drake.evolution.run import evolve
-from tetra_drake.evolution.summary import summary
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.trials import run_trials
+from tetra_drake.robot.gait import ParameterSpace, load_gait
 
 
 def lines(path):
@@ -41,9 +40,7 @@ def test_every_evaluation_has_its_line(run_small):
     for number in range(2):
         entries = lines(run / f"trial_{number:02d}" / "evaluations.jsonl")
         assert [entry["index"] for entry in entries] == list(range(12 + 2 * 15))
-        assert [entry["iteration"] for entry in entries] == [0] * 12 + [
-            1 + i // 2 for i in range(30)
-        ]
+        assert [e["iteration"] for e in entries] == [0] * 12 + [1 + i // 2 for i in range(30)]
         assert [entry["placed"] for entry in entries[:12]] == list(range(12))
         for entry in entries:
             expected = Bowl()(np.array(entry["genome"]))
@@ -66,9 +63,7 @@ def test_the_lines_of_the_iterations_follow_from_those_of_the_evaluations(run_sm
         alive = [e["fitness"] for e in population.values() if e["fitness"] is not None]
         assert row["mean_fitness"] == pytest.approx(np.mean(alive), rel=1e-12)
         assert row["best_fitness"] == max(alive)
-        best = entries[row["best_evaluation"]]
-        assert best["fitness"] == row["best_fitness"]
-        assert best["metrics"]["distance_in"] == row["best_distance_in"]
+        assert entries[row["best_evaluation"]]["fitness"] == row["best_fitness"]
     assert [row["stop"] for row in iterations] == [None] * 15 + ["all iterations done"]
 
 
@@ -76,16 +71,17 @@ def test_the_best_gait_is_that_of_the_best_evaluation(run_small, scenario):
     trial = run_small() / "trial_00"
     gait = load_gait(trial / "best_gait.json", scenario)
     best = lines(trial / "iterations.jsonl")[-1]["best_evaluation"]
-    assert genome_of(gait).tolist() == lines(trial / "evaluations.jsonl")[best]["genome"]
+    vector = ParameterSpace.of(scenario).vector(gait)
+    assert vector.tolist() == lines(trial / "evaluations.jsonl")[best]["genome"]
     assert gait.name == f"thesis, seed 5, trial 0, evaluation {best}"
 
 
 def test_neither_workers_nor_executor_nor_timing_change_the_record(run_small, tmp_path):
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
-    for name, workers, make_executor in (("pool", 2, process_executor), ("plain", 3, AtOnce)):
+    for name, workers, executor in (("pool", 2, process_executor), ("plain", 3, AtOnce)):
         with RunRecord.create(tmp_path / name, scenario=small_scenario(), seed=5) as record:
-            evolve(record, evaluate=Bowl(), workers=workers, make_executor=make_executor)
+            run_trials(record, evaluate=Bowl(), workers=workers, executor=executor)
         assert read_record(tmp_path / name) == reference
 
 
@@ -93,101 +89,73 @@ def test_trials_differ_and_do_not_depend_on_their_number(run_small):
     two = read_record(run_small("two", trials=2))
     three = read_record(run_small("three", trials=3))
     other = read_record(run_small("other", trials=2, seed=6))
-    name = "trial_{:02d}/evaluations.jsonl"
-    assert two[name.format(0)] == three[name.format(0)]
-    assert two[name.format(1)] == three[name.format(1)]
-    assert two[name.format(0)] != two[name.format(1)]
-    assert two[name.format(0)] != other[name.format(0)]
+    first, second = ("trial_00/evaluations.jsonl", "trial_01/evaluations.jsonl")
+    assert (two[first], two[second]) == (three[first], three[second])
+    assert two[first] != two[second]
+    assert two[first] != other[first]
 
 
 def test_as_many_evaluations_as_workers_are_under_way(run_small):
     under_way, most = set(), []
 
-    def evaluate(genome):
-        under_way.add(id(genome))
+    def evaluate(vector):
+        under_way.add(id(vector))
         most.append(len(under_way))
         time.sleep(0.002)
-        under_way.discard(id(genome))
-        return Bowl()(genome)
+        under_way.discard(id(vector))
+        return Bowl()(vector)
 
     run_small(workers=3, evaluate=evaluate)
     assert max(most) == 3
 
 
 def test_a_run_in_which_everything_fails_goes_to_its_end(run_small):
-    def evaluate(genome):
-        return Evaluation.failed("no ground")
-
-    trial = run_small(evaluate=evaluate) / "trial_00"
+    trial = run_small(evaluate=lambda vector: Evaluation.failed("no ground")) / "trial_00"
     assert len(lines(trial / "evaluations.jsonl")) == 42
     assert lines(trial / "iterations.jsonl")[-1]["mean_fitness"] is None
     assert not (trial / "best_gait.json").exists()
 
 
 def test_an_error_in_the_program_is_no_failed_evaluation(run_small):
-    def evaluate(genome):
+    def evaluate(vector):
         raise TypeError("a bug")
 
     with pytest.raises(TypeError, match="a bug"):
         run_small(evaluate=evaluate)
 
 
-def test_what_kills_its_process_fails_and_the_run_goes_on(tmp_path):
-    scenario = small_scenario(population=8, iterations=2, trials=1)
-    with RunRecord.create(tmp_path / "run", scenario=scenario, seed=2) as record:
-        evolve(record, evaluate=Deadly(), workers=2)
-    entries = lines(tmp_path / "run" / "trial_00" / "evaluations.jsonl")
-    assert len(entries) == 12
-    assert any(is_deadly(entry["genome"]) for entry in entries)
-    for entry in entries:
-        assert (entry["failure"] == "its process died") == is_deadly(entry["genome"])
-
-
-def test_workers_are_recycled_without_losing_any(tmp_path, monkeypatch):
-    monkeypatch.setattr("tetra_drake.evolution.executors.TASKS_PER_WORKER", 12)
-    scenario = small_scenario(population=30, iterations=10, trials=1)
-    with RunRecord.create(tmp_path / "run", scenario=scenario, seed=2) as record:
-        (status,) = evolve(record, evaluate=Bowl(), workers=2)
-    assert status.evaluations == 50
-
-
 class RandomSearch:
-    """Another optimiser: two batches of four, nobody bred."""
+    """Another optimiser: two batches of four without a population."""
 
     evaluations_at_most = 8
 
-    def __init__(self, scenario, generator):
-        self._generator = generator
+    def __init__(self, space, settings, generator):
+        self._space, self._generator = space, generator
         self._told = []
 
     def ask(self):
-        return list(self._generator.uniform(1.0, 3.0, (4, 26)))
+        return [self._space.random(self._generator) for _ in range(4)]
 
-    def tell(self, fitnesses):
-        self._told.append(max(fitnesses))
-        stop = "done" if len(self._told) == 2 else None
-        return Iteration(mean_fitness=max(self._told), placed=(None,) * 4, stop=stop)
+    def tell(self, evaluations):
+        self._told += [e.metrics.get("distance", 0.0) for e in evaluations]
+        report = {"farthest": max(self._told), "note": "wide"}
+        return Iteration(report=report, stop="done" if len(self._told) == 8 else None)
 
 
-def test_another_optimiser_can_take_the_place(tmp_path):
+def test_another_optimiser_reports_its_own_numbers(tmp_path):
     with RunRecord.create(tmp_path / "run", scenario=small_scenario(), seed=2) as record:
-        statuses = evolve(
+        statuses = run_trials(
             record,
             evaluate=Bowl(),
             workers=2,
-            make_executor=ThreadPoolExecutor,
-            make_optimizer=RandomSearch,
+            executor=ThreadPoolExecutor,
+            optimizer=RandomSearch,
         )
-    assert [status.evaluations for status in statuses] == [8, 8]
-    assert [status.stop for status in statuses] == ["done", "done"]
-
-
-def test_the_summary_has_the_thesis_beside_it(tmp_path):
-    with RunRecord.create(tmp_path / "run", scenario=small_scenario(), seed=2) as record:
-        statuses = evolve(record, evaluate=Bowl(), workers=2, make_executor=ThreadPoolExecutor)
-    text = summary(statuses)
-    for number in ("6.6 in", "14.34 in", "32 %", "51 %", "22 s"):
-        assert number in text
-    best = max(status.best_distance_in for status in statuses)
-    assert f"{best:.2f} in" in text
-    assert summary([]).count("-") >= 5
+    assert [(status.evaluations, status.stop) for status in statuses] == [(8, "done")] * 2
+    run = load_run(tmp_path / "run")
+    assert "placed" not in run.evaluations
+    assert run.last_population(0).empty
+    farthest = run.evaluations.groupby("trial")["distance"].max()
+    assert run.iterations.groupby("trial")["farthest"].last().tolist() == farthest.tolist()
+    assert set(run.iterations["note"]) == {"wide"}
+    assert run.statuses[1].report["farthest"] == farthest[1]

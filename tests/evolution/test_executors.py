@@ -1,0 +1,104 @@
+"""Many evaluations at once: order, recycled workers, tasks that end their workers."""
+
+import importlib
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from helpers.analytic import Bowl, Deadly, is_deadly
+
+from tetra_drake.evolution.executors import EvaluationImpossible, evaluate_all
+from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.robot.gait import ParameterSpace
+
+
+@pytest.fixture
+def vectors(scenario):
+    generator, space = np.random.default_rng(2), ParameterSpace.of(scenario)
+    return [space.random(generator) for _ in range(20)]
+
+
+def test_every_task_is_evaluated_once(vectors):
+    found = dict(evaluate_all(Bowl(), vectors, workers=3, executor=ThreadPoolExecutor))
+    assert found == {i: Bowl()(vector) for i, vector in enumerate(vectors)}
+    assert list(evaluate_all(Bowl(), [], workers=2)) == []
+
+
+def test_workers_are_recycled_without_losing_any(vectors, monkeypatch):
+    monkeypatch.setattr("tetra_drake.evolution.executors.TASKS_PER_WORKER", 4)
+    assert len(dict(evaluate_all(Bowl(), vectors, workers=2))) == 20
+
+
+def test_only_what_ends_its_process_fails(vectors):
+    found = dict(evaluate_all(Deadly(), vectors, workers=2))
+    assert sorted(found) == list(range(20))
+    died = [found[i].failure == "its process died" for i in range(20)]
+    assert died == [is_deadly(vector.tolist()) for vector in vectors]
+    assert any(died)
+
+
+def end_the_process(task):
+    os._exit(3)
+
+
+def succeed_once(task):
+    if task > 0:
+        os._exit(3)
+    return Evaluation(1.0)
+
+
+def test_deaths_count_once_anything_has_succeeded():
+    found = dict(evaluate_all(succeed_once, [1, 0, 2, 3, 4], workers=1))
+    assert [found[i].failure is None for i in range(5)] == [False, True, False, False, False]
+
+
+@pytest.mark.parametrize("tasks", [1, 10])
+def test_if_every_task_ends_its_process_none_can_run(tasks):
+    with pytest.raises(EvaluationImpossible):
+        list(evaluate_all(end_the_process, range(tasks), workers=2))
+
+
+def test_a_function_that_cannot_be_sent_is_refused_with_the_cause(vectors):
+    with pytest.raises(EvaluationImpossible, match="lambda"):
+        list(evaluate_all(lambda vector: Evaluation(1.0), vectors, workers=2))
+
+
+def test_a_function_that_workers_cannot_load_is_refused_with_the_cause(vectors, monkeypatch):
+    monkeypatch.delenv("TETRA_DRAKE_LOADED_IN", raising=False)
+    evaluate = importlib.import_module("helpers.unloadable").evaluate
+    with pytest.raises(EvaluationImpossible, match="only one process can load this"):
+        list(evaluate_all(evaluate, vectors, workers=2))
+
+
+PROGRAM = """
+import numpy as np
+from tetra_drake.evolution.executors import evaluate_all
+from helpers.analytic import Bowl
+def own(vector):
+    return Bowl()(vector)
+print(len(list(evaluate_all({evaluate}, [np.ones(26)], workers=1))))
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "evaluate"), [("stdin", "Bowl()"), ("stdin", "own"), ("file", "own")]
+)
+def test_programs_that_workers_cannot_import_are_told_at_once(how, evaluate, tmp_path):
+    program = PROGRAM.format(evaluate=evaluate)
+    (tmp_path / "unguarded.py").write_text(program)
+    ended = subprocess.run(
+        [sys.executable, "-" if how == "stdin" else tmp_path / "unguarded.py"],
+        input=program,
+        text=True,
+        capture_output=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        timeout=60,
+    )
+    # Read from standard input there is no file to import; in a file, a worker would start workers.
+    assert ended.stdout == ""
+    error = ended.stderr.splitlines()[-1]
+    assert "EvaluationImpossible" in error
+    assert ("<stdin>" if how == "stdin" else "__main__") in error

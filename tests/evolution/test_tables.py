@@ -1,0 +1,224 @@
+"""A recorded run as tables: columns, best gaits, populations, states of trials, schema 1."""
+
+import dataclasses
+import json
+import lzma
+import math
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.analytic import Bowl, small_scenario
+from helpers.synthetic_run import write_run
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.json_lines import append_lines
+from tetra_drake.evolution.record import RunRecord
+from tetra_drake.evolution.summary import comparisons, summary
+from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.trials import run_trials
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.units import INCH
+
+
+def test_a_run_loads_as_tables(run_small):
+    run = load_run(run_small(seed=11))
+    assert run.manifest.seed == 11
+    assert len(run.evaluations) == 2 * 42
+    assert len(run.iterations) == 2 * 16
+    row = run.evaluations.iloc[20]
+    assert row["weight_3"] == run.vector(0, 20)[2]
+    expected = Bowl()(run.vector(0, 20))
+    assert expected.failure or row["fitness"] == expected.fitness
+    failed = run.evaluations["failure"].notna()
+    assert failed.any()
+    assert run.evaluations["fitness"][failed].isna().all()
+    walked = run.evaluations[~failed]
+    np.testing.assert_array_equal(walked["distance_in"], walked["distance"] / INCH)
+    means = run.iterations.pivot(index="iteration", columns="trial", values="mean_fitness")
+    assert means.shape == (16, 2)
+    last = run.iterations.iloc[-1]
+    best = run.evaluations.set_index(["trial", "index"]).loc[(1, last["best_evaluation"])]
+    assert last["best_distance_in"] == best["distance_in"]
+
+
+def test_a_run_in_progress_loads_and_is_left_alone(run_small):
+    run = run_small()
+    path = run / "trial_00" / "evaluations.jsonl"
+    path.write_bytes(path.read_bytes()[:-10])
+    torn = path.read_bytes()
+    assert len(load_run(run).evaluations) == 2 * 42 - 1
+    assert path.read_bytes() == torn
+    for trial in ("trial_00", "trial_01"):
+        for file in (run / trial).iterdir():
+            file.unlink()
+    empty = load_run(run)
+    assert empty.evaluations.empty
+    assert [status.evaluations for status in empty.statuses] == [0, 0]
+    with pytest.raises(InputError):
+        empty.fittest()
+
+
+def test_a_compressed_record_reads_alike_and_is_not_added_to(run_small, refused):
+    run = run_small()
+    plain = load_run(run)
+    for path in run.rglob("*.jsonl"):
+        path.with_name(path.name + ".xz").write_bytes(lzma.compress(path.read_bytes()))
+        path.unlink()
+    packed = load_run(run)
+    assert packed.evaluations.equals(plain.evaluations)
+    assert packed.iterations.equals(plain.iterations)
+    path = run / "trial_00" / "iterations.jsonl"
+    with refused(f"{path}.xz", "", "decompress"):
+        append_lines(path, [{}])
+    path.with_name("iterations.jsonl.xz").write_bytes(b"no xz")
+    with refused(f"{path}.xz", "", ""):
+        load_run(run)
+
+
+@pytest.mark.parametrize(
+    ("name", "entry", "key"),
+    [
+        ("evaluations.jsonl", {"index": 0}, "iteration"),
+        ("iterations.jsonl", {"iteration": "first"}, "iteration"),
+        ("reevaluations.jsonl", {"index": 0, "iteration": 0, "genome": 3}, "genome"),
+    ],
+)
+def test_a_line_that_is_no_entry_is_reported(run_small, refused, name, entry, key):
+    run = run_small()
+    path = run / "trial_01" / name
+    path.write_text(json.dumps(entry) + "\n")
+    with refused(path, "line 1", key):
+        load_run(run)
+
+
+# Best gaits and populations
+
+
+def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(tmp_path):
+    run = load_run(
+        write_run(tmp_path / "run", [[[(5.0, 0), (5.0, 1), (None, 2), (7.0, 3)]], [[(6.0, 0)]]])
+    )
+    best = run.best(3)
+    assert best[["trial", "index"]].to_numpy().tolist() == [[0, 3], [0, 0], [1, 0]]
+    assert run.best()["fitness"].tolist() == [7.0, 6.0]
+    assert run.fittest() == (0, 3)
+    assert run.gait(0, 3).name == "tiny, seed 7, trial 0, evaluation 3"
+
+
+def test_the_gait_of_an_evaluation_is_that_of_its_file(run_small, scenario):
+    directory = run_small()
+    run = load_run(directory)
+    trial, index = run.fittest()
+    assert load_gait(directory / f"trial_0{trial}" / "best_gait.json", scenario) == run.gait(
+        trial, index
+    )
+
+
+def test_the_last_population_is_that_kept_by_hand(run_small):
+    directory = run_small()
+    run = load_run(directory)
+    for trial in (0, 1):
+        kept = {}
+        for line in (directory / f"trial_0{trial}" / "evaluations.jsonl").open():
+            entry = json.loads(line)
+            if entry["placed"] is not None:
+                kept[entry["placed"]] = entry["index"]
+        population = run.last_population(trial)
+        assert population["placed"].tolist() == list(range(12))
+        assert population["index"].tolist() == [kept[place] for place in range(12)]
+        assert population["fitness"].mean() == pytest.approx(run.statuses[trial].mean_fitness)
+
+
+# State of trials
+
+
+def test_the_record_says_what_the_run_said_at_its_end(tmp_path):
+    with RunRecord.create(tmp_path / "run", scenario=small_scenario(), seed=3) as record:
+        ended = run_trials(
+            record, evaluate=Bowl(delay=0.001), workers=2, executor=ThreadPoolExecutor
+        )
+    recorded = load_run(tmp_path / "run").statuses
+    alike = {"wall_time": 0.0, "recalled": 0, "evaluations_at_most": 0}
+    for ours, theirs in zip(recorded, ended, strict=True):
+        assert ours.wall_time == pytest.approx(theirs.wall_time, abs=1e-3)
+        assert dataclasses.replace(ours, **alike) == dataclasses.replace(theirs, **alike)
+
+
+def test_an_unfinished_run_says_how_far_it_has_come(tmp_path):
+    run = load_run(
+        write_run(
+            tmp_path / "run",
+            [[[(1.0, 0), (None, 1)], [(4.0, 1)]], [[(None, 0)]], []],
+            unfinished=(0, 1, 2),
+        )
+    )
+    first, second, third = run.statuses
+    assert (first.iteration, first.evaluations, first.failures, first.stop) == (1, 3, 1, None)
+    assert (first.initial_mean_fitness, first.mean_fitness) == (1.0, 2.5)
+    assert (first.initial_best_distance_in, first.best_distance_in) == pytest.approx((0.5, 2.0))
+    assert (second.failures, second.best_fitness) == (1, -math.inf)
+    assert (third.iteration, third.evaluations) == (-1, 0)
+    ours = [row.ours for row in comparisons(run)]
+    assert ours == ["0.50 in", "2.00 in", "300.00 %", "300.00 %", "1.00 s"]
+
+
+def test_the_reference_stands_beside_our_numbers_where_there_is_one(tmp_path):
+    scenario = load_scenario("thesis")
+    with_reference = load_run(write_run(tmp_path / "a", [[[(5.0, 0)]]], scenario=scenario))
+    assert [row.reference for row in comparisons(with_reference)] == [
+        "6.6 in", "14.34 in", "32 %", "51 %", "22 s",
+    ]  # fmt: skip
+    assert "14.34 in" in summary(with_reference)
+    scenario.reference = None
+    without = load_run(write_run(tmp_path / "b", [[[(5.0, 0)]]], scenario=scenario))
+    assert {row.reference for row in comparisons(without)} == {""}
+
+
+# Runs of schema 1
+
+RECORDED = Path(__file__).parents[2] / "runs" / "thesis"
+
+
+def first_lines(tmp_path, count):
+    """A copy of the recorded run's first trial, ended after this many evaluations."""
+    run = tmp_path / "run"
+    (run / "trial_00").mkdir(parents=True)
+    for name in ("manifest.json", "scenario.yaml"):
+        (run / name).write_bytes((RECORDED / name).read_bytes())
+    content = lzma.decompress((RECORDED / "trial_00" / "evaluations.jsonl.xz").read_bytes())
+    (run / "trial_00" / "evaluations.jsonl").write_bytes(
+        b"".join(content.splitlines(keepends=True)[:count])
+    )
+    return run
+
+
+def test_a_recorded_run_of_schema_1_loads_with_its_inches_to_the_last_digit(tmp_path):
+    run = load_run(first_lines(tmp_path, 100))
+    assert run.manifest.method.evaluator.name == "compiled"
+    lines = (tmp_path / "run" / "trial_00" / "evaluations.jsonl").read_text().splitlines()
+    inches = [json.loads(line)["metrics"]["distance_in"] for line in lines]
+    assert run.evaluations["distance_in"].tolist() == inches
+    assert run.evaluations["twist"].notna().all()
+
+
+class Interrupted(Exception):
+    pass
+
+
+def test_a_recorded_run_of_schema_1_is_resumed_where_it_ended(tmp_path):
+    """The optimiser must ask for what the record holds: 50 gaits and 2 per iteration."""
+    path = first_lines(tmp_path, 56)
+    asked = []
+
+    def evaluate(vector):
+        asked.append(vector.tolist())
+        raise Interrupted
+
+    with RunRecord.resume(path) as record, pytest.raises(Interrupted):
+        run_trials(record, evaluate=evaluate, workers=1, executor=ThreadPoolExecutor)
+    recorded = lzma.decompress((RECORDED / "trial_00" / "evaluations.jsonl.xz").read_bytes())
+    assert asked[0] == json.loads(recorded.splitlines()[56])["genome"]
+    assert len(load_run(path).iterations) == 4

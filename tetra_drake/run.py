@@ -1,0 +1,146 @@
+"""evolve(): a whole run, from its record's first line to its report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
+from tetra_drake.evolution.executors import (
+    EvaluationImpossible,
+    MakeExecutor,
+    available_cores,
+    process_executor,
+    thread_executor,
+)
+from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.optimizers.base import MakeOptimizer
+from tetra_drake.evolution.optimizers.steady_state import SteadyState
+from tetra_drake.evolution.progress import Progress
+from tetra_drake.evolution.record import Manifest, RunRecord, read_manifest
+from tetra_drake.evolution.reevaluation import reevaluate as reevaluate_gaits
+from tetra_drake.evolution.tables import Run, load_run
+from tetra_drake.evolution.trials import run_trials
+from tetra_drake.results.result import versions
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+
+
+def evolve(
+    scenario: Scenario | str | Path | None,
+    out: str | Path,
+    *,
+    seed: int | None = None,
+    workers: int | None = None,
+    resume: bool = False,
+    optimizer: MakeOptimizer | None = None,
+    objective: Objective | None = None,
+    executor: MakeExecutor | None = None,
+    progress: Progress | None = None,
+    reevaluate: bool = True,
+    report: bool = True,
+) -> Run:
+    """Evolves gaits on a scenario and records the run in the new directory `out`.
+
+    seed: 0 by default. The record depends on scenario, method and seed only.
+    workers: one per core by default.
+    resume: goes on with the run in `out`; then `scenario` may be None, and what is given must be
+        what the run began with.
+    optimizer: optimizer(space, scenario.evolution, generator) makes the optimiser of a trial
+        (see optimizers.base); by default the thesis's steady-state algorithm.
+    objective: objective(result) -> float, to be maximised; by default the scenario's fitness.
+    executor: executor(workers) makes a concurrent.futures.Executor; by default worker processes,
+        for which an objective must be defined in a module (for the compiled engine, threads).
+    progress: shown none by default; see evolution.progress.
+    reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another.
+    report: in the end, writes report.html, replay.html and figures/.
+
+    Raises InputError for what cannot be used, EvaluationImpossible if no evaluation can run.
+    """
+    out, progress, workers = Path(out), progress or Progress(), workers or available_cores()
+    if isinstance(scenario, (str, Path)):
+        scenario = load_scenario(scenario)
+    if resume:
+        own = read_manifest(out).scenario
+        method = Method.of(own, objective=objective, optimizer=optimizer)
+        record = RunRecord.resume(out, scenario=scenario, seed=seed, method=method)
+    elif scenario is None:
+        raise InputError("scenario", "", "is needed to begin a run")
+    else:
+        method = Method.of(scenario, objective=objective, optimizer=optimizer)
+        record = RunRecord.create(out, scenario=scenario, seed=seed or 0, method=method)
+    with record, progress:
+        scenario = record.manifest.scenario
+        compiled = scenario.simulation.engine == "compiled"
+        progress.say(_introduction(out, record.manifest, workers, report=report))
+        _warn_of_versions(record.manifest, progress)
+        if compiled:
+            from tetra_drake.engines.compiled.engine import compile_engine
+
+            compile_engine(scenario, progress.say)
+        run_trials(
+            record,
+            evaluate=GaitEvaluation(scenario, objective),
+            workers=workers,
+            executor=executor or (thread_executor if compiled else process_executor),
+            optimizer=optimizer or SteadyState,
+            progress=progress,
+        )
+        if reevaluate and scenario.simulation.engine != "drake":
+            try:
+                reevaluate_gaits(
+                    out,
+                    workers=workers,
+                    executor=executor or process_executor,
+                    objective=objective,
+                    progress=progress,
+                )
+            except EvaluationImpossible as error:
+                progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
+        if report:
+            _report(out, progress)
+    return load_run(out)
+
+
+def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
+    scenario, settings = manifest.scenario, manifest.scenario.evolution
+    trials = f"{settings.trials} trial{'s' if settings.trials > 1 else ''}"
+    text = (
+        f"{directory}: scenario {scenario.name}, seed {manifest.seed}, {trials} of at most "
+        f"{settings.max_iterations} iterations, population {settings.population}, engine "
+        f"{scenario.simulation.engine}, {workers} worker{'s' if workers > 1 else ''}"
+    )
+    for part in manifest.method.given_from_python:
+        text += f", {part} {getattr(manifest.method, part).name}"
+    if report:
+        text += (
+            f"\nat the end, {directory / 'replay.html'} shows the best gait walking and "
+            f"{directory / 'report.html'} the results; before, make them with: "
+            f"tetra-drake figures {directory}"
+        )
+    return text
+
+
+def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
+    then, now = manifest.versions, versions()
+    changed = [f"{name} {then.get(name)}" for name in now if then.get(name) != now[name]]
+    if changed:
+        progress.warn(
+            f"the run was begun with {', '.join(changed)}; with other versions its record may "
+            "not be that of an uninterrupted run"
+        )
+
+
+def _report(directory: Path, progress: Progress) -> None:
+    """Writes the report; the run is complete even if that fails."""
+    from tetra_drake.report.run_page import write_report
+
+    progress.say("drawing figures and the report")
+    try:
+        write_report(directory)
+    except Exception as error:
+        known = isinstance(error, (InputError, SimulationFailure))
+        progress.warn(
+            "the run is complete, but its report could not be written: "
+            f"{error if known else repr(error)}; try again with: tetra-drake figures {directory}"
+        )
