@@ -54,7 +54,7 @@ class Motion:
     """(samples, 3, 3): contact, and friction modes along x and y, as GroundContact has them."""
 
 
-def MakeStandingTetrahedron(scenario: Scenario) -> Structure:
+def make_standing_tetrahedron(scenario: Scenario) -> Structure:
     """One tetrahedron of the robot, without cables, with its base at height 0.
 
     Its body frame is turned with it, which its inertia, the same about all axes, allows.
@@ -72,9 +72,9 @@ def MakeStandingTetrahedron(scenario: Scenario) -> Structure:
     )
 
 
-def MakeDiagram(scenario: Scenario) -> Diagram:
+def make_diagram(scenario: Scenario) -> Diagram:
     """The tetrahedron and the ground under it, with logs of their outputs."""
-    tetrahedron = MakeStandingTetrahedron(scenario)
+    tetrahedron = make_standing_tetrahedron(scenario)
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
     AddTetrahedra(plant, tetrahedron)
@@ -96,7 +96,7 @@ def let_go(
     scenario: Scenario, *, height: float, velocity: Sequence[float], duration: float
 ) -> Motion:
     """Simulates the tetrahedron from `height` (m) of its base and `velocity` (3,) in m/s."""
-    tetrahedron, diagram = MakeStandingTetrahedron(scenario), MakeDiagram(scenario)
+    tetrahedron, diagram = make_standing_tetrahedron(scenario), make_diagram(scenario)
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-4).set_target_accuracy(1e-4)
     context = simulator.get_mutable_context()
@@ -125,5 +125,5 @@ def let_go(
 def weight(scenario: Scenario) -> float:
     """Weight of one tetrahedron in N."""
     return (
-        tetrahedron_inertia(MakeStandingTetrahedron(scenario)).get_mass() * scenario.robot.gravity
+        tetrahedron_inertia(make_standing_tetrahedron(scenario)).get_mass() * scenario.robot.gravity
     )

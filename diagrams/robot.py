@@ -14,8 +14,9 @@ cables    the tension of 24 cables, from their length, its rate, and the signals
 ground    normal force and friction at 11 nodes; contact and stiction are discrete state
 plant     five tetrahedra, free bodies without joints and without contact geometry
 
-Writes robot.svg, the block diagram, and robot.html, the page. `tetra-drake simulate` does the
-same, with the diagram of tetra_drake/systems/diagram.py and adaptive steps.
+Writes robot.svg, the block diagram, and robot.html, the page. `tetra-drake simulate` wires the same
+systems (tetra_drake/systems/diagram.py) and takes longer steps, which it lets end where a node is
+predicted to touch the ground or to break free.
 """
 
 from __future__ import annotations

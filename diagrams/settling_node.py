@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from one_tetrahedron import TRAILING, MakeDiagram, Motion, let_go
+from one_tetrahedron import TRAILING, Motion, let_go, make_diagram
 
 from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.figures.style import common_style, make_figure, save_figure
@@ -77,7 +77,7 @@ def main() -> None:
     out = parser.parse_args().out
 
     scenario = load_scenario("thesis")
-    save_block_diagram(MakeDiagram(scenario), out / "one_tetrahedron.svg")
+    save_block_diagram(make_diagram(scenario), out / "one_tetrahedron.svg")
     settling, bouncing = settle(scenario), bounce(scenario)
     save_figure(draw(settling, bouncing), out, "settling_node_motion", kinds=["svg"])
 

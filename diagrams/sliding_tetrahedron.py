@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from one_tetrahedron import LEADING, TRAILING, MakeDiagram, Motion, let_go, weight
+from one_tetrahedron import LEADING, TRAILING, Motion, let_go, make_diagram, weight
 
 from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
@@ -95,7 +95,7 @@ def main() -> None:
     out = parser.parse_args().out
 
     scenario = load_scenario("thesis")
-    save_block_diagram(MakeDiagram(scenario), out / "one_tetrahedron.svg")
+    save_block_diagram(make_diagram(scenario), out / "one_tetrahedron.svg")
     motion = slide(scenario)
     figure = draw(motion, stiction_range=scenario.friction.stiction_range)
     save_figure(figure, out, "sliding_tetrahedron_motion", kinds=["svg"])

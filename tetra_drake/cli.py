@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import sys
 from collections.abc import Sequence
@@ -11,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
-from tetra_drake.benchmark.command import add_bench
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.experiment.command import add_analyse, add_tables
 from tetra_drake.figures.command import add_figures
+from tetra_drake.files import whole_file
 from tetra_drake.report.replay_command import add_replay
 from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
@@ -22,6 +23,8 @@ from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     from tetra_drake.visualization.live import LiveView
+
+BENCHMARK_GAITS = 12
 
 BAD_INPUT, FAILED = 2, 1
 """Exit statuses: the input cannot be used; the simulation failed."""
@@ -63,10 +66,9 @@ def make_parser() -> argparse.ArgumentParser:
     add_figures(commands)
     add_analyse(commands)
     add_tables(commands)
-    add_bench(commands)
+    _add_benchmark(commands)
     _add_cpg(commands)
     _add_diagram(commands)
-    _add_work_precision(commands)
     return parser
 
 
@@ -319,35 +321,72 @@ def _diagram(options: argparse.Namespace) -> None:
     save_block_diagram(MakeTensegrityDiagram(scenario, seeded_gait(scenario)), options.out)
 
 
-def _add_work_precision(commands: argparse._SubParsersAction) -> None:
+def _add_benchmark(commands: argparse._SubParsersAction) -> None:
     command = commands.add_parser(
-        "work-precision",
-        help="measure what each integrator setting costs and how exact it is",
-        description="Simulates gaits with many integrator settings and prints, for each, the "
-        "distance error against a converged run, derivative evaluations and wall time.",
+        "benchmark",
+        help="measure speed and accuracy of the engines and their settings",
+        description="Simulates gaits on the engines with different settings and prints how many "
+        "times faster than real time each is, how far its distances are from converged ones, and "
+        "the compiled engine's cost per step by number of tetrahedra. Takes some minutes, the set "
+        "integrators longer. Times are meaningful on an idle machine only.",
+    )
+    command.add_argument(
+        "gaits", metavar="GAIT", type=Path, nargs="*", help="gait files (default: random gaits)"
+    )
+    command.add_argument(
+        "--gaits",
+        dest="number",
+        metavar="N",
+        type=arguments.count,
+        help=f"number of random gaits, of seeds 0, 1 ... (default: {BENCHMARK_GAITS})",
+    )
+    command.add_argument(
+        "--settings",
+        metavar="SET",
+        nargs="+",
+        choices=("default", "integrators", "compiled", "mujoco"),
+        default=["default"],
+        help="sets of settings: default (all engines), integrators (of the Drake diagram), "
+        "compiled, mujoco (default: default)",
+    )
+    command.add_argument(
+        "--sizes",
+        metavar="N",
+        nargs="*",
+        type=arguments.count,
+        help="numbers of tetrahedra to measure the cost per step for (default: 5 10 20 40 with "
+        "the default settings, else none)",
     )
     arguments.add_scenario(command)
-    arguments.add_engine(command)
-    command.add_argument(
-        "gaits", metavar="GAIT", type=Path, nargs="+", help="gait files; at least six say something"
-    )
-    command.add_argument(
-        "--workers",
-        type=arguments.count,
-        default=1,
-        help="processes; 1 for times that mean something",
-    )
-    command.set_defaults(run=_work_precision)
+    command.add_argument("--json", metavar="FILE", type=Path, help="also write a JSON file")
+    command.set_defaults(run=_benchmark)
 
 
-def _work_precision(options: argparse.Namespace) -> None:
-    from tetra_drake.benchmark.work_precision import HEADER, format_row, measure
+def _benchmark(options: argparse.Namespace) -> None:
+    scenario = load_scenario(options.scenario)
+    if options.gaits and options.number is not None:
+        raise InputError("--gaits", "", "not allowed with gait files")
+    gaits = [load_gait(path, scenario) for path in options.gaits] or [
+        seeded_gait(scenario, seed) for seed in range(options.number or BENCHMARK_GAITS)
+    ]
+    with contextlib.ExitStack() as stack:
+        # Opened first: a path that cannot be written is refused before minutes are spent.
+        file = stack.enter_context(whole_file(options.json)) if options.json else None
 
-    scenario = _scenario(options)
-    gaits = [load_gait(path, scenario) for path in options.gaits]
-    print(HEADER)
-    for row in measure(scenario, gaits, workers=options.workers):
-        print(format_row(row, scenario.simulation.duration), flush=True)
+        from tetra_drake.benchmark.measure import SIZES, measure
+        from tetra_drake.benchmark.tables import to_markdown
+
+        sizes = options.sizes
+        if sizes is None:
+            sizes = SIZES if options.settings == ["default"] else ()
+        found = measure(scenario, gaits, sets=options.settings, sizes=sizes, say=_say)
+        print(to_markdown(found))
+        if file is not None:
+            file.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _say(stage: str) -> None:
+    print(f"{stage} ...", file=sys.stderr, flush=True)
 
 
 def _add_gait(command: argparse.ArgumentParser) -> None:

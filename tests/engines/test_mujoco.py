@@ -1,160 +1,166 @@
-"""The robot in MuJoCo is ours: bodies, cables, actuation, weight; only the ground differs."""
+"""The engine `mujoco`: the same robot as on the other engines, on ground of its own."""
 
 from __future__ import annotations
 
 import json
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from tetra_drake.engines.mujoco import (
-    INSTALL,
-    control_signals,
-    installed,
-    make_mjcf,
-    mujoco_kept_quiet,
-    walk_in_mujoco,
-)
-from tetra_drake.physics.cable import PASSIVE, cable_forces
-from tetra_drake.robot.bodies import tetrahedron_inertia
+from tetra_drake.cli import main
+from tetra_drake.engines import mujoco as engine
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.signals import even_samples
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
-pytestmark = pytest.mark.skipif(not installed(), reason=f"needs MuJoCo: {INSTALL}")
-
-STEP = 0.25e-3  # s
+needs_mujoco = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
 
 
-def make_model(scenario: Scenario) -> tuple[Any, Any]:
-    """MuJoCo's model and data of the robot."""
-    import mujoco
-
-    model = mujoco.MjModel.from_xml_string(make_mjcf(scenario, integrator="Euler", step=STEP))
-    return model, mujoco.MjData(model)
-
-
-@pytest.fixture(params=[2, 5, 8])
-def robot(request: pytest.FixtureRequest, scenario: Scenario) -> Scenario:
-    """Robots of several sizes."""
-    scenario.robot.tetrahedra = request.param
-    return scenario
+@pytest.fixture
+def short(scenario: Scenario) -> Scenario:
+    """0.4 s on the engine `mujoco`, driven from between the samples at 0.10 and 0.11 s on."""
+    times = {"simulation.duration": 0.4, "simulation.steady_from": 0.2, "cpg.start_up": 0.105}
+    return scenario.with_changes({"simulation.engine": "mujoco", **times})
 
 
-def test_bodies_have_our_mass_and_inertia(robot: Scenario) -> None:
-    model, _ = make_model(robot)
-    inertia = tetrahedron_inertia(MakeStructure(robot.robot, robot.cables))
-    assert model.nbody == 1 + robot.robot.tetrahedra
-    np.testing.assert_allclose(model.body_mass[1:], inertia.get_mass(), rtol=1e-12)
-    moments = inertia.get_mass() * inertia.get_unit_inertia().get_moments()
-    for found in model.body_inertia[1:]:
-        np.testing.assert_allclose(found, moments, rtol=1e-12)
-    assert model.opt.gravity[2] == -robot.robot.gravity
+@needs_mujoco
+@pytest.mark.parametrize("tetrahedra", [2, 5, 8])
+def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(
+    short: Scenario, tetrahedra: int
+) -> None:
+    # Bodies, cables and motors are the same; only the ground differs. MuJoCo's error is of first
+    # order in the step, so that two steps give the limit.
+    floating = {"robot.tetrahedra": tetrahedra, "robot.gravity": 0.0}
+    floating |= {"robot.offsets": [[0.0, 0.0, 1.0]] * tetrahedra}
+    fine = {"compiled.tolerance": 1e-6, "compiled.max_step": 0.5e-3, "compiled.look_ahead": 1e-6}
+    engines = (
+        {"simulation.engine": "compiled", **fine},
+        {"mujoco.step": 4e-5},
+        {"mujoco.step": 2e-5},
+    )
+    scenarios = [short.with_changes(floating | changes) for changes in engines]
+    gait = seeded_gait(scenarios[0])
+    ours, coarse, halved = (
+        simulate(scenario=scenario, gait=gait, record=True).trajectory for scenario in scenarios
+    )
+    assert ours is not None and coarse is not None and halved is not None
+    limit = 2.0 * halved - coarse
+    assert np.ptp(ours["q_WB"].sel(quaternion="y").values) > 0.01
+    tolerances = {"p_WN": 2e-5, "v_WN": 2e-4, "p_WB": 2e-5, "q_WB": 1e-4}
+    tolerances |= {"length": 1e-6, "tension": 1e-3, "signal": 1e-9}
+    for name in ours:
+        difference = float(abs(limit[name] - ours[name]).max())
+        assert difference <= tolerances.get(name, 0.0), name
 
 
-def test_cables_are_as_long_as_ours_at_the_start(robot: Scenario) -> None:
-    import mujoco
-
-    model, data = make_model(robot)
-    mujoco.mj_forward(model, data)
-    structure = MakeStructure(robot.robot, robot.cables)
-    p_WN = (structure.p_WB[:, None] + structure.p_BN).reshape(-1, 3)
-    way = p_WN[structure.cables["node_b"]] - p_WN[structure.cables["node_a"]]
-    np.testing.assert_allclose(data.ten_length, np.linalg.norm(way, axis=1), rtol=1e-12)
-
-
-def test_cables_and_motors_pull_as_ours_do_on_bodies_that_move(robot: Scenario) -> None:
-    import mujoco
-
-    model, data = make_model(robot)
-    structure = MakeStructure(robot.robot, robot.cables)
-    bodies = len(structure.bodies)
-    generator = np.random.default_rng(0)
-    state = structure.initial_state
-    p_WB = state[: 7 * bodies].reshape(bodies, 7)[:, 4:]
-    p_WB += generator.normal(scale=0.01, size=p_WB.shape)
-    v_WB = generator.normal(scale=0.1, size=(bodies, 6))  # ours: angular, linear
-    state[7 * bodies :] = v_WB.ravel()
-    signals = generator.normal(size=structure.signals)
-
-    force = np.zeros(6 * bodies)
-    tensions, lengths = np.empty((2, len(structure.cables)))
-    cable_forces(state, signals, structure.p_BN, structure.cables, False, force, tensions, lengths)
-    data.qpos[:] = np.column_stack([p_WB, np.tile([1.0, 0.0, 0.0, 0.0], (bodies, 1))]).ravel()
-    data.qvel[:] = v_WB[:, [3, 4, 5, 0, 1, 2]].ravel()
-    driven = structure.cables["signal"]
-    data.ctrl[:] = signals[driven[driven != PASSIVE]]
-    mujoco.mj_forward(model, data)
-    found = (data.qfrc_passive + data.qfrc_actuator).reshape(bodies, 6)[:, [3, 4, 5, 0, 1, 2]]
-    np.testing.assert_allclose(found, force.reshape(bodies, 6), rtol=1e-9, atol=1e-10)
-
-
-def test_motors_get_the_signals_of_their_cables_after_the_start_up(scenario: Scenario) -> None:
-    gait, step = seeded_gait(scenario), scenario.cpg.listing_step
-    control = control_signals(scenario, gait, step=step, steps=5000)
-    samples = even_samples(scenario, gait)[:5000]
-    active = np.arange(5000) * step >= scenario.cpg.start_up - 1e-9
-    assert not control[~active].any()
-    # The two bottom outer cables of each junction have the same signal.
-    for motor in range(8):
-        np.testing.assert_allclose(
-            control[active, motor], samples[active, motor // 2], rtol=1e-9, atol=1e-12
-        )
-
-
-def test_at_rest_the_ground_bears_the_weight_and_the_pose_is_ours(
+@needs_mujoco
+def test_at_rest_the_ground_bears_the_weight_and_the_pose_is_that_of_the_other_engines(
     scenario: Scenario, data: Path
 ) -> None:
-    import mujoco
-
-    model, mujoco_data = make_model(scenario)
-    for _ in range(round(1.2 / STEP)):
-        mujoco.mj_step(model, mujoco_data)
-    borne, wrench = 0.0, np.zeros(6)
-    for i in range(mujoco_data.ncon):
-        mujoco.mj_contactForce(model, mujoco_data, i, wrench)
-        borne += wrench[0]
-        # Our spring: normal force = stiffness x depth.
-        depth = -mujoco_data.contact[i].dist
-        assert wrench[0] == pytest.approx(scenario.ground.stiffness * depth, rel=1e-2)
+    times = {"simulation.duration": 1.2, "simulation.steady_from": 1.0}
+    scenario = scenario.with_changes({"simulation.engine": "mujoco", **times})
+    trajectory = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
+    assert trajectory is not None
+    end = trajectory.isel(time=-1)
     settled = json.loads((data / "expected.json").read_text())["settled"]
+    borne = float(end["normal_force"].sum())
     assert borne / POUND_FORCE == pytest.approx(settled["normal_sum_lbf"], rel=1e-3)
-    spacing = np.diff(mujoco_data.xpos[1:, 0]) / INCH
+    # Forces are on the nodes that are in the ground, by their depth.
+    depth = -end["p_WN"].sel(axis="z").values.ravel()
+    contacts = MakeStructure(scenario.robot, scenario.cables).contacts
+    expected = scenario.ground.stiffness * np.maximum(depth[contacts], 0.0)
+    np.testing.assert_allclose(end["normal_force"], expected, atol=0.02 * expected.max())
+    np.testing.assert_array_equal(end["in_contact"], end["normal_force"] > 0.0)
+    assert not end["friction_mode"].any()
+    spacing = np.diff(end["p_WB"].sel(axis="x")) / INCH
     np.testing.assert_allclose(spacing, settled["spacing_in"], atol=0.05)
-    tip = mujoco_data.site_xpos[-1, 2] / INCH
+    tip = float(end["p_WN"].sel(tetrahedron="T5", node="tip", axis="z")) / INCH
     assert tip == pytest.approx(settled["tip5_height_in"], abs=0.05)
 
 
-def test_the_same_gait_goes_equally_far_in_any_thread(scenario: Scenario) -> None:
-    scenario.simulation.duration, scenario.cpg.start_up = 0.4, 0.1
-    gait = seeded_gait(scenario)
-    walk = partial(walk_in_mujoco, scenario=scenario, integrator="implicitfast", step=STEP)
-    alone = walk(gait)
+@needs_mujoco
+def test_friction_opposes_motion_within_the_cone(short: Scenario) -> None:
+    short.simulation.duration = 1.0
+    trajectory = simulate(scenario=short, gait=seeded_gait(short), record=True).trajectory
+    assert trajectory is not None
+    friction = np.linalg.norm(trajectory["friction_force"], axis=2)
+    normal = trajectory["normal_force"].values
+    assert (friction <= short.mujoco.friction * normal + 1e-6).all()
+    names = np.array(MakeStructure(short.robot, short.cables).node_names)
+    node = [names.tolist().index(name) for name in trajectory["contact"].values]
+    velocity = trajectory["v_WN"].values.reshape(len(trajectory["time"]), -1, 3)[:, node, :2]
+    power = (trajectory["friction_force"].values * velocity).sum(axis=2)
+    assert power.sum() < 0.0 and power.max() < 1e-2 * -power.min()
+
+
+@needs_mujoco
+def test_a_gait_gives_the_same_numbers_recorded_or_not_in_any_thread(short: Scenario) -> None:
+    gait = seeded_gait(short)
+    alone = simulate(scenario=short, gait=gait)
+    assert alone.engine == "mujoco" and alone.trajectory is None
+    assert (alone.integrator.scheme, alone.integrator.steps) == ("implicitfast", 3200)
     with ThreadPoolExecutor(2) as threads:
-        assert list(threads.map(walk, [gait] * 3)) == [alone] * 3
-    finer = walk_in_mujoco(gait, scenario=scenario, integrator="Euler", step=0.5 * STEP)
-    assert alone == pytest.approx(finer, abs=0.02)
+        for other in threads.map(
+            lambda record: simulate(scenario=short, gait=gait, record=record), [False, True, True]
+        ):
+            assert (other.metrics, other.fitness) == (alone.metrics, alone.fitness)
+    for integrator in ("Euler", "discrete"):
+        finer = short.with_changes({"mujoco.integrator": integrator, "mujoco.step": 0.0625e-3})
+        distance = simulate(scenario=finer, gait=gait).metrics.distance_in
+        assert distance == pytest.approx(alone.metrics.distance_in, abs=0.02)
 
 
-def test_a_robot_that_is_thrown_about_has_no_distance(scenario: Scenario) -> None:
-    # In steps of 4 ms it jumps for ever, but nothing overflows.
-    gait = seeded_gait(scenario, 0)
-    assert np.isnan(walk_in_mujoco(gait, scenario=scenario, integrator="implicitfast", step=4e-3))
-
-
-def test_what_is_unstable_has_no_distance_and_leaves_no_log(
-    scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@needs_mujoco
+@pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
+def test_too_long_a_step_diverges_without_a_log_file(
+    short: Scenario, integrator: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # With implicitfast the robot jumps for ever, but nothing overflows; Euler's state does.
     monkeypatch.chdir(tmp_path)
-    with mujoco_kept_quiet():
-        distance = walk_in_mujoco(
-            seeded_gait(scenario), scenario=scenario, integrator="Euler", step=4e-3
-        )
-    assert np.isnan(distance)
+    steps = {"mujoco.integrator": integrator, "mujoco.step": 4e-3}
+    unstable = short.with_changes({"simulation.duration": 3.0, **steps})
+    with pytest.raises(Diverged) as caught:
+        simulate(scenario=unstable, gait=seeded_gait(unstable, 0))
+    assert 0.0 < caught.value.time <= 3.0
     assert list(tmp_path.iterdir()) == []
+
+
+@needs_mujoco
+def test_steps_count_against_the_budget_of_evaluations(short: Scenario) -> None:
+    gait, steps = seeded_gait(short), 3200
+    allowed = short.with_changes({"simulation.max_evaluations": steps})
+    assert simulate(scenario=allowed, gait=gait).integrator.derivative_evaluations == steps
+    short.simulation.max_evaluations = steps - 1
+    with pytest.raises(StepBudgetExceeded):
+        simulate(scenario=short, gait=gait)
+
+
+def test_a_scenario_that_mujoco_cannot_simulate_is_refused(
+    short: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(engine, "installed", lambda: True)
+    slack = short.with_changes({"cables.slack": True})
+    with pytest.raises(InputError) as caught:
+        simulate(scenario=slack, gait=seeded_gait(slack))
+    assert caught.value.key == "cables.slack"
+    monkeypatch.setattr(engine, "installed", lambda: False)
+    with pytest.raises(InputError) as caught:
+        simulate(scenario=short, gait=seeded_gait(short))
+    assert caught.value.key == "simulation.engine" and engine.INSTALL in caught.value.problem
+
+
+@needs_mujoco
+def test_the_command_simulate_takes_the_engine(tmp_path: Path) -> None:
+    text = "{base: thesis, name: x, simulation: {duration: 0.3 s, steady_from: 0.1 s}}"
+    (tmp_path / "x.yaml").write_text(text)
+    out = tmp_path / "out"
+    options = ["--scenario", str(tmp_path / "x.yaml"), "--engine", "mujoco", "--out", str(out)]
+    assert main(["simulate", *options]) == 0
+    found = json.loads((out / "result.json").read_text())
+    assert (found["engine"], found["integrator"]["scheme"]) == ("mujoco", "implicitfast")
+    assert {"trajectory.nc", "replay.html"} <= {path.name for path in out.iterdir()}

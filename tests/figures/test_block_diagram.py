@@ -37,12 +37,8 @@ def test_blocks_show_class_name_and_ports_in_use(robot: Diagram) -> None:
     assert re.findall(r"<u\d+> (\w+)", label(source, "diagram outputs")) == exported
 
 
-def test_there_is_an_edge_per_connection_and_exported_port(
-    robot: Diagram, scenario: Scenario
-) -> None:
-    source = graphviz_source(robot)
-    assert source == graphviz_source(MakeTensegrityDiagram(scenario, seeded_gait(scenario)))
-    edges = [line for line in source.splitlines() if "->" in line]
+def test_there_is_an_edge_per_connection_and_exported_port(robot: Diagram) -> None:
+    edges = [line for line in graphviz_source(robot).splitlines() if "->" in line]
     assert len(edges) == len(robot.connection_map()) + robot.num_output_ports()
     assert '"cables":y0:e -> "forces":u0:w' in edges
     assert '"ground":y3:e -> "diagram outputs":u6:w' in edges

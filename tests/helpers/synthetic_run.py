@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +24,7 @@ PER_DISTANCE = 2.0
 
 def tiny_scenario(*, trials: int = 1, name: str = "tiny") -> Scenario:
     """A robot of three tetrahedra that walks for a moment."""
-    scenario = copy.deepcopy(load_scenario("thesis"))
+    scenario = load_scenario("thesis")
     scenario.name = name
     scenario.robot.tetrahedra = 3
     scenario.simulation.duration = 0.3

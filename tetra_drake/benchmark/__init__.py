@@ -1,1 +1,1 @@
-"""What each way of simulating the robot costs and how exact it is, in one table."""
+"""Benchmark of the engines and their settings: speed, accuracy, and cost by size of the robot."""

@@ -1,38 +1,43 @@
-"""The same robot in MuJoCo (https://mujoco.org), as one of its users would model it.
+"""The engine `mujoco`: the same robot in MuJoCo (https://mujoco.org), as its users would model it.
 
-Bodies, cables, actuation and gravity are ours, save that cables never go slack. The ground is
-MuJoCo's soft contact with a cone of friction, calibrated as closely as that allows:
+Bodies, cables, actuation and gravity are those of the other engines. The ground is MuJoCo's soft
+contact with a cone of friction, calibrated as closely as that allows:
 
-- The normal force has our stiffness, but a constant damping: ours at the depth of rest. Our
-  damping grows with depth, from none at the surface.
-- A node that sticks is held by our viscous stiction damping, but breaks free where that exceeds
-  a coefficient of friction times the normal force; ours breaks free after a way, the stiction
-  range, whatever the normal force, and then slides almost freely.
+- The normal force has the scenario's stiffness, but a constant damping: the scenario's at the
+  depth of rest. The ground law's own damping grows with depth, from none at the surface.
+- A node that sticks is held by the scenario's stiction damping, but breaks free where that exceeds
+  `mujoco.friction` times the normal force. In the thesis's law it breaks free after a deflection,
+  the stiction range, whatever the normal force, and then slides almost freely.
 """
 
 from __future__ import annotations
 
-import contextlib
-import math
-from collections.abc import Iterator
+import functools
+import importlib
+import time
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.robot.bodies import tetrahedron_inertia
+from tetra_drake.engines.viewer import Viewer, show_recording
+from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
+from tetra_drake.physics.cable import PASSIVE, cable_forces
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
+from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.structure import BOTTOM_LEFT, MakeStructure, Structure
+from tetra_drake.robot.model import Model, make_model
+from tetra_drake.robot.signals import signals_at
+from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import INCH
+
+if TYPE_CHECKING:
+    import xarray
+
+Array = np.ndarray
 
 INSTALL = 'pip install "mujoco>=3.13"'
 """The first version with the integrator `discrete`."""
-
-FRICTION = 0.5
-"""The coefficient of friction, as of metal on a floor. To calibrate it makes no sense: with
-0.03, 0.1, 0.2, 0.35, 0.5, 1 and 2, random gaits end 2.4 to 3.7 in (median) from where ours do."""
 
 _IMPEDANCE = 0.5
 """Of contacts. Nothing at rest depends on it, nor do converged distances by more than 0.01 in;
@@ -42,81 +47,222 @@ _POINT = 1e-5
 """Radius (m) of the spheres that touch the floor: the ground acts on the centre of a node."""
 
 _MAX_SPEED = 1.0
-"""Of a body (m/s); who is faster has been thrown about by an unstable step. In a walking robot
-it is below 0.2 m/s."""
+"""Of a body (m/s), where the scenario allows more: too long a step throws a robot about for ever,
+far forward at times. In a walking robot it is below 0.2 m/s."""
 
-_STRETCH = 1.0
-"""Simulated time (s) between two looks at whether a simulation is still stable."""
+_STRETCH = 5000
+"""Steps between two checks of whether a simulation is still stable."""
+
+
+def simulate_mujoco(
+    *, scenario: Scenario, gait: Gait, record: bool = False, viewer: Viewer | None = None
+) -> SimulationResult:
+    """Simulates a gait as simulate() does, in MuJoCo, in steps of `scenario.mujoco.step`.
+
+    Instants asked for, as of samples, are those of the nearest steps. Other threads run meanwhile.
+    The viewer is shown the recording.
+
+    Raises Diverged or StepBudgetExceeded; InputError if MuJoCo is missing or cannot do it.
+    """
+    check_mujoco(scenario)
+    settings, simulation = scenario.mujoco, scenario.simulation
+    steps = max(1, round(simulation.duration / settings.step))
+    if steps > simulation.max_evaluations:
+        reason = f"{steps} steps exceed the budget of {simulation.max_evaluations} evaluations"
+        raise StepBudgetExceeded(time=0.0, reason=reason)
+
+    times = sample_times(simulation.duration, simulation.sample_period)
+    times = times if record or viewer is not None else times[:0]
+    instants = np.array([0.0, simulation.steady_from, simulation.duration, *times])
+    robot = _Robot(scenario, gait, steps=steps)
+    started = time.perf_counter()
+    found = robot.walk(np.rint(instants / settings.step).astype(int))
+    wall_time = time.perf_counter() - started
+
+    trajectory = robot.dataset(times, found[3:]) if times.size else None
+    if viewer is not None and trajectory is not None:
+        show_recording(viewer, trajectory)
+    return make_result(
+        scenario,
+        robot.structure,
+        positions=[node_positions(robot.structure, state) for state in robot.states(found[:3])],
+        wall_time=wall_time,
+        integrator=IntegratorWork(
+            scheme=settings.integrator,
+            accuracy=settings.step,
+            steps=steps,
+            derivative_evaluations=steps,
+            jacobian_evaluations=0,
+        ),
+        trajectory=trajectory if record else None,
+    )
 
 
 def installed() -> bool:
-    """Whether there is a MuJoCo that has the integrators that are measured."""
+    """Whether there is a MuJoCo that has all integrators of the scenario's choice."""
     try:
-        import mujoco.rollout
+        mujoco = importlib.import_module("mujoco")
+        importlib.import_module("mujoco.rollout")
     except ImportError:
         return False
     return hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE")
 
 
-def make_mjcf(scenario: Scenario, *, integrator: str, step: float) -> str:
-    """The robot of a scenario in MuJoCo's format, with one motor a driven cable.
-
-    `integrator` by MuJoCo's name of it, `step` in s.
-    """
-    structure = MakeStructure(scenario.robot, scenario.cables)
+def make_mjcf(scenario: Scenario) -> str:
+    """The robot in MuJoCo's format, with one motor per driven cable."""
     model = ElementTree.Element("mujoco", model=scenario.name)
+    structure, settings = MakeStructure(scenario.robot, scenario.cables), scenario.mujoco
+    robot = make_model(scenario, structure)
     _add(model, "compiler", inertiafromgeom="false")
-    _add(
-        model,
-        "option",
-        integrator=integrator,
-        timestep=_text(step),
-        gravity=_text(0.0, 0.0, -scenario.robot.gravity),
-        cone="elliptic",
-    )
-    _add_bodies(model, scenario, structure)
+    options = {"integrator": settings.integrator, "timestep": settings.step, "cone": "elliptic"}
+    _add(model, "option", gravity=[0.0, 0.0, -robot.gravity], **options)
+    _add_bodies(model, structure, robot, _contact(scenario, structure, robot))
     _add_cables(model, structure)
     return ElementTree.tostring(model, encoding="unicode")
 
 
-def _add_bodies(model: ElementTree.Element, scenario: Scenario, structure: Structure) -> None:
+class _Robot:
+    """MuJoCo's model of the robot, driven by the signals of one gait."""
+
+    def __init__(self, scenario: Scenario, gait: Gait, *, steps: int) -> None:
+        import mujoco
+
+        if mujoco.get_mju_user_warning() is None:
+            # MuJoCo would print that a simulation is unstable, and append it to a file in the
+            # working folder. Not set back: other threads may be simulating.
+            mujoco.set_mju_user_warning(lambda message: None)
+        self._mujoco: Any = mujoco
+        self.structure = MakeStructure(scenario.robot, scenario.cables)
+        self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario))
+        self._data = mujoco.MjData(self._model)
+        self._max_speed = min(scenario.simulation.max_speed, _MAX_SPEED)
+        driven = self.structure.cables["signal"]
+        self._motors = driven[driven != PASSIVE]  # the signal of each motor
+        starts = scenario.mujoco.step * np.arange(steps)
+        self._control = signals_at(scenario, gait, starts)[:, self._motors]
+        self._signals = functools.partial(signals_at, scenario, gait)
+
+    def walk(self, wanted: Array) -> Array:
+        """Simulates all steps; MuJoCo's states (time, qpos, qvel) after each of the `wanted`."""
+        from mujoco.rollout import Rollout
+
+        kind = self._mujoco.mjtState.mjSTATE_FULLPHYSICS
+        state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
+        self._mujoco.mj_getState(self._model, self._data, state, kind)
+        found = np.tile(state, (len(wanted), 1))
+        with Rollout(nthread=0) as rollout:
+            for first in range(0, len(self._control), _STRETCH):
+                control = self._control[None, first : first + _STRETCH]
+                (states,), _ = rollout.rollout(self._model, self._data, state[None], control)
+                self._check_stability(states)
+                state = states[-1]
+                here = (first < wanted) & (wanted <= first + len(states))
+                found[here] = states[wanted[here] - first - 1]
+        return found
+
+    def _check_stability(self, states: Array) -> None:
+        v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
+        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
+        if fast.any():
+            reason = f"a body's velocity exceeds the limit of {self._max_speed:g} m/s"
+            raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
+        if any(warning.number for warning in self._data.warning):
+            raise Diverged(time=float(states[-1, 0]), reason="MuJoCo warns of instability")
+
+    def states(self, found: Array) -> Array:
+        """[q; v] (rows, 13 bodies) of MuJoCo's states, where w is given in the body's frame."""
+        rows, nq = len(found), 1 + self._model.nq
+        pose, velocity = found[:, 1:nq].reshape(rows, -1, 7), found[:, nq:].reshape(rows, -1, 6)
+        scalar, vector, w_WB_B = pose[..., 3:4], pose[..., 4:], velocity[..., 3:]
+        turn = 2.0 * np.cross(vector, w_WB_B)
+        w_WB = w_WB_B + scalar * turn + np.cross(vector, turn)
+        q = np.concatenate([pose[..., 3:], pose[..., :3]], axis=2)
+        v = np.concatenate([w_WB, velocity[..., :3]], axis=2)
+        return np.hstack([q.reshape(rows, -1), v.reshape(rows, -1)])
+
+    def dataset(self, times: Array, found: Array) -> xarray.Dataset:
+        """The trajectory: MuJoCo's states at `times` (s), and the forces there."""
+        structure, rows = self.structure, len(times)
+        states, signals = self.states(found), self._signals(times)
+        force = np.empty(6 * len(structure.bodies))
+        tensions, lengths = np.empty((2, rows, len(structure.cables)))
+        ground = np.empty((rows, len(structure.contacts), 3))
+        laws = structure.p_BN, structure.cables, False
+        for i in range(rows):
+            cable_forces(states[i], signals[i], *laws, force, tensions[i], lengths[i])
+            ground[i] = self._ground_forces(found[i], signals[i])
+        modes = np.zeros_like(ground)  # of friction: 0, as MuJoCo's has none
+        modes[:, :, 0] = ground[:, :, 2] > 0.0
+        return assemble_dataset(
+            structure,
+            times=times,
+            states=states,
+            signals=signals,
+            tensions=tensions,
+            lengths=lengths,
+            normal_forces=ground[:, :, 2],
+            friction_forces=ground[:, :, :2],
+            modes=modes,
+        )
+
+    def _ground_forces(self, found: Array, signals: Array) -> Array:
+        """(contacts, 3): MuJoCo's contact forces on the nodes in World, in N."""
+        mujoco, model, data = self._mujoco, self._model, self._data
+        mujoco.mj_setState(model, data, found, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        data.ctrl[:] = signals[self._motors]
+        mujoco.mj_forward(model, data)
+        forces, wrench = np.zeros((len(self.structure.contacts), 3)), np.zeros(6)
+        for i, contact in enumerate(data.contact):
+            mujoco.mj_contactForce(model, data, i, wrench)
+            # The floor is geom 0; those of the contact nodes follow in their order.
+            forces[contact.geom[1] - 1] += contact.frame.reshape(3, 3).T @ wrench[:3]
+        return forces
+
+
+def check_mujoco(scenario: Scenario) -> None:
+    """Raises InputError if MuJoCo cannot simulate the scenario."""
+    if not installed():
+        raise InputError(scenario.name, "simulation.engine", f"mujoco is not installed: {INSTALL}")
+    if scenario.cables.slack:
+        problem = "found true, expected false: cables cannot go slack on the engine mujoco"
+        raise InputError(scenario.name, "cables.slack", problem)
+
+
+def _add_bodies(
+    model: ElementTree.Element, structure: Structure, robot: Model, contact: dict[str, Any]
+) -> None:
     """The tetrahedra, with a site at each node, and the floor, which only contact nodes touch."""
-    inertia = tetrahedron_inertia(structure)
-    mass = inertia.get_mass()
-    moments = mass * inertia.get_unit_inertia().get_moments()
-    contact = _contact(scenario, structure, mass=mass)
     world, pairs = _add(model, "worldbody"), _add(model, "contact")
     alone = {"contype": "0", "conaffinity": "0"}  # only the pairs touch each other
-    place = {"pos": _text(0.0, 0.0, -_POINT), "size": "0 0 1"}
-    _add(world, "geom", name="floor", type="plane", **place, **alone)
+    _add(world, "geom", name="floor", type="plane", pos=[0, 0, -_POINT], size="0 0 1", **alone)
     names = iter(enumerate(structure.node_names))
     for body_name, p_WB in zip(structure.bodies, structure.p_WB, strict=True):
-        body = _add(world, "body", name=body_name, pos=_text(*p_WB))
+        body = _add(world, "body", name=body_name, pos=p_WB)
         _add(body, "freejoint")
-        _add(body, "inertial", pos="0 0 0", mass=_text(mass), diaginertia=_text(*moments))
+        _add(body, "inertial", pos="0 0 0", mass=robot.mass, diaginertia=3 * [robot.moment])
         for p_BN in structure.p_BN:
             node, name = next(names)
-            place = {"name": name, "pos": _text(*p_BN), "size": _text(_POINT)}
-            _add(body, "site", **place)
+            _add(body, "site", name=name, pos=p_BN)
             if node in structure.contacts:
-                _add(body, "geom", **place, **alone)
+                _add(body, "geom", name=name, pos=p_BN, size=_POINT, **alone)
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
 
 
-def _contact(scenario: Scenario, structure: Structure, *, mass: float) -> dict[str, str]:
-    """How the floor acts on a node of a body of `mass` (kg)."""
-    ground = scenario.ground
-    weight = mass * len(structure.bodies) * scenario.robot.gravity
+def _contact(scenario: Scenario, structure: Structure, robot: Model) -> dict[str, Any]:
+    """How the floor acts on a node."""
+    ground, friction = scenario.ground, scenario.mujoco.friction
+    weight = robot.mass * len(structure.bodies) * robot.gravity
     rest_damping = ground.damping * weight / len(structure.contacts) / ground.stiffness
-    # MuJoCo wants accelerations for forces, and divides them by 1 - impedance.
-    per_mass = (1.0 - _IMPEDANCE) / mass
-    stiffness = -ground.stiffness * per_mass  # the signs tell it what kind of numbers these are
+    # MuJoCo takes accelerations for forces, and divides them by 1 - impedance. The minus says
+    # that the numbers are stiffness and damping.
+    per_mass = -(1.0 - _IMPEDANCE) / robot.mass
+    stiffness = ground.stiffness * per_mass
     return {
         "condim": "3",
-        "friction": _text(FRICTION, FRICTION, 0.0, 0.0, 0.0),
-        "solref": _text(stiffness, -rest_damping * per_mass),
-        "solreffriction": _text(stiffness, -scenario.friction.stiction_damping * per_mass),
-        "solimp": _text(_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 1.0),
+        "friction": [friction, friction, 0, 0, 0],
+        "solref": [stiffness, rest_damping * per_mass],
+        "solreffriction": [stiffness, scenario.friction.stiction_damping * per_mass],
+        "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
     }
 
 
@@ -124,81 +270,18 @@ def _add_cables(model: ElementTree.Element, structure: Structure) -> None:
     """A tendon for each cable, and a motor for each that is driven."""
     tendons, actuators = _add(model, "tendon"), _add(model, "actuator")
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
-        tendon = _add(
-            tendons,
-            "spatial",
-            name=name,
-            stiffness=_text(cable["stiffness"]),
-            damping=_text(cable["damping"]),
-            springlength=_text(cable["free_length"]),
-        )
+        law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
+        tendon = _add(tendons, "spatial", name=name, springlength=cable["free_length"], **law)
         for node in (cable["node_a"], cable["node_b"]):
             _add(tendon, "site", site=structure.node_names[node])
         if cable["signal"] != PASSIVE:  # a motor's force lengthens its tendon, ours shortens it
             _add(actuators, "motor", name=name, tendon=name, gear="-1")
 
 
-def walk_in_mujoco(gait: Gait, *, scenario: Scenario, integrator: str, step: float) -> float:
-    """How far (in) a gait goes in MuJoCo, in steps of `step` (s); NaN if that is unstable.
-
-    `integrator` by MuJoCo's name of it. Other threads run meanwhile.
-    """
-    import mujoco
-    from mujoco.rollout import Rollout
-
-    mjcf = make_mjcf(scenario, integrator=integrator, step=step)
-    model = mujoco.MjModel.from_xml_string(mjcf)
-    data = mujoco.MjData(model)
-    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS  # time, positions, velocities
-    state = np.empty(mujoco.mj_stateSize(model, kind))
-    mujoco.mj_getState(model, data, state, kind)
-    mujoco.mj_kinematics(model, data)
-    start = data.site_xpos[BOTTOM_LEFT, 0]
-    steps = max(1, round(scenario.simulation.duration / step))
-    stretch = max(1, round(_STRETCH / step))
-    control = control_signals(scenario, gait, step=step, steps=steps)
-    with Rollout(nthread=0) as rollout:
-        for i in range(0, steps, stretch):
-            states, _ = rollout.rollout(model, data, state[None], control[None, i : i + stretch])
-            state = states[0, -1]
-            v_WB = states[0, :, 1 + model.nq :].reshape(-1, model.nbody - 1, 6)[:, :, :3]
-            warned = any(warning.number for warning in data.warning)
-            if warned or not np.abs(v_WB).max() <= _MAX_SPEED:
-                return math.nan
-    mujoco.mj_setState(model, data, state, kind)
-    mujoco.mj_kinematics(model, data)
-    return float(data.site_xpos[BOTTOM_LEFT, 0] - start) / INCH
-
-
-def control_signals(scenario: Scenario, gait: Gait, *, step: float, steps: int) -> np.ndarray:
-    """(steps, driven cables): the motors' forces in N at the start of each step."""
-    structure = MakeStructure(scenario.robot, scenario.cables)
-    samples = signal_samples(scenario, gait)
-    times = step * np.arange(steps)
-    grid = scenario.cpg.listing_step * np.arange(len(samples))
-    signals = np.column_stack([np.interp(times, grid, column) for column in samples.T])
-    signals[times < scenario.cpg.start_up - 0.5 * step] = 0.0
-    driven = structure.cables["signal"]
-    return signals[:, driven[driven != PASSIVE]]
-
-
-@contextlib.contextmanager
-def mujoco_kept_quiet() -> Iterator[None]:
-    """Keeps MuJoCo from printing that a simulation is unstable, and from writing that to a log
-    in the current folder."""
-    import mujoco
-
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
-
-
-def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
-    return ElementTree.SubElement(parent, tag, attributes)
-
-
-def _text(*numbers: float) -> str:
-    return " ".join(repr(float(number)) for number in numbers)
+def _add(parent: ElementTree.Element, tag: str, **attributes: Any) -> ElementTree.Element:
+    """A new element; its attributes are text, numbers or arrays of numbers."""
+    text = {
+        name: value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))
+        for name, value in attributes.items()
+    }
+    return ElementTree.SubElement(parent, tag, text)

@@ -23,6 +23,10 @@ def simulate(
         from tetra_drake.engines.compiled.engine import simulate_compiled
 
         return simulate_compiled(scenario=scenario, gait=gait, record=record, viewer=viewer)
+    if scenario.simulation.engine == "mujoco":
+        from tetra_drake.engines.mujoco import simulate_mujoco
+
+        return simulate_mujoco(scenario=scenario, gait=gait, record=record, viewer=viewer)
     from tetra_drake.engines.drake import simulate_drake
 
     return simulate_drake(scenario=scenario, gait=gait, record=record, viewer=viewer)

@@ -33,6 +33,7 @@ class IntegratorWork:
 
     scheme: str
     accuracy: float
+    """Drake's target accuracy, the compiled engine's tolerance (m/s), or MuJoCo's step (s)."""
     steps: int
     derivative_evaluations: int
     jacobian_evaluations: int
@@ -51,7 +52,7 @@ class SimulationResult:
     """Time from the start of the integration to its end, in s; building is not in it."""
     integrator: IntegratorWork
     engine: str
-    """Of the scenario: "drake" or "compiled"."""
+    """That of the scenario."""
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
     """See trajectory.make_dataset; None unless asked for."""
 
@@ -83,9 +84,10 @@ def make_result(
     )
 
 
-def versions() -> dict[str, str]:
-    """What decides the last digits of a result."""
-    libraries = {name: metadata.version(name) for name in ("drake", "numpy", "numba")}
+def versions(engine: str = "") -> dict[str, str]:
+    """The versions on which the last digits of a result of an engine depend."""
+    names = ["drake", "numpy", "numba"] + (["mujoco"] if engine == "mujoco" else [])
+    libraries = {name: metadata.version(name) for name in names}
     return {"tetra_drake": __version__, "python": platform.python_version(), **libraries}
 
 
@@ -102,7 +104,7 @@ def result_to_json(scenario: Scenario, gait: Gait, result: SimulationResult) -> 
         "real_time_factor": result.duration / result.wall_time,
         "engine": result.engine,
         "integrator": dataclasses.asdict(result.integrator),
-        "versions": versions(),
+        "versions": versions(result.engine),
         "gait": gait.to_json(),
     }
 

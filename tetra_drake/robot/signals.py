@@ -53,6 +53,15 @@ def signal_samples(scenario: Scenario, gait: Gait) -> np.ndarray:
     return scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
 
 
+def signals_at(scenario: Scenario, gait: Gait, times: np.ndarray) -> np.ndarray:
+    """The signals (times, n) in N that cables are fed at `times` (s); zero before the start-up."""
+    samples = signal_samples(scenario, gait)
+    grid = scenario.cpg.listing_step * np.arange(len(samples))
+    signals = np.column_stack([np.interp(times, grid, column) for column in samples.T])
+    signals[times < scenario.cpg.start_up - 1e-9] = 0.0
+    return signals
+
+
 def save_signals(
     path: str | Path,
     scenario: Scenario,

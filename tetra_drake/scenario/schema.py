@@ -20,11 +20,12 @@ from tetra_drake.scenario.fields import (
     with_values,
 )
 
-ENGINES = ("drake", "compiled")
+ENGINES = ("drake", "compiled", "mujoco")
 SCHEMES = (
     *("radau3", "runge_kutta3", "runge_kutta2", "runge_kutta5", "bogacki_shampine3", "radau1"),
     *("implicit_euler", "velocity_implicit_euler", "explicit_euler", "semi_explicit_euler"),
 )
+MUJOCO_INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
 
 
 @dataclass
@@ -144,6 +145,15 @@ class CompiledScenario:
 
 
 @dataclass
+class MujocoScenario:
+    """How the engine `mujoco` simulates, and its friction, which is not that of Table 2."""
+
+    integrator: str = choice(*MUJOCO_INTEGRATORS, default="implicitfast")
+    step: float = quantity("s", above=0, default=0.125e-3)
+    friction: float = setting(above=0, default=0.5)  # coefficient, as of metal on a floor
+
+
+@dataclass
 class FitnessScenario:
     """The constants phi_1 to phi_4 of the fitness (Table 7, Eq. 10), for lengths in inches."""
 
@@ -213,6 +223,7 @@ class Scenario:
     gait_bounds: GaitBoundsScenario = field(default_factory=GaitBoundsScenario)
     simulation: SimulationScenario = field(default_factory=SimulationScenario)
     compiled: CompiledScenario = field(default_factory=CompiledScenario)
+    mujoco: MujocoScenario = field(default_factory=MujocoScenario)
     fitness: FitnessScenario = field(default_factory=FitnessScenario)
     evolution: EvolutionScenario = field(default_factory=EvolutionScenario)
     reference: ReferenceScenario | None = None

@@ -19,7 +19,7 @@ from tetra_drake.engines.compiled.walk import (
     Settings,
     walk,
 )
-from tetra_drake.engines.viewer import Viewer
+from tetra_drake.engines.viewer import Viewer, show_recording
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import cable_forces
 from tetra_drake.physics.contact import MODE_COLUMNS, STICK_POINT, ground_forces
@@ -81,9 +81,7 @@ def simulate_compiled(
     positions = {0.0: start, **dict(zip(prepared.marks, prepared.positions, strict=True))}
     trajectory = _dataset(structure, prepared) if record or viewer else None
     if viewer is not None and trajectory is not None:
-        for i, instant in enumerate(trajectory["time"].values):
-            if viewer.wants(instant):
-                viewer.show(trajectory.isel(time=[i]))
+        show_recording(viewer, trajectory)
     return make_result(
         scenario,
         structure,
