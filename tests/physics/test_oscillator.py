@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tetra_drake.physics.oscillator import (
+    Network,
     inhibition_matrix,
     listing_output,
     network_output,
@@ -33,18 +34,9 @@ def test_rates_are_those_of_equation_7() -> None:
     #   du_f = ( 0.2 - 1.5*0.4 - 2.5*0.3 + 0.5       )/0.25 = -2.6
     #   dv_e = (0.4 - 0.1)/0.5 = 0.6,  dv_f = (0 - 0.3)/0.5 = -0.6
     u_rate, v_rate = np.empty(2), np.empty(2)
-    neuron_rates(
-        np.array([0.4, -0.2]),
-        np.array([0.1, 0.3]),
-        np.array([0.05, 0.0]),
-        np.array([[0.0, 1.5], [1.5, 0.0]]),
-        0.25,
-        0.5,
-        2.5,
-        0.5,
-        u_rate,
-        v_rate,
-    )
+    network = Network(np.array([[0.0, 1.5], [1.5, 0.0]]), 0.25, 0.5, 2.5, 0.5)
+    u, v, feedback = np.array([0.4, -0.2]), np.array([0.1, 0.3]), np.array([0.05, 0.0])
+    neuron_rates(network, u, v, feedback, u_rate, v_rate)
     np.testing.assert_allclose(u_rate, [-0.4, -2.6], rtol=1e-14)
     np.testing.assert_allclose(v_rate, [0.6, -0.6], rtol=1e-14)
 
@@ -57,7 +49,8 @@ def test_the_network_rests_where_all_neurons_agree() -> None:
     inhibition = inhibition_matrix(np.full(24, weight), oscillators=4, partner_weight=1.5)
     u_rate, v_rate = np.empty(8), np.empty(8)
     u = np.full(8, r)
-    neuron_rates(u, u, np.zeros(8), inhibition, 0.3, 0.6, beta, u0, u_rate, v_rate)
+    network = Network(inhibition, 0.3, 0.6, beta, u0)
+    neuron_rates(network, u, u, np.zeros(8), u_rate, v_rate)
     np.testing.assert_allclose([u_rate, v_rate], 0.0, atol=1e-15)
 
 
@@ -73,12 +66,12 @@ def test_output_counts_only_firing_neurons() -> None:
 def test_integrators_have_their_order(integrate, first_row: int, order: int) -> None:
     # While both neurons of one oscillator fire, Eq. 7 is linear, without kinks. Halving the
     # step then divides the error by 2^order.
-    inhibition = np.array([[0.0, 0.4], [0.4, 0.0]])
+    network = Network(np.array([[0.0, 0.4], [0.4, 0.0]]), 0.3, 0.6, 2.5, 0.5)
 
     def output_at_the_end(steps: int) -> float:
         u, v = np.array([0.3, 0.25]), np.array([0.1, 0.12])
         output = np.empty((steps + 1 - first_row, 1))
-        integrate(u, v, inhibition, 0.3, 0.6, 2.5, 0.5, 0.2 / steps, output)
+        integrate(network, u, v, 0.2 / steps, output)
         return float(output[-1, 0])
 
     exact = output_at_the_end(4096)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from tetra_drake.physics.oscillator import inhibition_matrix, neuron_rates
+from tetra_drake.physics.oscillator import neuron_rates
 from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.model import make_network
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import MatsuokaCpg
 
@@ -55,20 +56,9 @@ def test_derivatives_are_the_laws(scenario: Scenario, gait: Gait) -> None:
     context = cpg.CreateDefaultContext()
     state = np.random.default_rng(5).normal(size=16)
     context.SetContinuousState(state)
-    inhibition = inhibition_matrix(np.array(gait.weights), oscillators=4, partner_weight=1.5)
     expected = np.empty(16)
-    neuron_rates(
-        state[:8],
-        state[8:],
-        np.zeros(8),
-        inhibition,
-        gait.tau_a,
-        gait.tau_b,
-        2.5,
-        0.5,
-        expected[:8],
-        expected[8:],
-    )
+    network = make_network(scenario.cpg, gait, oscillators=4)
+    neuron_rates(network, state[:8], state[8:], np.zeros(8), expected[:8], expected[8:])
     np.testing.assert_array_equal(cpg.EvalTimeDerivatives(context).CopyToVector(), expected)
 
 

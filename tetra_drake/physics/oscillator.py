@@ -3,11 +3,25 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
 
 Array = np.ndarray
+
+
+class Network(NamedTuple):
+    """The constants of a network of n oscillators."""
+
+    inhibition: Array
+    """(2n, 2n): see inhibition_matrix."""
+    tau_a: float
+    tau_b: float
+    """In s."""
+    self_inhibition_weight: float
+    external_input: float
 
 
 def inhibition_matrix(weights: Array, *, oscillators: int, partner_weight: float) -> Array:
@@ -30,29 +44,19 @@ def inhibition_matrix(weights: Array, *, oscillators: int, partner_weight: float
 
 @compiled
 def neuron_rates(
-    u: Array,
-    v: Array,
-    feedback: Array,
-    inhibition: Array,
-    tau_a: float,
-    tau_b: float,
-    self_inhibition_weight: float,
-    external_input: float,
-    u_rate: Array,
-    v_rate: Array,
+    network: Network, u: Array, v: Array, feedback: Array, u_rate: Array, v_rate: Array
 ) -> None:
     """Rates of the inner states u and the self-inhibitions v (Eq. 7; -u as in listing B.2).
 
-    All arrays (2n,) but `inhibition`, (2n, 2n); time constants in s; `u_rate` and
-    `v_rate` are written, in 1/s.
+    All arrays (2n,); `u_rate` and `v_rate` are written, in 1/s.
     """
     neurons = u.size
     for i in range(neurons):
-        total = external_input + feedback[i] - u[i] - self_inhibition_weight * v[i]
+        total = network.external_input + feedback[i] - u[i] - network.self_inhibition_weight * v[i]
         for j in range(neurons):
-            total -= inhibition[i, j] * max(0.0, u[j])
-        u_rate[i] = total / tau_a
-        v_rate[i] = (max(0.0, u[i]) - v[i]) / tau_b
+            total -= network.inhibition[i, j] * max(0.0, u[j])
+        u_rate[i] = total / network.tau_a
+        v_rate[i] = (max(0.0, u[i]) - v[i]) / network.tau_b
 
 
 @compiled
@@ -63,38 +67,15 @@ def oscillator_output(u: Array, output: Array) -> None:
 
 
 @compiled
-def listing_output(
-    u: Array,
-    v: Array,
-    inhibition: Array,
-    tau_a: float,
-    tau_b: float,
-    self_inhibition_weight: float,
-    external_input: float,
-    step: float,
-    output: Array,
-) -> None:
+def listing_output(network: Network, u: Array, v: Array, step: float, output: Array) -> None:
     """The outputs (steps, n) of the network stepped as listing B.1 steps it: forward Euler.
 
     Row i is the state after i + 1 steps of `step` (s); the listing stamps it with i steps.
     `u` and `v`, (2n,), hold the initial state and are overwritten with the last.
     """
-    u_rate = np.empty_like(u)
-    v_rate = np.empty_like(v)
-    feedback = np.zeros_like(u)
+    u_rate, v_rate, feedback = np.empty_like(u), np.empty_like(v), np.zeros_like(u)
     for i in range(output.shape[0]):
-        neuron_rates(
-            u,
-            v,
-            feedback,
-            inhibition,
-            tau_a,
-            tau_b,
-            self_inhibition_weight,
-            external_input,
-            u_rate,
-            v_rate,
-        )
+        neuron_rates(network, u, v, feedback, u_rate, v_rate)
         for k in range(u.size):
             u[k] += u_rate[k] * step
             v[k] += v_rate[k] * step
@@ -102,17 +83,7 @@ def listing_output(
 
 
 @compiled
-def network_output(
-    u: Array,
-    v: Array,
-    inhibition: Array,
-    tau_a: float,
-    tau_b: float,
-    self_inhibition_weight: float,
-    external_input: float,
-    step: float,
-    output: Array,
-) -> None:
+def network_output(network: Network, u: Array, v: Array, step: float, output: Array) -> None:
     """The outputs (steps, n) of the network by the classical Runge-Kutta method of order 4.
 
     Row i is the state after i steps of `step` (s). The other arguments are those of
@@ -128,18 +99,7 @@ def network_output(
         u_sum, v_sum = np.zeros(neurons), np.zeros(neurons)
         for stage in range(4):
             reach = reaches[stage] * step
-            neuron_rates(
-                u + reach * u_rate,
-                v + reach * v_rate,
-                feedback,
-                inhibition,
-                tau_a,
-                tau_b,
-                self_inhibition_weight,
-                external_input,
-                u_rate,
-                v_rate,
-            )
+            neuron_rates(network, u + reach * u_rate, v + reach * v_rate, feedback, u_rate, v_rate)
             u_sum += weights[stage] * u_rate
             v_sum += weights[stage] * v_rate
         u += step * u_sum

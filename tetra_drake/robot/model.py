@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.physics.contact import GROUND
-from tetra_drake.physics.oscillator import inhibition_matrix
+from tetra_drake.physics.oscillator import Network, inhibition_matrix
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure
@@ -35,18 +35,6 @@ class Model(NamedTuple):
     radius: float
     """Distance of the nodes from the centre of mass."""
     gravity: float
-
-
-class Network(NamedTuple):
-    """An oscillator network as the kernels take it."""
-
-    inhibition: Array
-    """(2n, 2n): see physics.oscillator.inhibition_matrix."""
-    tau_a: float
-    tau_b: float
-    """In s."""
-    self_inhibition_weight: float
-    external_input: float
 
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:

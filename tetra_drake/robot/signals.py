@@ -35,7 +35,7 @@ def raw_output(cpg: CpgScenario, gait: Gait, *, oscillators: int, duration: floa
     steps = duration / cpg.listing_step
     listing = cpg.signals == "listing"
     output = np.empty((round(steps) if listing else math.ceil(steps) + 1, oscillators))
-    (listing_output if listing else network_output)(u, v, *network, cpg.listing_step, output)
+    (listing_output if listing else network_output)(network, u, v, cpg.listing_step, output)
     return output
 
 

@@ -12,17 +12,6 @@ from tetra_drake.robot.structure import Structure
 class CableNetwork(LeafSystem):
     """The cables between the tetrahedra (thesis Eq. 6); no state.
 
-    .. pydrake_system::
-
-        name: CableNetwork
-        input_ports:
-        - state
-        - signals
-        output_ports:
-        - generalized_force
-        - tensions
-        - lengths
-
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|
     | state             | (13 n,)        | SI     | [q; v] of n free bodies, from the plant  |

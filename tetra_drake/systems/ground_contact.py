@@ -32,17 +32,6 @@ from tetra_drake.scenario.schema import FrictionScenario, GroundScenario
 class GroundContact(LeafSystem):
     """Normal force (thesis Eq. 1) and reset-integrator friction (Eq. 3-5) at m contact nodes.
 
-    .. pydrake_system::
-
-        name: GroundContact
-        input_ports:
-        - state
-        output_ports:
-        - generalized_force
-        - normal_forces
-        - friction_forces
-        - modes
-
     | port              | shape   | unit   | meaning                                          |
     |-------------------|---------|--------|--------------------------------------------------|
     | state             | (13 n,) | SI     | [q; v] of n free bodies, from the plant          |

@@ -14,15 +14,6 @@ from tetra_drake.scenario.schema import CpgScenario
 class MatsuokaCpg(LeafSystem):
     """A network of n Matsuoka oscillators (thesis Eq. 7-9), one a gait.
 
-    .. pydrake_system::
-
-        name: MatsuokaCpg
-        input_ports:
-        - feedback (optional)
-        output_ports:
-        - signals
-        - neurons
-
     | port     | shape | unit | meaning                                                      |
     |----------|-------|------|--------------------------------------------------------------|
     | feedback | (2n,) | 1    | f of Eq. 7, by neuron; zero where nothing is connected       |
@@ -54,14 +45,7 @@ class MatsuokaCpg(LeafSystem):
         if self._feedback.HasValue(context):
             feedback = self._feedback.Eval(context)
         rates = np.empty(2 * u.size)
-        neuron_rates(
-            u,
-            v,
-            feedback,
-            *self._network,
-            rates[: u.size],
-            rates[u.size :],
-        )
+        neuron_rates(self._network, u, v, feedback, rates[: u.size], rates[u.size :])
         derivatives.SetFromVector(rates)
 
     def _split(self, context: Context) -> tuple[np.ndarray, np.ndarray]:

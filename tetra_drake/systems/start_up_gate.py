@@ -11,14 +11,6 @@ _LONGER_THAN_ANY_SIMULATION = 1e9  # s; Drake has no one-time event, so its peri
 class StartUpGate(LeafSystem):
     """Passes signals on from the start-up time on, and zeros before it (thesis listing B.1).
 
-    .. pydrake_system::
-
-        name: StartUpGate
-        input_ports:
-        - ungated
-        output_ports:
-        - signals
-
     | port    | shape | unit | meaning                       |
     |---------|-------|------|-------------------------------|
     | ungated | (m,)  | N    | signals of the oscillators    |
