@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.experiment.command import add_analyse, add_tables
 from tetra_drake.figures.command import add_figures
 from tetra_drake.files import whole_file
 from tetra_drake.report.replay_command import add_replay
@@ -64,8 +63,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_reevaluate(commands)
     add_replay(commands)
     add_figures(commands)
-    add_analyse(commands)
-    add_tables(commands)
+    _add_robustness(commands)
     _add_benchmark(commands)
     _add_cpg(commands)
     _add_diagram(commands)
@@ -297,6 +295,62 @@ def _cpg(options: argparse.Namespace) -> None:
         scenario.cpg.signals = options.signals
     gait = _gait(options, scenario)
     save_signals(options.out, scenario, gait, unit=options.unit, rate=options.rate, raw=options.raw)
+
+
+def _add_robustness(commands: argparse._SubParsersAction) -> None:
+    command = commands.add_parser(
+        "robustness",
+        help="simulate gaits with the robot or its surroundings slightly changed",
+        description="Simulates a gait, or the best gait of each trial of a run, on the compiled "
+        "engine with starting pose, friction, cables and ground changed by a few percent, one at "
+        "a time, and prints how much that changes the distance.",
+    )
+    command.add_argument(
+        "source", metavar="GAIT|RUN", type=Path, help="a gait file, or a folder written by `evolve`"
+    )
+    command.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        help="a shipped scenario or a YAML file (default: the run's, thesis for a gait file)",
+    )
+    command.add_argument(
+        "--percent",
+        metavar="P",
+        type=arguments.rate,
+        nargs="+",
+        default=[2.0, 5.0],
+        help="changes in percent, each with both signs (default: 2 5)",
+    )
+    arguments.add_workers(command)
+    command.add_argument(
+        "--out", metavar="FILE", type=Path, help="a CSV file: the distance (m) of each simulation"
+    )
+    command.set_defaults(run=_robustness)
+
+
+def _robustness(options: argparse.Namespace) -> None:
+    from tetra_drake.engines.compiled.engine import compile_engine
+    from tetra_drake.evolution.robustness import describe, robustness
+    from tetra_drake.evolution.tables import load_run
+    from tetra_drake.files import write_whole
+
+    if options.source.is_dir():
+        run = load_run(options.source)
+        run.fittest()  # or an error
+        gaits = {f"trial {t}": run.gait(t, i) for t, i in run.best()[["trial", "index"]].to_numpy()}
+        scenario = load_scenario(options.scenario) if options.scenario else run.manifest.scenario
+    else:
+        scenario = load_scenario(options.scenario or "thesis")
+        gait = load_gait(options.source, scenario)
+        gaits = {gait.name: gait}
+    compile_engine(scenario, lambda message: print(message, flush=True))
+    table = robustness(scenario, gaits, percents=options.percent, workers=options.workers)
+    print(describe(table))
+    if options.out:
+        write_whole(
+            options.out, table.rename(columns={"distance": "distance_m"}).to_csv(index=False)
+        )
+        print(f"wrote {options.out}")
 
 
 def _add_diagram(commands: argparse._SubParsersAction) -> None:

@@ -1,0 +1,251 @@
+"""Simulates the best gaits of recorded runs under other conditions.
+
+    python runs/analyse.py runs/thesis [RUN ...]
+
+Writes analysis.json to each run's folder, for tables.py, and figures/engines.svg where the initial
+gaits were evaluated on both engines.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+from matplotlib.figure import Figure
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.evaluation import GaitEvaluation
+from tetra_drake.evolution.executors import available_cores, evaluate_all, process_executor
+from tetra_drake.evolution.robustness import robustness
+from tetra_drake.evolution.tables import Run, load_run
+from tetra_drake.figures.style import OKABE_ITO, REFERENCE, common_style, make_figure, save_figure
+from tetra_drake.files import write_whole
+from tetra_drake.results.measures import (
+    dominant_frequency,
+    shares_off_ground,
+    signal_frequencies,
+)
+from tetra_drake.results.result import versions
+from tetra_drake.robot.gait import Gait, ParameterSpace
+from tetra_drake.robot.signals import signal_samples
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
+
+SCHEMA = 1
+ANALYSIS = "analysis.json"
+
+DEFAULT = "default"
+"""The integrator setting that the others are compared with."""
+
+OSCILLATOR_TAU_A = 0.3
+"""s, the time constant of the thesis's figures of a single oscillator."""
+
+_COLUMNS = {
+    "best_gaits": ("trial", "evaluation", "distance_in", "off_ground", "frequencies_hz"),
+    "resimulations": ("trial", "setting", "distance_in", "failure"),
+    "variations": ("trial", "what", "percent", "distance_in", "failure"),
+}
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Content of analysis.json; distances in inches, NaN where a simulation failed."""
+
+    oscillator_frequency_hz: float
+    """Of a single oscillator with OSCILLATOR_TAU_A."""
+    best_gaits: pandas.DataFrame
+    """The fittest gait of each trial on the run's own engine: trial, evaluation, distance_in,
+    off_ground (share of the steady stretch by tetrahedron), frequencies_hz (by junction)."""
+    resimulations: pandas.DataFrame
+    """Those gaits on the Drake diagram: trial, setting, distance_in, failure."""
+    variations: pandas.DataFrame
+    """Those gaits with something changed, on the compiled engine: trial, what, percent,
+    distance_in, failure."""
+
+
+def load_analysis(directory: Path) -> Analysis:
+    """Reads analysis.json of a run; InputError if it is missing or damaged."""
+    path = directory / ANALYSIS
+    try:
+        raw: Any = json.loads(path.read_text(encoding="utf-8"))
+        frames = {key: pandas.DataFrame(raw[key])[list(_COLUMNS[key])] for key in _COLUMNS}
+        for frame in frames.values():
+            frame["distance_in"] = frame["distance_in"].astype(float)
+        return Analysis(oscillator_frequency_hz=raw["oscillator"]["frequency_hz"], **frames)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        problem = f"cannot be read ({error}); run `python runs/analyse.py {directory}`"
+        raise InputError(path, "", problem) from error
+
+
+def analyse(
+    directory: Path, *, workers: int, executor: Callable[[int], Executor] = process_executor
+) -> None:
+    """Simulates what Analysis holds for a run's best gaits and writes analysis.json.
+
+    `executor` is for the Drake diagrams.
+    """
+    run = load_run(directory)
+    scenario = run.manifest.scenario
+    run.fittest()  # InputError if there is none
+    best = [(int(trial), int(index)) for trial, index in run.best()[["trial", "index"]].to_numpy()]
+    gaits = {trial: run.gait(trial, index) for trial, index in best}
+    content = {
+        "schema": SCHEMA,
+        "versions": versions(),
+        "oscillator": {"tau_a_s": OSCILLATOR_TAU_A, "frequency_hz": oscillator_frequency(scenario)},
+        "best_gaits": [
+            {"trial": trial, "evaluation": index, **walk(scenario, gaits[trial])}
+            for trial, index in best
+        ],
+        "resimulations": resimulate(scenario, gaits, workers, executor),
+        "variations": [
+            {"trial": row["gait"], "what": row["what"], "percent": row["percent"]}
+            | _outcome(row, row["failure"])
+            for row in robustness(scenario, gaits, workers=workers).to_dict("records")
+        ],
+    }
+    text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
+    write_whole(directory / ANALYSIS, text + "\n")
+
+
+def resimulate(
+    scenario: Scenario,
+    gaits: Mapping[int, Gait],
+    workers: int,
+    executor: Callable[[int], Executor],
+) -> list[dict[str, Any]]:
+    """The gaits on the Drake diagram with every integrator setting."""
+    space = ParameterSpace.of(scenario)
+    vectors = [space.vector(gait) for gait in gaits.values()]
+    rows = []
+    for name, changed in integrator_settings(scenario).items():
+        found = dict(
+            evaluate_all(GaitEvaluation(changed), vectors, workers=workers, executor=executor)
+        )
+        rows += [
+            {"trial": trial, "setting": name, **_outcome(found[i].metrics, found[i].failure)}
+            for i, trial in enumerate(gaits)
+        ]
+    return rows
+
+
+def integrator_settings(scenario: Scenario) -> dict[str, Scenario]:
+    """The scenario on the Drake diagram with several integrator settings, by their names."""
+    accuracy = scenario.simulation.accuracy
+    witness = {"mode_changes": "witness"}
+    explicit = {"scheme": "runge_kutta3", "accuracy": 1e-3, "max_step": 2e-3}
+    changes: dict[str, dict[str, Any]] = {
+        DEFAULT: {},
+        "accuracy × 10": {"accuracy": accuracy / 10.0},
+        "accuracy × 100": {"accuracy": accuracy / 100.0},
+        "witness, steps ≤ 2 ms": {"max_step": 2e-3} | witness,
+        "runge_kutta3": explicit,
+        "runge_kutta3, witness": explicit | witness,
+    }
+    return {
+        name: scenario.with_changes(
+            {"simulation.engine": "drake"}
+            | {f"simulation.{key}": value for key, value in change.items()}
+        )
+        for name, change in changes.items()
+    }
+
+
+def walk(scenario: Scenario, gait: Gait) -> dict[str, Any]:
+    """What a gait does on the run's own engine, as in Analysis.best_gaits."""
+    result = simulate(scenario=scenario, gait=gait, record=True)
+    assert result.trajectory is not None
+    since = scenario.simulation.steady_from
+    frequencies = signal_frequencies(result.trajectory, since=since)
+    return {
+        "distance_in": result.metrics.distance_in,
+        "off_ground": shares_off_ground(result.trajectory, since=since),
+        "frequencies_hz": {name: _finite(value) for name, value in frequencies.items()},
+    }
+
+
+def oscillator_frequency(scenario: Scenario) -> float:
+    """Frequency (Hz) of a single oscillator with OSCILLATOR_TAU_A, from 5 s on."""
+    single = scenario.with_changes(
+        {"robot.tetrahedra": 2, "cpg.signals": "recorded", "simulation.duration": 15.0}
+    )
+    gait = Gait("single", weights=(), tau_a=OSCILLATOR_TAU_A, tau_b=2.0 * OSCILLATOR_TAU_A)
+    signal = signal_samples(single, gait)[:, 0]
+    times = single.cpg.listing_step * np.arange(len(signal))
+    return dominant_frequency(times[times >= 5.0], signal[times >= 5.0])
+
+
+def distances_on_both(run: Run) -> pandas.DataFrame:
+    """The gaits of a compiled run that were evaluated again on the Drake diagram.
+
+    Columns trial, index, iteration, compiled_in and drake_in; NaN where a gait failed.
+    """
+    key = ["trial", "index"]
+    if run.reevaluations.empty:
+        return pandas.DataFrame(columns=[*key, "iteration", "compiled_in", "drake_in"])
+    compiled = run.evaluations[[*key, "iteration", "distance_in"]]
+    both = compiled.merge(run.reevaluations[[*key, "distance_in"]], on=key, validate="1:1")
+    return both.rename(columns={"distance_in_x": "compiled_in", "distance_in_y": "drake_in"})
+
+
+@common_style()
+def figure_engines(distances: pandas.DataFrame) -> Figure:
+    """Distances of gaits on the Drake diagram over those on the compiled engine, in inches.
+
+    Beside them the share of the gaits over the absolute difference. Takes rows of
+    distances_on_both() without failures.
+    """
+    compiled, drake = distances["compiled_in"], distances["drake_in"]
+    difference = (compiled - drake).abs().clip(lower=1e-4).sort_values()  # none is 0 on a log axis
+    figure, panels = make_figure(width_in=8.0, height_in=4.2, columns=2)
+    scatter, shares = panels[0]
+    ends = [min(compiled.min(), drake.min()), max(compiled.max(), drake.max())]
+    scatter.plot(ends, ends, label="equal", **REFERENCE)
+    scatter.plot(compiled, drake, "o", color=OKABE_ITO["blue"], markersize=2.5, label="gait")
+    scatter.set_aspect("equal")
+    scatter.set_xlabel("distance on the compiled engine (in)")
+    scatter.set_ylabel("distance on the Drake diagram (in)")
+    scatter.legend(loc="upper left")
+    share = 100.0 * np.arange(1, len(difference) + 1) / len(difference)
+    shares.step(difference, share, where="post", color=OKABE_ITO["blue"])
+    for percent in (50.0, 95.0):
+        value = difference.quantile(percent / 100.0)
+        shares.plot(value, percent, "o", color=OKABE_ITO["vermillion"])
+        shares.annotate(f"{percent:g} %: {value:.2g} in", (value, percent), ha="right")
+    shares.set_xscale("log")
+    shares.set_xlabel("difference of the distances, absolute (in)")
+    shares.set_ylabel("gaits that differ by less (%)")
+    figure.suptitle(f"{len(distances)} random gaits on both engines")
+    return figure
+
+
+def _outcome(metrics: Mapping[str, Any], failure: str | None) -> dict[str, Any]:
+    distance = metrics.get("distance", math.nan) / INCH
+    return {"distance_in": _finite(distance), "failure": failure}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Analyses the runs of the given folders."""
+    for directory in map(Path, arguments):
+        analyse(directory, workers=available_cores())
+        both = distances_on_both(load_run(directory)).dropna()
+        initial = both[both["iteration"] == 0]
+        if len(initial):
+            save_figure(figure_engines(initial), directory / "figures", "engines")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

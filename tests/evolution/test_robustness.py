@@ -1,0 +1,93 @@
+"""How far gaits walk with the robot or its surroundings slightly changed."""
+
+import math
+
+import numpy as np
+import pandas
+import pytest
+from helpers.synthetic_run import tiny_scenario
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.evolution.robustness import (
+    DISPLACED,
+    DRAWS,
+    NOTHING,
+    SCALED,
+    robustness,
+    summarize,
+)
+from tetra_drake.robot.gait import seeded_gait
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    """A short walk in which the oscillators start at once."""
+    return tiny_scenario().with_changes({"simulation.engine": "compiled", "cpg.start_up": 0.0})
+
+
+@pytest.fixture(scope="module")
+def gaits(scenario):
+    return {"a": seeded_gait(scenario, 1), "b": seeded_gait(scenario, 2)}
+
+
+@pytest.fixture(scope="module")
+def table(scenario, gaits):
+    return robustness(scenario, gaits, percents=[3.0], workers=2)
+
+
+def distances(table, what, percent):
+    chosen = table[(table["what"] == what) & (table["percent"] == percent)]
+    return chosen.set_index("gait")["distance"]
+
+
+def test_every_change_is_simulated_for_every_gait(table):
+    counts = table.groupby("what").size().to_dict()
+    assert counts == {NOTHING: 2, DISPLACED: 2 * DRAWS} | dict.fromkeys(SCALED, 4)
+    assert table["failure"].isna().all()
+    assert np.isfinite(table["distance"]).all()
+
+
+def test_a_change_scales_its_keys(scenario, gaits, table):
+    for percent in (-3.0, 3.0):
+        stiffness = scenario.ground.stiffness * (1.0 + percent / 100.0)
+        changed = scenario.with_changes({"ground.stiffness": stiffness})
+        walked = simulate(scenario=changed, gait=gaits["b"]).metrics.distance
+        assert distances(table, "ground stiffness k", percent)["b"] == walked
+
+
+def test_nothing_changed_is_the_simulation_itself(scenario, gaits, table):
+    walked = {key: simulate(scenario=scenario, gait=gait) for key, gait in gaits.items()}
+    expected = {key: result.metrics.distance for key, result in walked.items()}
+    assert distances(table, NOTHING, 0.0).to_dict() == expected
+
+
+def test_displaced_starts_differ_and_are_the_same_again(scenario, gaits, table):
+    displaced = table[table["what"] == DISPLACED]
+    assert displaced["distance"].nunique() == 2 * DRAWS
+    again = robustness(scenario, {"b": gaits["b"]}, percents=[3.0], workers=1)
+    pandas.testing.assert_frame_equal(
+        again, table[table["gait"] == "b"].reset_index(drop=True), check_exact=True
+    )
+
+
+def test_a_simulation_that_fails_has_a_reason_and_no_distance(scenario, gaits):
+    stopped = scenario.with_changes({"simulation.max_evaluations": 100})
+    table = robustness(stopped, {"a": gaits["a"]}, percents=[3.0])
+    assert table["distance"].isna().all()
+    assert table["failure"].notna().all()
+
+
+def test_the_summary_is_of_the_changes_from_the_unchanged_distance():
+    rows = [("nothing", 0.0, 10.0), ("mass", -2.0, 8.5), ("mass", 2.0, 10.2), ("mass", 5.0, 9.5)]
+    table = pandas.DataFrame(
+        [{"gait": 1, "what": w, "percent": p, "distance": d, "failure": None} for w, p, d in rows]
+        + [{"gait": 1, "what": "mass", "percent": -5.0, "distance": math.nan, "failure": "fell"}]
+    )
+    summary = summarize(table, by=["what", "percent"])
+    at_2, at_5 = (summary.loc[("mass", percent)].to_dict() for percent in (2.0, 5.0))
+    assert at_2 == pytest.approx(
+        {"median": 0.85, "least": -1.5, "greatest": 0.2, "kept": 0.5, "failed": 0}
+    )
+    assert at_5 == pytest.approx(
+        {"median": 0.5, "least": -0.5, "greatest": -0.5, "kept": 0.5, "failed": 1}
+    )

@@ -1,0 +1,99 @@
+"""What analyse.py simulates of a run's best gaits, and its figure."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+
+import analyse
+import numpy as np
+import pandas
+import pytest
+from helpers.synthetic_run import tiny_scenario, write_run
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.evolution.robustness import NOTHING, SCALED
+from tetra_drake.evolution.tables import load_run
+
+TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1)]]]
+"""Trial 1 has no gait with a fitness."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """An analysed run of a robot of three tetrahedra."""
+    scenario = tiny_scenario().with_changes({"simulation.engine": "compiled"})
+    run = write_run(tmp_path_factory.mktemp("runs") / "thesis", TRIALS, scenario=scenario)
+    analyse.analyse(run, workers=1, executor=ThreadPoolExecutor)
+    return run
+
+
+def distances(run, scenario):
+    return [
+        simulate(scenario=scenario, gait=run.gait(trial, index)).metrics.distance_in
+        for trial, index in ((0, 2), (2, 0))
+    ]
+
+
+def test_the_best_gait_of_each_trial_is_simulated_on_the_engine_of_the_run(folder):
+    run, best = load_run(folder), analyse.load_analysis(folder).best_gaits
+    assert best[["trial", "evaluation"]].to_numpy().tolist() == [[0, 2], [2, 0]]
+    assert best["distance_in"].tolist() == distances(run, run.manifest.scenario)
+    assert all(list(off) == ["T1", "T2", "T3"] for off in best["off_ground"])
+    assert all(list(hertz) == ["T1-T2", "T2-T3"] for hertz in best["frequencies_hz"])
+
+
+def test_every_integrator_setting_is_simulated_on_the_diagram(folder):
+    run, again = load_run(folder), analyse.load_analysis(folder).resimulations
+    settings = analyse.integrator_settings(run.manifest.scenario)
+    assert list(again["setting"]) == [name for name in settings for _ in range(2)]
+    assert {each.simulation.engine for each in settings.values()} == {"drake"}
+    default = again[again["setting"] == analyse.DEFAULT]["distance_in"].tolist()
+    assert default == distances(run, settings[analyse.DEFAULT])
+    assert again["distance_in"].nunique() > 2
+
+
+def test_every_change_is_simulated_on_the_compiled_engine(folder):
+    found = analyse.load_analysis(folder)
+    assert set(SCALED) < set(found.variations["what"])
+    unchanged = found.variations[found.variations["what"] == NOTHING]
+    assert unchanged["distance_in"].tolist() == found.best_gaits["distance_in"].tolist()
+
+
+def test_a_single_oscillator_has_the_frequency_of_its_equations(folder):
+    hertz = analyse.load_analysis(folder).oscillator_frequency_hz
+    assert hertz == pytest.approx(1.0 / (2.0 * np.pi * analyse.OSCILLATOR_TAU_A), abs=0.01)
+
+
+def test_a_run_without_any_fitness_is_refused(tmp_path, refused):
+    run = write_run(tmp_path / "run", [[[(None, 0)]]])
+    with refused(run, "", "fitness"):
+        analyse.analyse(run, workers=1)
+    assert not (run / analyse.ANALYSIS).exists()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda content: None,
+        lambda content: "{",
+        lambda content: [],
+        lambda content: content | {"variations": [{"trial": 0}]},
+        lambda content: content | {"oscillator": {}},
+    ],
+    ids=["missing", "cut off", "no object", "columns", "oscillator"],
+)
+def test_a_damaged_analysis_is_refused(folder, tmp_path, refused, damage):
+    content = damage(json.loads((folder / analyse.ANALYSIS).read_text()))
+    if content is not None:
+        text = content if isinstance(content, str) else json.dumps(content)
+        (tmp_path / analyse.ANALYSIS).write_text(text)
+    with refused(tmp_path / analyse.ANALYSIS, "", "analyse.py"):
+        analyse.load_analysis(tmp_path)
+
+
+def test_the_figure_shows_every_gait_and_names_median_and_percentile():
+    compiled = np.linspace(-5.0, 8.0, 40)
+    both = pandas.DataFrame({"compiled_in": compiled, "drake_in": compiled + 0.02})
+    scatter, shares = analyse.figure_engines(both).axes
+    (dots,) = [line for line in scatter.lines if line.get_linestyle() == "None"]
+    np.testing.assert_array_equal(dots.get_xydata(), np.column_stack([compiled, compiled + 0.02]))
+    assert [text.get_text() for text in shares.texts] == ["50 %: 0.02 in", "95 %: 0.02 in"]

@@ -1,0 +1,150 @@
+"""Robustness of gaits: how far they walk with the robot or its surroundings slightly changed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.evaluation import GaitEvaluation
+from tetra_drake.evolution.executors import available_cores, evaluate_all, thread_executor
+from tetra_drake.formatting import fixed, signed
+from tetra_drake.robot.gait import Gait, ParameterSpace
+from tetra_drake.scenario.perturb import displaced, scaled
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
+
+if TYPE_CHECKING:
+    import pandas
+
+NOTHING = "nothing"
+"""What is changed in the simulations that the others are compared with."""
+
+SCALED = {
+    "initial spacing": ("robot.spacing",),
+    "stiction range p₀": ("friction.stiction_range",),
+    "stiction damping σ₁": ("friction.stiction_damping",),
+    "stiction switch a_c": ("friction.stiction_switch",),
+    "proportional stiction σ₀": ("friction.proportional_stiction",),
+    "outer cables' stiffness": ("cables.outer_stiffness",),
+    "inner cables' stiffness": ("cables.inner_stiffness",),
+    "all cables' stiffness": ("cables.outer_stiffness", "cables.inner_stiffness"),
+    "ground stiffness k": ("ground.stiffness",),
+    "ground damping λ": ("ground.damping",),
+}
+"""Changes that multiply scenario keys by 1 + percent / 100; absent keys are left out."""
+
+DISPLACED = "initial place of each tetrahedron"
+"""The change that displaces every tetrahedron at random by at most percent of the spacing."""
+
+PERCENTS = (2.0, 5.0)
+DRAWS = 5
+"""Displaced starts per percentage."""
+
+KEPT = 0.9
+"""A gait counts as kept under a change where it walks this share of its distance or more."""
+
+
+def robustness(
+    scenario: Scenario,
+    gaits: Mapping[Any, Gait],
+    *,
+    percents: Sequence[float] = PERCENTS,
+    workers: int | None = None,
+) -> pandas.DataFrame:
+    """Distances of gaits under every change, simulated on the compiled engine.
+
+    Columns: gait (its key), what (NOTHING first), percent, distance (m; NaN where the simulation
+    failed), failure. Raises InputError where a gait is for another number of tetrahedra.
+    """
+    import pandas
+
+    scenario = scenario.with_changes({"simulation.engine": "compiled"})
+    space = ParameterSpace.of(scenario)
+    for key, gait in gaits.items():
+        if space.vector(gait).size != len(space.names):
+            problem = f"{key} has {len(gait.weights)} weights, expected {len(space.names) - 2}"
+            raise InputError(f"scenario {scenario.name}", "robot.tetrahedra", problem)
+    rows, tasks = [], []
+    for what, percent, changed in _changes(scenario, percents):
+        for key, gait in gaits.items():
+            rows.append({"gait": key, "what": what, "percent": percent})
+            tasks.append((changed, space.vector(gait)))
+    for index, evaluation in evaluate_all(
+        lambda task: GaitEvaluation(task[0])(task[1]),
+        tasks,
+        workers=workers or available_cores(),
+        executor=thread_executor,
+    ):
+        rows[index]["distance"] = evaluation.metrics.get("distance", math.nan)
+        rows[index]["failure"] = evaluation.failure
+    return pandas.DataFrame(rows)
+
+
+def summarize(table: pandas.DataFrame, *, by: Sequence[str]) -> pandas.DataFrame:
+    """Changes of the distance in a table of robustness(), grouped by gait, what or percent.
+
+    Percents lose their signs. Columns, in the unit of the distance: median (of the absolute
+    change), least and greatest (change); kept (share of the simulations, 0 to 1, that walk at
+    least KEPT of the unchanged distance), failed (count).
+    """
+    unchanged = table[table["what"] == NOTHING].set_index("gait")["distance"]
+    changed = table[table["what"] != NOTHING]
+    before = changed["gait"].map(unchanged)
+    change = changed["distance"] - before
+    changed = changed.assign(
+        percent=changed["percent"].abs(),
+        change=change,
+        size=change.abs(),
+        kept=change > (KEPT - 1.0) * before.abs(),
+        failed=changed["failure"].notna(),
+    )
+    return changed.groupby(list(by), sort=False).agg(
+        median=("size", "median"),
+        least=("change", "min"),
+        greatest=("change", "max"),
+        kept=("kept", "mean"),
+        failed=("failed", "sum"),
+    )
+
+
+def describe(table: pandas.DataFrame) -> str:
+    """Summaries of a table of robustness() for printing, in inches: by change, by gait."""
+    import pandas
+
+    inches = table.assign(distance=table["distance"] / INCH)
+    unchanged = inches[inches["what"] == NOTHING].set_index("gait")["distance"]
+    texts = []
+    for key, heading in (("what", "changed"), ("gait", "gait")):
+        summary = summarize(inches, by=[key, "percent"]).reset_index()
+        columns = {
+            heading: summary[key],
+            "by": summary["percent"].map("± {:g} %".format),
+            "median change, in": summary["median"].map(fixed),
+            "least": summary["least"].map(signed),
+            "greatest": summary["greatest"].map(signed),
+            f"keeps {100.0 * KEPT:g} %": summary["kept"].map("{:.0%}".format),
+            "failed": summary["failed"],
+        }
+        if key == "gait":
+            columns["unchanged distance, in"] = summary[key].map(unchanged).map(fixed)
+        texts.append(pandas.DataFrame(columns).to_string(index=False))
+    return "\n\n".join(texts)
+
+
+def _changes(base: Scenario, percents: Sequence[float]) -> Iterator[tuple[str, float, Scenario]]:
+    """What is changed, by how many percent, and the changed scenario; first the scenario itself."""
+    yield NOTHING, 0.0, base
+    for what, keys in SCALED.items():
+        if all(_has(base, key) for key in keys):
+            for percent in (sign * size for size in percents for sign in (-1.0, 1.0)):
+                yield what, percent, scaled(base, keys, 1.0 + percent / 100.0)
+    for percent in percents:
+        for seed in range(DRAWS):
+            yield DISPLACED, percent, displaced(base, percent=percent, seed=seed)
+
+
+def _has(scenario: Scenario, key: str) -> bool:
+    section, name = key.split(".")
+    return hasattr(getattr(scenario, section, None), name)
