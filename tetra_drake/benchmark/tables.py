@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tetra_drake.benchmark.measure import CLOSE_IN
+from tetra_drake.engines.mujoco import INSTALL
 from tetra_drake.formatting import fixed, listed, markdown_table
 
 
@@ -27,7 +28,7 @@ def to_markdown(found: dict[str, Any]) -> str:
             f"ground differs, and its distances differ by {apart} in (median) from ours."
         )
     elif mujoco["left_out"]:
-        parts.append(f"Without MuJoCo: {mujoco['left_out']}")
+        parts.append(f"Without MuJoCo: it is not installed ({INSTALL}), or cables may go slack.")
     if found["step_costs"]:
         parts.append(_cost_table(found["step_costs"]))
     return "\n\n".join(parts)

@@ -1,22 +1,18 @@
 """The engine `mujoco`: the same robot in MuJoCo (https://mujoco.org), as its users would model it.
 
 Bodies, cables, actuation and gravity are those of the other engines. The ground is MuJoCo's soft
-contact with a cone of friction, calibrated as closely as that allows:
-
-- The normal force has the scenario's stiffness, but a constant damping: the scenario's at the
-  depth of rest. The ground law's own damping grows with depth, from none at the surface.
-- A node that sticks is held by the scenario's stiction damping, but breaks free where that exceeds
-  `mujoco.friction` times the normal force. In the thesis's law it breaks free after a deflection,
-  the stiction range, whatever the normal force, and then slides almost freely.
+contact with a cone of friction. The normal force has the scenario's stiffness, but constant
+damping: the scenario's at the depth of rest, which otherwise grows with depth. A node that sticks
+is held by the scenario's stiction damping, but breaks free where that exceeds `mujoco.friction`
+times the normal force, not after a deflection, and then does not slide almost freely.
 """
 
 from __future__ import annotations
 
 import functools
-import importlib
 import time
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
@@ -36,22 +32,19 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-INSTALL = 'pip install "mujoco>=3.13"'
-"""The first version with the integrator `discrete`."""
+INSTALL = 'pip install "mujoco>=3.13"'  # the first version with the integrator `discrete`
 
 _IMPEDANCE = 0.5
 """Of contacts. Nothing at rest depends on it, nor do converged distances by more than 0.01 in;
 with a smaller one friction chatters in steps beyond 0.06 ms, with a larger one errors grow."""
 
-_POINT = 1e-5
-"""Radius (m) of the spheres that touch the floor: the ground acts on the centre of a node."""
+_POINT = 1e-5  # radius (m) of the spheres that touch the floor: it acts on the centres of nodes
+
+_STRETCH = 5000  # steps between two checks of whether a simulation is still stable
 
 _MAX_SPEED = 1.0
-"""Of a body (m/s), where the scenario allows more: too long a step throws a robot about for ever,
-far forward at times. In a walking robot it is below 0.2 m/s."""
-
-_STRETCH = 5000
-"""Steps between two checks of whether a simulation is still stable."""
+"""Of a body (m/s), where the scenario allows more. Too long a step throws a robot about for ever,
+at times far forward; a walking robot stays below 0.2 m/s."""
 
 
 def simulate_mujoco(
@@ -65,18 +58,17 @@ def simulate_mujoco(
     Raises Diverged or StepBudgetExceeded; InputError if MuJoCo is missing or cannot do it.
     """
     check_mujoco(scenario)
-    settings, simulation = scenario.mujoco, scenario.simulation
-    steps = max(1, round(simulation.duration / settings.step))
+    simulation, step = scenario.simulation, scenario.mujoco.step
+    steps = max(1, round(simulation.duration / step))
     if steps > simulation.max_evaluations:
-        reason = f"{steps} steps exceed the budget of {simulation.max_evaluations} evaluations"
-        raise StepBudgetExceeded(time=0.0, reason=reason)
-
+        limit = f"the budget of {simulation.max_evaluations}"
+        raise StepBudgetExceeded(time=0.0, reason=f"{steps} steps exceed {limit}")
     times = sample_times(simulation.duration, simulation.sample_period)
     times = times if record or viewer is not None else times[:0]
     instants = np.array([0.0, simulation.steady_from, simulation.duration, *times])
     robot = _Robot(scenario, gait, steps=steps)
     started = time.perf_counter()
-    found = robot.walk(np.rint(instants / settings.step).astype(int))
+    found = robot.walk(np.rint(instants / step).astype(int))
     wall_time = time.perf_counter() - started
 
     trajectory = robot.dataset(times, found[3:]) if times.size else None
@@ -88,11 +80,10 @@ def simulate_mujoco(
         positions=[node_positions(robot.structure, state) for state in robot.states(found[:3])],
         wall_time=wall_time,
         integrator=IntegratorWork(
-            scheme=settings.integrator,
-            accuracy=settings.step,
+            scheme=scenario.mujoco.integrator,
+            accuracy=step,
             steps=steps,
             derivative_evaluations=steps,
-            jacobian_evaluations=0,
         ),
         trajectory=trajectory if record else None,
     )
@@ -101,8 +92,7 @@ def simulate_mujoco(
 def installed() -> bool:
     """Whether there is a MuJoCo that has all integrators of the scenario's choice."""
     try:
-        mujoco = importlib.import_module("mujoco")
-        importlib.import_module("mujoco.rollout")
+        import mujoco.rollout
     except ImportError:
         return False
     return hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE")
@@ -110,15 +100,15 @@ def installed() -> bool:
 
 def make_mjcf(scenario: Scenario) -> str:
     """The robot in MuJoCo's format, with one motor per driven cable."""
-    model = ElementTree.Element("mujoco", model=scenario.name)
+    model = Element("mujoco", model=scenario.name)
     structure, settings = MakeStructure(scenario.robot, scenario.cables), scenario.mujoco
     robot = make_model(scenario, structure)
+    steps = {"integrator": settings.integrator, "timestep": settings.step}
     _add(model, "compiler", inertiafromgeom="false")
-    options = {"integrator": settings.integrator, "timestep": settings.step, "cone": "elliptic"}
-    _add(model, "option", gravity=[0.0, 0.0, -robot.gravity], **options)
+    _add(model, "option", gravity=[0.0, 0.0, -robot.gravity], cone="elliptic", **steps)
     _add_bodies(model, structure, robot, _contact(scenario, structure, robot))
     _add_cables(model, structure)
-    return ElementTree.tostring(model, encoding="unicode")
+    return tostring(model, encoding="unicode")
 
 
 class _Robot:
@@ -138,9 +128,8 @@ class _Robot:
         self._max_speed = min(scenario.simulation.max_speed, _MAX_SPEED)
         driven = self.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # the signal of each motor
-        starts = scenario.mujoco.step * np.arange(steps)
-        self._control = signals_at(scenario, gait, starts)[:, self._motors]
         self._signals = functools.partial(signals_at, scenario, gait)
+        self._control = self._signals(scenario.mujoco.step * np.arange(steps))[:, self._motors]
 
     def walk(self, wanted: Array) -> Array:
         """Simulates all steps; MuJoCo's states (time, qpos, qvel) after each of the `wanted`."""
@@ -154,13 +143,13 @@ class _Robot:
             for first in range(0, len(self._control), _STRETCH):
                 control = self._control[None, first : first + _STRETCH]
                 (states,), _ = rollout.rollout(self._model, self._data, state[None], control)
-                self._check_stability(states)
+                self._check(states)
                 state = states[-1]
                 here = (first < wanted) & (wanted <= first + len(states))
                 found[here] = states[wanted[here] - first - 1]
         return found
 
-    def _check_stability(self, states: Array) -> None:
+    def _check(self, states: Array) -> None:
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
         fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
         if fast.any():
@@ -176,21 +165,18 @@ class _Robot:
         scalar, vector, w_WB_B = pose[..., 3:4], pose[..., 4:], velocity[..., 3:]
         turn = 2.0 * np.cross(vector, w_WB_B)
         w_WB = w_WB_B + scalar * turn + np.cross(vector, turn)
-        q = np.concatenate([pose[..., 3:], pose[..., :3]], axis=2)
-        v = np.concatenate([w_WB, velocity[..., :3]], axis=2)
-        return np.hstack([q.reshape(rows, -1), v.reshape(rows, -1)])
+        parts = (pose[..., 3:], pose[..., :3]), (w_WB, velocity[..., :3])
+        return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
     def dataset(self, times: Array, found: Array) -> xarray.Dataset:
         """The trajectory: MuJoCo's states at `times` (s), and the forces there."""
         structure, rows = self.structure, len(times)
         states, signals = self.states(found), self._signals(times)
-        force = np.empty(6 * len(structure.bodies))
         tensions, lengths = np.empty((2, rows, len(structure.cables)))
-        ground = np.empty((rows, len(structure.contacts), 3))
-        laws = structure.p_BN, structure.cables, False
+        laws, force = (structure.p_BN, structure.cables, False), np.empty(6 * len(structure.bodies))
         for i in range(rows):
             cable_forces(states[i], signals[i], *laws, force, tensions[i], lengths[i])
-            ground[i] = self._ground_forces(found[i], signals[i])
+        ground = np.array([self._ground_forces(*row) for row in zip(found, signals, strict=True)])
         modes = np.zeros_like(ground)  # of friction: 0, as MuJoCo's has none
         modes[:, :, 0] = ground[:, :, 2] > 0.0
         return assemble_dataset(
@@ -224,13 +210,10 @@ def check_mujoco(scenario: Scenario) -> None:
     if not installed():
         raise InputError(scenario.name, "simulation.engine", f"mujoco is not installed: {INSTALL}")
     if scenario.cables.slack:
-        problem = "found true, expected false: cables cannot go slack on the engine mujoco"
-        raise InputError(scenario.name, "cables.slack", problem)
+        raise InputError(scenario.name, "cables.slack", "found true, which mujoco cannot simulate")
 
 
-def _add_bodies(
-    model: ElementTree.Element, structure: Structure, robot: Model, contact: dict[str, Any]
-) -> None:
+def _add_bodies(model: Element, structure: Structure, robot: Model, contact: dict) -> None:
     """The tetrahedra, with a site at each node, and the floor, which only contact nodes touch."""
     world, pairs = _add(model, "worldbody"), _add(model, "contact")
     alone = {"contype": "0", "conaffinity": "0"}  # only the pairs touch each other
@@ -248,25 +231,25 @@ def _add_bodies(
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
 
 
-def _contact(scenario: Scenario, structure: Structure, robot: Model) -> dict[str, Any]:
+def _contact(scenario: Scenario, structure: Structure, robot: Model) -> dict:
     """How the floor acts on a node."""
     ground, friction = scenario.ground, scenario.mujoco.friction
+    stiction_damping = scenario.friction.stiction_damping
     weight = robot.mass * len(structure.bodies) * robot.gravity
     rest_damping = ground.damping * weight / len(structure.contacts) / ground.stiffness
     # MuJoCo takes accelerations for forces, and divides them by 1 - impedance. The minus says
     # that the numbers are stiffness and damping.
     per_mass = -(1.0 - _IMPEDANCE) / robot.mass
-    stiffness = ground.stiffness * per_mass
     return {
         "condim": "3",
         "friction": [friction, friction, 0, 0, 0],
-        "solref": [stiffness, rest_damping * per_mass],
-        "solreffriction": [stiffness, scenario.friction.stiction_damping * per_mass],
+        "solref": [ground.stiffness * per_mass, rest_damping * per_mass],
+        "solreffriction": [ground.stiffness * per_mass, stiction_damping * per_mass],
         "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
     }
 
 
-def _add_cables(model: ElementTree.Element, structure: Structure) -> None:
+def _add_cables(model: Element, structure: Structure) -> None:
     """A tendon for each cable, and a motor for each that is driven."""
     tendons, actuators = _add(model, "tendon"), _add(model, "actuator")
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
@@ -278,10 +261,10 @@ def _add_cables(model: ElementTree.Element, structure: Structure) -> None:
             _add(actuators, "motor", name=name, tendon=name, gear="-1")
 
 
-def _add(parent: ElementTree.Element, tag: str, **attributes: Any) -> ElementTree.Element:
+def _add(parent: Element, tag: str, **attributes: Any) -> Element:
     """A new element; its attributes are text, numbers or arrays of numbers."""
     text = {
         name: value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))
         for name, value in attributes.items()
     }
-    return ElementTree.SubElement(parent, tag, text)
+    return SubElement(parent, tag, text)

@@ -36,7 +36,7 @@ class IntegratorWork:
     """Drake's target accuracy, the compiled engine's tolerance (m/s), or MuJoCo's step (s)."""
     steps: int
     derivative_evaluations: int
-    jacobian_evaluations: int
+    jacobian_evaluations: int = 0
     """Derivative evaluations that went into Jacobian columns, among those above."""
 
 

@@ -92,7 +92,6 @@ def simulate_compiled(
             accuracy=scenario.compiled.tolerance,
             steps=steps,
             derivative_evaluations=evaluations,
-            jacobian_evaluations=0,
         ),
         trajectory=trajectory if record else None,
     )
