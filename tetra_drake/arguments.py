@@ -35,8 +35,8 @@ def add_engine(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--engine",
         choices=ENGINES,
-        help="the Drake diagram, or the same laws compiled end to end, many times faster "
-        "(default: the scenario's)",
+        help="the Drake diagram; the same laws compiled end to end, many times faster; or MuJoCo, "
+        "with contact and friction of its own (default: the scenario's)",
     )
 
 

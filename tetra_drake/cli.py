@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tetra_drake import arguments
+from tetra_drake.benchmark.settings import SETS
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.figures.command import add_figures
 from tetra_drake.files import whole_file
@@ -380,9 +381,9 @@ def _add_benchmark(commands: argparse._SubParsersAction) -> None:
         "benchmark",
         help="measure speed and accuracy of the engines and their settings",
         description="Simulates gaits on the engines with different settings and prints how many "
-        "times faster than real time each is, how far its distances are from converged ones, and "
-        "the compiled engine's cost per step by number of tetrahedra. Takes some minutes, the set "
-        "integrators longer. Times are meaningful on an idle machine only.",
+        "times faster than real time each is, the errors of its distances against converged ones, "
+        "and the compiled engine's cost per step by number of tetrahedra. Takes some minutes; the "
+        "set integrators takes longer. Times are meaningful on an idle machine only.",
     )
     command.add_argument(
         "gaits", metavar="GAIT", type=Path, nargs="*", help="gait files (default: random gaits)"
@@ -398,10 +399,10 @@ def _add_benchmark(commands: argparse._SubParsersAction) -> None:
         "--settings",
         metavar="SET",
         nargs="+",
-        choices=("default", "integrators", "compiled", "mujoco"),
+        choices=SETS,
         default=["default"],
-        help="sets of settings: default (all engines), integrators (of the Drake diagram), "
-        "compiled, mujoco (default: default)",
+        help="sets of settings: default (a few for each engine), integrators (many for the "
+        "diagram), compiled or mujoco (many for that engine)",
     )
     command.add_argument(
         "--sizes",

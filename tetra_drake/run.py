@@ -122,7 +122,7 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
 
 
 def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
-    then, now = manifest.versions, versions()
+    then, now = manifest.versions, versions(manifest.scenario.simulation.engine)
     changed = [f"{name} {then.get(name)}" for name in now if then.get(name) != now[name]]
     if changed:
         progress.warn(

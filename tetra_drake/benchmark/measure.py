@@ -22,8 +22,7 @@ from tetra_drake.results.result import SimulationResult, versions
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.scenario.schema import Scenario
 
-CLOSE_IN = 0.05
-"""Distances (in) that differ by no more count as the same."""
+CLOSE_IN = 0.05  # distances (in) that differ by no more count as the same
 
 CONVERGED, CHECK = compiled(1e-3, 0.5, 1e-3), compiled(2e-3, 1.0, 2e-3)
 """What errors are measured against, but MuJoCo's; and the other converged setting: a gait that
@@ -108,12 +107,10 @@ def measure(
 
     All settings simulate the first gait, then the second, and so on, so that whatever else runs on
     the machine affects all alike. All is done in this process, of which Drake before 1.56 keeps
-    about 2 MB per simulation on the diagram. Returns what `tables.to_markdown` prints, which can
-    be written as JSON: lengths in inches, times in s, None for what failed. `say` is told which
-    stage begins.
+    about 2 MB per simulation on the diagram. Returns what tables.to_markdown() prints and JSON can
+    hold: lengths in inches, times in s, None for what failed. `say` is told which stage begins.
 
-    Raises InputError if MuJoCo is asked for and cannot simulate the scenario; the set `default`
-    leaves it out then.
+    Raises InputError if MuJoCo is asked for by its set and cannot simulate the scenario.
     """
     settings = [changes for name in sets for changes in settings_of(name)]
     left_out = "mujoco" not in sets and (scenario.cables.slack or not installed())
@@ -173,6 +170,7 @@ def step_cost(scenario: Scenario, tetrahedra: int) -> dict[str, Any]:
         "tetrahedra": tetrahedra,
         "steps": results[0].integrator.steps if results[0] else None,
         "microseconds_per_step": statistics.median(times) if times else None,
+        "microseconds_per_tetrahedron": statistics.median(times) / tetrahedra if times else None,
     }
 
 

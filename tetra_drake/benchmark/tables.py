@@ -8,6 +8,22 @@ from tetra_drake.benchmark.measure import CLOSE_IN
 from tetra_drake.engines.mujoco import INSTALL
 from tetra_drake.formatting import fixed, listed, markdown_table
 
+SETTINGS = {
+    "engine": ("engine", "{}"),
+    "setting": ("setting", "{}"),
+    "real_time_factor_per_core": ("times real time per core", "{:.3g}"),
+    "median_error_in": ("median error, in", "{:.3f}"),
+    "worst_error_in": ("worst error, in", "{:.3f}"),
+    "evaluations": ("evaluations per gait", "{:,}"),
+    "failed": ("failed", "{}"),
+}
+STEP_COSTS = {
+    "tetrahedra": ("tetrahedra", "{}"),
+    "steps": ("steps", "{:,}"),
+    "microseconds_per_step": ("μs per step", "{:.1f}"),
+    "microseconds_per_tetrahedron": ("μs per step and tetrahedron", "{:.2f}"),
+}
+
 
 def to_markdown(found: dict[str, Any]) -> str:
     """What `measure` has found: the settings, the cost per step, and what errors refer to."""
@@ -15,7 +31,7 @@ def to_markdown(found: dict[str, Any]) -> str:
     parts = [
         f"Scenario {found['scenario']}, duration {found['duration_s']:g} s, gaits: "
         f"{len(found['gaits'])}, cores: {found['cores']}",
-        _settings_table(found["rows"]),
+        _table(found["rows"], SETTINGS),
         "Times are from gait to result. Errors are of the distance, against converged runs of the "
         f"compiled engine ({found['converged']}), without ill-conditioned gaits, whose distances "
         f"in two converged runs differ by more than {CLOSE_IN:g} in: {listed(left_out)}.",
@@ -30,40 +46,15 @@ def to_markdown(found: dict[str, Any]) -> str:
     elif mujoco["left_out"]:
         parts.append(f"Without MuJoCo: it is not installed ({INSTALL}), or cables may go slack.")
     if found["step_costs"]:
-        parts.append(_cost_table(found["step_costs"]))
+        parts.append(_table(found["step_costs"], STEP_COSTS))
     return "\n\n".join(parts)
 
 
-def _settings_table(rows: list[dict[str, Any]]) -> str:
-    columns = {
-        "real_time_factor_per_core": ("times real time per core", "{:.3g}"),
-        "median_error_in": ("median error, in", "{:.3f}"),
-        "worst_error_in": ("worst error, in", "{:.3f}"),
-        "evaluations": ("evaluations per gait", "{:,}"),
-        "failed": ("failed", "{}"),
-    }
-    headings = ["engine", "setting", *(heading for heading, _ in columns.values())]
+def _table(rows: list[dict[str, Any]], columns: dict[str, tuple[str, str]]) -> str:
+    """Rows in Markdown; `columns` gives the heading and the format of each key."""
     cells = [
-        [
-            row["engine"],
-            row["setting"],
-            *(_text(row[key], form) for key, (_, form) in columns.items()),
-        ]
+        ["-" if row[key] is None else form.format(row[key]) for key, (_, form) in columns.items()]
         for row in rows
     ]
-    return markdown_table(headings, cells, text_columns=(0, 1))
-
-
-def _cost_table(costs: list[dict[str, Any]]) -> str:
-    headings = ["tetrahedra", "steps", "μs per step", "μs per step and tetrahedron"]
-    cells = []
-    for cost in costs:
-        number, time = cost["tetrahedra"], cost["microseconds_per_step"]
-        each = time and time / number
-        steps = _text(cost["steps"], "{:,}")
-        cells.append([str(number), steps, _text(time, "{:.1f}"), _text(each, "{:.2f}")])
-    return markdown_table(headings, cells, text_columns=())
-
-
-def _text(value: float | None, form: str) -> str:
-    return "-" if value is None else form.format(value)
+    text = [i for i, key in enumerate(columns) if key in ("engine", "setting")]
+    return markdown_table([heading for heading, _ in columns.values()], cells, text)

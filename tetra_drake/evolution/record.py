@@ -149,7 +149,12 @@ class RunRecord:
             for leftover in (*directory.glob(".manifest.*"), *directory.glob(".scenario.*")):
                 leftover.unlink()
             method = method or Method.of(scenario)
-            manifest = Manifest(scenario=scenario, seed=seed, versions=versions(), method=method)
+            manifest = Manifest(
+                scenario=scenario,
+                seed=seed,
+                versions=versions(scenario.simulation.engine),
+                method=method,
+            )
             _write_manifest(directory, manifest)
         except BaseException:
             os.close(lock)
