@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tetra_drake.errors import InputError
+from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -17,6 +18,12 @@ Refused = Callable[[object, str, str], contextlib.AbstractContextManager[None]]
 def scenario() -> Scenario:
     """The thesis scenario, a fresh copy that a test may change."""
     return load_scenario("thesis")
+
+
+@pytest.fixture
+def structure(scenario: Scenario) -> Structure:
+    """That of the thesis's robot."""
+    return MakeStructure(scenario.robot, scenario.cables)
 
 
 @pytest.fixture(scope="session")

@@ -1,8 +1,5 @@
-"""Where compiled kernels are kept. The package is copied and run in a fresh process, with a
-plain file standing where its cache folder would be: as unwritable as a read-only
-installation, whoever runs the test."""
-
-from __future__ import annotations
+"""Where compiled kernels are kept. A copy of the package runs in a fresh process, with a plain
+file where its cache folder would be: unwritable even for root."""
 
 import os
 import shutil
@@ -21,57 +18,40 @@ PROGRAM = (
 
 
 @pytest.fixture
-def read_only_package(tmp_path: Path) -> Path:
-    source = Path(tetra_drake.__file__).parent
+def package(tmp_path: Path) -> Path:
+    """A read-only installation."""
     target = tmp_path / "installed" / "tetra_drake"
-    shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
+    without_cache = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(Path(tetra_drake.__file__).parent, target, ignore=without_cache)
     (target / "physics" / "__pycache__").write_text("in the way")
     return target.parent
 
 
-def run(
-    package: Path, cache_home: Path, program: str = PROGRAM
-) -> subprocess.CompletedProcess[str]:
+def run(package: Path, cache_home: Path, program: str = PROGRAM) -> str:
+    """What the program prints."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
-    environment |= {
-        "PYTHONPATH": str(package),
-        "XDG_CACHE_HOME": str(cache_home),
-        "HOME": str(cache_home),
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
-    return subprocess.run(
-        [sys.executable, "-c", program],
-        env=environment,
-        cwd=package,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    environment |= {"PYTHONPATH": str(package), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment |= {"XDG_CACHE_HOME": str(cache_home), "HOME": str(cache_home)}
+    command = [sys.executable, "-c", program]
+    return subprocess.check_output(command, env=environment, cwd=package, text=True)
 
 
-def test_a_read_only_installation_caches_in_the_users_folder(
-    read_only_package: Path, tmp_path: Path
-) -> None:
-    cache_home = tmp_path / "cache"
-    cache_home.mkdir()
-    assert float(run(read_only_package, cache_home).stdout) == pytest.approx(2.0)
-    assert list(cache_home.rglob("cable.cable_tension*.nbi"))
+def test_a_read_only_installation_caches_in_the_users_folder(package: Path, tmp_path: Path) -> None:
+    assert float(run(package, tmp_path / "cache")) == pytest.approx(2.0)
+    assert list((tmp_path / "cache").rglob("cable.cable_tension*.nbi"))
 
 
-def test_without_any_folder_for_a_cache_kernels_still_work(
-    read_only_package: Path, tmp_path: Path
-) -> None:
-    nowhere = tmp_path / "file"
-    nowhere.write_text("")
-    assert float(run(read_only_package, nowhere / "cache").stdout) == pytest.approx(2.0)
+def test_without_any_folder_for_a_cache_kernels_still_work(package: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    assert float(run(package, tmp_path / "file" / "cache")) == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("folder", ["physics", "elsewhere/deeper"])
 def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(
-    read_only_package: Path, tmp_path: Path, folder: str
+    package: Path, tmp_path: Path, folder: str
 ) -> None:
     # outer() calls inner(), which uses a constant of a third module; they may be in any folder.
-    kernels = read_only_package / "tetra_drake" / folder
+    kernels = package / "tetra_drake" / folder
     kernels.mkdir(parents=True, exist_ok=True)
     name = f"tetra_drake.{folder.replace('/', '.')}"
     begin = "from tetra_drake.physics.compiling import compiled\n"
@@ -83,13 +63,11 @@ def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(
         f"{begin}from {name}.inner import inner\n@compiled\ndef outer():\n    return inner()\n"
     )
     program = f"from {name}.outer import outer;print(outer(), sum(outer.stats.cache_hits.values()))"
-    cache_home = tmp_path / "cache"
-    cache_home.mkdir()
     if folder != "physics":  # keeps numba from writing beside the sources, as there
         (kernels / "__pycache__").write_text("in the way")
 
     def value_and_hits() -> list[str]:
-        return run(read_only_package, cache_home, program).stdout.split()
+        return run(package, tmp_path / "cache", program).split()
 
     assert value_and_hits() == ["1.0", "0"]
     assert value_and_hits() == ["1.0", "1"]
