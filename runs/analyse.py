@@ -220,7 +220,8 @@ def figure_engines(distances: pandas.DataFrame) -> Figure:
     for percent in (50.0, 95.0):
         value = difference.quantile(percent / 100.0)
         shares.plot(value, percent, "o", color=OKABE_ITO["vermillion"])
-        shares.annotate(f"{percent:g} %: {value:.2g} in", (value, percent), ha="right")
+        label = f"{percent:g} %: {value:.2g} in"
+        shares.annotate(label, (value, percent), (-6, 4), textcoords="offset points", ha="right")
     shares.set_xscale("log")
     shares.set_xlabel("difference of the distances, absolute (in)")
     shares.set_ylabel("gaits that differ by less (%)")

@@ -345,6 +345,7 @@ def _robustness(options: argparse.Namespace) -> None:
         gait = load_gait(options.source, scenario)
         gaits = {gait.name: gait}
     compile_engine(scenario, lambda message: print(message, flush=True))
+    print(f"gaits: {len(gaits)}; simulating each under every change", flush=True)
     table = robustness(scenario, gaits, percents=options.percent, workers=options.workers)
     print(describe(table))
     if options.out:

@@ -1,12 +1,14 @@
 """How far gaits walk with the robot or its surroundings slightly changed."""
 
 import math
+import re
 
 import numpy as np
 import pandas
 import pytest
-from helpers.synthetic_run import tiny_scenario
+from helpers.synthetic_run import tiny_scenario, write_run
 
+from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.robustness import (
     DISPLACED,
@@ -16,7 +18,8 @@ from tetra_drake.evolution.robustness import (
     robustness,
     summarize,
 )
-from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.gait import save_gait, seeded_gait
+from tetra_drake.scenario.load import dump_scenario, load_scenario
 
 
 @pytest.fixture(scope="module")
@@ -91,3 +94,38 @@ def test_the_summary_is_of_the_changes_from_the_unchanged_distance():
     assert at_5 == pytest.approx(
         {"median": 0.5, "least": -0.5, "greatest": -0.5, "kept": 0.5, "failed": 1}
     )
+
+
+@pytest.fixture
+def short(scenario, tmp_path):
+    """A scenario file of the short walk."""
+    path = tmp_path / "short.yaml"
+    path.write_text(dump_scenario(scenario))
+    return path
+
+
+def test_the_command_writes_the_distance_of_every_simulation(scenario, gaits, short, tmp_path):
+    gait, out = tmp_path / "gait.json", tmp_path / "out.csv"
+    save_gait(gaits["b"], gait)
+    options = ["--scenario", str(short), "--percent", "3", "--out", str(out)]
+    assert main(["robustness", str(gait), *options]) == 0
+    found = pandas.read_csv(out)
+    expected = robustness(scenario, {"b": gaits["b"]}, percents=[3.0])
+    np.testing.assert_allclose(found["distance_m"], expected["distance"], rtol=1e-15)
+    assert found["what"].tolist() == expected["what"].tolist()
+
+
+def test_the_command_takes_the_best_gait_of_each_trial_of_a_run(tmp_path, capsys):
+    trials = [[[(1.0, 0), (2.0, 1)]], [[(3.0, 0)]]]
+    scenario = tiny_scenario().with_changes({"simulation.engine": "compiled"})
+    run, out = write_run(tmp_path / "run", trials, scenario=scenario), tmp_path / "out.csv"
+    assert main(["robustness", str(run), "--percent", "1", "--out", str(out)]) == 0
+    assert pandas.read_csv(out)["gait"].unique().tolist() == ["trial 0", "trial 1"]
+    assert {"trial 0", "trial 1", DISPLACED} <= set(
+        re.split(r"\s{2,}|\n| ± ", capsys.readouterr().out)
+    )
+
+
+def test_a_gait_of_another_robot_is_refused(scenario, refused):
+    with refused("scenario tiny", "robot.tetrahedra", "expected 4"):
+        robustness(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)})
