@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING
 from tetra_drake import arguments
 from tetra_drake.benchmark.settings import SETS
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.figures.command import add_figures
 from tetra_drake.files import whole_file
-from tetra_drake.report.replay_command import add_replay
 from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import Scenario
@@ -62,8 +60,8 @@ def make_parser() -> argparse.ArgumentParser:
     _add_simulate(commands)
     _add_evolve(commands)
     _add_reevaluate(commands)
-    add_replay(commands)
-    add_figures(commands)
+    _add_replay(commands)
+    _add_figures(commands)
     _add_robustness(commands)
     _add_benchmark(commands)
     _add_cpg(commands)
@@ -74,11 +72,10 @@ def make_parser() -> argparse.ArgumentParser:
 def _add_simulate(commands: argparse._SubParsersAction) -> None:
     command = commands.add_parser(
         "simulate",
-        help="simulate one gait and say how far it walks",
-        description="Simulates one gait, as a Drake diagram or on the compiled engine, prints "
-        "how far and how straight the robot walked, and writes result.json (the numbers), "
-        "trajectory.nc (motion and forces over time, for xarray), replay.html (open it in a "
-        "browser) and scenario.yaml (the scenario in full).",
+        help="simulate one gait",
+        description="Simulates one gait, prints how far and how straight the robot walked, and "
+        "writes result.json (the numbers), trajectory.nc (motion and forces over time, for "
+        "xarray), replay.html (open it in a browser) and scenario.yaml (the scenario in full).",
     )
     arguments.add_scenario(command)
     _add_gait(command)
@@ -93,8 +90,8 @@ def _add_simulate(commands: argparse._SubParsersAction) -> None:
     command.add_argument(
         "--meshcat",
         action="store_true",
-        help="show the robot in a browser as it walks, no faster than real time; the numbers "
-        "stay the same",
+        help="show the robot in a browser during the simulation, at most in real time (does not "
+        "affect results)",
     )
     command.set_defaults(run=_simulate)
 
@@ -108,7 +105,7 @@ def _scenario(options: argparse.Namespace) -> Scenario:
 
 def _simulate(options: argparse.Namespace) -> None:
     from tetra_drake.engines.simulate import simulate
-    from tetra_drake.results.folder import check_result_folder, save_result_folder
+    from tetra_drake.results.folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.results.result import summary
 
     scenario = _scenario(options)
@@ -123,11 +120,14 @@ def _simulate(options: argparse.Namespace) -> None:
     assert result.trajectory is not None
     print(summary(scenario, gait, result))
     save_result_folder(options.out, scenario=scenario, gait=gait, result=result)
-    print(f"wrote result.json, trajectory.nc, replay.html and scenario.yaml to {options.out}/")
+    print(
+        f"wrote result.json, trajectory.nc, scenario.yaml and replay.html to {options.out}/\n"
+        f"to watch the robot, open in a browser: {options.out / REPLAY}"
+    )
     if view is not None:
         view.replay(result.trajectory)
         with contextlib.suppress(EOFError, KeyboardInterrupt):
-            input("the browser shows it again and again; press Enter to end ")
+            input("the browser repeats the motion; press Enter to end ")
 
 
 def _open_view(scenario: Scenario) -> LiveView:
@@ -254,6 +254,67 @@ def _reevaluate(options: argparse.Namespace) -> None:
             progress=progress,
         )
     print(summary(run))
+
+
+def _add_replay(commands: argparse._SubParsersAction) -> None:
+    command = commands.add_parser(
+        "replay",
+        help="write a page that shows a gait in a browser",
+        description="Writes one HTML page that shows the robot walking, in any browser, without "
+        "server or network: from the trajectory that `simulate` recorded, or by simulating a "
+        "gait file, or the best gait of a run of `evolve` on the run's scenario.",
+    )
+    command.add_argument(
+        "source",
+        metavar="RESULT_DIR|GAIT|RUN_DIR",
+        type=Path,
+        help="a folder written by `simulate`, a gait file, or a folder written by `evolve`",
+    )
+    command.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        help=f"for a gait file: a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML "
+        "file (default: thesis)",
+    )
+    command.add_argument(
+        "--out", metavar="FILE", type=Path, required=True, help="the HTML file to write"
+    )
+    command.set_defaults(run=_replay)
+
+
+def _replay(options: argparse.Namespace) -> None:
+    from tetra_drake.report.replay_page import write_replay
+
+    title = write_replay(options.source, options.out, scenario=options.scenario)
+    print(f"{title}\nto watch the robot, open in a browser: {options.out}")
+
+
+def _add_figures(commands: argparse._SubParsersAction) -> None:
+    command = commands.add_parser(
+        "figures",
+        help="draw the figures of a run or a simulation",
+        description="Draws figures as SVG and PNG, and the table of the two best gaits as CSV. "
+        "For a run of `evolve`, finished or not: into figures/ in its directory, where report.html "
+        "and replay.html are written anew, too. For a folder written by `simulate`: the figures "
+        "of one gait, into figures/ in it.",
+    )
+    command.add_argument(
+        "source",
+        metavar="RUN_DIR|RESULT_DIR",
+        type=Path,
+        help="a folder written by `evolve` or by `simulate`",
+    )
+    command.add_argument(
+        "--out", metavar="DIR", type=Path, help="draw into this folder; leave the source as it is"
+    )
+    command.set_defaults(run=_figures)
+
+
+def _figures(options: argparse.Namespace) -> None:
+    from tetra_drake.report.run_page import write_figures
+
+    written = write_figures(options.source, options.out)
+    print(f"wrote {', '.join(str(path) for path in written)}")
 
 
 def _add_cpg(commands: argparse._SubParsersAction) -> None:

@@ -1,4 +1,4 @@
-"""What the tests of figures of a trajectory start from."""
+"""Fixtures of the tests of figures."""
 
 from __future__ import annotations
 
@@ -9,11 +9,5 @@ from helpers.made_up_walk import make_walk
 
 @pytest.fixture(scope="session")
 def walk() -> xarray.Dataset:
-    """Of five tetrahedra."""
+    """A walk of five tetrahedra."""
     return make_walk()
-
-
-@pytest.fixture(scope="session", params=[2, 3, 8])
-def other_walk(request: pytest.FixtureRequest) -> xarray.Dataset:
-    """Of another number of tetrahedra."""
-    return make_walk(bodies=request.param)

@@ -92,7 +92,7 @@ def test_series_differ_in_colour_and_many_in_colour_and_dashes() -> None:
 
 
 def test_figures_need_no_pyplot_and_so_no_display() -> None:
-    modules = ("contact", "forces", "motion", "oscillators")
+    modules = ("forces", "motion", "evolution", "engines")
     program = "\n".join(
         [
             *(f"import tetra_drake.figures.{module}" for module in modules),

@@ -1,10 +1,11 @@
-"""A walk made up for the tests of figures, of which everything is known."""
+"""A walk made up for tests of figures and measures, of which everything is known."""
 
 from __future__ import annotations
 
 import numpy as np
 import xarray
 
+from tetra_drake.results.trajectory import assemble_dataset
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.load import load_scenario
 
@@ -24,33 +25,25 @@ def make_walk(*, bodies: int = 5, duration: float = 9.0) -> xarray.Dataset:
     phase = 2.0 * np.pi * times / PERIOD
     turn = np.where(np.arange(bodies) % 2, -1.0, 1.0)
     lift = HEIGHT * np.maximum(0.0, np.round(np.sin(phase), 12)[:, np.newaxis] * turn)
-    way = np.stack([np.broadcast_to(SPEED * times[:, np.newaxis], lift.shape), 0 * lift, lift], -1)
-    nodes = structure.p_WB[:, np.newaxis] + structure.p_BN + way[:, :, np.newaxis]
+    states = np.tile(structure.initial_state, (len(times), 1))
+    poses = states[:, : 7 * bodies].reshape(-1, bodies, 7)
+    poses[..., 4] += SPEED * times[:, np.newaxis]
+    poses[..., 6] += lift
+    states[:, : 7 * bodies] = poses.reshape(len(times), -1)
 
     names = np.array(structure.node_names)[structure.contacts]
-    owners = structure.contacts // 4
-    stands = (lift[:, owners] == 0.0) & (names != f"T{bodies} tip")
+    stands = (lift[:, structure.contacts // 4] == 0.0) & (names != f"T{bodies} tip")
     normal = np.where(stands, LOAD, 0.0)
-    friction = np.stack([-0.5 * normal, 0.0 * normal], axis=-1)
-    signal = 2.0 * np.sin(phase[:, np.newaxis] - np.arange(bodies - 1))
+    signals = 2.0 * np.sin(phase[:, np.newaxis] - np.arange(bodies - 1))
     driver = structure.cables["signal"]
-    tension = 3.0 + np.where(driver < 0, 0.0, signal[:, driver])
-    return xarray.Dataset(
-        {
-            "p_WN": (("time", "tetrahedron", "node", "axis"), nodes),
-            "tension": (("time", "cable"), tension),
-            "signal": (("time", "junction"), signal),
-            "normal_force": (("time", "contact"), normal),
-            "friction_force": (("time", "contact", "horizontal"), friction),
-        },
-        coords={
-            "time": times,
-            "tetrahedron": list(structure.bodies),
-            "node": ["bottom_left", "bottom_right", "top", "tip"],
-            "cable": list(structure.cable_names),
-            "contact": names.tolist(),
-            "junction": [f"T{i + 1}-T{i + 2}" for i in range(bodies - 1)],
-            "axis": ["x", "y", "z"],
-            "horizontal": ["x", "y"],
-        },
+    return assemble_dataset(
+        structure,
+        times=times,
+        states=states,
+        signals=signals,
+        tensions=3.0 + np.where(driver < 0, 0.0, signals[:, driver]),
+        lengths=np.ones((len(times), len(driver))),
+        normal_forces=normal,
+        friction_forces=np.stack([-0.5 * normal, 0.0 * normal], axis=-1),
+        modes=np.stack([stands, 0 * stands, 0 * stands], axis=-1).reshape(len(times), -1),
     )

@@ -1,4 +1,4 @@
-"""The report of a run: what stands in it, that it is sound, and that it needs nothing else."""
+"""The report of a run: it is sound, says what the record says, and needs nothing else."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
 
-import numpy as np
 import pytest
 from helpers.meshcat_page import read_page
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import make_parser
-from tetra_drake.evolution.study import Study, study_run
+from tetra_drake.evolution.method import Method, Part
 from tetra_drake.evolution.summary import comparisons
 from tetra_drake.evolution.tables import load_run
-from tetra_drake.figures.evolution import table_8_two_best
+from tetra_drake.figures.evolution import two_best
 from tetra_drake.report.run_page import render_report, write_report
+from tetra_drake.report.study import Study, study_run
+from tetra_drake.scenario.schema import ReferenceScenario
+from tetra_drake.scenario.units import INCH
+
+from .conftest import TRIALS
 
 EVIL = """<script>alert(1)</script> & "quoted" 'name'"""
-FIGURES = (14, 15, 16, 17, 18, 19, 20, 21, 22, 23)
 VOID = {"meta", "img", "br"}
-TRIALS = [
-    [[(2.0, 0), (-1.0, 1), (None, 2)], [(3.0, 1), (1.0, None)]],
-    [[(1.5, 0), (0.5, 1), (1.0, 2)], [(2.5, 1), (4.0, 2)]],
-]
+REFERENCE = ReferenceScenario("a paper", best_distance=14.34 * INCH, two_best_weights=[0.1] * 4)
 
 
 class Page(HTMLParser):
-    """What stands in a page; its tags must be closed in order."""
+    """Tags and texts of a page; its tags must be closed in order."""
 
     def __init__(self, source: str) -> None:
         super().__init__()
@@ -61,15 +61,13 @@ class Page(HTMLParser):
         return [str(values[name]) for _, values in self.tags if name in values]
 
 
-def make_run(directory: Path, **options: object) -> Path:
-    return write_run(directory, TRIALS, scenario=tiny_scenario(name=EVIL), **options)
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run with its report; its gaits were made up, so they end elsewhere than recorded."""
-    directory = make_run(tmp_path_factory.mktemp("runs") / "run")
-    assert write_report(directory) == ["figures/", "replay.html", "report.html"]
+    """A run with its report; its gaits were made up, so they do not move as recorded."""
+    directory = tmp_path_factory.mktemp("runs") / "run"
+    write_run(directory, TRIALS, scenario=tiny_scenario(name=EVIL))
+    names = [path.name for path in write_report(directory)]
+    assert names == ["figures", "replay.html", "report.html"]
     return directory
 
 
@@ -85,7 +83,12 @@ def page(source: str) -> Page:
 
 @pytest.fixture(scope="module")
 def study(run: Path) -> Study:
-    return study_run(run)
+    return study_run(load_run(run))
+
+
+def with_manifest(study: Study, **changes: object) -> Study:
+    manifest = dataclasses.replace(study.run.manifest, **changes)  # type: ignore[arg-type]
+    return dataclasses.replace(study, run=dataclasses.replace(study.run, manifest=manifest))
 
 
 def render(study: Study) -> Page:
@@ -93,27 +96,18 @@ def render(study: Study) -> Page:
     return Page(render_report(study, [], folder=Path("unused")))
 
 
-def test_all_figures_are_files_and_stand_in_the_page_once(run: Path, page: Page) -> None:
-    files = sorted(path.name for path in (run / "figures").iterdir())
-    numbers = [
-        int(re.findall(r"figure_(\d+)_\w+\.svg", name)[0]) for name in files if "svg" in name
-    ]
-    assert numbers == list(FIGURES)
-    stems = [name.removesuffix(".svg") for name in files if name.endswith(".svg")]
-    expected = {f"{stem}{suffix}" for stem in stems for suffix in (".svg", ".png")}
-    assert set(files) == expected | {"table_08_two_best.csv"}
-
-    images = [values for tag, values in page.tags if tag == "img"]
-    assert [int(str(i["alt"]).split(":")[0].removeprefix("Figure ")) for i in images] == numbers
-    for image, stem in zip(images, stems, strict=True):
-        kind, content = str(image["src"]).split(",", 1)
-        assert kind == "data:image/svg+xml"
-        drawn = (run / "figures" / f"{stem}.svg").read_text(encoding="utf-8")
-        assert unquote(content).split() == drawn.split()
-    captions = page.texts["figcaption"]
-    assert len(captions) == len(numbers)
-    assert all(f"Figure {n}." in text for n, text in zip(numbers, captions, strict=True))
-    assert all("Thesis: " in text for text in captions)
+def test_figures_are_files_and_in_the_page(run: Path, page: Page) -> None:
+    files = {path.name for path in (run / "figures").iterdir()}
+    stems = {name.removesuffix(".svg") for name in files if name.endswith(".svg")}
+    assert {"fitness_of_trials", "before_and_after", "one_step", "ground_forces"} <= stems
+    assert files == {f"{s}{kind}" for s in stems for kind in (".svg", ".png")} | {"two_best.csv"}
+    drawn = {(run / "figures" / f"{stem}.svg").read_text().replace("\n", " ") for stem in stems}
+    images = [str(values["src"]).split(",", 1) for tag, values in page.tags if tag == "img"]
+    assert {kind for kind, _ in images} == {"data:image/svg+xml"}
+    assert {" ".join(unquote(svg).split()) for _, svg in images} == {
+        " ".join(svg.split()) for svg in drawn
+    }
+    assert all(page.texts["figcaption"])
 
 
 def test_it_needs_no_network_and_links_relatively(run: Path, source: str, page: Page) -> None:
@@ -125,117 +119,111 @@ def test_it_needs_no_network_and_links_relatively(run: Path, source: str, page: 
         # This run was never evolved, which is when the best gait's file is written.
         assert (run / link).exists() or link == "trial_01/best_gait.json"
     without_pictures = re.sub(r'"data:image[^"]*"', "", source)
-    assert "data:" not in without_pictures
-    for elsewhere in ("http", "url(", "@import"):
+    for elsewhere in ("data:", "http", "url(", "@import"):
         assert elsewhere not in without_pictures
+    assert len(source) < 3e6
 
 
 def test_names_are_escaped(run: Path, source: str, page: Page) -> None:
     assert EVIL not in source
     assert "script" not in {tag for tag, _ in page.tags}
-    assert page.texts["h1"][0].startswith(EVIL)
-    assert page.texts["title"][0].startswith(EVIL)
+    for tag in ("h1", "title"):
+        (text,) = page.texts[tag]
+        assert text.startswith(EVIL)
     assert "<script>alert" not in (run / "replay.html").read_text(encoding="utf-8")
     assert "<script>alert" not in read_page(run / "replay.html")
 
 
-def test_it_is_a_whole_page_of_moderate_size(source: str, page: Page) -> None:
-    assert source.startswith("<!DOCTYPE html>\n<html lang=")
-    assert [tag for tag, _ in page.tags[:3]] == ["html", "head", "meta"]
-    for once in ("title", "h1", "style", "body"):
-        assert len(page.texts[once]) == 1
-    assert len(source) < 3e6
-
-
-def test_results_are_those_that_evolve_prints(run: Path, page: Page) -> None:
-    headings, cells = page.texts["th"], page.texts["td"]
-    rows = comparisons(load_run(run)).statuses
-    assert len(rows) == 5
-    for row in rows:
-        assert row.name in headings
-        place = cells.index(row.ours)
-        assert row.reference in cells[place : place + 2]
-
-
 def test_each_trial_has_a_row(page: Page) -> None:
     # Distances are half the fitnesses; the gait that failed counts in no mean.
-    first, second = "1.00 → 1.50", "0.75 → 2.00"
     cells = page.texts["td"]
     for rise, row in (
-        (first, ["50.00 %", "0.50 → 2.50", "1", "5", "1", "all iterations done"]),
-        (second, ["166.67 %", "1.00 → 2.67", "1", "5", "0", "all iterations done"]),
+        ("1.00 → 1.50", ["50.00", "0.50 → 2.50", "1", "5", "1"]),
+        ("0.75 → 2.00", ["166.67", "1.00 → 2.67", "1", "5", "0"]),
     ):
-        place = cells.index(rise)
-        assert cells[place + 1 : place + 1 + len(row)] == row
+        place = cells.index(rise) + 1
+        assert cells[place : place + len(row)] == row
 
 
-def test_table_8_and_the_best_gait_are_laid_out_in_fours(study: Study, page: Page) -> None:
-    table = table_8_two_best(study.run, 1)
+def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(
+    study: Study, page: Page
+) -> None:
+    table = two_best(study.run, 1)
     assert table is not None
-    cells = page.texts["td"]
-    for name, difference in table["difference"].items():
-        assert f"{difference:.4f}" in cells, name
-    assert page.texts["th"].count("w1\N{EN DASH}4") == 2
-    for weight in study.best.gait.weights:
-        assert f"{weight:.4f}" in cells
+    cells, headings = page.texts["td"], page.texts["th"]
+    for name, row in table.iterrows():
+        place = headings.index(str(name))
+        assert place
+        assert all(f"{value:.4f}" in cells for value in row)
+    assert "4.00" in cells  # the recorded fitness; simulated again, it is another
+    assert "2.00 inches" in page.texts["h1"][0]
+    assert study.best.deviation_in > 1.0
+    assert any("trial 1, evaluation 4: 2 in" in text for text in page.texts["p"])
 
 
-def test_the_thesiss_table_8_stands_below_ours(tmp_path: Path) -> None:
-    scenario = tiny_scenario()
-    scenario.robot.tetrahedra = 5
-    page = render(study_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
-    cells = page.texts["td"]
-    ending = [cell[6:] for cell in cells if re.fullmatch(r"\d\.\d{4}\d\.\d{4}", cell)]
-    assert len(ending) == 27
-    # Row by row: fitness, w1, w5, w9 ..., tau_A; then w2, w6 ...
-    assert ending[:4] == ["0.0006", "0.0594", "0.1184", "0.0874"]
-    assert ending[8:10] == ["0.1063", "0.0000"]
-    assert ending[-1] == "0.1322"
+def test_reference_numbers_stand_only_where_the_scenario_has_them(study: Study, page: Page) -> None:
+    assert "a paper" not in " ".join(page.texts["body"])
+    scenario = dataclasses.replace(study.run.manifest.scenario, reference=REFERENCE)
+    beside = with_manifest(study, scenario=scenario)
+    shown = render(beside)
+    assert "a paper" in shown.texts["th"]
+    for row in comparisons(beside.run):
+        place = shown.texts["td"].index(row.ours)
+        assert row.reference in shown.texts["td"][place : place + 2]
+    assert shown.texts["td"].count("0.1000") >= 4
 
 
-def test_it_says_that_gaits_did_not_go_as_recorded(study: Study, page: Page) -> None:
-    (note,) = (text for text in page.texts["p"] if "simulated again" in text)
-    assert "trial 1, evaluation 4 ends 2 in from where it did in the run" in note
-    distance = study.best.result.metrics.distance_in
-    assert abs(distance) < 0.1
-    as_recorded = dataclasses.replace(study.best, recorded_distance_in=distance)
-    quiet = render(dataclasses.replace(study, best=as_recorded, initial=as_recorded))
-    assert not any("simulated again" in text for text in quiet.texts["p"])
-
-
-def test_an_unfinished_run_says_so(tmp_path: Path) -> None:
-    page = render(study_run(make_run(tmp_path / "run", unfinished=(0,))))
-    assert any("not finished: 1 of 2 trials go on" in text for text in page.texts["p"])
-    assert "not ended" in page.texts["td"]
-
-
-def test_a_compiled_run_shows_what_the_diagram_made_of_its_best(study: Study, page: Page) -> None:
-    heading = "best on the Drake diagram"
-    assert heading not in page.texts["th"]
-    again = study.run.evaluations.assign(distance_in=1.23)
-    page = render(
-        dataclasses.replace(study, run=dataclasses.replace(study.run, reevaluations=again))
-    )
-    assert heading in page.texts["th"]
-    assert page.texts["td"].count("1.23") == 2
+def test_settings_that_differ_from_the_thesis_are_listed(page: Page) -> None:
+    facts = dict(zip(page.texts["th"], page.texts["td"][: len(page.texts["th"])], strict=False))
+    assert facts["robot.tetrahedra"] == "3"
+    assert facts["simulation.duration"] == "0.3 s"
+    assert "cables.damping" not in facts
 
 
 def test_the_commands_to_reproduce_it_are_commands(page: Page) -> None:
     commands = page.texts["pre"][0].strip().splitlines()
-    assert len(commands) == 3
     for command in commands:
         program, *arguments = shlex.split(command)
         assert program == "tetra-drake"
         make_parser().parse_args(arguments)
+    assert [shlex.split(command)[1] for command in commands] == ["evolve", "simulate", "figures"]
     assert "--seed 7" in commands[0]
 
 
-def test_table_8_is_a_csv_file_as_well(run: Path, study: Study) -> None:
-    lines = (run / "figures" / "table_08_two_best.csv").read_text().splitlines()
-    assert lines[0] == "parameter,best,second,difference,thesis"
-    table = table_8_two_best(study.run, 1)
-    assert table is not None
-    for line, (name, row) in zip(lines[1:], table.iterrows(), strict=True):
-        parameter, *numbers = line.split(",")
-        assert parameter == name
-        assert np.array(numbers[:3], dtype=float).tolist() == row.tolist()[:3]
+def test_what_was_given_from_python_is_named_and_no_command_claims_to_repeat_it(
+    study: Study,
+) -> None:
+    method = Method(
+        evaluator=Part("compiled"),
+        objective=Part("mine.far", {}, "0123456789abcdef" * 4),
+        optimizer=Part("mine.Search", {"step": 0.25}, "fedcba9876543210" * 4),
+    )
+    page = render(with_manifest(study, method=method))
+    text = " ".join(page.texts["td"])
+    for word in ("mine.far", "0123456789abcdef", "mine.Search", '"step": 0.25'):
+        assert word in text
+    assert "evolve" not in page.texts["pre"][0]
+    assert "SteadyState" not in text and "steady-state" not in text
+
+
+def test_an_unfinished_run_and_what_the_diagram_made_of_its_best(tmp_path: Path) -> None:
+    directory = write_run(tmp_path / "run", TRIALS, unfinished=(0,))
+    study = study_run(load_run(directory))
+    again = study.run.evaluations.assign(distance_in=1.23)
+    page = render(
+        dataclasses.replace(study, run=dataclasses.replace(study.run, reevaluations=again))
+    )
+    assert any("--resume" in text for text in page.texts["p"])
+    assert page.texts["td"].count("1.23") == 2
+
+
+def test_gaits_of_a_run_move_again_as_recorded(study: Study) -> None:
+    assert (study.trial, study.best.label) == (1, "trial 1, evaluation 4")
+    assert study.initial.label == "trial 1, evaluation 0"
+    distance = study.best.recorded["distance_in"] - study.best.deviation_in
+    as_recorded = study.best.recorded.copy()
+    as_recorded["distance_in"] = distance
+    walk = dataclasses.replace(study.best, recorded=as_recorded)
+    assert walk.deviation_in < 1e-9
+    quiet = render(dataclasses.replace(study, best=walk, initial=walk))
+    assert not any("evaluation 4:" in text for text in quiet.texts["p"][1:2])

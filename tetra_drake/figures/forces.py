@@ -1,4 +1,4 @@
-"""The thesis's Figures 19 and 20: the forces in the cables and on the ground."""
+"""Figures of forces: in the actuated cables and on the ground."""
 
 from __future__ import annotations
 
@@ -12,39 +12,31 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from tetra_drake.figures.style import OKABE_ITO, SHADE, common_style, make_figure
-from tetra_drake.results.measures import actuated_cable, intervals, off_ground, share_of_time
-from tetra_drake.robot.structure import BOTTOM_LEFT, NODES, TIP
+from tetra_drake.formatting import fixed
+from tetra_drake.results.measures import intervals, off_ground, share_of_time
 from tetra_drake.scenario.units import POUND_FORCE
 
 if TYPE_CHECKING:
     import xarray
-
-SECONDS = 5.0
-"""How much of the end of a trajectory Fig. 20 shows, so that single steps can be read."""
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
 _SECOND: Any = {"color": OKABE_ITO["vermillion"], "linestyle": (0, (4, 1.2))}
 
 
 @common_style()
-def figure_19_signal_and_tension(trajectory: xarray.Dataset) -> Figure:
-    """The signals and the tension of the cables that they drive.
+def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
+    """Actuation signals and the tension of a cable that each drives (lbf) over time (s).
 
-    The thesis's Fig. 19: both in lbf over time in s, a panel for each junction, which shows the
-    left one of its two actuated cables (the right one is its mirror image).
+    One panel per junction. A signal drives a left and a right cable, mirror images of each other;
+    the left one is shown.
     """
-    junctions = trajectory.junction.values
-    rows = len(junctions)
-    figure, panels = make_figure(
-        width_in=7.5, height_in=1.0 + 1.35 * rows, rows=rows, sharex=True, sharey=True
-    )
-    for panel, junction in zip(panels[:, 0], junctions, strict=True):
-        tension = trajectory.tension.sel(cable=actuated_cable(junction)) / POUND_FORCE
-        signal = trajectory.signal.sel(junction=junction) / POUND_FORCE
-        panel.plot(trajectory.time, tension, **_FIRST)
-        panel.plot(trajectory.time, signal, **_SECOND)
-        panel.set_ylabel(f"{junction}\n(lbf)")
-    panels[-1, 0].set_xlabel("time (s)")
+    figure, panels = _panels([str(name) for name in trajectory.junction.values])
+    for junction, panel in panels.items():
+        driven = np.flatnonzero(trajectory.cable_signal.values == junction)[0]
+        panel.plot(trajectory.time, trajectory.tension[:, driven] / POUND_FORCE, **_FIRST)
+        panel.plot(
+            trajectory.time, trajectory.signal.sel(junction=junction) / POUND_FORCE, **_SECOND
+        )
     _add_legend(
         figure,
         Line2D([], [], label="cable tension", **_FIRST),
@@ -52,53 +44,53 @@ def figure_19_signal_and_tension(trajectory: xarray.Dataset) -> Figure:
     )
     swing = np.ptp(trajectory.signal.values, axis=0).max() / POUND_FORCE
     figure.suptitle(
-        "Signals and tensions of actuated cables (Fig. 19)\n"
-        f"largest signal: {swing:.2f} lbf peak to peak (thesis: one pound)"
+        f"Signals and tensions of actuated cables\nlargest signal: {fixed(swing)} lbf peak to peak"
     )
     return figure
 
 
 @common_style()
-def figure_20_ground_forces(trajectory: xarray.Dataset, *, seconds: float = SECONDS) -> Figure:
-    """Normal force and friction on each tetrahedron at the end of the walk.
+def ground_forces(trajectory: xarray.Dataset, *, seconds: float = 5.0) -> Figure:
+    """Normal force and friction along x (lbf) over the last `seconds` of time (s).
 
-    The thesis's Fig. 20: both in lbf over time in s, a panel for the bottom left node of each
-    tetrahedron (the right one is its mirror image) and one for the tip of the lead; friction
-    is along x, positive forward. Shaded is when the node bears no normal force,
-    whose share of the time shown is given.
+    One panel per tetrahedron, for its bottom left node (the right one is its mirror image), and
+    one for each other contact node. Shaded: intervals without normal force.
     """
     end = trajectory.sel(time=slice(trajectory.time[-1] - seconds, None))
-    bodies = trajectory.tetrahedron.values
-    contacts = [f"{body} {NODES[BOTTOM_LEFT]}" for body in bodies] + [f"{bodies[-1]} {NODES[TIP]}"]
-    rows = len(contacts)
-    figure, panels = make_figure(
-        width_in=7.5, height_in=1.0 + 1.35 * rows, rows=rows, sharex=True, sharey=True
-    )
-    for panel, contact in zip(panels[:, 0], contacts, strict=True):
+    names = [str(name) for name in trajectory.contact.values]
+    figure, panels = _panels([name for name in names if not name.endswith(" bottom_right")])
+    for contact, panel in panels.items():
         _draw_contact(panel, end.sel(contact=contact))
-        panel.set_ylabel(f"{contact.replace('_', ' ')}\n(lbf)")
-    panels[-1, 0].set_xlabel("time (s)")
     _add_legend(
         figure,
         Line2D([], [], label="normal force", **_FIRST),
         Line2D([], [], label="friction force along x", **_SECOND),
         Patch(color=SHADE, label="no normal force"),
     )
-    figure.suptitle("Forces of the ground on each tetrahedron (Fig. 20)")
+    figure.suptitle("Forces of the ground on each tetrahedron")
     return figure
 
 
 def _draw_contact(panel: Axes, node: xarray.Dataset) -> None:
-    normal = node.normal_force / POUND_FORCE
-    friction = node.friction_force.sel(horizontal="x") / POUND_FORCE
     off = off_ground(node)
     for start, end in intervals(node.time.values, off.values):
         panel.axvspan(start, end, color=SHADE, linewidth=0.0)
-    panel.plot(node.time, normal, **_FIRST)
-    panel.plot(node.time, friction, **_SECOND)
-    panel.set_title(
-        f"off the ground {100 * share_of_time(off):.0f} % of the time shown", loc="right"
+    panel.plot(node.time, node.normal_force / POUND_FORCE, **_FIRST)
+    panel.plot(node.time, node.friction_force.sel(horizontal="x") / POUND_FORCE, **_SECOND)
+    share = fixed(100 * share_of_time(off), 0)
+    panel.set_title(f"off the ground {share} % of the time shown", loc="right")
+
+
+def _panels(names: list[str]) -> tuple[Figure, dict[str, Axes]]:
+    """A figure with one panel per name, one below the other, over time."""
+    rows = len(names)
+    figure, panels = make_figure(
+        width_in=7.5, height_in=1.0 + 1.35 * rows, rows=rows, sharex=True, sharey=True
     )
+    for name, panel in zip(names, panels[:, 0], strict=True):
+        panel.set_ylabel(f"{name.replace('_', ' ')}\n(lbf)")
+    panels[-1, 0].set_xlabel("time (s)")
+    return figure, dict(zip(names, panels[:, 0], strict=True))
 
 
 def _add_legend(figure: Figure, *handles: Artist) -> None:

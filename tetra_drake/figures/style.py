@@ -1,7 +1,7 @@
-"""The look that all figures share, and how they are written.
+"""The common look of figures, and how they are written.
 
-A figure function is decorated with `@common_style()`, begins with make_figure() and returns the
-figure; save_figure() writes it. Nothing here needs a display or keeps pyplot's state.
+A figure function is decorated with `@common_style()`, starts with make_figure() and returns the
+figure; save_figure() writes it. Neither a display nor pyplot is needed.
 """
 
 from __future__ import annotations
@@ -10,15 +10,20 @@ import contextlib
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import matplotlib.style
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 
 from tetra_drake.files import whole_file
+from tetra_drake.scenario.units import INCH
+
+if TYPE_CHECKING:
+    from tetra_drake.scenario.schema import ReferenceScenario
 
 OKABE_ITO = {
     "black": "#000000",
@@ -30,77 +35,42 @@ OKABE_ITO = {
     "orange": "#e69f00",
     "yellow": "#f0e442",
 }
-"""The colours that Okabe and Ito chose for colour-blind people. Yellow is too faint on white
-for lines."""
+"""Okabe and Ito's colours for colour-blind people. Yellow is too faint on white for lines."""
 
 LINE_COLOURS = tuple(colour for name, colour in OKABE_ITO.items() if name != "yellow")
-"""In the order in which series take them: neighbours differ in lightness, too."""
+"""Colours of series in order; neighbours differ in lightness, too."""
 
 DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
-"""Line styles that tell series apart in a grey print. As there are four of them and seven
-colours, 28 series differ."""
+"""Line styles that tell series apart in a grey print; with the colours, 28 series differ."""
 
 SHADE = "0.9"
-"""Grey of a stretch of time that is marked behind the data."""
+"""Grey behind marked intervals of time."""
 
-REFERENCE = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
-"""The line style of the thesis's numbers."""
+REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
+"""Line style of reference values."""
+
+PNG_DPI = 150
 
 
 def line_style(index: int) -> dict[str, Any]:
-    """Colour and dashes of a series by its index; they tell 28 series apart."""
+    """Colour and dashes of a series by its index."""
     return {
         "color": LINE_COLOURS[index % len(LINE_COLOURS)],
         "linestyle": DASHES[index % len(DASHES)],
     }
 
 
-_SERIES = [line_style(index) for index in range(len(LINE_COLOURS) * len(DASHES))]
-
-_STYLE: Any = {
-    "axes.prop_cycle": cycler(
-        color=[style["color"] for style in _SERIES],
-        linestyle=[style["linestyle"] for style in _SERIES],
-    ),
-    "font.family": "DejaVu Sans",  # comes with matplotlib: the same on every machine
-    "font.size": 9.0,
-    "axes.titlesize": 9.5,
-    "axes.labelsize": 9.0,
-    "figure.titlesize": 10.5,
-    "figure.labelsize": 9.0,
-    "legend.fontsize": 8.5,
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
-    "lines.linewidth": 1.3,
-    "lines.markersize": 4.0,
-    "axes.linewidth": 0.8,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.xmargin": 0.0,
-    "grid.color": "0.86",
-    "grid.linewidth": 0.5,
-    "legend.frameon": True,
-    "legend.framealpha": 0.9,
-    "legend.edgecolor": "0.8",
-    "legend.borderpad": 0.35,
-    "legend.handlelength": 2.4,
-    "figure.constrained_layout.use": True,
-    "path.simplify": True,
-    "path.simplify_threshold": 0.3,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "tetra_drake",  # else ids, and so bytes, are random
-}
-
-PNG_DPI = 150
-
-
 @contextlib.contextmanager
 def common_style() -> Iterator[None]:
-    """What is drawn inside has the common look, whatever the user's matplotlibrc says.
+    """The common look for what is drawn inside, whatever the user's matplotlibrc says.
 
-    As `@common_style()` it decorates a function that draws.
+    `@common_style()` decorates a function that draws.
     """
-    with matplotlib.style.context("default"), matplotlib.rc_context(_STYLE):
+    series = [line_style(index) for index in range(len(LINE_COLOURS) * len(DASHES))]
+    columns = {key: [style[key] for style in series] for key in ("color", "linestyle")}
+    sheet = Path(__file__).with_name("tetra_drake.mplstyle")
+    with matplotlib.style.context(["default", sheet]):
+        matplotlib.rcParams["axes.prop_cycle"] = cycler(**columns)
         yield
 
 
@@ -108,12 +78,19 @@ def common_style() -> Iterator[None]:
 def make_figure(
     *, width_in: float, height_in: float, rows: int = 1, columns: int = 1, **layout: Any
 ) -> tuple[Figure, np.ndarray]:
-    """A figure and its axes, always (rows, columns); sizes in inches on paper.
-
-    `layout` goes to Figure.subplots: sharex, sharey, height_ratios, width_ratios ...
-    """
+    """A figure and its axes (rows, columns); sizes in inches on paper, `layout` for subplots."""
     figure = Figure(figsize=(width_in, height_in))
     return figure, figure.subplots(rows, columns, squeeze=False, **layout)
+
+
+def draw_reference(axes: Axes, reference: ReferenceScenario | None, name: str) -> None:
+    """Draws a distance of the reference, if it has one, as a labelled horizontal line (in)."""
+    if reference is None or getattr(reference, name) is None:
+        return
+    inches = getattr(reference, name) / INCH
+    axes.axhline(inches, **REFERENCE)
+    place: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
+    axes.annotate(f"{reference.source}: {inches:.4g} in", (0.02, inches), (0, 3), **place)
 
 
 @common_style()
@@ -130,9 +107,9 @@ def save_figure(
             figure.savefig(file, format=kind, dpi=PNG_DPI, metadata=metadata)
             if kind == "svg":
                 svg = file.read_text(encoding="utf-8")
-                file.write_text(_without_needless_digits(svg), encoding="utf-8")
+                file.write_text(_with_short_paths(svg), encoding="utf-8")
 
 
-def _without_needless_digits(svg: str) -> str:
-    """Paths to 0.01 points, which matplotlib writes to 1e-6: an eighth of the file."""
+def _with_short_paths(svg: str) -> str:
+    """The drawing with paths to 0.01 points, which matplotlib writes to 1e-6."""
     return re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)

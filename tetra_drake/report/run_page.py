@@ -1,130 +1,183 @@
-"""The report of a run: one HTML page with its numbers and figures, and what goes with it."""
+"""The report of a run: an HTML page with its numbers and figures, and the files it links to."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
+import pandas
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.method import Part
 from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.evolution.reevaluation import best_distances
-from tetra_drake.evolution.study import Study, Walk, study_run
 from tetra_drake.evolution.summary import comparisons
-from tetra_drake.figures.book import TABLE_8, Picture, draw_run
-from tetra_drake.figures.evolution import table_8_two_best
-from tetra_drake.files import write_whole
-from tetra_drake.formatting import duration
-from tetra_drake.formatting import fixed as number
+from tetra_drake.evolution.tables import Run, load_run
+from tetra_drake.figures.book import TWO_BEST, Picture, draw_run, draw_trajectory
+from tetra_drake.figures.evolution import two_best
+from tetra_drake.files import check_folder, write_whole
+from tetra_drake.formatting import duration, fixed
+from tetra_drake.report.study import Study, study_run
+from tetra_drake.results.folder import RESULT, RUN_MANIFEST, load_result_folder
 from tetra_drake.results.result import versions
-from tetra_drake.scenario.load import dump_scenario
+from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
+from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.replay import replay_title, save_replay
-
-if TYPE_CHECKING:
-    import pandas
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
 
 
-def write_report(directory: Path) -> list[str]:
-    """Writes figures/, replay.html and report.html into a run's directory; their names.
+def write_figures(source: Path, out: Path | None = None) -> list[Path]:
+    """Writes the figures of a run or of a result folder into `out`; returns what was written.
 
-    Works for a run that is not finished, too. Raises InputError if `directory` holds no
-    run, a damaged one, or one without any fitness, or cannot be written to.
+    Without `out`, they go to figures/ in the source, and a run's report and replay are written
+    anew, too. Raises InputError.
     """
-    study = study_run(directory)
-    pictures = draw_run(study, directory / FIGURES)
+    folder = out or source / FIGURES
+    if (source / RUN_MANIFEST).exists():
+        check_folder(folder)
+        if out is None:
+            return write_report(source)
+        _draw(study_run(load_run(source)), folder)
+    elif (source / RESULT).exists():
+        check_folder(folder)
+        draw_trajectory(load_result_folder(source).trajectory, folder)
+    else:
+        problem = f"holds neither {RUN_MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
+        raise InputError(source, "", problem)
+    return [folder]
+
+
+def write_report(directory: Path) -> list[Path]:
+    """Writes figures/, replay.html and report.html into a run's directory; returns their paths.
+
+    Works for an unfinished run, too. Raises InputError if `directory` holds no run, a damaged
+    one, or one without any fitness, or cannot be written to.
+    """
+    study = study_run(load_run(directory))
+    best = study.best
+    pictures = _draw(study, directory / FIGURES)
     save_replay(
         directory / REPLAY,
         scenario=study.run.manifest.scenario,
-        trajectory=study.best.trajectory,
-        title=replay_title(study.best.gait.name, study.best.trajectory),
+        trajectory=best.trajectory,
+        title=replay_title(best.gait.name, best.trajectory),
     )
     write_whole(directory / REPORT, render_report(study, pictures, folder=directory / FIGURES))
-    return [f"{FIGURES}/", REPLAY, REPORT]
+    return [directory / FIGURES, directory / REPLAY, directory / REPORT]
+
+
+def _draw(study: Study, folder: Path) -> list[Picture]:
+    initial, best = study.initial, study.best
+    return draw_run(
+        study.run,
+        folder,
+        trial=study.trial,
+        initial=initial.trajectory,
+        best=best.trajectory,
+        labels=(initial.label, best.label),
+    )
 
 
 def render_report(study: Study, pictures: Sequence[Picture], *, folder: Path) -> str:
     """The page, with the pictures as saved in `folder` in it; its links are relative."""
     from jinja2 import Environment, StrictUndefined
 
-    template = (resources.files("tetra_drake") / "report" / "report.html.jinja").read_text(
-        encoding="utf-8"
-    )
+    template = resources.files("tetra_drake") / "report" / "report.html.jinja"
     environment = Environment(autoescape=True, undefined=StrictUndefined)
-    scenario, best = study.run.manifest.scenario, study.best
-    seconds = f"{scenario.simulation.duration:g} s"
-    return environment.from_string(template).render(
-        title=f"{scenario.name}, seed {study.run.manifest.seed}: "
-        f"{number(best.result.metrics.distance_in)} inches in {seconds}",
+    run, best = study.run, study.best
+    scenario, reference = run.manifest.scenario, run.manifest.scenario.reference
+    walked = f"{fixed(best.recorded['distance_in'])} inches in {scenario.simulation.duration:g} s"
+    return environment.from_string(template.read_text(encoding="utf-8")).render(
+        title=f"{scenario.name}, seed {run.manifest.seed}: {walked}",
         notes=_notes(study),
-        facts=_run_facts(study),
-        comparisons=comparisons(study.run),
-        duration=seconds,
-        trials=_trial_table(study),
-        best=_best_gait(best, seconds),
+        facts=_facts(run),
+        differences=differences(scenario, load_scenario("thesis")),
+        source=reference.source if reference else "",
+        comparisons=comparisons(run),
+        trials=_trials(run),
+        best=f"{best.label}: {walked}".capitalize(),
+        replay=REPLAY,
+        gait=_gait_file(study),
+        metrics=_metrics(best.recorded),
+        parameters=_parameters(study),
+        two_best=f"{FIGURES}/{TWO_BEST}",
         figures=FIGURES,
         pictures=[_embedded(picture, folder) for picture in pictures],
-        table_8=_table_8(study),
         commands=_commands(study),
+        own=run.manifest.method.given_from_python,
         scenario=dump_scenario(scenario),
     )
 
 
 def _notes(study: Study) -> list[str]:
-    """What a reader has to know before believing the rest."""
+    """What limits the report: an unfinished run, and gaits that do not move as recorded."""
+    run, statuses = study.run, study.run.statuses
     notes = []
-    going_on = sum(status.stop is None for status in study.statuses)
+    going_on = sum(status.stop is None for status in statuses)
     if going_on:
+        own = run.manifest.method.given_from_python
+        how = "tetra-drake evolve --out . --resume in its directory"
+        how = "tetra_drake.evolve(..., resume=True) from Python" if own else how
         notes.append(
-            f"This run is not finished: {going_on} of {len(study.statuses)} trials go on with "
-            "tetra-drake evolve --out . --resume in its directory."
+            f"This run is not finished: {going_on} of {len(statuses)} trials have not ended. "
+            f"Continue it with {how}."
         )
     walks = [study.best] if study.initial is study.best else [study.best, study.initial]
-    changed = [
-        f"that of {walk.label} ends {walk.deviation_in:.1g} in from where it did in the run"
-        for walk in walks
-        if walk.deviation_in
-    ]
+    changed = [f"{walk.label}: {walk.deviation_in:.1g} in" for walk in walks if walk.deviation_in > 1e-6]
     if changed:
         notes.append(
-            f"The gaits were simulated again for these pictures, with {_listed(versions())}; "
-            f"{', '.join(changed)}."
+            f"Figures and replay show gaits simulated again with {_listed(versions())}. Their "
+            f"distances differ from the recorded ones: {'; '.join(changed)}."
         )
     return notes
 
 
-def _run_facts(study: Study) -> list[tuple[str, str]]:
-    manifest, statuses = study.run.manifest, study.statuses
-    settings = manifest.scenario.evolution
+def _facts(run: Run) -> list[tuple[str, str]]:
+    manifest, statuses = run.manifest, run.statuses
+    settings, method = manifest.scenario.evolution, manifest.method
     evaluations = sum(status.evaluations for status in statuses)
     failures = sum(status.failures for status in statuses)
-    wall_time = sum(status.wall_time for status in statuses)
     return [
         ("scenario", manifest.scenario.name),
         ("seed", f"{manifest.seed}"),
         ("trials", f"{settings.trials} of at most {settings.max_iterations} iterations"),
-        ("population", f"{settings.population}"),
+        ("evaluated by", _described(method.evaluator)),
+        ("objective", _described(method.objective)),
+        ("optimiser", _described(method.optimizer)),
         ("evaluations", f"{evaluations}, of which {failures} failed"),
-        ("simulated time", f"{manifest.scenario.simulation.duration:g} s an evaluation"),
-        ("engine", manifest.scenario.simulation.engine),
-        ("simulation took", f"{duration(wall_time)} (h:mm:ss), all processes together"),
+        ("simulated time", f"{manifest.scenario.simulation.duration:g} s per evaluation"),
+        ("wall time", f"{duration(sum(s.wall_time for s in statuses))} (h:mm:ss), all processes"),
         ("versions", _listed(manifest.versions)),
     ]
 
 
-def _trial_table(study: Study) -> dict[str, list[str]]:
+def _described(part: Part) -> str:
+    own = {
+        "drake": "the Drake diagram",
+        "compiled": "the compiled engine",
+        "fitness": "the scenario's fitness",
+        "SteadyState": "the steady-state evolutionary algorithm of the scenario",
+    }
+    text = own.get(part.name, part.name)
+    text += f" {json.dumps(part.settings)}" if part.settings else ""
+    return text + (f", given from Python (SHA-256 {part.digest[:16]})" if part.digest else "")
+
+
+def _trials(run: Run) -> dict[str, list[str]]:
     """The cells of each column, by its heading."""
-    statuses = study.statuses
-    rises = [status.improvement_percent for status in statuses]
+    statuses = run.statuses
     columns = {
         "trial": [f"{status.number}" for status in statuses],
-        "best distance": [
+        "best distance (in)": [
             _rise(status.initial_best_distance_in, status.best_distance_in) for status in statuses
         ],
-        "improvement": [number(rise) + (" %" if math.isfinite(rise) else "") for rise in rises],
+        "improvement (%)": [fixed(status.improvement_percent) for status in statuses],
         "mean fitness": [
             _rise(status.initial_mean_fitness, status.mean_fitness) for status in statuses
         ],
@@ -133,92 +186,53 @@ def _trial_table(study: Study) -> dict[str, list[str]]:
         "failed": [f"{status.failures}" for status in statuses],
         "state": [status.stop or "not ended" for status in statuses],
     }
-    if not study.run.reevaluations.empty:
-        on_diagram = {trial: distance for trial, _, distance in best_distances(study.run)}
-        columns["best on the Drake diagram"] = [
-            number(on_diagram.get(status.number, math.nan)) for status in statuses
+    if not run.reevaluations.empty:
+        again = {trial: distance for trial, _, distance in best_distances(run)}
+        columns["best on the Drake diagram (in)"] = [
+            fixed(again.get(status.number, math.nan)) for status in statuses
         ]
     return columns
 
 
 def _rise(before: float, after: float) -> str:
-    return f"{number(before)} \N{RIGHTWARDS ARROW} {number(after)}"
+    return f"{fixed(before)} \N{RIGHTWARDS ARROW} {fixed(after)}"
 
 
-def _best_gait(best: Walk, seconds: str) -> dict[str, Any]:
-    metrics = best.result.metrics
-    gait = best.gait
-    weights = [{"ours": f"{weight:.4f}"} for weight in gait.weights]
-    taus = [{"ours": f"{tau:.4f}"} for tau in (gait.tau_a, gait.tau_b)]
-    return {
-        "label": best.label.capitalize(),
-        "walked": f"{number(metrics.distance_in)} inches in {seconds}",
-        "replay": REPLAY,
-        "file": f"{trial_folder(Path(), best.trial) / BEST_GAIT}",
-        "facts": [
-            ("fitness", number(best.result.fitness)),
-            ("steady distance", f"{number(metrics.in_inches()['steady_distance_in'])} in"),
-            ("twist", f"{metrics.in_inches()['twist_in']:.2g} in"),
-            ("lateral drift", f"{metrics.in_inches()['lateral_drift_in']:.2g} in"),
-        ],
-        "parameters": [*_weight_columns(weights), _column("τ_A, τ_B", taus)],
-    }
+def _metrics(recorded: pandas.Series) -> list[tuple[str, str]]:
+    names = {"steady_distance": "steady distance", "twist": "twist", "lateral_drift": "drift"}
+    lengths = [(text, f"{fixed(recorded[name] / INCH)} in") for name, text in names.items()]
+    return [("fitness", fixed(recorded["fitness"])), *lengths]
 
 
-def _table_8(study: Study) -> dict[str, Any] | None:
-    """The thesis's layout: weights in columns of four, between fitness and time constants."""
-    table = table_8_two_best(study.run, study.best.trial)
+def _parameters(study: Study) -> pandas.DataFrame:
+    """The best gait, beside the second best of its trial if there is one; rows: parameters."""
+    scenario = study.run.manifest.scenario
+    table = two_best(study.run, study.trial, scenario.reference)
     if table is None:
-        return None
-    fitness, *weights, tau_a, tau_b = _difference_cells(table)
-    return {
-        "trial": f"trial {study.best.trial}, the best one",
-        "has_thesis": bool(table["thesis"].notna().all()),
-        "file": f"{FIGURES}/{TABLE_8}",
-        "columns": [
-            _column("fitness", [fitness]),
-            *_weight_columns(weights),
-            _column("τ_A, τ_B", [tau_a, tau_b]),
-        ],
-    }
+        space = ParameterSpace.of(scenario)
+        table = pandas.DataFrame({"best": space.vector(study.best.gait)}, index=space.names)
+    return table.map(lambda value: fixed(value, 4))
 
 
-def _difference_cells(table: pandas.DataFrame) -> list[dict[str, str]]:
-    return [
-        {"ours": f"{ours:.4f}", "thesis": f"{theirs:.4f}" if math.isfinite(theirs) else ""}
-        for ours, theirs in zip(table["difference"], table["thesis"], strict=True)
-    ]
-
-
-def _weight_columns(cells: Sequence[dict[str, str]]) -> list[dict[str, Any]]:
-    """Columns of four; 2 n (n - 1) weights always fill them."""
-    return [
-        _column(f"w{first + 1}\N{EN DASH}{first + 4}", cells[first : first + 4])
-        for first in range(0, len(cells), 4)
-    ]
-
-
-def _column(heading: str, cells: Sequence[dict[str, str]]) -> dict[str, Any]:
-    return {"heading": heading, "cells": [{"thesis": ""} | cell for cell in cells]}
-
-
-def _embedded(picture: Picture, folder: Path) -> dict[str, Any]:
+def _embedded(picture: Picture, folder: Path) -> dict[str, str]:
     """As an image of its own, so that no two drawings share names within the page."""
     svg = (folder / f"{picture.name}.svg").read_text(encoding="utf-8")
-    return {
-        "number": picture.number,
-        "caption": picture.caption,
-        "thesis": picture.thesis,
-        # Not base64, which would be a fifth longer.
-        "svg": quote(" ".join(svg.split()), safe=" /:=,;()!?*+@$"),
-    }
+    # Not base64, which would be a fifth longer.
+    packed = quote(" ".join(svg.split()), safe=" /:=,;()!?*+@$")
+    return {"name": picture.name, "caption": picture.caption, "svg": packed}
+
+
+def _gait_file(study: Study) -> str:
+    return f"{trial_folder(Path(), study.trial) / BEST_GAIT}"
 
 
 def _commands(study: Study) -> list[str]:
-    gait = trial_folder(Path(), study.best.trial) / BEST_GAIT
+    """Commands that reproduce the run; those that evolve only where it was made by one."""
+    manifest = study.run.manifest
+    evolve = f"tetra-drake evolve --scenario {SCENARIO} --seed {manifest.seed} --out ../again"
     return [
-        f"tetra-drake evolve --scenario {SCENARIO} --seed {study.run.manifest.seed} --out ../again",
-        f"tetra-drake simulate --scenario {SCENARIO} --gait {gait} --out ../best",
+        *([] if manifest.method.given_from_python else [evolve]),
+        f"tetra-drake simulate --scenario {SCENARIO} --gait {_gait_file(study)} --out ../best",
         "tetra-drake figures .",
     ]
 

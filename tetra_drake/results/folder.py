@@ -1,8 +1,8 @@
-"""The folder that a simulation leaves behind: written by `simulate`, read by `replay`.
+"""The folder of one simulation: written by `simulate`, read by `replay` and `figures`.
 
 scenario.yaml     the scenario in full, for `--scenario`
 trajectory.nc     motion and forces over time, for xarray
-replay.html       the same to look at
+replay.html       a page that plays the motion
 result.json       the numbers and the gait
 """
 
@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.record import MANIFEST
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.robot.gait import Gait, gait_from_json
-from tetra_drake.robot.structure import NODES, MakeStructure, Structure
+from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -30,22 +29,24 @@ if TYPE_CHECKING:
 
 SCENARIO, TRAJECTORY = "scenario.yaml", "trajectory.nc"
 REPLAY, RESULT = "replay.html", "result.json"
+RUN_MANIFEST = "manifest.json"
+"""Marks the folder of a run, which has a scenario.yaml of its own."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """One gait's motion, with all it takes to show it."""
+    """The motion of one gait, with all that is needed to show it."""
 
     scenario: Scenario
     gait: Gait
     trajectory: xarray.Dataset
-    """See trajectory.make_dataset."""
+    """See trajectory.assemble_dataset."""
 
 
 def check_result_folder(folder: Path) -> None:
-    """Raises InputError if a simulation cannot leave its files in `folder`."""
+    """Raises InputError if a simulation cannot write its files to `folder`."""
     check_folder(folder)
-    if (folder / MANIFEST).exists():
+    if (folder / RUN_MANIFEST).exists():
         raise InputError(folder, "", "holds a run of `evolve`, expected another folder")
 
 
@@ -62,7 +63,7 @@ def save_result_folder(
 
     trajectory = result.trajectory
     assert trajectory is not None
-    # While there is a result.json, the other files belong to it.
+    # Written last and removed first: where there is a result.json, the other files belong to it.
     (folder / RESULT).unlink(missing_ok=True)
     write_whole(folder / SCENARIO, dump_scenario(scenario))
     save_dataset(trajectory, folder / TRAJECTORY)
@@ -78,7 +79,8 @@ def load_result_folder(folder: Path) -> Recording:
     """
     for name in (RESULT, SCENARIO, TRAJECTORY):
         if not (folder / name).is_file():
-            raise InputError(folder, "", f"holds no {name}, so is no folder written by `simulate`")
+            problem = f"holds no {name}, so it was not written by `simulate`"
+            raise InputError(folder, name, problem)
     scenario = load_scenario(folder / SCENARIO)
     structure = MakeStructure(scenario.robot, scenario.cables)
     return Recording(
@@ -110,24 +112,19 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
 
 
 def _check_trajectory(path: Path, trajectory: xarray.Dataset, structure: Structure) -> None:
-    """Raises InputError unless the file holds what there is to show of this robot."""
-    names = np.array(structure.node_names)
-    expected = {
-        "tetrahedron": structure.bodies,
-        "node": NODES,
-        "cable": structure.cable_names,
-        "contact": tuple(names[structure.contacts].tolist()),
-        "axis": ("x", "y", "z"),
-        "horizontal": ("x", "y"),
-    }
+    """Raises InputError unless the file holds the motion of this robot."""
+    names = [structure.node_names[node] for node in structure.contacts]
+    expected = {"tetrahedron": structure.bodies, "cable": structure.cable_names, "contact": names}
     for name, labels in expected.items():
-        if name not in trajectory.coords or tuple(trajectory[name].values.tolist()) != labels:
-            problem = f"is not as in {SCENARIO}, with {len(structure.bodies)} tetrahedra"
-            raise InputError(path, name, problem)
+        if name not in trajectory.coords or trajectory[name].values.tolist() != list(labels):
+            raise InputError(path, name, f"is not that of the robot in {SCENARIO}")
     dims = {
         "time": ("time",),
         "p_WN": ("time", "tetrahedron", "node", "axis"),
+        "p_WB": ("time", "tetrahedron", "axis"),
+        "q_WB": ("time", "tetrahedron", "quaternion"),
         "tension": ("time", "cable"),
+        "signal": ("time", "junction"),
         "normal_force": ("time", "contact"),
         "friction_force": ("time", "contact", "horizontal"),
     }
@@ -135,6 +132,6 @@ def _check_trajectory(path: Path, trajectory: xarray.Dataset, structure: Structu
         if name not in trajectory.variables or trajectory[name].dims != wanted:
             raise InputError(path, name, f"is missing, or not over {', '.join(wanted)}")
         if trajectory[name].size == 0 or not np.isfinite(trajectory[name].values).all():
-            raise InputError(path, name, "holds no numbers, or some that are not finite")
+            raise InputError(path, name, "is empty, or holds numbers that are not finite")
     if not (np.diff(trajectory["time"].values) > 0.0).all():
         raise InputError(path, "time", "does not ascend")

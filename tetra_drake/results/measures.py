@@ -110,8 +110,3 @@ def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:
     i = int(np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))[-1])
     end = times[i] - y[i] * (times[i + 1] - times[i]) / (y[i + 1] - y[i])
     return float(end - 1.0 / frequency), float(end)
-
-
-def actuated_cable(junction: str) -> str:
-    """One of the two cables that the junction's signal drives; the other mirrors it."""
-    return f"{junction} outer bottom_left"

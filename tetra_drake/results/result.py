@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import platform
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake import __version__, thesis
+from tetra_drake import __version__
 from tetra_drake.files import write_whole
+from tetra_drake.formatting import fixed
 from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import ReferenceScenario, Scenario
+from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
     import xarray
@@ -116,32 +117,33 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
 
 
 def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
-    """A few lines for the terminal, the thesis's numbers beside ours."""
-    inches, work = result.metrics.in_inches(), result.integrator
+    """Metrics, lengths in inches, and what the simulation took, as lines for the terminal."""
+    metrics, work = result.metrics, result.integrator
     after = f"from {scenario.simulation.steady_from:g} s on"
     rows = [
-        (
-            "distance",
-            f"{inches['distance_in']:8.2f} in",
-            f"thesis: {thesis.BEST_INITIAL_DISTANCE_IN} in the best random gait, "
-            f"{thesis.BEST_EVOLVED_DISTANCE_IN} in the best evolved one",
-        ),
-        ("steady distance", f"{inches['steady_distance_in']:8.2f} in", after),
-        ("twist", f"{_tidy(inches['twist_in'])} in", "x1 - x2: turned about the vertical"),
-        ("lateral drift", f"{_tidy(inches['lateral_drift_in'])} in", ""),
-        ("fitness", f"{result.fitness:8.2f}", ""),
+        ("distance", metrics.distance, ""),
+        ("steady distance", metrics.steady_distance, after),
+        ("twist", metrics.twist, "x1 - x2 at the end: turned about the vertical"),
+        ("lateral drift", metrics.lateral_drift, ""),
     ]
     lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
-    for name, value, note in rows:
-        lines.append(f"  {name:<16}{value:<14}{f'({note})' if note else ''}".rstrip())
+    for name, metres, note in rows:
+        line = f"  {name:<16}{fixed(metres / INCH):>8} in   {f'({note})' if note else ''}"
+        lines.append(line.rstrip())
+    lines.append(f"  {'fitness':<16}{fixed(result.fitness):>8}")
+    reference = scenario.reference
+    if reference is not None:
+        lines.append(f"  {reference.source}: {_best_distances(reference)}")
+    speed = fixed(result.duration / result.wall_time, 1)
     lines.append(
-        f"  simulated in {result.wall_time:.1f} s, {result.duration / result.wall_time:.1f} times "
-        f"real time: {work.scheme}, accuracy {work.accuracy:g}, {work.steps} steps, "
+        f"  simulated in {fixed(result.wall_time, 1)} s, {speed} times real time: {work.scheme}, "
+        f"accuracy {work.accuracy:g}, {work.steps} steps, "
         f"{work.derivative_evaluations} derivative evaluations"
     )
     return "\n".join(lines)
 
 
-def _tidy(value: float) -> str:
-    """A small length without digits that are rounding."""
-    return f"{value if math.fabs(value) >= 5e-3 else 0.0:8.2f}"
+def _best_distances(reference: ReferenceScenario) -> str:
+    named = {"random": reference.best_initial_distance, "evolved": reference.best_distance}
+    found = [f"{name} {d / INCH:.4g} in" for name, d in named.items() if d is not None]
+    return f"best distances {', '.join(found)}"

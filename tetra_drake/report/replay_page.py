@@ -1,0 +1,63 @@
+"""The replay page of a result folder, a gait file or a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.tables import load_run
+from tetra_drake.files import check_folder
+from tetra_drake.results.folder import RESULT, RUN_MANIFEST, Recording, load_result_folder
+from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.visualization.replay import replay_title, save_replay
+
+
+def write_replay(source: Path, out: Path, *, scenario: str | None = None) -> str:
+    """Writes the replay page of what load_recording() finds; returns the page's title.
+
+    Raises InputError, before anything is simulated, if `out` cannot be written.
+    """
+    if out.is_dir():
+        raise InputError(out, "", "is a directory, expected a file to write")
+    check_folder(out.parent)
+    recording = load_recording(source, scenario=scenario)
+    title = replay_title(recording.gait.name, recording.trajectory)
+    save_replay(out, scenario=recording.scenario, trajectory=recording.trajectory, title=title)
+    return title
+
+
+def load_recording(source: Path, *, scenario: str | None = None) -> Recording:
+    """The motion in a result folder, or of a gait file or a run's fittest gait, simulated.
+
+    A gait file is simulated on `scenario` (default: thesis); folders have their own scenarios.
+    Raises InputError if there is no motion, or if a scenario is given for a folder, and
+    SimulationFailure.
+    """
+    if source.is_dir() and scenario is not None:
+        raise InputError("--scenario", "", f"is for gait files; {source} has one of its own")
+    if (source / RUN_MANIFEST).exists():
+        run = load_run(source)
+        return _simulate(run.gait(*run.fittest()), run.manifest.scenario)
+    if (source / RESULT).exists():
+        return load_result_folder(source)
+    if source.is_dir():
+        raise _neither(source)
+    if not source.exists():
+        expected = "a folder of `simulate` or `evolve`, or a gait file"
+        raise InputError(source, "", f"no such file or folder, expected {expected}")
+    given = load_scenario(scenario or "thesis")
+    return _simulate(load_gait(source, given), given)
+
+
+def _neither(source: Path) -> InputError:
+    problem = f"holds neither {RESULT}, as `simulate` writes, nor {RUN_MANIFEST}, as `evolve`"
+    return InputError(source, "", problem)
+
+
+def _simulate(gait: Gait, scenario: Scenario) -> Recording:
+    trajectory = simulate(scenario=scenario, gait=gait, record=True).trajectory
+    assert trajectory is not None
+    return Recording(scenario=scenario, gait=gait, trajectory=trajectory)

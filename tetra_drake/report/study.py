@@ -1,0 +1,72 @@
+"""A recorded run with its best gaits simulated again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.evolution.tables import Run
+from tetra_drake.results.measures import distance_walked
+from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.units import INCH
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A gait of a run, simulated again."""
+
+    gait: Gait
+    recorded: pandas.Series
+    """Its row of the run's evaluations."""
+    trajectory: xarray.Dataset
+
+    @property
+    def label(self) -> str:
+        """Trial and number of the evaluation."""
+        return f"trial {self.recorded['trial']}, evaluation {self.recorded['index']}"
+
+    @property
+    def deviation_in(self) -> float:
+        """Difference from the recorded distance: 0, except with other versions than the run's."""
+        walked = float(distance_walked(self.trajectory)[-1]) / INCH
+        return abs(walked - self.recorded["distance_in"])
+
+
+@dataclass(frozen=True)
+class Study:
+    """A run with the gaits that its report shows."""
+
+    run: Run
+    trial: int
+    """The best trial: the one with the fittest gait."""
+    initial: Walk
+    """The fittest gait of the best trial's first iteration in which not all failed."""
+    best: Walk
+    """The fittest gait of the run."""
+
+
+def study_run(run: Run) -> Study:
+    """Simulates the fittest gait of the best trial, initially and of all.
+
+    Raises InputError if no gait of the run has a fitness, and SimulationFailure if other versions
+    than the run's make such a gait fail.
+    """
+    trial, index = run.fittest()
+    rows = run.evaluations.query("trial == @trial").dropna(subset="fitness").set_index("index")
+    first = int(rows[rows["iteration"] == rows["iteration"].min()]["fitness"].idxmax())
+    best = _walk(run, trial, index)
+    initial = best if first == index else _walk(run, trial, first)
+    return Study(run=run, trial=trial, initial=initial, best=best)
+
+
+def _walk(run: Run, trial: int, index: int) -> Walk:
+    gait = run.gait(trial, index)
+    trajectory = simulate(scenario=run.manifest.scenario, gait=gait, record=True).trajectory
+    assert trajectory is not None
+    recorded = run.evaluations.query("trial == @trial and index == @index").iloc[0]
+    return Walk(gait=gait, recorded=recorded, trajectory=trajectory)
