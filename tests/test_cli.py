@@ -217,9 +217,7 @@ def test_the_process_ends_with_the_status_and_no_traceback(
 
 def test_a_simulation_that_fails_says_when_and_why_with_status_1(inputs, work, capsys):
     assert main(["simulate", "--scenario", str(inputs / "poor.yaml")]) == 1
-    assert_refused_in_one_line(
-        capsys.readouterr(), "simulation failed at t = ", "the budget of 100"
-    )
+    assert_refused_in_one_line(capsys.readouterr(), "simulation failed at t = ", "100")
     assert os.listdir(work) == []
 
 

@@ -129,7 +129,8 @@ def _notes(study: Study) -> list[str]:
             f"Continue it with {how}."
         )
     walks = [study.best] if study.initial is study.best else [study.best, study.initial]
-    changed = [f"{walk.label}: {walk.deviation_in:.1g} in" for walk in walks if walk.deviation_in > 1e-6]
+    deviations = [(walk.label, walk.deviation_in) for walk in walks]
+    changed = [f"{label}: {inches:.1g} in" for label, inches in deviations if inches > 1e-6]
     if changed:
         notes.append(
             f"Figures and replay show gaits simulated again with {_listed(versions())}. Their "
