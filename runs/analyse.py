@@ -212,6 +212,7 @@ def figure_engines(distances: pandas.DataFrame) -> Figure:
     scatter.plot(ends, ends, label="equal", **REFERENCE)
     scatter.plot(compiled, drake, "o", color=OKABE_ITO["blue"], markersize=2.5, label="gait")
     scatter.set_aspect("equal")
+    scatter.margins(0.04)
     scatter.set_xlabel("distance on the compiled engine (in)")
     scatter.set_ylabel("distance on the Drake diagram (in)")
     scatter.legend(loc="upper left")
