@@ -53,12 +53,18 @@ def signal_samples(scenario: Scenario, gait: Gait) -> np.ndarray:
     return scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
 
 
-def signals_at(scenario: Scenario, gait: Gait, times: np.ndarray) -> np.ndarray:
-    """The signals (times, n) in N that cables are fed at `times` (s); zero before the start-up."""
-    samples = signal_samples(scenario, gait)
+def signals_at(
+    scenario: Scenario, gait: Gait, times: np.ndarray, *, raw: bool = False
+) -> np.ndarray:
+    """The signals (times, n) in N that cables are fed at `times` (s), zero before the start-up.
+
+    With `raw`, y_extensor - y_flexor, with neither gain nor start-up applied.
+    """
+    samples = signal_samples(scenario, gait) / (scenario.cpg.gain if raw else 1.0)
     grid = scenario.cpg.listing_step * np.arange(len(samples))
     signals = np.column_stack([np.interp(times, grid, column) for column in samples.T])
-    signals[times < scenario.cpg.start_up - 1e-9] = 0.0
+    if not raw:
+        signals[times < scenario.cpg.start_up - 1e-9] = 0.0
     return signals
 
 
@@ -78,14 +84,9 @@ def save_signals(
     columns are y_extensor - y_flexor, with neither gain nor start-up applied.
     """
     cpg, duration = scenario.cpg, scenario.simulation.duration
-    samples = signal_samples(scenario, gait)
-    samples = samples / cpg.gain if raw else samples / UNITS[unit]
     period = 1.0 / rate if rate else cpg.listing_step
     times = period * np.arange(math.floor(duration / period + 1e-9) + 1)
-    grid = cpg.listing_step * np.arange(len(samples))
-    signals = np.column_stack([np.interp(times, grid, column) for column in samples.T])
-    if not raw:
-        signals[times < cpg.start_up] = 0.0
+    signals = signals_at(scenario, gait, times, raw=raw) / (1.0 if raw else UNITS[unit])
     names = [f"signal_{i + 1}" for i in range(scenario.oscillators)]
     kind = "y_extensor - y_flexor (no unit)" if raw else f"force in {unit} that shortens the cables"
     drives = ", ".join(
