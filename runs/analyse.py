@@ -2,8 +2,7 @@
 
     python runs/analyse.py runs/thesis [RUN ...]
 
-Writes analysis.json to each run's folder, for tables.py, and figures/engines.svg where the initial
-gaits were evaluated on both engines.
+Writes analysis.json to each run's folder, for tables.py.
 """
 
 from __future__ import annotations
@@ -19,15 +18,13 @@ from typing import Any
 
 import numpy as np
 import pandas
-from matplotlib.figure import Figure
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import available_cores, evaluate_all, process_executor
 from tetra_drake.evolution.robustness import robustness
-from tetra_drake.evolution.tables import Run, load_run
-from tetra_drake.figures.style import OKABE_ITO, REFERENCE, common_style, make_figure, save_figure
+from tetra_drake.evolution.tables import load_run
 from tetra_drake.files import write_whole
 from tetra_drake.results.measures import (
     dominant_frequency,
@@ -184,52 +181,6 @@ def oscillator_frequency(scenario: Scenario) -> float:
     return dominant_frequency(times[times >= 5.0], signal[times >= 5.0])
 
 
-def distances_on_both(run: Run) -> pandas.DataFrame:
-    """The gaits of a compiled run that were evaluated again on the Drake diagram.
-
-    Columns trial, index, iteration, compiled_in and drake_in; NaN where a gait failed.
-    """
-    key = ["trial", "index"]
-    if run.reevaluations.empty:
-        return pandas.DataFrame(columns=[*key, "iteration", "compiled_in", "drake_in"])
-    compiled = run.evaluations[[*key, "iteration", "distance_in"]]
-    both = compiled.merge(run.reevaluations[[*key, "distance_in"]], on=key, validate="1:1")
-    return both.rename(columns={"distance_in_x": "compiled_in", "distance_in_y": "drake_in"})
-
-
-@common_style()
-def figure_engines(distances: pandas.DataFrame) -> Figure:
-    """Distances of gaits on the Drake diagram over those on the compiled engine, in inches.
-
-    Beside them the share of the gaits over the absolute difference. Takes rows of
-    distances_on_both() without failures.
-    """
-    compiled, drake = distances["compiled_in"], distances["drake_in"]
-    difference = (compiled - drake).abs().clip(lower=1e-4).sort_values()  # none is 0 on a log axis
-    figure, panels = make_figure(width_in=8.0, height_in=4.2, columns=2)
-    scatter, shares = panels[0]
-    ends = [min(compiled.min(), drake.min()), max(compiled.max(), drake.max())]
-    scatter.plot(ends, ends, label="equal", **REFERENCE)
-    scatter.plot(compiled, drake, "o", color=OKABE_ITO["blue"], markersize=2.5, label="gait")
-    scatter.set_aspect("equal")
-    scatter.margins(0.04)
-    scatter.set_xlabel("distance on the compiled engine (in)")
-    scatter.set_ylabel("distance on the Drake diagram (in)")
-    scatter.legend(loc="upper left")
-    share = 100.0 * np.arange(1, len(difference) + 1) / len(difference)
-    shares.step(difference, share, where="post", color=OKABE_ITO["blue"])
-    for percent in (50.0, 95.0):
-        value = difference.quantile(percent / 100.0)
-        shares.plot(value, percent, "o", color=OKABE_ITO["vermillion"])
-        label = f"{percent:g} %: {value:.2g} in"
-        shares.annotate(label, (value, percent), (-6, 4), textcoords="offset points", ha="right")
-    shares.set_xscale("log")
-    shares.set_xlabel("difference of the distances, absolute (in)")
-    shares.set_ylabel("gaits that differ by less (%)")
-    figure.suptitle(f"{len(distances)} random gaits on both engines")
-    return figure
-
-
 def _outcome(metrics: Mapping[str, Any], failure: str | None) -> dict[str, Any]:
     distance = metrics.get("distance", math.nan) / INCH
     return {"distance_in": _finite(distance), "failure": failure}
@@ -243,10 +194,6 @@ def main(arguments: Sequence[str]) -> None:
     """Analyses the runs of the given folders."""
     for directory in map(Path, arguments):
         analyse(directory, workers=available_cores())
-        both = distances_on_both(load_run(directory)).dropna()
-        initial = both[both["iteration"] == 0]
-        if len(initial):
-            save_figure(figure_engines(initial), directory / "figures", "engines")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import analyse
 import numpy as np
-import pandas
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
@@ -88,12 +87,3 @@ def test_a_damaged_analysis_is_refused(folder, tmp_path, refused, damage):
         (tmp_path / analyse.ANALYSIS).write_text(text)
     with refused(tmp_path / analyse.ANALYSIS, "", "analyse.py"):
         analyse.load_analysis(tmp_path)
-
-
-def test_the_figure_shows_every_gait_and_names_median_and_percentile():
-    compiled = np.linspace(-5.0, 8.0, 40)
-    both = pandas.DataFrame({"compiled_in": compiled, "drake_in": compiled + 0.02})
-    scatter, shares = analyse.figure_engines(both).axes
-    (dots,) = [line for line in scatter.lines if line.get_linestyle() == "None"]
-    np.testing.assert_array_equal(dots.get_xydata(), np.column_stack([compiled, compiled + 0.02]))
-    assert [text.get_text() for text in shares.texts] == ["50 %: 0.02 in", "95 %: 0.02 in"]
