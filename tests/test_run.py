@@ -10,6 +10,7 @@ import tetra_drake
 from tetra_drake import cli
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.optimizers.base import Iteration
+from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import read_manifest
 from tetra_drake.scenario.load import load_scenario
@@ -135,7 +136,7 @@ def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(tiny, tmp_path, refused
     for changed, key in (
         ({"objective": None}, "objective"),
         ({"objective": Heaviest(3.0)}, "objective"),
-        ({"optimizer": None}, "optimizer"),
+        ({"optimizer": SteadyState}, "optimizer"),
         ({"seed": 1}, "seed"),
         ({"scenario": tiny.with_changes({"evolution.trials": 2})}, "evolution.trials"),
     ):

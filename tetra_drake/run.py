@@ -33,7 +33,7 @@ def evolve(
     seed: int | None = None,
     workers: int | None = None,
     resume: bool = False,
-    optimizer: MakeOptimizer | None = None,
+    optimizer: MakeOptimizer = SteadyState,
     objective: Objective | None = None,
     executor: MakeExecutor | None = None,
     progress: Progress | None = None,
@@ -83,7 +83,7 @@ def evolve(
             evaluate=GaitEvaluation(scenario, objective),
             workers=workers,
             executor=executor or (thread_executor if compiled else process_executor),
-            optimizer=optimizer or SteadyState,
+            optimizer=optimizer,
             progress=progress,
         )
         if reevaluate and scenario.simulation.engine != "drake":

@@ -13,7 +13,12 @@ from helpers.analytic import Bowl, read_record, small_scenario
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers.base import Evaluation
-from tetra_drake.evolution.record import RunRecord, TrialRecord, read_manifest
+from tetra_drake.evolution.record import (
+    RunRecord,
+    TrialRecord,
+    evaluation_entry,
+    read_manifest,
+)
 from tetra_drake.results.result import versions
 
 
@@ -255,7 +260,8 @@ def test_a_finished_run_is_resumed_without_an_evaluation(run_small):
 
 def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, refused):
     genome = np.linspace(1.0, 2.0, 26)
-    TrialRecord(tmp_path).keep(3, 1, genome, Evaluation.failed("why", wall_time=1.25))
+    failed = Evaluation.failed("why", wall_time=1.25)
+    TrialRecord(tmp_path).keep(evaluation_entry(3, 1, genome, failed))
     with (tmp_path / "in_progress.jsonl").open("a") as file:
         file.write('{"index": 4, "torn')
     record = TrialRecord(tmp_path)

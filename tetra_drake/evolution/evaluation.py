@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from types import FrameType
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import SimulationFailure
+from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import ParameterSpace, Vector
@@ -44,11 +44,9 @@ class GaitEvaluation:
             with time_limit(self.scenario.evolution.time_budget):
                 result = simulate(scenario=self.scenario, gait=gait)
         except (SimulationFailure, TimeBudgetExceeded) as error:
-            return Evaluation.failed(
-                f"{_KINDS.get(type(error).__name__, 'failed')}: {error}",
-                wall_time=time.perf_counter() - started,
-                engine=engine,
-            )
+            reason = f"{_KINDS[type(error)]}: {error}"
+            wall_time = time.perf_counter() - started
+            return Evaluation.failed(reason, wall_time=wall_time, engine=engine)
         wall_time = time.perf_counter() - started
         fitness = result.fitness if self.objective is None else float(self.objective(result))
         if not math.isfinite(fitness):
@@ -69,10 +67,11 @@ class TimeBudgetExceeded(Exception):
     """
 
 
-_KINDS = {
-    "Diverged": "diverged",
-    "StepBudgetExceeded": "step budget",
-    "TimeBudgetExceeded": "time budget",
+_KINDS: dict[type[Exception], str] = {
+    SimulationFailure: "failed",
+    Diverged: "diverged",
+    StepBudgetExceeded: "step budget",
+    TimeBudgetExceeded: "time budget",
 }
 
 

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -23,7 +23,6 @@ from concurrent.futures import (
 from dataclasses import dataclass
 from multiprocessing.connection import wait as wait_for_any
 from multiprocessing.context import SpawnContext, SpawnProcess
-from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 from tetra_drake.errors import InputError
@@ -75,33 +74,24 @@ def thread_executor(workers: int) -> ThreadPoolExecutor:
 
 def available_cores() -> int:
     """The cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _do_nothing() -> None:
+def _do_nothing(*_: object) -> None:
     """The first task of each worker."""
-
-
-def _receive(*_: object) -> None:
-    """Does nothing with what it was sent."""
 
 
 def _end_with_parent() -> None:
     """Ends this worker when its parent ends; it would wait for work for ever otherwise."""
-    parent = multiprocessing.parent_process()
-    if parent is None:
-        return
 
     def watch() -> None:
-        wait_for_any([parent.sentinel])
+        wait_for_any([multiprocessing.parent_process().sentinel])  # type: ignore[union-attr]
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
 
 
-JobT = TypeVar("JobT", bound=Hashable)
+JobT = TypeVar("JobT")
 TaskT = TypeVar("TaskT")
 
 _HOPELESS = 3
@@ -112,9 +102,9 @@ class EvaluationImpossible(InputError):
     """No evaluation can run at all: workers that do not start, or a function they cannot load."""
 
 
-@dataclass(frozen=True)
-class _Task(Generic[JobT]):
-    job: JobT
+@dataclass(frozen=True, eq=False)
+class _Task:
+    job: Any
     task: Any
     suspect: bool = False
     """Whether it was under way when a worker died."""
@@ -143,21 +133,17 @@ class EvaluationPool(Generic[JobT]):
         if executor is process_executor:
             _check_sendable(evaluate)
         self._executor = executor(workers)
-        self._queue: deque[_Task[JobT]] = deque()
-        self._suspects: deque[_Task[JobT]] = deque()
-        self._running: dict[Future[Evaluation], _Task[JobT]] = {}
+        self._queue: deque[_Task] = deque()
+        self._suspects: deque[_Task] = deque()
+        self._running: dict[Future[Evaluation], _Task] = {}
         self._proven = False
+        """Whether any task has succeeded."""
         self._held: list[tuple[JobT, Evaluation]] = []
 
     def __enter__(self) -> EvaluationPool[JobT]:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._executor.shutdown(wait=kind is None, cancel_futures=True)
         if kind is not None:
             _terminate_workers()
@@ -175,14 +161,9 @@ class EvaluationPool(Generic[JobT]):
         """Whatever has been evaluated, as soon as there is something or time (s) is up."""
         self._fill()
         done, _ = wait(self._running, timeout=timeout, return_when=FIRST_COMPLETED)
-        finished: list[tuple[JobT, Evaluation]] = []
-        broken: list[_Task[JobT]] = []
-        for future in done:
-            task = self._running.pop(future)
-            try:
-                finished.append((task.job, future.result()))
-            except BrokenExecutor:
-                broken.append(task)
+        tasks = [(self._running.pop(future), future) for future in done]
+        broken = [task for task, future in tasks if isinstance(future.exception(), BrokenExecutor)]
+        finished = [(task.job, future.result()) for task, future in tasks if task not in broken]
         self._proven = self._proven or bool(finished)
         if broken:
             self._recover(broken)
@@ -209,7 +190,7 @@ class EvaluationPool(Generic[JobT]):
     def _has_suspects(self) -> bool:
         return bool(self._suspects) or any(task.suspect for task in self._running.values())
 
-    def _recover(self, broken: list[_Task[JobT]]) -> None:
+    def _recover(self, broken: list[_Task]) -> None:
         """Starts new workers; what was under way with the old ones is suspect now."""
         broken += self._running.values()
         self._running.clear()
@@ -269,7 +250,7 @@ def _check_sendable(evaluate: object) -> None:
 
 def _check_worker(evaluate: object) -> None:
     """Raises EvaluationImpossible if a new worker ends before it can evaluate anything."""
-    worker = _Worker(target=_receive, args=(evaluate,))
+    worker = _Worker(target=_do_nothing, args=(evaluate,))
     with tempfile.TemporaryFile("w+") as messages:
         ours = os.dup(2)
         os.dup2(messages.fileno(), 2)  # which the worker inherits

@@ -1,4 +1,4 @@
-"""Append-only files of JSON objects, one a line, that survive a kill at any moment.
+"""Append-only files of JSON objects, one per line, that survive a kill at any moment.
 
 A file that is complete may be compressed by `xz`, which names it NAME.xz: it can still be read.
 """

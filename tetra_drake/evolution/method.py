@@ -1,7 +1,7 @@
-"""What makes a run besides scenario and seed: evaluator, objective and optimiser.
+"""The method of a run: evaluator, objective and optimiser, each by name and settings.
 
-Each is kept by name and settings, and what was given from Python also by a digest of its code and
-of the values that the code uses. So a run is never continued with anything else unnoticed.
+What was given from Python has a digest of its code and of the values that the code uses, so that
+a run is never resumed with anything else.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -39,18 +40,16 @@ class Part:
     @classmethod
     def of(cls, given: object) -> Part:
         """The part that a function, a class or an instance is."""
-        kind = given if isinstance(given, (type, types.FunctionType)) else type(given)
-        name = f"{kind.__module__}.{kind.__qualname__}"
+        kind: Any = given if isinstance(given, (type, types.FunctionType)) else type(given)
         settings = {}
         if dataclasses.is_dataclass(given) and not isinstance(given, type):
             values = {f.name: getattr(given, f.name) for f in dataclasses.fields(given)}
-            settings = {key: _plain(value) for key, value in values.items()}
+            settings = json.loads(json.dumps(values, default=lambda value: type(value).__name__))
         if (kind.__module__ or "").startswith("tetra_drake."):
-            return cls(name, settings)
-        digest = hashlib.sha256()
-        for piece in _pieces(given, {}):
-            digest.update(piece.encode() + b"\0")
-        return cls(name, settings, digest.hexdigest())
+            return cls(kind.__qualname__, settings)
+        text = "\0".join(_pieces(given, {}))
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        return cls(f"{kind.__module__}.{kind.__qualname__}", settings, digest)
 
 
 @dataclass(frozen=True)
@@ -64,14 +63,25 @@ class Method:
 
     @classmethod
     def of(
-        cls, scenario: Scenario, *, objective: object | None = None, optimizer: object | None = None
+        cls, scenario: Scenario, *, objective: object | None = None, optimizer: object = SteadyState
     ) -> Method:
-        """The method of a run; None stands for the scenario's fitness and the thesis's EA."""
+        """The method of a run; without an objective its own is the scenario's fitness."""
         return cls(
             evaluator=Part(scenario.simulation.engine),
             objective=Part("fitness") if objective is None else Part.of(objective),
-            optimizer=Part("SteadyState") if optimizer is None else Part.of(optimizer),
+            optimizer=Part.of(optimizer),
         )
+
+    @classmethod
+    def from_json(cls, raw: Mapping[str, Any], source: object) -> Method:
+        """The method in a manifest, where dataclasses.asdict puts it; InputError if damaged."""
+        parts = {}
+        for f in dataclasses.fields(cls):
+            try:
+                parts[f.name] = Part(**raw[f.name])
+            except (KeyError, TypeError) as error:
+                raise InputError(source, f.name, "is missing or damaged") from error
+        return cls(**parts)
 
     @property
     def given_from_python(self) -> list[str]:
@@ -84,45 +94,12 @@ class Method:
             theirs: Part = getattr(other, name)
             if ours == theirs:
                 continue
-            problem = f"the run was made with {_described(ours)}, not {_described(theirs)}"
-            if ours.name == theirs.name:
-                problem = f"the run was made with another version of {ours.name}"
-                problem += f" ({json.dumps(ours.settings)})" if ours.settings else ""
+            now = f"another {name} of this name" if ours.name == theirs.name else theirs.name
+            problem = f"the run was made with {ours.name} {json.dumps(ours.settings)}, not {now}"
             if ours.digest is not None:
-                problem += (
-                    f"; resume it from Python with the {name} it began with: "
-                    f"tetra_drake.evolve(None, {str(source)!r}, resume=True, {name}=...)"
-                )
+                call = f"tetra_drake.evolve(None, {str(source)!r}, resume=True, {name}=...)"
+                problem += f"; resume it from Python, with its own: {call}"
             raise InputError(source, name, problem)
-
-    def to_json(self) -> dict[str, Any]:
-        """The method as a manifest holds it."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_json(cls, raw: Mapping[str, Any], source: object) -> Method:
-        """The method as a manifest holds it; InputError where that makes no sense."""
-        parts = {}
-        for f in dataclasses.fields(cls):
-            try:
-                parts[f.name] = Part(**raw[f.name])
-            except (KeyError, TypeError) as error:
-                raise InputError(source, f.name, "is missing or damaged") from error
-        return cls(**parts)
-
-
-def _described(part: Part) -> str:
-    if part.digest is None:
-        return {"fitness": "the scenario's fitness"}.get(part.name, part.name)
-    return f"{part.name}, given from Python"
-
-
-def _plain(value: Any) -> Any:
-    """The value if JSON can hold it, else its text."""
-    try:
-        return json.loads(json.dumps(value))
-    except (TypeError, ValueError):
-        return repr(value)
 
 
 def _pieces(value: Any, seen: dict[int, Any]) -> Iterator[str]:

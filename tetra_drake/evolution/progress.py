@@ -7,7 +7,6 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
 
 from tetra_drake.evolution.trial import TrialStatus
@@ -20,34 +19,26 @@ _LINE_PERIOD = 10.0  # s, between plain lines
 
 
 class Progress:
-    """Is told what a run does. This one shows nothing; warnings become Python's warnings.
-
-    A context manager: entered when a run begins.
-    """
+    """Receives what a run does, entered when it begins; this one shows nothing."""
 
     def __enter__(self) -> Progress:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         return None
 
     def say(self, text: str) -> None:
         """Something the user may like to know."""
 
     def warn(self, text: str) -> None:
-        """Something the user should know."""
+        """Something the user should know; here it becomes a Python warning."""
         warnings.warn(text, RuntimeWarning, stacklevel=3)
 
     def show(self, statuses: Sequence[TrialStatus]) -> None:
         """The state of all trials: about once per second and after every evaluation."""
 
     def stage(self, title: str, done: int, total: int) -> None:
-        """How far something other than the trials has come."""
+        """The state of work other than the trials."""
 
 
 def make_progress(stream: TextIO) -> Progress:
@@ -61,7 +52,7 @@ class Overview:
 
     done: int
     total: int
-    """Evaluations, of all trials; of those that have ended, what they took."""
+    """Evaluations of all trials; of those that have ended, what they took."""
     made: int
     """Evaluations made now, not taken from the record."""
     parts: list[str]
@@ -70,24 +61,25 @@ class Overview:
     @classmethod
     def of(cls, statuses: Sequence[TrialStatus]) -> Overview:
         """The overview of all trials."""
-        done = sum(status.evaluations for status in statuses)
-        most = [s.evaluations if s.stop else s.evaluations_at_most for s in statuses]
-        parts = []
         fittest = max(statuses, key=lambda status: status.best_fitness)
-        if fittest.best_fitness > -float("inf"):
-            parts.append(f"best fitness {fixed(fittest.best_fitness)}")
-            parts.append(f"fittest gait's distance {fixed(fittest.best_distance_in)} in")
-        if len(statuses) > 1:
-            ended = sum(status.stop is not None for status in statuses)
-            parts.append(f"{ended} of {len(statuses)} trials ended")
+        ended = sum(status.stop is not None for status in statuses)
         failures = sum(status.failures for status in statuses)
-        parts += [f"{failures} failed"] if failures else []
-        made = done - sum(status.recalled for status in statuses)
-        return cls(done, sum(most), made, parts)
+        parts = {
+            f"best fitness {fixed(fittest.best_fitness)}": fittest.iteration >= 0,
+            f"fittest gait's distance {fixed(fittest.best_distance_in)} in": fittest.iteration >= 0,
+            f"{ended} of {len(statuses)} trials ended": len(statuses) > 1,
+            f"{failures} failed": failures > 0,
+        }
+        return cls(
+            done=sum(status.evaluations for status in statuses),
+            total=sum(s.evaluations if s.stop else s.evaluations_at_most for s in statuses),
+            made=sum(status.evaluations - status.recalled for status in statuses),
+            parts=[part for part, known in parts.items() if known],
+        )
 
 
 class LineProgress(Progress):
-    """Prints a line every ten seconds, and when a stage ends."""
+    """Prints a line every ten seconds, and when a stage begins and ends."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -105,11 +97,11 @@ class LineProgress(Progress):
     def show(self, statuses: Sequence[TrialStatus]) -> None:
         """Prints how far the run is, and one time left for all of it."""
         now, run = time.monotonic(), Overview.of(statuses)
-        if run.done == run.made == 0:
+        if run.made == 0:
             self._began = now
-        left = (run.total - run.done) * (now - self._began) / run.made if run.made else 0.0
         parts = [f"{run.done} of {run.total} evaluations", *run.parts]
         if run.made and run.done < run.total:
+            left = (run.total - run.done) * (now - self._began) / run.made
             parts.append(f"{duration(left)} left")
         self._print(", ".join(parts), due=run.done == run.total)
 
@@ -144,12 +136,7 @@ class BarProgress(Progress):
         self._bars.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._bars.stop()
 
     def say(self, text: str) -> None:
@@ -163,14 +150,14 @@ class BarProgress(Progress):
     def show(self, statuses: Sequence[TrialStatus]) -> None:
         """Moves the run's bar."""
         run = Overview.of(statuses)
-        self._update("evaluations", run.done, run.total, ", ".join(run.parts))
+        self._move("evaluations", run.done, run.total, ", ".join(run.parts))
 
     def stage(self, title: str, done: int, total: int) -> None:
         """Moves the bar of a stage."""
-        self._update(title, done, total, "")
+        self._move(title, done, total)
 
-    def _update(self, title: str, done: int, total: int, text: str) -> None:
+    def _move(self, title: str, done: int, total: int, text: str = "") -> None:
         if title not in self._tasks:
-            # Begun with what is done, so that the speed counts what is made now only.
-            self._tasks[title] = self._bars.add_task(title, completed=done, total=total, text=text)
+            # Begun with what is done, so that the speed counts only what is made now.
+            self._tasks[title] = self._bars.add_task(title, completed=done, text=text)
         self._bars.update(self._tasks[title], completed=done, total=total, text=text)

@@ -26,7 +26,6 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import yaml
@@ -42,28 +41,25 @@ from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
+_Kinds = dict[str, tuple[type, ...]]
+_Lines = Sequence[dict[str, Any]]
+
 SCHEMA, FIRST_SCHEMA = 2, 1
 MANIFEST, SCENARIO, LOCK = "manifest.json", "scenario.yaml", ".lock"
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS = "reevaluations.jsonl"
 
-_EVALUATION_KEYS = {
-    "index": (int,),
-    "iteration": (int,),
-    "genome": (list,),
-    "metrics": (dict,),
-    "fitness": (int, float, type(None)),
-    "failure": (str, type(None)),
-    "wall_time_s": (int, float),
+_NUMBER = (int, float)
+_OPTIONAL = (int, float, type(None))
+_EVALUATION_KEYS: _Kinds = {
+    **{"index": (int,), "iteration": (int,), "genome": (list,), "metrics": (dict,)},
+    **{"fitness": _OPTIONAL, "failure": (str, type(None)), "wall_time_s": _NUMBER},
     "engine": (str,),
 }
-_ITERATION_KEYS = {
-    "iteration": (int,),
-    "evaluations": (int,),
-    "best_fitness": (int, float, type(None)),
-    "best_evaluation": (int, type(None)),
-    "stop": (str, type(None)),
+_ITERATION_KEYS: _Kinds = {
+    **{"iteration": (int,), "evaluations": (int,), "best_fitness": _OPTIONAL},
+    **{"best_evaluation": (int, type(None)), "stop": (str, type(None))},
 }
 _FIRST_METRICS = {
     "distance_in": "distance",
@@ -99,9 +95,7 @@ def read_manifest(directory: Path) -> Manifest:
         raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run") from error
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
-    if not isinstance(raw, dict):
-        raise InputError(path, "", "expected a JSON object")
-    schema = raw.get("schema")
+    schema = raw.get("schema") if isinstance(raw, dict) else None
     if schema not in (SCHEMA, FIRST_SCHEMA):
         raise InputError(path, "schema", f"found {schema!r}, expected {FIRST_SCHEMA} or {SCHEMA}")
     scenario_key = ("scenario", dict) if schema == FIRST_SCHEMA else ("scenario_sha256", str)
@@ -111,15 +105,15 @@ def read_manifest(directory: Path) -> Manifest:
     scenario = load_scenario(scenario_file)
     text = scenario_file.read_text(encoding="utf-8")
     if schema == FIRST_SCHEMA:
-        difference = _first_difference(raw["scenario"], yaml.safe_load(text))
-        if difference:
-            raise InputError(scenario_file, difference.key, f"is not as in {MANIFEST}")
+        changed = _first_difference(raw["scenario"], yaml.safe_load(text))
+        if changed:
+            raise InputError(scenario_file, changed, f"is not as in {MANIFEST}")
         method = Method.of(scenario)
     else:
         if _sha256(text) != raw["scenario_sha256"]:
             raise InputError(scenario_file, "", "was changed after the run had begun")
         method = Method.from_json(raw, path)
-    return Manifest(scenario=scenario, seed=raw["seed"], versions=raw["versions"], method=method)
+    return Manifest(scenario, raw["seed"], raw["versions"], method)
 
 
 class RunRecord:
@@ -137,24 +131,18 @@ class RunRecord:
         """Begins a run in a directory that does not exist or is empty."""
         if directory.exists() and not directory.is_dir():
             raise InputError(directory, "", "is a file, expected a run directory")
-        if directory.is_dir() and not _is_untouched(directory):
-            raise InputError(directory, "", "is not empty, expected a new directory")
+        _refuse_a_used(directory)
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(directory, "", f"cannot be made: {error.strerror}") from error
         lock = _lock(directory)
         try:
-            _refuse_a_run(directory)  # Another process may have been faster.
+            _refuse_a_used(directory)  # Another process may have been faster.
             for leftover in (*directory.glob(".manifest.*"), *directory.glob(".scenario.*")):
                 leftover.unlink()
-            method = method or Method.of(scenario)
-            manifest = Manifest(
-                scenario=scenario,
-                seed=seed,
-                versions=versions(scenario.simulation.engine),
-                method=method,
-            )
+            now = versions(scenario.simulation.engine)
+            manifest = Manifest(scenario, seed, now, method or Method.of(scenario))
             _write_manifest(directory, manifest)
         except BaseException:
             os.close(lock)
@@ -172,16 +160,14 @@ class RunRecord:
     ) -> RunRecord:
         """Opens a run to go on with it. What is given must be the run's."""
         manifest = read_manifest(directory)
-        if seed is not None and seed != manifest.seed:
-            problem = f"the run has seed {manifest.seed}, not {seed}; leave the seed out to resume"
-            raise InputError(directory, "seed", problem)
+        if seed not in (None, manifest.seed):
+            raise InputError(directory, "seed", f"the run has seed {manifest.seed}, not {seed}")
         if scenario is not None:
-            difference = _first_difference(_tree(manifest.scenario), _tree(scenario))
-            if difference:
-                problem = f"the run has {difference.first!r}, not {difference.second!r}"
-                raise InputError(
-                    directory, difference.key, f"{problem}; a run is resumed with its own scenario"
-                )
+            ours, theirs = (dataclasses.asdict(each) for each in (manifest.scenario, scenario))
+            key = _first_difference(ours | {"reference": None}, theirs | {"reference": None})
+            if key:
+                problem = f"the run has {_at(ours, key)!r}, not {_at(theirs, key)!r}"
+                raise InputError(directory, key, f"{problem}; it is resumed with its own scenario")
         if method is not None:
             manifest.method.check_same(method, directory)
         return cls(directory, manifest, _lock(directory))
@@ -193,12 +179,7 @@ class RunRecord:
     def __enter__(self) -> RunRecord:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         os.close(self._lock)
 
 
@@ -242,12 +223,11 @@ class TrialRecord:
             engine=entry["engine"],
         )
 
-    def keep(self, index: int, iteration: int, vector: Vector, evaluation: Evaluation) -> None:
+    def keep(self, entry: dict[str, Any]) -> None:
         """Saves an evaluation whose iteration is not complete yet."""
-        entry = evaluation_entry(index, iteration, vector, evaluation)
         append_lines(self._folder / IN_PROGRESS, [entry])
 
-    def complete(self, evaluations: Sequence[dict[str, Any]], iteration: dict[str, Any]) -> None:
+    def complete(self, evaluations: _Lines, iteration: dict[str, Any]) -> None:
         """Writes an iteration's lines, or checks those that are there.
 
         In this order: a kill in between leaves nothing that repeating the run would not complete.
@@ -267,18 +247,10 @@ class TrialRecord:
             self._refuse(EVALUATIONS, evaluations, "the trial ends before this evaluation")
         (self._folder / IN_PROGRESS).unlink(missing_ok=True)
 
-    def _write(
-        self,
-        name: str,
-        recorded: Sequence[dict[str, Any]],
-        entries: Sequence[dict[str, Any]],
-        *,
-        first: int,
-    ) -> None:
+    def _write(self, name: str, recorded: _Lines, entries: _Lines, *, first: int) -> None:
         for row, entry in enumerate(entries, start=first):
             if row < len(recorded) and recorded[row] != entry:
-                wrong = [key for key in entry if recorded[row].get(key) != entry[key]]
-                key = wrong[0] if wrong else "a key too many"
+                key = _first_difference(recorded[row], entry)
                 self._refuse(name, row, f"{key} is not what scenario and seed lead to")
         missing = entries[max(0, len(recorded) - first) :]
         if missing:
@@ -314,7 +286,7 @@ def read_iterations(path: Path) -> list[dict[str, Any]]:
     return [_upgraded(entry) for entry in _checked(path, _ITERATION_KEYS)]
 
 
-def _checked(path: Path, keys: Mapping[str, tuple[type, ...]]) -> list[dict[str, Any]]:
+def _checked(path: Path, keys: _Kinds) -> list[dict[str, Any]]:
     entries = read_lines(path)
     for line, entry in enumerate(entries, start=1):
         for key, kinds in keys.items():
@@ -350,7 +322,7 @@ def _write_manifest(directory: Path, manifest: Manifest) -> None:
         "seed": manifest.seed,
         "versions": dict(manifest.versions),
         "scenario_sha256": _sha256(text),
-        **manifest.method.to_json(),
+        **dataclasses.asdict(manifest.method),
     }
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
@@ -359,23 +331,14 @@ def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _tree(scenario: Scenario) -> dict[str, Any]:
-    tree = dataclasses.asdict(scenario)
-    tree.pop("reference", None)  # changes no evaluation
-    return tree
-
-
-def _refuse_a_run(directory: Path) -> None:
+def _refuse_a_used(directory: Path) -> None:
+    """Raises InputError if more is there than a run killed in its first moment leaves."""
     if (directory / MANIFEST).exists():
         problem = "holds a run already; to go on with it, use --resume (in Python, resume=True)"
         raise InputError(directory, "", problem)
-
-
-def _is_untouched(directory: Path) -> bool:
-    """Whether nothing is there but what a run killed in its first moment leaves."""
-    _refuse_a_run(directory)
     ours = (LOCK, SCENARIO, ".manifest.", ".scenario.")
-    return all(entry.name.startswith(ours) for entry in directory.iterdir())
+    if directory.is_dir() and not all(f.name.startswith(ours) for f in directory.iterdir()):
+        raise InputError(directory, "", "is not empty, expected a new directory")
 
 
 def _lock(directory: Path) -> int:
@@ -394,22 +357,20 @@ def _lock(directory: Path) -> int:
     return lock
 
 
-@dataclass(frozen=True)
-class _Difference:
-    key: str
-    first: Any
-    second: Any
-
-
-def _first_difference(
-    first: Mapping[str, Any], second: Mapping[str, Any], prefix: str = ""
-) -> _Difference | None:
+def _first_difference(first: Mapping[str, Any], second: Mapping[str, Any]) -> str | None:
+    """The dotted key of the first value in which two trees differ; None if they do not."""
     for key in [*first, *(key for key in second if key not in first)]:
         ours, theirs = first.get(key), second.get(key)
         if isinstance(ours, dict) and isinstance(theirs, dict):
-            difference = _first_difference(ours, theirs, f"{prefix}{key}.")
-            if difference:
-                return difference
-        elif ours != theirs:
-            return _Difference(f"{prefix}{key}", ours, theirs)
+            inner = _first_difference(ours, theirs)
+            if inner:
+                return f"{key}.{inner}"
+        elif ours != theirs or (key in first) != (key in second):
+            return key
     return None
+
+
+def _at(tree: Any, key: str) -> Any:
+    for part in key.split("."):
+        tree = tree.get(part)
+    return tree

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tetra_drake.evolution.optimizers.base import Evaluation, Iteration, Optimizer
+from tetra_drake.evolution.optimizers.base import Evaluation, Optimizer
 from tetra_drake.evolution.record import TrialRecord, evaluation_entry
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.units import INCH
@@ -31,11 +31,11 @@ class TrialStatus:
     """Total of the evaluations, in s."""
     best_fitness: float = -math.inf
     best_distance_in: float = math.nan
-    initial_best_distance_in: float = math.nan
-    """After iteration 0."""
     report: Mapping[str, Any] = field(default_factory=dict)
     """The optimiser's, of the last iteration."""
+    initial_best_distance_in: float = math.nan
     initial_report: Mapping[str, Any] = field(default_factory=dict)
+    """Both of iteration 0."""
     stop: str | None = None
     """Why the trial ended; None while it goes on."""
 
@@ -77,21 +77,6 @@ LINE_KEYS = ("iteration", "evaluations", "best_fitness", "best_evaluation", "sto
 """Keys of a line of iterations.jsonl besides the optimiser's report."""
 
 
-@dataclass(frozen=True)
-class Assignment:
-    """Number `index` of the evaluations of a trial."""
-
-    trial: int
-    index: int
-
-
-@dataclass(frozen=True)
-class _Best:
-    index: int
-    vector: Vector
-    evaluation: Evaluation
-
-
 class Trial:
     """Takes evaluations in any order and gives them to the optimiser in the order asked.
 
@@ -112,13 +97,12 @@ class Trial:
         self._space = space
         self._optimizer = optimizer
         self._record = record
-        self._first = 0
-        """Index of the first vector of the batch."""
-        self._batch: list[Vector] = []
+        self._batch: dict[int, Vector] = {}
+        """By the numbers of their evaluations, in the order asked."""
         self._results: dict[int, Evaluation] = {}
-        self._best: _Best | None = None
+        self._best: tuple[int, Vector, Evaluation] | None = None
         self._saved_best: int | None = None
-        self._ask()
+        self._ask(first=0)
         self._catch_up()
 
     @property
@@ -126,91 +110,73 @@ class Trial:
         """Whether the optimiser has ended the trial."""
         return self.status.stop is not None
 
-    def unevaluated(self) -> list[tuple[Assignment, Vector]]:
-        """What has to be evaluated before the optimiser can go on."""
-        return [
-            (Assignment(self.status.number, index), vector)
-            for index, vector in self._numbered()
-            if index not in self._results
-        ]
+    def unevaluated(self) -> dict[int, Vector]:
+        """What has to be evaluated before the optimiser can go on, by number."""
+        return {i: vector for i, vector in self._batch.items() if i not in self._results}
 
     def take(self, index: int, evaluation: Evaluation) -> bool:
         """Takes an evaluation; True if that was the last of its batch."""
-        self._results[index] = evaluation
-        self._count(evaluation)
-        if len(self._results) < len(self._batch):
-            vector = self._batch[index - self._first]
-            self._record.keep(index, self.status.iteration + 1, vector, evaluation)
+        self._add(index, evaluation)
+        if self.unevaluated():
+            iteration = self.status.iteration + 1
+            self._record.keep(evaluation_entry(index, iteration, self._batch[index], evaluation))
             return False
         self._tell()
         self._catch_up()
         return True
 
-    def _numbered(self) -> list[tuple[int, Vector]]:
-        return list(enumerate(self._batch, start=self._first))
-
-    def _ask(self) -> None:
-        self._first += len(self._batch)
-        self._batch = self._optimizer.ask()
+    def _ask(self, *, first: int) -> None:
+        self._batch = dict(enumerate(self._optimizer.ask(), start=first))
         self._results = {}
-        for index, vector in self._numbered():
+        for index, vector in self._batch.items():
             evaluation = self._record.recall(index, vector)
             if evaluation is not None:
-                self._results[index] = evaluation
-                self._count(evaluation)
+                self._add(index, evaluation)
                 self.status.recalled += 1
 
-    def _catch_up(self) -> None:
-        """Goes on as far as evaluations are known, then saves the best gait if it is new."""
-        while not self.finished and len(self._results) == len(self._batch):
-            self._tell()
-        if self._best is not None and self._best.index != self._saved_best:
-            name = f"{self._name}, evaluation {self._best.index}"
-            self._record.save_best(self._space.gait(self._best.vector, name=name))
-            self._saved_best = self._best.index
-
-    def _count(self, evaluation: Evaluation) -> None:
+    def _add(self, index: int, evaluation: Evaluation) -> None:
+        self._results[index] = evaluation
         failed = evaluation.failure is not None
         self.status.count(evaluations=1, failures=failed, wall_time=evaluation.wall_time)
 
+    def _catch_up(self) -> None:
+        """Goes on as far as evaluations are known, then saves the best gait if it is new."""
+        while not self.finished and not self.unevaluated():
+            self._tell()
+        if self._best is not None and self._best[0] != self._saved_best:
+            index, vector, _ = self._best
+            name = f"{self._name}, evaluation {index}"
+            self._record.save_best(self._space.gait(vector, name=name))
+            self._saved_best = index
+
     def _tell(self) -> None:
-        evaluations = [self._results[index] for index, _ in self._numbered()]
-        iteration = self._optimizer.tell(evaluations)
-        for (index, vector), evaluation in zip(self._numbered(), evaluations, strict=True):
-            if evaluation.fitness > (self._best.evaluation.fitness if self._best else -math.inf):
-                self._best = _Best(index, vector, evaluation)
-        line = self._line(iteration)
-        metrics = self._best.evaluation.metrics if self._best else {}
-        distance = metrics.get("distance", math.nan)
-        self.status.complete(line, best_distance_in=distance / INCH)
-        self._record.complete(self._entries(iteration), line)
-        if self.finished:
-            self._record.finish(self.status.evaluations)
-        else:
-            self._ask()
-
-    def _entries(self, iteration: Iteration) -> list[dict[str, Any]]:
-        entries = [
-            evaluation_entry(index, self.status.iteration, vector, self._results[index])
-            for index, vector in self._numbered()
-        ]
-        if iteration.placed is None:
-            return entries
-        return [
-            entry | {"placed": place}
-            for entry, place in zip(entries, iteration.placed, strict=True)
-        ]
-
-    def _line(self, iteration: Iteration) -> dict[str, Any]:
-        best = self._best
+        iteration = self._optimizer.tell([self._results[index] for index in self._batch])
+        for index, vector in self._batch.items():
+            evaluation = self._results[index]
+            if evaluation.fitness > (self._best[2].fitness if self._best else -math.inf):
+                self._best = index, vector, evaluation
         line = {
             "iteration": self.status.iteration + 1,
             "evaluations": self.status.evaluations,
-            "best_fitness": best.evaluation.fitness if best else None,
-            "best_evaluation": best.index if best else None,
+            "best_fitness": self._best[2].fitness if self._best else None,
+            "best_evaluation": self._best[0] if self._best else None,
             "stop": iteration.stop,
+            **iteration.report,
         }
-        return line | dict(iteration.report)
+        distance = self._best[2].metrics.get("distance", math.nan) if self._best else math.nan
+        self.status.complete(line, best_distance_in=distance / INCH)
+        entries = [
+            evaluation_entry(index, self.status.iteration, vector, self._results[index])
+            for index, vector in self._batch.items()
+        ]
+        if iteration.placed is not None:
+            for entry, place in zip(entries, iteration.placed, strict=True):
+                entry["placed"] = place
+        self._record.complete(entries, line)
+        if self.finished:
+            self._record.finish(self.status.evaluations)
+        else:
+            self._ask(first=self.status.evaluations)
 
 
 def _number(value: Any) -> float:

@@ -9,7 +9,7 @@ from tetra_drake.evolution.optimizers.base import Evaluate, MakeOptimizer
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import RunRecord
-from tetra_drake.evolution.trial import Assignment, Trial, TrialStatus
+from tetra_drake.evolution.trial import Trial, TrialStatus
 from tetra_drake.robot.gait import ParameterSpace
 
 _PROGRESS_PERIOD = 1.0  # s
@@ -35,20 +35,19 @@ def run_trials(
     progress.show(statuses)
     if all(trial.finished for trial in trials):
         return statuses
-    with EvaluationPool[Assignment](evaluate, workers=workers, executor=executor) as pool:
+    with EvaluationPool[tuple[int, int]](evaluate, workers=workers, executor=executor) as pool:
 
         def submit(trial: Trial) -> None:
             if not trial.finished:
-                for assignment, vector in trial.unevaluated():
-                    pool.submit(assignment, vector)
+                for index, vector in trial.unevaluated().items():
+                    pool.submit((trial.status.number, index), vector)
 
         for trial in trials:
             submit(trial)
         while pool.busy:
-            for assignment, evaluation in pool.wait(_PROGRESS_PERIOD):
-                trial = trials[assignment.trial]
-                if trial.take(assignment.index, evaluation):
-                    submit(trial)
+            for (number, index), evaluation in pool.wait(_PROGRESS_PERIOD):
+                if trials[number].take(index, evaluation):
+                    submit(trials[number])
             progress.show(statuses)
     return statuses
 
