@@ -1,31 +1,35 @@
-"""The command line: `tetra-drake COMMAND ...`."""
+"""The command line: each command parses its options, calls one function and prints."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
 import json
+import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-from tetra_drake import arguments
+from tetra_drake import __version__
 from tetra_drake.benchmark.settings import SETS
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import whole_file
 from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import ENGINES, Scenario
 
-if TYPE_CHECKING:
-    from tetra_drake.visualization.live import LiveView
+BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
+"""Exit statuses."""
+
+FIRST_SCENARIO = "quick"
+"""The scenario that `evolve` starts without another: it ends in minutes."""
 
 BENCHMARK_GAITS = 12
 
-BAD_INPUT, FAILED = 2, 1
-"""Exit statuses: the input cannot be used; the simulation failed."""
+Options = argparse.Namespace
+Command = argparse.ArgumentParser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -33,160 +37,133 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = make_parser().parse_args(argv)
     try:
         options.run(options)
-    except InputError as error:
+    except (InputError, SimulationFailure) as error:
         print(f"tetra-drake: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except SimulationFailure as error:
-        print(f"tetra-drake: {error}", file=sys.stderr)
-        return FAILED
-    except BrokenPipeError:  # who read our output has closed it, as `| head` does
+        return BAD_INPUT if isinstance(error, InputError) else FAILED
+    except BrokenPipeError:  # the reader of our output has closed it, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except KeyboardInterrupt:
         print("tetra-drake: interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
     return 0
 
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser of all commands; each sets `run`, a function of the parsed options."""
+    import shtab
+
     parser = argparse.ArgumentParser(
         prog="tetra-drake",
-        description="Simulate a walking tensegrity robot, five nested tetrahedra driven by a "
-        "Matsuoka central pattern generator, as a Drake diagram.",
+        description="Simulate a walking tensegrity robot, nested tetrahedra driven by a Matsuoka "
+        "central pattern generator, as a Drake diagram, and evolve its gaits.",
         epilog="`tetra-drake COMMAND --help` explains a command.",
     )
+    parser.add_argument("--version", action="version", version=f"tetra-drake {__version__}")
+    shtab.add_argument_to(parser, help="print a completion script for the shell: bash, zsh, tcsh")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    _add_simulate(commands)
-    _add_evolve(commands)
-    _add_reevaluate(commands)
-    _add_replay(commands)
-    _add_figures(commands)
-    _add_robustness(commands)
-    _add_benchmark(commands)
-    _add_cpg(commands)
-    _add_diagram(commands)
+
+    def add(name: str, run: Callable[[Options], None], what: str, description: str) -> Command:
+        command = commands.add_parser(name, help=what, description=description)
+        command.set_defaults(run=run)
+        return command
+
+    _add_simulate(add)
+    _add_evolve(add)
+    _add_reevaluate(add)
+    _add_replay(add)
+    _add_figures(add)
+    _add_robustness(add)
+    _add_benchmark(add)
+    _add_cpg(add)
+    _add_diagram(add)
     return parser
 
 
-def _add_simulate(commands: argparse._SubParsersAction) -> None:
-    command = commands.add_parser(
+Add = Callable[[str, Callable[[Options], None], str, str], Command]
+
+
+def _add_simulate(add: Add) -> None:
+    command = add(
         "simulate",
-        help="simulate one gait",
-        description="Simulates one gait, prints how far and how straight the robot walked, and "
-        "writes result.json (the numbers), trajectory.nc (motion and forces over time, for "
-        "xarray), replay.html (open it in a browser) and scenario.yaml (the scenario in full).",
+        _simulate,
+        "simulate one gait",
+        "Simulates one gait, prints how far and how straight the robot walked, and writes "
+        "result.json (the numbers), trajectory.nc (motion and forces over time, for xarray), "
+        "replay.html (open it in a browser) and scenario.yaml (the scenario in full).",
     )
-    arguments.add_scenario(command)
+    _add_scenario(command)
     _add_gait(command)
-    arguments.add_engine(command)
-    command.add_argument(
-        "--out",
-        metavar="DIR",
-        type=Path,
-        default=Path("out"),
-        help="the folder to write to, made if missing (default: %(default)s)",
-    )
+    _add_engine(command)
+    _add_path(command, "--out", "DIR", "the folder to write to (default: out)", default=Path("out"))
     command.add_argument(
         "--meshcat",
         action="store_true",
         help="show the robot in a browser during the simulation, at most in real time (does not "
         "affect results)",
     )
-    command.set_defaults(run=_simulate)
 
 
-def _scenario(options: argparse.Namespace) -> Scenario:
-    """The scenario of the options, on the engine that they ask for."""
-    scenario = load_scenario(options.scenario)
-    engine = options.engine or scenario.simulation.engine
-    return scenario.with_changes({"simulation.engine": engine})
-
-
-def _simulate(options: argparse.Namespace) -> None:
-    from tetra_drake.engines.simulate import simulate
+def _simulate(options: Options) -> None:
+    from tetra_drake.engines.simulate import prepare, simulate
     from tetra_drake.results.folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.results.result import summary
 
-    scenario = _scenario(options)
+    scenario = load_scenario(options.scenario)
+    if options.engine:
+        scenario = scenario.with_changes({"simulation.engine": options.engine})
     gait = _gait(options, scenario)
     check_result_folder(options.out)
-    if scenario.simulation.engine == "compiled":
-        from tetra_drake.engines.compiled.engine import compile_engine
+    prepare(scenario, say=_say)
+    view = None
+    if options.meshcat:
+        from tetra_drake.visualization.live import open_view
 
-        compile_engine(scenario, lambda message: print(message, flush=True))
-    view = _open_view(scenario) if options.meshcat else None
+        view = open_view(scenario, say=_say)
     result = simulate(scenario=scenario, gait=gait, record=True, viewer=view)
-    assert result.trajectory is not None
     print(summary(scenario, gait, result))
     save_result_folder(options.out, scenario=scenario, gait=gait, result=result)
     print(
         f"wrote result.json, trajectory.nc, scenario.yaml and replay.html to {options.out}/\n"
         f"to watch the robot, open in a browser: {options.out / REPLAY}"
     )
-    if view is not None:
+    if view is not None and result.trajectory is not None:
         view.replay(result.trajectory)
         with contextlib.suppress(EOFError, KeyboardInterrupt):
             input("the browser repeats the motion; press Enter to end ")
 
 
-def _open_view(scenario: Scenario) -> LiveView:
-    from pydrake.geometry import MeshcatParams
-
-    from tetra_drake.visualization.live import LiveView
-    from tetra_drake.visualization.replay import quiet_meshcat
-
-    meshcat = quiet_meshcat(MeshcatParams())
-    print(f"open {meshcat.web_url()} in a browser, which starts the simulation", flush=True)
-    return LiveView(meshcat, scenario)
-
-
-FIRST_SCENARIO = "quick"
-"""The scenario that `evolve` starts without another: it ends in minutes."""
-
-
-def _add_evolve(commands: argparse._SubParsersAction) -> None:
-    command = commands.add_parser(
+def _add_evolve(add: Add) -> None:
+    command = add(
         "evolve",
-        help="evolve gaits that walk far",
-        description="Evolves gaits by the thesis's evolutionary algorithm, one simulation per "
-        "candidate, and records every evaluation in a run directory. Ctrl-C ends it; the same "
-        "command with --resume continues it. The result depends on scenario and seed only. At the "
-        "end it writes report.html, replay.html and figures/ into the run directory.",
+        _evolve,
+        "evolve gaits that walk far",
+        "Evolves gaits by the thesis's evolutionary algorithm, one simulation per candidate, and "
+        "records every evaluation in a run directory. Ctrl-C ends it; the same command with "
+        "--resume continues it. The result depends on scenario and seed only. At the end it writes "
+        "report.html, replay.html and figures/ into the run directory.",
     )
-    command.add_argument(
-        "--scenario",
-        metavar="NAME|FILE",
-        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
-        f"(default: {FIRST_SCENARIO}, which takes minutes; with --resume, the run's)",
+    _add_scenario(
+        command,
+        default=None,
+        note=f"{FIRST_SCENARIO}, which takes minutes; with --resume, the run's",
     )
-    command.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="the run directory, as runs/NAME"
-    )
-    arguments.add_engine(command)
-    command.add_argument(
-        "--trials",
-        metavar="N",
-        type=arguments.count,
-        help="number of independent trials, instead of the scenario's",
-    )
-    command.add_argument(
+    _add_path(command, "--out", "DIR", "the run directory, as runs/NAME", required=True)
+    _add_engine(command)
+    _add_count(command, "--trials", "number of independent trials, instead of the scenario's")
+    _add_count(
+        command,
         "--iterations",
-        metavar="N",
-        type=arguments.count,
-        help="greatest number of iterations per trial, instead of the scenario's",
+        "greatest number of iterations per trial, instead of the scenario's",
     )
-    command.add_argument(
-        "--seed", metavar="N", type=arguments.seed, help="random seed (default: 0)"
-    )
-    arguments.add_workers(command)
+    command.add_argument("--seed", metavar="N", type=_seed, help="random seed (default: 0)")
+    _add_workers(command)
     command.add_argument(
         "--resume", action="store_true", help="continue an interrupted run; needs only --out"
     )
-    command.set_defaults(run=_evolve)
 
 
-def _evolve(options: argparse.Namespace) -> None:
+def _evolve(options: Options) -> None:
     from tetra_drake.evolution.progress import make_progress
     from tetra_drake.evolution.summary import summary, whole_experiment
     from tetra_drake.run import evolve
@@ -209,7 +186,7 @@ def _evolve(options: argparse.Namespace) -> None:
     print(summary(run))
 
 
-def _scenario_to_evolve(options: argparse.Namespace) -> Scenario | None:
+def _scenario_to_evolve(options: Options) -> Scenario | None:
     """The scenario with the options' changes; None if they leave a run to resume as it is."""
     from tetra_drake.evolution.record import read_manifest
 
@@ -224,24 +201,24 @@ def _scenario_to_evolve(options: argparse.Namespace) -> Scenario | None:
     return load_scenario(options.scenario or FIRST_SCENARIO).with_changes(changes)
 
 
-def _add_reevaluate(commands: argparse._SubParsersAction) -> None:
-    command = commands.add_parser(
+def _add_reevaluate(add: Add) -> None:
+    command = add(
         "reevaluate",
-        help="evaluate gaits of a run once more, on the Drake diagram",
-        description="Evaluates gaits of a run made on another engine once more, on the Drake "
-        "diagram, and adds them to the run's record (reevaluations.jsonl of each trial): the best "
-        "gaits of each trial, which evolve itself does at its end, or all initial gaits. Gaits "
-        "that have been evaluated so already are skipped.",
+        _reevaluate,
+        "evaluate gaits of a run once more, on the Drake diagram",
+        "Evaluates gaits of a run made on another engine once more, on the Drake diagram, and adds "
+        "them to the run's record (reevaluations.jsonl of each trial): the best gaits of each "
+        "trial, which evolve itself does at its end, or all initial gaits. Gaits that have been "
+        "evaluated so already are skipped.",
     )
-    command.add_argument("run_directory", metavar="RUN", type=Path, help="the run directory")
+    _add_path(command, "run_directory", "RUN", "the run directory")
     command.add_argument(
         "--initial", action="store_true", help="the initial gaits instead of the best"
     )
-    arguments.add_workers(command)
-    command.set_defaults(run=_reevaluate)
+    _add_workers(command)
 
 
-def _reevaluate(options: argparse.Namespace) -> None:
+def _reevaluate(options: Options) -> None:
     from tetra_drake.evolution.progress import make_progress
     from tetra_drake.evolution.reevaluation import reevaluate
     from tetra_drake.evolution.summary import summary
@@ -256,207 +233,100 @@ def _reevaluate(options: argparse.Namespace) -> None:
     print(summary(run))
 
 
-def _add_replay(commands: argparse._SubParsersAction) -> None:
-    command = commands.add_parser(
+def _add_replay(add: Add) -> None:
+    command = add(
         "replay",
-        help="write a page that shows a gait in a browser",
-        description="Writes one HTML page that shows the robot walking, in any browser, without "
-        "server or network: from the trajectory that `simulate` recorded, or by simulating a "
-        "gait file, or the best gait of a run of `evolve` on the run's scenario.",
+        _replay,
+        "write a page that shows a gait in a browser",
+        "Writes one HTML page that shows the robot walking, in any browser, without server or "
+        "network: from the trajectory that `simulate` recorded, or by simulating a gait file, or "
+        "the best gait of a run of `evolve` on the run's scenario.",
     )
-    command.add_argument(
-        "source",
-        metavar="RESULT_DIR|GAIT|RUN_DIR",
-        type=Path,
-        help="a folder written by `simulate`, a gait file, or a folder written by `evolve`",
-    )
-    command.add_argument(
-        "--scenario",
-        metavar="NAME|FILE",
-        help=f"for a gait file: a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML "
-        "file (default: thesis)",
-    )
-    command.add_argument(
-        "--out", metavar="FILE", type=Path, required=True, help="the HTML file to write"
-    )
-    command.set_defaults(run=_replay)
+    source = "a folder written by `simulate`, a gait file, or a folder written by `evolve`"
+    _add_path(command, "source", "RESULT_DIR|GAIT|RUN_DIR", source)
+    _add_scenario(command, default=None, note="thesis; for gait files only")
+    _add_path(command, "--out", "FILE", "the HTML file to write", required=True)
 
 
-def _replay(options: argparse.Namespace) -> None:
+def _replay(options: Options) -> None:
     from tetra_drake.report.replay_page import write_replay
 
     title = write_replay(options.source, options.out, scenario=options.scenario)
     print(f"{title}\nto watch the robot, open in a browser: {options.out}")
 
 
-def _add_figures(commands: argparse._SubParsersAction) -> None:
-    command = commands.add_parser(
+def _add_figures(add: Add) -> None:
+    command = add(
         "figures",
-        help="draw the figures of a run or a simulation",
-        description="Draws figures as SVG and PNG, and the table of the two best gaits as CSV. "
-        "For a run of `evolve`, finished or not: into figures/ in its directory, where report.html "
-        "and replay.html are written anew, too. For a folder written by `simulate`: the figures "
-        "of one gait, into figures/ in it.",
+        _figures,
+        "draw the figures of a run or a simulation",
+        "Draws figures as SVG and PNG, and the table of the two best gaits as CSV. For a run of "
+        "`evolve`, finished or not: into figures/ in its directory, where report.html and "
+        "replay.html are written anew, too. For a folder written by `simulate`: the figures of one "
+        "gait, into figures/ in it.",
     )
-    command.add_argument(
-        "source",
-        metavar="RUN_DIR|RESULT_DIR",
-        type=Path,
-        help="a folder written by `evolve` or by `simulate`",
-    )
-    command.add_argument(
-        "--out", metavar="DIR", type=Path, help="draw into this folder; leave the source as it is"
-    )
-    command.set_defaults(run=_figures)
+    source = "a folder written by `evolve` or by `simulate`"
+    _add_path(command, "source", "RUN_DIR|RESULT_DIR", source)
+    _add_path(command, "--out", "DIR", "draw into this folder; leave the source as it is")
 
 
-def _figures(options: argparse.Namespace) -> None:
+def _figures(options: Options) -> None:
     from tetra_drake.report.run_page import write_figures
 
     written = write_figures(options.source, options.out)
     print(f"wrote {', '.join(str(path) for path in written)}")
 
 
-def _add_cpg(commands: argparse._SubParsersAction) -> None:
-    command = commands.add_parser(
-        "cpg",
-        help="write the oscillator signals of a gait to a CSV file",
-        description="Writes the signals that the cables of a gait are fed: time_s, signal_1, "
-        "signal_2 ..., a column per junction, from 0 to the scenario's duration, zero before the "
-        "start-up time. A positive signal shortens the two bottom outer cables of its junction. "
-        "The file's first lines, which begin with #, say what each column is.",
-    )
-    arguments.add_scenario(command)
-    _add_gait(command)
-    command.add_argument(
-        "--out", metavar="FILE", type=Path, required=True, help="the CSV file to write"
-    )
-    command.add_argument(
-        "--signals",
-        choices=("listing", "recorded"),
-        help="how the network is integrated, instead of the scenario's cpg.signals: forward Euler "
-        "as in the thesis's listing, or accurately",
-    )
-    command.add_argument("--unit", choices=("lbf", "N"), default="lbf", help="default: lbf")
-    command.add_argument(
-        "--rate", metavar="HZ", type=arguments.rate, help="samples per second (default: 2000)"
-    )
-    command.add_argument(
-        "--raw",
-        action="store_true",
-        help="write y_extensor - y_flexor: no gain, and no zeros before the start-up time",
-    )
-    command.set_defaults(run=_cpg)
-
-
-def _cpg(options: argparse.Namespace) -> None:
-    from tetra_drake.robot.signals import save_signals
-
-    scenario = load_scenario(options.scenario)
-    if options.signals:
-        scenario.cpg.signals = options.signals
-    gait = _gait(options, scenario)
-    save_signals(options.out, scenario, gait, unit=options.unit, rate=options.rate, raw=options.raw)
-
-
-def _add_robustness(commands: argparse._SubParsersAction) -> None:
-    command = commands.add_parser(
+def _add_robustness(add: Add) -> None:
+    command = add(
         "robustness",
-        help="simulate gaits with the robot or its surroundings slightly changed",
-        description="Simulates a gait, or the best gait of each trial of a run, on the compiled "
-        "engine with starting pose, friction, cables and ground changed by a few percent, one at "
-        "a time, and prints how much that changes the distance.",
+        _robustness,
+        "simulate gaits with the robot or its surroundings slightly changed",
+        "Simulates a gait, or the best gait of each trial of a run, on the compiled engine with "
+        "starting pose, friction, cables and ground changed by a few percent, one at a time, and "
+        "prints how much that changes the distance.",
     )
-    command.add_argument(
-        "source", metavar="GAIT|RUN", type=Path, help="a gait file, or a folder written by `evolve`"
-    )
-    command.add_argument(
-        "--scenario",
-        metavar="NAME|FILE",
-        help="a shipped scenario or a YAML file (default: the run's, thesis for a gait file)",
-    )
+    _add_path(command, "source", "GAIT|RUN", "a gait file, or a folder written by `evolve`")
+    _add_scenario(command, default=None, note="the run's, thesis for a gait file")
     command.add_argument(
         "--percent",
         metavar="P",
-        type=arguments.rate,
+        type=_positive,
         nargs="+",
         default=[2.0, 5.0],
         help="changes in percent, each with both signs (default: 2 5)",
     )
-    arguments.add_workers(command)
-    command.add_argument(
-        "--out", metavar="FILE", type=Path, help="a CSV file: the distance (m) of each simulation"
-    )
-    command.set_defaults(run=_robustness)
+    _add_workers(command)
+    _add_path(command, "--out", "FILE", "a CSV file: the distance (m) of each simulation")
 
 
-def _robustness(options: argparse.Namespace) -> None:
-    from tetra_drake.engines.compiled.engine import compile_engine
-    from tetra_drake.evolution.robustness import describe, robustness
-    from tetra_drake.evolution.tables import load_run
-    from tetra_drake.files import write_whole
+def _robustness(options: Options) -> None:
+    from tetra_drake.engines.simulate import prepare
+    from tetra_drake.evolution.robustness import describe, gaits_of, robustness, save_table
 
-    if options.source.is_dir():
-        run = load_run(options.source)
-        run.fittest()  # or an error
-        gaits = {f"trial {t}": run.gait(t, i) for t, i in run.best()[["trial", "index"]].to_numpy()}
-        scenario = load_scenario(options.scenario) if options.scenario else run.manifest.scenario
-    else:
-        scenario = load_scenario(options.scenario or "thesis")
-        gait = load_gait(options.source, scenario)
-        gaits = {gait.name: gait}
-    compile_engine(scenario, lambda message: print(message, flush=True))
-    print(f"gaits: {len(gaits)}; simulating each under every change", flush=True)
+    scenario, gaits = gaits_of(options.source, scenario=options.scenario)
+    prepare(scenario.with_changes({"simulation.engine": "compiled"}), say=_say)
+    _say(f"gaits: {len(gaits)}; simulating each under every change")
     table = robustness(scenario, gaits, percents=options.percent, workers=options.workers)
     print(describe(table))
     if options.out:
-        write_whole(
-            options.out, table.rename(columns={"distance": "distance_m"}).to_csv(index=False)
-        )
+        save_table(table, options.out)
         print(f"wrote {options.out}")
 
 
-def _add_diagram(commands: argparse._SubParsersAction) -> None:
-    command = commands.add_parser(
-        "diagram",
-        help="draw the block diagram",
-        description="Draws the block diagram of the robot. FILE.dot is Graphviz source; .svg, "
-        ".png and .pdf are drawn by Graphviz's program `dot`, which must be installed.",
-    )
-    arguments.add_scenario(command)
-    command.add_argument(
-        "--out", metavar="FILE", type=Path, required=True, help="the file to write"
-    )
-    command.set_defaults(run=_diagram)
-
-
-def _diagram(options: argparse.Namespace) -> None:
-    from tetra_drake.figures.block_diagram import save_block_diagram
-    from tetra_drake.systems.diagram import MakeTensegrityDiagram
-
-    scenario = load_scenario(options.scenario)
-    save_block_diagram(MakeTensegrityDiagram(scenario, seeded_gait(scenario)), options.out)
-
-
-def _add_benchmark(commands: argparse._SubParsersAction) -> None:
-    command = commands.add_parser(
+def _add_benchmark(add: Add) -> None:
+    command = add(
         "benchmark",
-        help="measure speed and accuracy of the engines and their settings",
-        description="Simulates gaits on the engines with different settings and prints how many "
-        "times faster than real time each is, the errors of its distances against converged ones, "
-        "and the compiled engine's cost per step by number of tetrahedra. Takes some minutes; the "
-        "set integrators takes longer. Times are meaningful on an idle machine only.",
+        _benchmark,
+        "measure speed and accuracy of the engines and their settings",
+        "Simulates gaits on the engines with different settings and prints how many times faster "
+        "than real time each is, the errors of its distances against converged ones, and the "
+        "compiled engine's cost per step by number of tetrahedra. Takes some minutes; the set "
+        "integrators takes longer. Times are meaningful on an idle machine only.",
     )
-    command.add_argument(
-        "gaits", metavar="GAIT", type=Path, nargs="*", help="gait files (default: random gaits)"
-    )
-    command.add_argument(
-        "--gaits",
-        dest="number",
-        metavar="N",
-        type=arguments.count,
-        help=f"number of random gaits, of seeds 0, 1 ... (default: {BENCHMARK_GAITS})",
-    )
+    _add_path(command, "gaits", "GAIT", "gait files (default: random gaits)", nargs="*")
+    gaits = f"number of random gaits, of seeds 0, 1 ... (default: {BENCHMARK_GAITS})"
+    _add_count(command, "--gaits", gaits, dest="number")
     command.add_argument(
         "--settings",
         metavar="SET",
@@ -466,20 +336,16 @@ def _add_benchmark(commands: argparse._SubParsersAction) -> None:
         help="sets of settings: default (a few for each engine), integrators (many for the "
         "diagram), compiled or mujoco (many for that engine)",
     )
-    command.add_argument(
-        "--sizes",
-        metavar="N",
-        nargs="*",
-        type=arguments.count,
-        help="numbers of tetrahedra to measure the cost per step for (default: 5 10 20 40 with "
-        "the default settings, else none)",
+    sizes = (
+        "numbers of tetrahedra to measure the cost per step for (default: 5 10 20 40 with the "
+        "default settings, else none)"
     )
-    arguments.add_scenario(command)
-    command.add_argument("--json", metavar="FILE", type=Path, help="also write a JSON file")
-    command.set_defaults(run=_benchmark)
+    _add_count(command, "--sizes", sizes, nargs="*")
+    _add_scenario(command)
+    _add_path(command, "--json", "FILE", "also write a JSON file")
 
 
-def _benchmark(options: argparse.Namespace) -> None:
+def _benchmark(options: Options) -> None:
     scenario = load_scenario(options.scenario)
     if options.gaits and options.number is not None:
         raise InputError("--gaits", "", "not allowed with gait files")
@@ -502,27 +368,135 @@ def _benchmark(options: argparse.Namespace) -> None:
             file.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _say(stage: str) -> None:
-    print(f"{stage} ...", file=sys.stderr, flush=True)
+def _add_cpg(add: Add) -> None:
+    command = add(
+        "cpg",
+        _cpg,
+        "write the oscillator signals of a gait to a CSV file",
+        "Writes the signals that the cables of a gait are fed: time_s, signal_1, signal_2 ..., a "
+        "column per junction, from 0 to the scenario's duration, zero before the start-up time. A "
+        "positive signal shortens the two bottom outer cables of its junction. The file's first "
+        "lines, which begin with #, say what each column is.",
+    )
+    _add_scenario(command)
+    _add_gait(command)
+    _add_path(command, "--out", "FILE", "the CSV file to write", required=True)
+    command.add_argument(
+        "--signals",
+        choices=("listing", "recorded"),
+        help="how the network is integrated, instead of the scenario's cpg.signals: forward Euler "
+        "as in the thesis's listing, or accurately",
+    )
+    command.add_argument("--unit", choices=("lbf", "N"), default="lbf", help="default: lbf")
+    command.add_argument(
+        "--rate", metavar="HZ", type=_positive, help="samples per second (default: 2000)"
+    )
+    command.add_argument(
+        "--raw",
+        action="store_true",
+        help="write y_extensor - y_flexor: no gain, and no zeros before the start-up time",
+    )
 
 
-def _add_gait(command: argparse.ArgumentParser) -> None:
+def _cpg(options: Options) -> None:
+    from tetra_drake.robot.signals import save_signals
+
+    scenario = load_scenario(options.scenario)
+    if options.signals:
+        scenario = scenario.with_changes({"cpg.signals": options.signals})
+    gait = _gait(options, scenario)
+    save_signals(options.out, scenario, gait, unit=options.unit, rate=options.rate, raw=options.raw)
+
+
+def _add_diagram(add: Add) -> None:
+    command = add(
+        "diagram",
+        _diagram,
+        "draw the block diagram",
+        "Draws the block diagram of the robot. FILE.dot is Graphviz source; .svg, .png and .pdf "
+        "are drawn by Graphviz's program `dot`, which must be installed.",
+    )
+    _add_scenario(command)
+    _add_path(command, "--out", "FILE", "the file to write", required=True)
+
+
+def _diagram(options: Options) -> None:
+    from tetra_drake.figures.block_diagram import save_block_diagram
+    from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+    scenario = load_scenario(options.scenario)
+    save_block_diagram(MakeTensegrityDiagram(scenario, seeded_gait(scenario)), options.out)
+
+
+def _add_scenario(command: Command, *, default: str | None = "thesis", note: str = "") -> None:
+    command.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        default=default,
+        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
+        f"(default: {note or default})",
+    )
+
+
+def _add_engine(command: Command) -> None:
+    command.add_argument(
+        "--engine",
+        choices=ENGINES,
+        help="the Drake diagram, the same laws compiled end to end, or MuJoCo "
+        "(default: the scenario's)",
+    )
+
+
+def _add_path(command: Command, name: str, metavar: str, what: str, **more: Any) -> None:
+    command.add_argument(name, metavar=metavar, type=Path, help=what, **more)
+
+
+def _add_count(command: Command, name: str, what: str, **more: Any) -> None:
+    command.add_argument(name, metavar="N", type=_count, help=what, **more)
+
+
+def _add_workers(command: Command) -> None:
+    _add_count(command, "--workers", "worker processes (default: one per core)")
+
+
+def _add_gait(command: Command) -> None:
     group = command.add_mutually_exclusive_group()
     group.add_argument("--gait", metavar="FILE", type=Path, help="a gait file (JSON)")
     group.add_argument(
         "--seed",
         metavar="N",
-        type=arguments.seed,
+        type=_seed,
         default=WALKING_SEED,
-        help="instead, a gait drawn at random with this seed (default: %(default)s, which walks)",
+        help="instead, a random gait of this seed (default: %(default)s, which walks)",
     )
 
 
-def _gait(options: argparse.Namespace, scenario: Scenario) -> Gait:
+def _gait(options: Options, scenario: Scenario) -> Gait:
     if options.gait is not None:
         return load_gait(options.gait, scenario)
     return seeded_gait(scenario, options.seed)
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def _seed(text: str) -> int:
+    return _integer(text, least=0)
+
+
+def _count(text: str) -> int:
+    return _integer(text, least=1)
+
+
+def _integer(text: str, *, least: int) -> int:
+    if not (text.isascii() and text.isdecimal() and int(text) >= least):
+        raise argparse.ArgumentTypeError(f"found '{text}', expected an integer, {least} or more")
+    return int(text)
+
+
+def _positive(text: str) -> float:
+    with contextlib.suppress(ValueError):
+        if 0.0 < (value := float(text)) < math.inf:
+            return value
+    raise argparse.ArgumentTypeError(f"found '{text}', expected a number above 0")
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)

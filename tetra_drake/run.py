@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tetra_drake.engines.simulate import prepare
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import (
@@ -71,13 +72,10 @@ def evolve(
         record = RunRecord.create(out, scenario=scenario, seed=seed or 0, method=method)
     with record, progress:
         scenario = record.manifest.scenario
-        compiled = scenario.simulation.engine == "compiled"
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
-        if compiled:
-            from tetra_drake.engines.compiled.engine import compile_engine
-
-            compile_engine(scenario, progress.say)
+        prepare(scenario, say=progress.say)
+        compiled = scenario.simulation.engine == "compiled"
         run_trials(
             record,
             evaluate=GaitEvaluation(scenario, objective),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
@@ -30,3 +32,14 @@ def simulate(
     from tetra_drake.engines.drake import simulate_drake
 
     return simulate_drake(scenario=scenario, gait=gait, record=record, viewer=viewer)
+
+
+def prepare(scenario: Scenario, *, say: Callable[[str], None] = lambda text: None) -> None:
+    """Makes the scenario's engine ready, so that no simulation has to wait for its compilation.
+
+    `say` is told if that takes longer than a moment.
+    """
+    if scenario.simulation.engine == "compiled":
+        from tetra_drake.engines.compiled.engine import compile_engine
+
+        compile_engine(scenario, say)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import available_cores, evaluate_all, thread_executor
+from tetra_drake.evolution.tables import load_run
+from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed, signed
-from tetra_drake.robot.gait import Gait, ParameterSpace
+from tetra_drake.robot.gait import Gait, ParameterSpace, load_gait
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.perturb import displaced, scaled
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
@@ -44,6 +48,22 @@ DRAWS = 5
 
 KEPT = 0.9
 """A gait counts as kept under a change where it walks this share of its distance or more."""
+
+
+def gaits_of(source: Path, *, scenario: str | None = None) -> tuple[Scenario, dict[Any, Gait]]:
+    """The gait of a file, or the best gait of each trial of a run, and the scenario to use.
+
+    `scenario`, a name or file, replaces the run's, or the thesis's for a gait file.
+    """
+    if not source.is_dir():
+        loaded = load_scenario(scenario or "thesis")
+        gait = load_gait(source, loaded)
+        return loaded, {gait.name: gait}
+    run = load_run(source)
+    run.fittest()  # raises InputError if there is none
+    loaded = load_scenario(scenario) if scenario else run.manifest.scenario
+    best = run.best()[["trial", "index"]].to_numpy()
+    return loaded, {f"trial {trial}": run.gait(trial, index) for trial, index in best}
 
 
 def robustness(
@@ -131,6 +151,11 @@ def describe(table: pandas.DataFrame) -> str:
             columns["unchanged distance, in"] = summary[key].map(unchanged).map(fixed)
         texts.append(pandas.DataFrame(columns).to_string(index=False))
     return "\n\n".join(texts)
+
+
+def save_table(table: pandas.DataFrame, path: Path) -> None:
+    """Writes a table of robustness() as CSV, the distance (m) in the column distance_m."""
+    write_whole(path, table.rename(columns={"distance": "distance_m"}).to_csv(index=False))
 
 
 def _changes(base: Scenario, percents: Sequence[float]) -> Iterator[tuple[str, float, Scenario]]:

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydrake.geometry import Meshcat
+from pydrake.geometry import Meshcat, MeshcatParams
 
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
-from tetra_drake.visualization.replay import show_replay
+from tetra_drake.visualization.replay import quiet_meshcat, show_replay
 from tetra_drake.visualization.scene import add_robot, motions, set_surroundings
 
 if TYPE_CHECKING:
@@ -72,3 +72,10 @@ class LiveView:
     def replay(self, trajectory: xarray.Dataset) -> None:
         """Plays what was simulated again and again."""
         show_replay(self._meshcat, scenario=self._scenario, trajectory=trajectory)
+
+
+def open_view(scenario: Scenario, *, say: Callable[[str], None]) -> LiveView:
+    """A view in a new Meshcat, whose address `say` is told."""
+    meshcat = quiet_meshcat(MeshcatParams())
+    say(f"open {meshcat.web_url()} in a browser, which starts the simulation")
+    return LiveView(meshcat, scenario)
