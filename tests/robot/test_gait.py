@@ -1,5 +1,6 @@
 """Gait files, random gaits, and the parameter space that evolution searches."""
 
+import itertools
 import json
 import math
 from pathlib import Path
@@ -125,6 +126,7 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
         ("", "", "JSON"),
         ("[" * 100_000, "", "JSON"),
     ],
+    ids=itertools.count(),
 )
 def test_a_bad_gait_file_is_refused_with_file_and_key(
     tmp_path, content, key, found, refused, scenario

@@ -1,7 +1,5 @@
 """The gate that keeps the actuation off at first."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
@@ -19,10 +17,11 @@ def signals_at(time: float, *, start_up: float) -> list[float]:
     return gate.GetOutputPort("signals").Eval(simulator.get_context()).tolist()
 
 
-@pytest.mark.parametrize(("time", "is_open"), [(0.0, 0), (1.2499, 0), (1.25, 1), (15.0, 1)])
-def test_passes_signals_from_the_start_up_time_on(time: float, is_open: int) -> None:
-    assert signals_at(time, start_up=1.25) == [is_open * 1.0, is_open * -2.0]
-
-
-def test_without_a_start_up_time_the_gate_is_open_at_once() -> None:
-    assert signals_at(0.0, start_up=0.0) == [1.0, -2.0]
+@pytest.mark.parametrize(
+    ("time", "start_up", "is_open"),
+    [(0.0, 1.25, 0), (1.2499, 1.25, 0), (1.25, 1.25, 1), (15.0, 1.25, 1), (0.0, 0.0, 1)],
+)
+def test_passes_signals_from_the_start_up_time_on(
+    time: float, start_up: float, is_open: int
+) -> None:
+    assert signals_at(time, start_up=start_up) == [is_open * 1.0, is_open * -2.0]

@@ -1,7 +1,5 @@
 """The linear solver, against numpy on the same matrix written out."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -17,15 +15,12 @@ from tetra_drake.engines.compiled.block_tridiagonal import (
 def random_system(bodies: int) -> tuple[np.ndarray, np.ndarray]:
     """Rows of a random positive definite system and the same written out in full."""
     generator = np.random.default_rng(bodies)
-    rows, full = np.zeros((bodies, BLOCK, ROW)), np.zeros((BLOCK * bodies, BLOCK * bodies))
-    for body in range(bodies):
-        rows[body, range(BLOCK), range(BLOCK)] = 0.1
-    full += 0.1 * np.eye(BLOCK * bodies)
+    rows, full = np.zeros((bodies, BLOCK, ROW)), 0.1 * np.eye(BLOCK * bodies)
+    rows[:, range(BLOCK), range(BLOCK)] = 0.1
     for _ in range(20 * bodies):
         body = int(generator.integers(bodies))
         size = ROW if body + 1 < bodies and generator.random() < 0.7 else BLOCK
-        vector = np.zeros(ROW)
-        vector[:size] = generator.normal(size=size)
+        vector = np.append(generator.normal(size=size), np.zeros(ROW - size))
         factor = generator.uniform(0.1, 2.0)
         add_outer_product(factor, vector, body, size, rows)
         place = slice(BLOCK * body, BLOCK * body + size)

@@ -1,0 +1,82 @@
+"""What holds on every engine: recording changes nothing, and failures are reported."""
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+
+from tetra_drake.engines.mujoco import INSTALL, installed
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
+
+MUJOCO = pytest.param("mujoco", marks=pytest.mark.skipif(not installed(), reason=INSTALL))
+
+
+def shortly(scenario: Scenario, engine: str, **settings: Any) -> Scenario:
+    """The scenario cut to 1 s on an engine, driven from 0.2 s on."""
+    settings = {"engine": engine, "duration": 1.0, "steady_from": 0.5, **settings}
+    changes = {f"simulation.{key}": value for key, value in settings.items()}
+    return scenario.with_changes({"cpg.start_up": 0.2, **changes})
+
+
+@pytest.mark.parametrize("engine", ["drake", "compiled", MUJOCO])
+@pytest.mark.parametrize("mode_changes", ["step_end", "witness"])
+def test_recording_changes_nothing(scenario: Scenario, engine: str, mode_changes: str) -> None:
+    short = shortly(scenario, engine, mode_changes=mode_changes)
+    gait = seeded_gait(short)
+    plain = simulate(scenario=short, gait=gait)
+    recorded = simulate(scenario=short, gait=gait, record=True)
+    assert plain.engine == engine
+    assert recorded.metrics == plain.metrics, "bit for bit"
+    assert recorded.integrator == plain.integrator
+    assert plain.trajectory is None and recorded.trajectory is not None
+    x1 = recorded.trajectory.p_WN.sel(tetrahedron="T1", node="bottom_left", axis="x")
+    assert float(x1[-1] - x1[0]) / INCH == recorded.metrics.distance_in
+
+
+@pytest.mark.parametrize("engine", ["compiled", MUJOCO])
+def test_a_gait_is_not_influenced_by_company_or_threads(scenario: Scenario, engine: str) -> None:
+    short = shortly(scenario, engine)
+
+    def distance(seed: int) -> float:
+        return simulate(scenario=short, gait=seeded_gait(short, seed)).metrics.distance
+
+    alone = [distance(seed) for seed in range(6)]
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(distance, [*range(6), *range(6)])) == alone * 2
+
+
+@pytest.mark.parametrize(
+    ("engine", "changes", "kind"),
+    [
+        # Explicit Euler at 2 ms is far beyond its stability limit of about 0.15 ms.
+        (
+            "drake",
+            {"simulation.scheme": "explicit_euler", "simulation.max_step": 2e-3},
+            Diverged,
+        ),
+        ("drake", {"simulation.max_evaluations": 1000}, StepBudgetExceeded),
+        ("compiled", {"simulation.max_speed": 1e-3}, Diverged),
+        ("compiled", {"cpg.gain": 4e9}, Diverged),  # a pull that grows without bound
+        ("compiled", {"simulation.max_evaluations": 100}, StepBudgetExceeded),
+    ],
+)
+def test_a_failed_simulation_says_when_and_why(
+    scenario: Scenario, engine: str, changes: dict[str, Any], kind: type[SimulationFailure]
+) -> None:
+    failing = shortly(scenario, engine).with_changes(changes)
+    with pytest.raises(kind) as caught:
+        simulate(scenario=failing, gait=seeded_gait(failing))
+    assert 0.0 <= caught.value.time < failing.simulation.duration
+    assert caught.value.reason in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", [Diverged, StepBudgetExceeded])
+def test_failures_cross_process_borders(kind: type[SimulationFailure]) -> None:
+    failure = pickle.loads(pickle.dumps(kind(time=1.5, reason="why")))
+    assert type(failure) is kind
+    assert (failure.time, failure.reason) == (1.5, "why")
