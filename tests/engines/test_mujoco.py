@@ -1,13 +1,11 @@
 """The engine `mujoco`: the same robot as on the other engines, on ground of its own."""
 
-from __future__ import annotations
-
 import json
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as engine
@@ -27,6 +25,13 @@ def short(scenario: Scenario) -> Scenario:
     return scenario.with_changes({"simulation.engine": "mujoco", **times})
 
 
+def trajectory_of(scenario: Scenario) -> xarray.Dataset:
+    """Of the seeded gait."""
+    result = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True)
+    assert result.trajectory is not None
+    return result.trajectory
+
+
 @needs_mujoco
 @pytest.mark.parametrize("tetrahedra", [2, 5, 8])
 def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(
@@ -37,17 +42,14 @@ def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(
     floating = {"robot.tetrahedra": tetrahedra, "robot.gravity": 0.0}
     floating |= {"robot.offsets": [[0.0, 0.0, 1.0]] * tetrahedra}
     fine = {"compiled.tolerance": 1e-6, "compiled.max_step": 0.5e-3, "compiled.look_ahead": 1e-6}
-    engines = (
-        {"simulation.engine": "compiled", **fine},
-        {"mujoco.step": 4e-5},
-        {"mujoco.step": 2e-5},
-    )
-    scenarios = [short.with_changes(floating | changes) for changes in engines]
     ours, coarse, halved = (
-        simulate(scenario=changed, gait=seeded_gait(changed), record=True).trajectory
-        for changed in scenarios
+        trajectory_of(short.with_changes(floating | changes))
+        for changes in (
+            {"simulation.engine": "compiled", **fine},
+            {"mujoco.step": 4e-5},
+            {"mujoco.step": 2e-5},
+        )
     )
-    assert ours is not None and coarse is not None and halved is not None
     limit = 2.0 * halved - coarse
     assert np.ptp(ours["q_WB"].sel(quaternion="y").values) > 0.01
     tolerances = {"p_WN": 2e-5, "v_WN": 2e-4, "p_WB": 2e-5, "q_WB": 1e-4}
@@ -57,13 +59,12 @@ def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(
 
 
 @needs_mujoco
-def test_at_rest_the_ground_bears_the_weight_in_the_pose_of_the_other_engines(
-    scenario: Scenario, data: Path
+def test_at_rest_the_ground_bears_the_weight_and_the_pose_is_that_of_the_other_engines(
+    scenario: Scenario, structure: Structure, data: Path
 ) -> None:
     times = {"simulation.duration": 1.2, "simulation.steady_from": 1.0}
-    scenario = scenario.with_changes({"simulation.engine": "mujoco", **times})
-    trajectory = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
-    assert trajectory is not None
+    resting = scenario.with_changes({"simulation.engine": "mujoco", **times})
+    trajectory = trajectory_of(resting)
     end = trajectory.isel(time=-1)
     settled = json.loads((data / "expected.json").read_text())["settled"]
     borne = float(end["normal_force"].sum()) / POUND_FORCE
@@ -82,35 +83,36 @@ def test_at_rest_the_ground_bears_the_weight_in_the_pose_of_the_other_engines(
 
 
 @needs_mujoco
-def test_friction_opposes_motion_within_the_cone(short: Scenario) -> None:
-    short.simulation.duration = 1.0
-    trajectory = simulate(scenario=short, gait=seeded_gait(short), record=True).trajectory
-    assert trajectory is not None
-    friction = trajectory["friction_force"].sel(contact="T1 bottom_left")
-    normal = trajectory["normal_force"].sel(contact="T1 bottom_left")
-    velocity = trajectory["v_WN"].sel(tetrahedron="T1", node="bottom_left")[:, :2]
-    assert (np.linalg.norm(friction, axis=1) <= short.mujoco.friction * normal + 1e-6).all()
-    power = (friction.values * velocity.values).sum(axis=1)
+def test_friction_opposes_motion_within_the_cone(short: Scenario, structure: Structure) -> None:
+    trajectory = trajectory_of(short.with_changes({"simulation.duration": 1.0}))
+    friction = trajectory["friction_force"].values
+    limit = short.mujoco.friction * trajectory["normal_force"].values
+    assert (np.linalg.norm(friction, axis=2) <= limit + 1e-6).all()
+    velocity = trajectory["v_WN"].values.reshape(len(friction), -1, 3)[:, structure.contacts, :2]
+    power = (friction * velocity).sum(axis=2)
     assert power.sum() < 0.0 and power.max() < 1e-2 * -power.min()
-    assert not trajectory["friction_mode"].any()
 
 
 @needs_mujoco
-def test_a_gait_gives_the_same_numbers_recorded_or_not_in_any_thread(short: Scenario) -> None:
+def test_steps_count_against_the_budget_of_evaluations(short: Scenario) -> None:
     gait, steps = seeded_gait(short), 3200
     short.simulation.max_evaluations = steps
-    alone = simulate(scenario=short, gait=gait)
-    assert alone.engine == "mujoco" and alone.trajectory is None
-    assert alone.integrator.scheme == "implicitfast"
-    assert alone.integrator.steps == alone.integrator.derivative_evaluations == steps
-    with ThreadPoolExecutor(2) as threads:
-        for other in threads.map(
-            lambda record: simulate(scenario=short, gait=gait, record=record), [False, True, True]
-        ):
-            assert (other.metrics, other.fitness) == (alone.metrics, alone.fitness)
+    implicit = simulate(scenario=short, gait=gait)
+    assert implicit.integrator.scheme == "implicitfast"
+    assert implicit.integrator.steps == implicit.integrator.derivative_evaluations == steps
     short.simulation.max_evaluations = steps - 1
     with pytest.raises(StepBudgetExceeded):
         simulate(scenario=short, gait=gait)
+
+
+@needs_mujoco
+def test_the_integrators_of_mujoco_agree(short: Scenario) -> None:
+    gait = seeded_gait(short)
+    implicit = simulate(scenario=short, gait=gait)
+    for integrator in ("Euler", "discrete"):
+        finer = short.with_changes({"mujoco.integrator": integrator, "mujoco.step": 0.0625e-3})
+        distance = simulate(scenario=finer, gait=gait).metrics.distance_in
+        assert distance == pytest.approx(implicit.metrics.distance_in, abs=0.02)
 
 
 @needs_mujoco

@@ -1,18 +1,15 @@
 """The metrics and the thesis's fitness (Eq. 10)."""
 
-from __future__ import annotations
-
 import pytest
 
 from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
-from tetra_drake.robot.structure import MakeStructure, node_positions
+from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.schema import Scenario
 
 INCH = 0.0254
 
 
-def test_metrics_are_the_displacements_of_figure_13(scenario: Scenario) -> None:
-    structure = MakeStructure(scenario.robot, scenario.cables)
+def test_metrics_are_the_displacements_of_figure_13(structure: Structure) -> None:
     start = node_positions(structure, structure.initial_state)
     steady, end = start.copy(), start.copy()
     steady[0, 0] += 0.1  # x1 after the transients
@@ -33,13 +30,9 @@ def test_metrics_are_the_displacements_of_figure_13(scenario: Scenario) -> None:
 
 def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario) -> None:
     # In inches: 1 * 4 - 10 * 0.5 + 0 * 7 - 1 * 0.25
-    metrics = Metrics(
-        distance=5.0 * INCH,
-        steady_distance=4.0 * INCH,
-        twist=0.5 * INCH,
-        lead=7.0 * INCH,
-        lateral_drift=0.25 * INCH,
-    )
+    inches = {"distance": 5.0, "steady_distance": 4.0, "twist": 0.5, "lead": 7.0}
+    inches["lateral_drift"] = 0.25
+    metrics = Metrics(**{name: value * INCH for name, value in inches.items()})
     assert compute_fitness(metrics, scenario.fitness) == pytest.approx(-1.25)
     scenario.fitness.direction = 2.0
     assert compute_fitness(metrics, scenario.fitness) == pytest.approx(12.75)

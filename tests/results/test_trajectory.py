@@ -1,7 +1,5 @@
 """The recorded trajectory: evenly spaced samples that agree with the motion and with each other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +9,14 @@ import xarray
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.results.trajectory import sample_times, save_dataset
 from tetra_drake.robot.gait import load_gait
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
 
 
 @pytest.fixture(scope="module", params=["drake", "compiled"])
 def trajectory(request: pytest.FixtureRequest, data: Path) -> xarray.Dataset:
-    scenario = load_scenario("thesis").with_changes(
-        {
-            "simulation.engine": request.param,
-            "simulation.duration": 3.0,
-            "simulation.steady_from": 1.5,
-        }
-    )
+    times = {"simulation.duration": 3.0, "simulation.steady_from": 1.5}
+    scenario = load_scenario("thesis").with_changes({"simulation.engine": request.param, **times})
     gait = load_gait(data / "gait_g.json", scenario)
     result = simulate(scenario=scenario, gait=gait, record=True)
     assert result.trajectory is not None
@@ -70,32 +62,30 @@ def test_positions_and_velocities_agree_between_samples(trajectory: xarray.Datas
     np.testing.assert_allclose(rates, early.v_WN.values[1:-1], atol=5e-5)
 
 
-def test_body_poses_carry_the_nodes(trajectory: xarray.Dataset, scenario: Scenario) -> None:
-    w, x, y, z = np.moveaxis(trajectory.q_WB.values, -1, 0)
-    R_WB = np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], -1),
-            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], -1),
-            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], -1),
-        ],
-        -2,
-    )
-    p_BN = MakeStructure(scenario.robot, scenario.cables).p_BN
-    p_WN = trajectory.p_WB.values[:, :, None] + np.einsum("tbij,nj->tbni", R_WB, p_BN)
+def test_body_poses_carry_the_nodes(trajectory: xarray.Dataset, structure: Structure) -> None:
+    # R r = r + 2 w (e x r) + 2 e x (e x r) for the unit quaternion (w, e).
+    q_WB = trajectory.q_WB.values[:, :, None]
+    w, e = q_WB[..., :1], q_WB[..., 1:]
+    turned = 2.0 * np.cross(e, structure.p_BN)
+    rotated = structure.p_BN + w * turned + np.cross(e, turned)
+    p_WN = trajectory.p_WB.values[:, :, None] + rotated
     # Drake does not keep quaternions at length 1; it is left by the accuracy of its steps.
     np.testing.assert_allclose(p_WN, trajectory.p_WN.values, atol=1e-6)
 
 
-def test_cables_reach_from_node_to_node(trajectory: xarray.Dataset) -> None:
-    def node(tetrahedron: str, name: str) -> np.ndarray:
-        return trajectory.p_WN.sel(tetrahedron=tetrahedron, node=name).values
-
-    for cable, a, b in (
-        ("T2-T3 outer top", node("T2", "top"), node("T3", "top")),
-        ("T4-T5 inner bottom_left", node("T4", "tip"), node("T5", "bottom_left")),
-    ):
-        distance = np.linalg.norm(b - a, axis=-1)
-        np.testing.assert_allclose(trajectory.length.sel(cable=cable), distance, rtol=1e-12)
+@pytest.mark.parametrize(
+    ("cable", "a", "b"),
+    [
+        ("T2-T3 outer top", ("T2", "top"), ("T3", "top")),
+        ("T4-T5 inner bottom_left", ("T4", "tip"), ("T5", "bottom_left")),
+    ],
+)
+def test_cables_reach_from_node_to_node(
+    trajectory: xarray.Dataset, cable: str, a: tuple[str, str], b: tuple[str, str]
+) -> None:
+    ends = (trajectory.p_WN.sel(tetrahedron=t, node=node).values for t, node in (a, b))
+    distance = np.linalg.norm(np.subtract(*ends), axis=-1)
+    np.testing.assert_allclose(trajectory.length.sel(cable=cable), distance, rtol=1e-12)
 
 
 def test_cables_say_where_they_are_and_what_drives_them(trajectory: xarray.Dataset) -> None:
@@ -106,15 +96,15 @@ def test_cables_say_where_they_are_and_what_drives_them(trajectory: xarray.Datas
     assert (inner.cable_junction.item(), inner.cable_role.item()) == ("T1-T2", "inner")
 
 
-def test_forces_belong_to_the_recorded_states(trajectory: xarray.Dataset) -> None:
+def test_forces_belong_to_the_recorded_states(
+    trajectory: xarray.Dataset, structure: Structure
+) -> None:
     assert (trajectory.signal.sel(time=slice(0.0, 1.2)) == 0.0).all()
     assert (abs(trajectory.signal.sel(time=slice(1.3, 3.0))) > 0.0).any()
     # Normal force only where a node is below the ground, friction only in contact (modes are
     # those of the step, so a node just lifting or landing may differ at single samples).
-    contact = [name.split() for name in trajectory.contact.values]
-    heights = np.stack(
-        [trajectory.p_WN.sel(tetrahedron=t, node=n, axis="z").values for t, n in contact], axis=1
-    )
+    nodes = trajectory.p_WN.values[..., 2].reshape(trajectory.sizes["time"], -1)
+    heights = nodes[:, structure.contacts]
     above = heights > 0.0
     normal = trajectory.normal_force.values
     assert (normal[above] == 0.0).all() and (normal[~above] > 0.0).any()
