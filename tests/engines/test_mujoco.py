@@ -12,6 +12,7 @@ from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
