@@ -1,9 +1,10 @@
-"""Numbers, durations, lists and tables as text."""
+"""Numbers, durations, lists, tables and pages as text."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from importlib import resources
 
 
 def fixed(value: float, digits: int = 2) -> str:
@@ -42,3 +43,13 @@ def markdown_table(
     aligned to the right."""
     rule = ["---" if i in text_columns else "---:" for i in range(len(headings))]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in [headings, rule, *rows])
+
+
+def render(template: str, **values: object) -> str:
+    """A page from a Jinja template of the package, as "report/report.html.jinja"; values are
+    escaped."""
+    from jinja2 import Environment, StrictUndefined
+
+    source = (resources.files("tetra_drake") / template).read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined)
+    return environment.from_string(source).render(values)

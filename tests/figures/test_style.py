@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -41,18 +40,6 @@ def test_a_figure_is_written_as_svg_and_png(tmp_path: Path) -> None:
     assert set(files) == {"line.svg", "line.png"}
     assert b"<svg" in files["line.svg"]
     assert files["line.png"].startswith(b"\x89PNG")
-
-
-def test_what_is_drawn_has_no_needless_digits(tmp_path: Path) -> None:
-    figure, [[panel]] = make_figure(width_in=4.0, height_in=3.0)
-    panel.plot([0.0, 1.0 / 3.0, 1.0], [0.0, 1.0, 0.3])
-    save_figure(figure, tmp_path, "line", kinds=["svg"])
-    digits = re.compile(r"\.(\d+)")
-    svg = (tmp_path / "line.svg").read_text()
-    paths = re.findall(r' d="([^"]*)"', svg)
-    assert max(len(found) for path in paths for found in digits.findall(path)) == 2
-    # The scale of letters, 1/64, must stay as it is.
-    assert "0.015625" in svg
 
 
 def test_equal_data_give_equal_bytes_whatever_the_users_style(tmp_path: Path) -> None:

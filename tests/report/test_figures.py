@@ -141,7 +141,7 @@ def test_a_damaged_or_empty_run_is_refused(
 def test_other_sources_and_outs_are_refused_before_anything_is_simulated(
     run: Path, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tetra_drake.report.study.simulate", None)
+    monkeypatch.setattr("tetra_drake.figures.study.simulate", None)
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").touch()
     (folder / "trajectory.nc").unlink()

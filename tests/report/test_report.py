@@ -18,8 +18,8 @@ from tetra_drake.evolution.method import Method, Part
 from tetra_drake.evolution.summary import comparisons
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.figures.evolution import two_best
+from tetra_drake.figures.study import Study, study_run
 from tetra_drake.report.run_page import render_report, write_report
-from tetra_drake.report.study import Study, study_run
 from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.units import INCH
 

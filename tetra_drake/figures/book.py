@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import xarray
 
     from tetra_drake.evolution.tables import Run
+    from tetra_drake.figures.study import Study
 
 TWO_BEST = "two_best.csv"
 
@@ -45,27 +46,20 @@ def draw_trajectory(trajectory: xarray.Dataset, folder: Path) -> list[Picture]:
     return [_save(folder, draw, trajectory) for draw in draws]
 
 
-def draw_run(
-    run: Run,
-    folder: Path,
-    *,
-    trial: int,
-    initial: xarray.Dataset,
-    best: xarray.Dataset,
-    labels: tuple[str, str],
-) -> list[Picture]:
+def draw_run(study: Study, folder: Path) -> list[Picture]:
     """Writes the figures of a run, and the table of its two best gaits as CSV.
 
-    `initial` and `best` are trajectories, described by `labels`, of the best gaits of `trial`
-    before and after evolution. Raises InputError if the folder cannot be written to.
+    Raises InputError if the folder cannot be written to.
     """
+    run, initial, best = study.run, study.initial, study.best
     reference = run.manifest.scenario.reference
-    table = evolution.two_best(run, trial, reference)
+    table = evolution.two_best(run, study.trial, reference)
     if table is not None:
         write_whole(folder / TWO_BEST, table.to_csv())
-    pictures = [_save(folder, *picture) for picture in _of_evolution(run, trial)]
-    walks = (motion.before_and_after, initial, best, labels, reference)
-    return [*pictures, _save(folder, *walks), *draw_trajectory(best, folder)]
+    pictures = [_save(folder, *picture) for picture in _of_evolution(run, study.trial)]
+    labels = initial.label, best.label
+    walks = (motion.before_and_after, initial.trajectory, best.trajectory, labels, reference)
+    return [*pictures, _save(folder, *walks), *draw_trajectory(best.trajectory, folder)]
 
 
 def _of_evolution(run: Run, trial: int) -> Iterator[tuple[Any, ...]]:

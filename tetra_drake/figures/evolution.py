@@ -75,11 +75,6 @@ def initial_distances(run: Run, reference: ReferenceScenario | None = None) -> F
     return figure
 
 
-def share_backward(initial: pandas.DataFrame) -> float:
-    """Share, 0 to 1, of initial gaits that walk backward, failed ones left out."""
-    return float((initial.dropna(subset="fitness")["distance_in"] < 0.0).mean())
-
-
 @common_style()
 def initial_fitness(run: Run, trial: int, reference: ReferenceScenario | None = None) -> Figure:
     """Histogram of the fitness of a trial's initial gaits; those that walk backward stand out."""
@@ -108,7 +103,7 @@ def initial_fitness(run: Run, trial: int, reference: ReferenceScenario | None = 
     theirs = reference.share_backward if reference else ""
     figure.suptitle(
         f"Fitness of the initial population, trial {trial}\n"
-        f"{fixed(100.0 * share_backward(initial), 0)} % walk backward"
+        f"{fixed(100.0 * float(backward.mean()), 0)} % walk backward"
         + (f" ({reference.source}: {theirs})" if reference and theirs else "")
         + (f"; {failed} failed" if failed else "")
     )

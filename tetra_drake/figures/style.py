@@ -7,7 +7,6 @@ figure; save_figure() writes it. Neither a display nor pyplot is needed.
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,11 +104,3 @@ def save_figure(
         metadata = {"Date": None} if kind == "svg" else None
         with whole_file(Path(folder) / f"{name}.{kind}") as file:
             figure.savefig(file, format=kind, dpi=PNG_DPI, metadata=metadata)
-            if kind == "svg":
-                svg = file.read_text(encoding="utf-8")
-                file.write_text(_with_short_paths(svg), encoding="utf-8")
-
-
-def _with_short_paths(svg: str) -> str:
-    """The drawing with paths to 0.01 points, which matplotlib writes to 1e-6."""
-    return re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), svg)

@@ -43,18 +43,11 @@ def load_recording(source: Path, *, scenario: str | None = None) -> Recording:
         return _simulate(run.gait(*run.fittest()), run.manifest.scenario)
     if (source / RESULT).exists():
         return load_result_folder(source)
-    if source.is_dir():
-        raise _neither(source)
-    if not source.exists():
+    if not source.is_file():
         expected = "a folder of `simulate` or `evolve`, or a gait file"
-        raise InputError(source, "", f"no such file or folder, expected {expected}")
+        raise InputError(source, "", f"expected {expected}")
     given = load_scenario(scenario or "thesis")
     return _simulate(load_gait(source, given), given)
-
-
-def _neither(source: Path) -> InputError:
-    problem = f"holds neither {RESULT}, as `simulate` writes, nor {RUN_MANIFEST}, as `evolve`"
-    return InputError(source, "", problem)
 
 
 def _simulate(gait: Gait, scenario: Scenario) -> Recording:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from urllib.parse import quote
 
@@ -19,9 +18,9 @@ from tetra_drake.evolution.summary import comparisons
 from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.figures.book import TWO_BEST, Picture, draw_run, draw_trajectory
 from tetra_drake.figures.evolution import two_best
+from tetra_drake.figures.study import Study, study_run
 from tetra_drake.files import check_folder, write_whole
-from tetra_drake.formatting import duration, fixed
-from tetra_drake.report.study import Study, study_run
+from tetra_drake.formatting import duration, fixed, render
 from tetra_drake.results.folder import RESULT, RUN_MANIFEST, load_result_folder
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import ParameterSpace
@@ -43,7 +42,7 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
         check_folder(folder)
         if out is None:
             return write_report(source)
-        _draw(study_run(load_run(source)), folder)
+        draw_run(study_run(load_run(source)), folder)
     elif (source / RESULT).exists():
         check_folder(folder)
         draw_trajectory(load_result_folder(source).trajectory, folder)
@@ -61,7 +60,7 @@ def write_report(directory: Path) -> list[Path]:
     """
     study = study_run(load_run(directory))
     best = study.best
-    pictures = _draw(study, directory / FIGURES)
+    pictures = draw_run(study, directory / FIGURES)
     save_replay(
         directory / REPLAY,
         scenario=study.run.manifest.scenario,
@@ -72,28 +71,13 @@ def write_report(directory: Path) -> list[Path]:
     return [directory / FIGURES, directory / REPLAY, directory / REPORT]
 
 
-def _draw(study: Study, folder: Path) -> list[Picture]:
-    initial, best = study.initial, study.best
-    return draw_run(
-        study.run,
-        folder,
-        trial=study.trial,
-        initial=initial.trajectory,
-        best=best.trajectory,
-        labels=(initial.label, best.label),
-    )
-
-
 def render_report(study: Study, pictures: Sequence[Picture], *, folder: Path) -> str:
     """The page, with the pictures as saved in `folder` in it; its links are relative."""
-    from jinja2 import Environment, StrictUndefined
-
-    template = resources.files("tetra_drake") / "report" / "report.html.jinja"
-    environment = Environment(autoescape=True, undefined=StrictUndefined)
-    run, best = study.run, study.best
+    run, best, gait = study.run, study.best, trial_folder(Path(), study.trial) / BEST_GAIT
     scenario, reference = run.manifest.scenario, run.manifest.scenario.reference
     walked = f"{fixed(best.recorded['distance_in'])} inches in {scenario.simulation.duration:g} s"
-    return environment.from_string(template.read_text(encoding="utf-8")).render(
+    return render(
+        "report/report.html.jinja",
         title=f"{scenario.name}, seed {run.manifest.seed}: {walked}",
         notes=_notes(study),
         facts=_facts(run),
@@ -103,13 +87,13 @@ def render_report(study: Study, pictures: Sequence[Picture], *, folder: Path) ->
         trials=_trials(run),
         best=f"{best.label}: {walked}".capitalize(),
         replay=REPLAY,
-        gait=_gait_file(study),
+        gait=gait,
         metrics=_metrics(best.recorded),
         parameters=_parameters(study),
         two_best=f"{FIGURES}/{TWO_BEST}",
         figures=FIGURES,
         pictures=[_embedded(picture, folder) for picture in pictures],
-        commands=_commands(study),
+        commands=_commands(run, gait),
         own=run.manifest.method.given_from_python,
         scenario=dump_scenario(scenario),
     )
@@ -117,20 +101,15 @@ def render_report(study: Study, pictures: Sequence[Picture], *, folder: Path) ->
 
 def _notes(study: Study) -> list[str]:
     """What limits the report: an unfinished run, and gaits that do not move as recorded."""
-    run, statuses = study.run, study.run.statuses
-    notes = []
-    going_on = sum(status.stop is None for status in statuses)
+    run, notes = study.run, []
+    going_on = sum(status.stop is None for status in run.statuses)
     if going_on:
-        own = run.manifest.method.given_from_python
         how = "tetra-drake evolve --out . --resume in its directory"
-        how = "tetra_drake.evolve(..., resume=True) from Python" if own else how
-        notes.append(
-            f"This run is not finished: {going_on} of {len(statuses)} trials have not ended. "
-            f"Continue it with {how}."
-        )
-    walks = [study.best] if study.initial is study.best else [study.best, study.initial]
-    deviations = [(walk.label, walk.deviation_in) for walk in walks]
-    changed = [f"{label}: {inches:.1g} in" for label, inches in deviations if inches > 1e-6]
+        if run.manifest.method.given_from_python:
+            how = "tetra_drake.evolve(..., resume=True) from Python"
+        notes.append(f"This run is not finished: {going_on} trials go on. Continue it with {how}.")
+    walks = {walk.label: walk.deviation_in for walk in (study.best, study.initial)}
+    changed = [f"{label}: {inches:.1g} in" for label, inches in walks.items() if inches > 1e-6]
     if changed:
         notes.append(
             f"Figures and replay show gaits simulated again with {_listed(versions())}. Their "
@@ -158,14 +137,16 @@ def _facts(run: Run) -> list[tuple[str, str]]:
     ]
 
 
+_NAMES = {
+    "drake": "the Drake diagram",
+    "compiled": "the compiled engine",
+    "fitness": "the scenario's fitness",
+    "SteadyState": "the steady-state evolutionary algorithm of the scenario",
+}
+
+
 def _described(part: Part) -> str:
-    own = {
-        "drake": "the Drake diagram",
-        "compiled": "the compiled engine",
-        "fitness": "the scenario's fitness",
-        "SteadyState": "the steady-state evolutionary algorithm of the scenario",
-    }
-    text = own.get(part.name, part.name)
+    text = _NAMES.get(part.name, part.name)
     text += f" {json.dumps(part.settings)}" if part.settings else ""
     return text + (f", given from Python (SHA-256 {part.digest[:16]})" if part.digest else "")
 
@@ -218,22 +199,17 @@ def _parameters(study: Study) -> pandas.DataFrame:
 def _embedded(picture: Picture, folder: Path) -> dict[str, str]:
     """As an image of its own, so that no two drawings share names within the page."""
     svg = (folder / f"{picture.name}.svg").read_text(encoding="utf-8")
-    # Not base64, which would be a fifth longer.
-    packed = quote(" ".join(svg.split()), safe=" /:=,;()!?*+@$")
-    return {"name": picture.name, "caption": picture.caption, "svg": packed}
+    packed = quote(" ".join(svg.split()), safe=" /:=,;()!?*+@$")  # base64 is a fifth longer
+    return {"caption": picture.caption, "svg": packed}
 
 
-def _gait_file(study: Study) -> str:
-    return f"{trial_folder(Path(), study.trial) / BEST_GAIT}"
-
-
-def _commands(study: Study) -> list[str]:
-    """Commands that reproduce the run; those that evolve only where it was made by one."""
-    manifest = study.run.manifest
-    evolve = f"tetra-drake evolve --scenario {SCENARIO} --seed {manifest.seed} --out ../again"
+def _commands(run: Run, gait: Path) -> list[str]:
+    """Commands that reproduce the run; `evolve` only where no part was given from Python."""
+    seed = run.manifest.seed
+    evolve = f"tetra-drake evolve --scenario {SCENARIO} --seed {seed} --out ../again"
     return [
-        *([] if manifest.method.given_from_python else [evolve]),
-        f"tetra-drake simulate --scenario {SCENARIO} --gait {_gait_file(study)} --out ../best",
+        *([] if run.manifest.method.given_from_python else [evolve]),
+        f"tetra-drake simulate --scenario {SCENARIO} --gait {gait} --out ../best",
         "tetra-drake figures .",
     ]
 

@@ -7,7 +7,6 @@ import gzip
 import html
 import logging
 import re
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,7 @@ from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams
 from pydrake.math import RigidTransform
 
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import fixed
+from tetra_drake.formatting import fixed, render
 from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, MakeStructure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
@@ -159,22 +158,14 @@ class _Film:
 def pack_page(page: str, *, title: str) -> str:
     """A page that holds `page` compressed and unpacks it in the browser; `title` is plain text."""
     packed = base64.b64encode(gzip.compress(page.encode("utf-8"), mtime=0)).decode("ascii")
-    return _render("packed_page.html.jinja", title=title, packed=packed)
+    return render("visualization/packed_page.html.jinja", title=title, packed=packed)
 
 
 def _with_overlay(page: str, title: str) -> str:
     """Meshcat's page with a title, and over the scene a heading, a legend and a clock."""
     legend = [(COLOURS[name], meaning) for name, meaning in LEGEND.items()]
-    overlay = _render("overlay.html.jinja", title=title, legend=legend, aspect=ASPECT)
+    overlay = render("visualization/overlay.html.jinja", title=title, legend=legend, aspect=ASPECT)
     # Functions, as backslashes in a replacement text would mean something.
     named = f"<title>{html.escape(title)}</title>"
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
     return re.sub(r"<body[^>]*>", lambda tag: tag[0] + overlay, page, count=1)
-
-
-def _render(template: str, **values: object) -> str:
-    from jinja2 import Environment, StrictUndefined
-
-    source = (resources.files("tetra_drake") / "visualization" / template).read_text("utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined)
-    return environment.from_string(source).render(values)
