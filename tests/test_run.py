@@ -229,7 +229,7 @@ def test_resuming_needs_the_directory_only(evolve, tmp_path, capsys):
         (("--trials", 2), "evolution.trials"),
         (("--iterations", 4), "evolution.max_iterations"),
         (("--engine", "compiled"), "simulation.engine"),
-        (("--scenario", "thesis"), "name"),
+        (("--scenario", "thesis"), "evolution.population"),
         (("--seed", 1), "seed"),
     ],
 )

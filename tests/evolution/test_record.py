@@ -121,9 +121,9 @@ def test_what_a_kill_in_the_first_moment_leaves_is_an_empty_directory(tmp_path):
 
 def test_another_seed_or_scenario_is_refused(run_small, refused):
     run = run_small(seed=5)
-    with refused(run, "seed", "the run has seed 5, not 6"):
+    with refused(run, "seed", "5, not 6"):
         RunRecord.resume(run, seed=6)
-    with refused(run, "evolution.population", "the run has 12, not 13"):
+    with refused(run, "evolution.population", "12"):
         RunRecord.resume(run, scenario=small_scenario(population=13))
     other = Method.of(small_scenario(), objective=Bowl())
     with refused(run, "objective", "Bowl"):
@@ -260,7 +260,7 @@ def test_a_finished_run_is_resumed_without_an_evaluation(run_small):
 
 def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, refused):
     genome = np.linspace(1.0, 2.0, 26)
-    failed = Evaluation.failed("why", wall_time=1.25)
+    failed = Evaluation(-math.inf, {}, "why", 1.25)
     TrialRecord(tmp_path).keep(evaluation_entry(3, 1, genome, failed))
     with (tmp_path / "in_progress.jsonl").open("a") as file:
         file.write('{"index": 4, "torn')

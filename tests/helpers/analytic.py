@@ -27,7 +27,7 @@ class Bowl:
         chance = hash(tuple(genome.tolist()))
         time.sleep(self.delay * (chance % 97) / 97)
         if chance % self.fails_every == 0:
-            return Evaluation.failed("fell off the table", wall_time=self.delay)
+            return Evaluation.failed("fell off the table")
         fitness = -float(((genome[:-2] - 2.0) ** 2).sum())
         return Evaluation(fitness, {"distance": 10.0 + fitness}, wall_time=self.delay)
 

@@ -86,7 +86,7 @@ def _lines(iterations, scenario, *, ends):
 def _entry(index, iteration, fitness, scenario):
     seed = index if fitness is None else abs(hash(fitness)) % 2**32
     genome = ParameterSpace.of(scenario).random(np.random.default_rng(seed))
-    evaluation = Evaluation.failed("fell over", wall_time=0.5)
+    evaluation = Evaluation(-math.inf, failure="fell over", wall_time=0.5)
     if fitness is not None:
         distances = {
             "distance": fitness / PER_DISTANCE * INCH,

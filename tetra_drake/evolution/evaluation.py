@@ -16,7 +16,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.schema import Scenario
 
 Objective = Callable[[SimulationResult], float]
@@ -38,26 +38,21 @@ class GaitEvaluation:
     def __call__(self, vector: Vector) -> Evaluation:
         """Fitness and metrics of one vector, or the reason of a failure."""
         started = time.perf_counter()
+        found = self._evaluate(ParameterSpace.of(self.scenario).gait(vector, name="candidate"))
+        wall_time = time.perf_counter() - started
         engine = self.scenario.simulation.engine
-        gait = ParameterSpace.of(self.scenario).gait(vector, name="candidate")
+        return dataclasses.replace(found, wall_time=wall_time, engine=engine)
+
+    def _evaluate(self, gait: Gait) -> Evaluation:
         try:
             with time_limit(self.scenario.evolution.time_budget):
                 result = simulate(scenario=self.scenario, gait=gait)
         except (SimulationFailure, TimeBudgetExceeded) as error:
-            reason = f"{_KINDS[type(error)]}: {error}"
-            wall_time = time.perf_counter() - started
-            return Evaluation.failed(reason, wall_time=wall_time, engine=engine)
-        wall_time = time.perf_counter() - started
+            return Evaluation.failed(f"{_KINDS[type(error)]}: {error}")
         fitness = result.fitness if self.objective is None else float(self.objective(result))
         if not math.isfinite(fitness):
-            reason = "diverged: the fitness is not finite"
-            return Evaluation.failed(reason, wall_time=wall_time, engine=engine)
-        return Evaluation(
-            fitness=fitness,
-            metrics=dataclasses.asdict(result.metrics),
-            wall_time=wall_time,
-            engine=engine,
-        )
+            return Evaluation.failed("diverged: the fitness is not finite")
+        return Evaluation(fitness, dataclasses.asdict(result.metrics))
 
 
 class TimeBudgetExceeded(Exception):

@@ -261,10 +261,10 @@ def _check_worker(evaluate: object) -> None:
             os.dup2(ours, 2)
             os.close(ours)
         messages.seek(0)
-        lines = [line for line in messages.read().splitlines() if line.strip()]
+        text = messages.read().strip()
     if worker.exitcode:
-        cause = lines[-1].strip() if lines else f"exit status {worker.exitcode}"
-        if any("_check_not_importing_main" in line for line in lines):
+        cause = text.splitlines()[-1] if text else f"exit status {worker.exitcode}"
+        if "_check_not_importing_main" in text:
             cause = 'the program lacks `if __name__ == "__main__":` around what it does'
         raise EvaluationImpossible(_SOURCE, "", f"do not start: {cause}")
 

@@ -32,12 +32,9 @@ def append_lines(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
 
 def repair_torn_line(path: Path) -> None:
     """Cuts off a last line that was not written to its end."""
-    if not path.exists():
-        return
-    content = path.read_bytes()
-    whole = content.rfind(b"\n") + 1
-    if whole < len(content):
-        os.truncate(path, whole)
+    if path.exists():
+        content = path.read_bytes()
+        os.truncate(path, content.rfind(b"\n") + 1)
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:
@@ -45,14 +42,13 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
 
     Raises InputError, naming file and line, where a line is not a JSON object.
     """
-    try:
-        if _compressed(path).exists():
-            path = _compressed(path)
-            content = lzma.decompress(path.read_bytes())
-        else:
-            content = path.read_bytes()
-    except FileNotFoundError:
+    packed = _compressed(path).exists()
+    path = _compressed(path) if packed else path
+    if not path.exists():
         return []
+    try:
+        content = path.read_bytes()
+        content = lzma.decompress(content) if packed else content
     except (OSError, lzma.LZMAError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     lines = content.split(b"\n")[:-1]
@@ -66,9 +62,8 @@ def _compressed(path: Path) -> Path:
 def _parse(line: bytes, path: Path, number: int) -> dict[str, Any]:
     try:
         entry = json.loads(line.decode("utf-8"))
+        if not isinstance(entry, dict):
+            raise ValueError("expected a JSON object")
     except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(path, f"line {number}", f"is damaged: {reason}") from error
-    if not isinstance(entry, dict):
-        raise InputError(path, f"line {number}", "is damaged: expected a JSON object")
+        raise InputError(path, f"line {number}", f"is damaged: {error}") from error
     return entry

@@ -37,7 +37,7 @@ from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.files import write_whole
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, Vector, save_gait
-from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
@@ -105,14 +105,13 @@ def read_manifest(directory: Path) -> Manifest:
     scenario = load_scenario(scenario_file)
     text = scenario_file.read_text(encoding="utf-8")
     if schema == FIRST_SCHEMA:
-        changed = _first_difference(raw["scenario"], yaml.safe_load(text))
-        if changed:
-            raise InputError(scenario_file, changed, f"is not as in {MANIFEST}")
+        unchanged = raw["scenario"] == yaml.safe_load(text)
         method = Method.of(scenario)
     else:
-        if _sha256(text) != raw["scenario_sha256"]:
-            raise InputError(scenario_file, "", "was changed after the run had begun")
+        unchanged = raw["scenario_sha256"] == _sha256(text)
         method = Method.from_json(raw, path)
+    if not unchanged:
+        raise InputError(scenario_file, "", "was changed after the run had begun")
     return Manifest(scenario, raw["seed"], raw["versions"], method)
 
 
@@ -163,11 +162,9 @@ class RunRecord:
         if seed not in (None, manifest.seed):
             raise InputError(directory, "seed", f"the run has seed {manifest.seed}, not {seed}")
         if scenario is not None:
-            ours, theirs = (dataclasses.asdict(each) for each in (manifest.scenario, scenario))
-            key = _first_difference(ours | {"reference": None}, theirs | {"reference": None})
-            if key:
-                problem = f"the run has {_at(ours, key)!r}, not {_at(theirs, key)!r}"
-                raise InputError(directory, key, f"{problem}; it is resumed with its own scenario")
+            for key, value in differences(manifest.scenario, scenario):
+                problem = f"the run has {value}; it is resumed with its own scenario"
+                raise InputError(directory, key, problem)
         if method is not None:
             manifest.method.check_same(method, directory)
         return cls(directory, manifest, _lock(directory))
@@ -250,7 +247,8 @@ class TrialRecord:
     def _write(self, name: str, recorded: _Lines, entries: _Lines, *, first: int) -> None:
         for row, entry in enumerate(entries, start=first):
             if row < len(recorded) and recorded[row] != entry:
-                key = _first_difference(recorded[row], entry)
+                keys = recorded[row] | entry
+                key = next(key for key in keys if recorded[row].get(key) != entry.get(key))
                 self._refuse(name, row, f"{key} is not what scenario and seed lead to")
         missing = entries[max(0, len(recorded) - first) :]
         if missing:
@@ -355,22 +353,3 @@ def _lock(directory: Path) -> int:
         problem = "another process is at work on this run" if taken else "cannot be locked"
         raise InputError(directory, "", problem) from error
     return lock
-
-
-def _first_difference(first: Mapping[str, Any], second: Mapping[str, Any]) -> str | None:
-    """The dotted key of the first value in which two trees differ; None if they do not."""
-    for key in [*first, *(key for key in second if key not in first)]:
-        ours, theirs = first.get(key), second.get(key)
-        if isinstance(ours, dict) and isinstance(theirs, dict):
-            inner = _first_difference(ours, theirs)
-            if inner:
-                return f"{key}.{inner}"
-        elif ours != theirs or (key in first) != (key in second):
-            return key
-    return None
-
-
-def _at(tree: Any, key: str) -> Any:
-    for part in key.split("."):
-        tree = tree.get(part)
-    return tree

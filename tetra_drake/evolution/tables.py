@@ -93,8 +93,9 @@ class Run:
 
     def vector(self, trial: int, index: int) -> Vector:
         """The parameters of an evaluation."""
-        row = self._by_index.loc[(trial, index), self._columns]
-        return row.to_numpy(dtype=np.float64)
+        rows = self.evaluations
+        row = rows[(rows["trial"] == trial) & (rows["index"] == index)]
+        return row[self._columns].to_numpy(dtype=np.float64)[0]
 
     def gait(self, trial: int, index: int) -> Gait:
         """The gait of an evaluation."""
@@ -106,10 +107,6 @@ class Run:
     def _columns(self) -> list[str]:
         weights = [name for name in self.evaluations if name.startswith("weight_")]
         return [*weights, "tau_a_s", "tau_b_s"]
-
-    @cached_property
-    def _by_index(self) -> pandas.DataFrame:
-        return self.evaluations.set_index(["trial", "index"])
 
     def _status(self, trial: int) -> TrialStatus:
         status = TrialStatus(trial)

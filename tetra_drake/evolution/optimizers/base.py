@@ -26,9 +26,9 @@ class Evaluation:
     engine: str = ""
 
     @classmethod
-    def failed(cls, reason: str, *, wall_time: float = 0.0, engine: str = "") -> Evaluation:
+    def failed(cls, reason: str) -> Evaluation:
         """A failed evaluation and its reason."""
-        return cls(fitness=-math.inf, failure=reason, wall_time=wall_time, engine=engine)
+        return cls(fitness=-math.inf, failure=reason)
 
 
 Evaluate = Callable[[Vector], Evaluation]
