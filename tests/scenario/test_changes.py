@@ -11,7 +11,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.load import differences, load_scenario
 from tetra_drake.scenario.perturb import displaced, scaled
-from tetra_drake.scenario.schema import ReferenceScenario, RobotScenario, Scenario
+from tetra_drake.scenario.schema import ReferenceScenario, Scenario
 
 IN = 0.0254
 
@@ -39,7 +39,7 @@ def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
         ({"robot.spacing": -1.0}, "robot.spacing", "-1.0"),
         ({"robot.spacing": "3 s"}, "robot.spacing", "'3 s'"),
         ({"simulation.duration": 2.0}, "simulation.steady_from", "3.0 s"),
-        ({"robot": RobotScenario()}, "robot.tetrahedra", "nothing"),
+        ({"robot": {}}, "robot.tetrahedra", "missing"),
         ({"reference.duration": 3.0, "reference.source": 5}, "reference.source", "5"),
     ],
 )

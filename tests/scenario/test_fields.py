@@ -3,7 +3,7 @@
 (The annotations below are read as types, so they are not postponed.)
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,6 @@ import pytest
 
 from tetra_drake.scenario.fields import (
     Check,
-    build,
     choice,
     dump_yaml,
     merge,
@@ -46,7 +45,7 @@ class Probe:
     active: bool = setting(default=True)
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Settings:
     count: int = setting(at_least=1)
     terrain: Flat | Incline | Cells = setting(default=Flat())
@@ -55,13 +54,13 @@ class Settings:
     probes: list[Probe] = setting(default=[])
     ramps: list[Incline | Flat] = setting(default=[])
     probe: Probe | None = setting(default=None)
-    inner: Incline = field(default_factory=Incline)
+    inner: Incline
 
 
 def load(text: str) -> Settings:
-    raw = parse_yaml(f"{{count: 2, inner: {{slope: 0 rad}}, {text} }}")
-    tree = Check("file").section(Settings, raw)
-    return build(Settings, Check("file", complete=True).section(Settings, tree))
+    raw = parse_yaml(f"{{count: 2, inner: {{slope: 0 rad}}, {text} }}", "file")
+    tree = Check("file").value(Settings, raw)
+    return Check("file", complete=True).value(Settings, tree)
 
 
 def shown(settings: Settings) -> str:
@@ -91,15 +90,14 @@ GOOD: list[tuple[str, str, Any]] = [
 def test_values_of_every_type_load_and_dump_back(text, name, value):
     settings = load(text)
     assert getattr(settings, name) == value
-    tree = Check("dump").section(Settings, parse_yaml(shown(settings)))
-    assert build(Settings, tree) == settings
+    assert Check("dump", complete=True).value(Settings, parse_yaml(shown(settings), "")) == settings
 
 
 def test_defaults_and_missing_fields_are_not_shared_or_dumped():
     settings = load("")
     settings.weights["twist"] = 1.0
     assert load("").weights == {"distance": 1.0}
-    assert parse_yaml(shown(load(""))) == {"count": 2, "inner": {"slope": "0.0 rad"}}
+    assert parse_yaml(shown(load("")), "file") == {"count": 2, "inner": {"slope": "0.0 rad"}}
 
 
 BAD = [
@@ -137,7 +135,7 @@ def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
 @pytest.mark.parametrize("text", ["!Flat 5", "!Flat [1]", "!Flat {a: 1, a: 2}"])
 def test_a_kind_has_a_mapping_of_different_keys(text):
     with pytest.raises(ValueError):
-        parse_yaml(f"terrain: {text}")
+        parse_yaml(f"terrain: {text}", "file")
 
 
 @pytest.mark.parametrize(
@@ -152,14 +150,13 @@ def test_a_kind_has_a_mapping_of_different_keys(text):
     ],
 )
 def test_a_file_is_merged_with_its_base(base, changes, result):
-    trees = [parse_yaml(f"{{{text} }}") for text in (base, changes, result)]
+    trees = [parse_yaml(f"{{{text} }}", "file") for text in (base, changes, result)]
     assert merge(trees[0], trees[1]) == trees[2]
 
 
 def changed(settings: Settings, changes: dict[str, Any]) -> Settings:
     tree = with_values(tree_of(settings), changes, "changes")
-    tree = Check("changes", complete=True).section(Settings, tree)
-    return build(Settings, tree)
+    return Check("changes", complete=True).value(Settings, tree)
 
 
 @pytest.mark.parametrize(

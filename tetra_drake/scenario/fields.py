@@ -3,7 +3,8 @@
 Works on any dataclass whose fields come from the helpers below. Types: float, int, str, bool,
 another dataclass, `X | None`, `list[X]`, `dict[str, X]`, and tagged kinds: a union of dataclasses,
 written `!Name {...}` as in Drake's YAML. A *tree* is what YAML holds (dicts, lists, scalars) with
-all numbers in SI; the dict of a tagged kind has its tag under "_tag", as in pydrake.common.yaml.
+all numbers in SI; the dict of a tagged kind has its tag under "_tag". Annotations are read as
+types, so a module with such dataclasses must not postpone them.
 """
 
 from __future__ import annotations
@@ -12,25 +13,22 @@ import contextlib
 import copy
 import dataclasses
 import difflib
+import functools
 import operator
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import yaml
-from pydrake.common.yaml import yaml_load_typed
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.units import quantity_to_si
 
-T = TypeVar("T")
 Tree = dict[str, Any]
+Limits = Mapping[str, Any]
 Show = Callable[[float, str], str]
-
-REQUIRED: Any = object()
-"""The default of a field that has none: a file, or one of its bases, must give it."""
 
 TAG = "_tag"
 
@@ -42,147 +40,149 @@ _SCALARS: dict[Any, tuple[Any, ...]] = {
 }
 """What each type is called, and the types of values that it takes."""
 
-
-def setting(*, default: Any = REQUIRED, **limits: Any) -> Any:
-    """A field of any type. Numbers may be limited by above, at_least, at_most; innermost lists by
-    `length`; `words` are texts allowed instead of a number."""
-    if default is REQUIRED:  # Drake constructs the dataclass before it sets the values
-        return dataclasses.field(default=None, metadata=limits | {"required": True})
-    return dataclasses.field(default_factory=lambda: copy.deepcopy(default), metadata=limits)
+_LIMITS: dict[str, tuple[str, Callable[[Any, Any], bool]]] = {
+    "above": ("more than", operator.gt),
+    "at_least": ("at least", operator.ge),
+    "at_most": ("at most", operator.le),
+}
 
 
-def quantity(unit: str, *, default: Any = REQUIRED, **limits: Any) -> Any:
+def setting(*, default: Any = dataclasses.MISSING, **limits: Any) -> Any:
+    """A field of any type, required in a file or its bases if it has no default.
+
+    Numbers may be limited by above, at_least, at_most; innermost lists by `length`; texts by
+    `choices`, which a number may have besides.
+    """
+    if default is dataclasses.MISSING:
+        return dataclasses.field(metadata=limits)
+    factory = functools.partial(copy.deepcopy, default)
+    return dataclasses.field(default_factory=factory, metadata=limits, kw_only=True)
+
+
+def quantity(unit: str, **limits: Any) -> Any:
     """A field of numbers in the SI unit `unit`, written as text with a unit."""
-    return setting(default=default, unit=unit, **limits)
+    return setting(unit=unit, **limits)
 
 
-def choice(*choices: str, default: Any = REQUIRED) -> Any:
+def choice(*choices: str, **default: Any) -> Any:
     """A field that holds one of the texts `choices`."""
-    return setting(default=default, choices=choices)
+    return setting(choices=choices, **default)
 
 
 @dataclass(frozen=True)
 class Check:
-    """Checks raw trees against dataclasses and turns them into SI trees.
+    """Checks raw values, as YAML holds them, against types; raises InputError.
 
-    Quantities are texts with units. A `complete` tree has every required field, and its quantities
-    may be numbers, in SI. Raises InputError: source and key, what was found and expected.
+    Quantities are texts with units, in the resulting tree SI. If `complete`, dataclasses result:
+    every required field must be there, and quantities may be numbers, in SI.
     """
 
-    source: str
+    source: object
     complete: bool = False
 
-    def section(self, schema: Any, raw: Any, key: str = "") -> Tree:
-        """The tree of a dataclass."""
-        tag = f"!{schema.__name__}"
-        if not isinstance(raw, dict) or raw.get(TAG, tag) != tag:
-            raise self._unexpected(key, raw, "a mapping of keys")
-        fields = {f.name: f for f in dataclasses.fields(schema)}
-        hints = typing.get_type_hints(schema)
-        path = {name: f"{key}.{name}" if key else str(name) for name in (*raw, *fields)}
-        tree: Tree = {}
-        for name in (name for name in raw if name != TAG):
-            if name not in fields:
-                raise InputError(self.source, path[name], f"unknown key; {_hint(name, fields)}")
-            tree[name] = self.value(hints[name], fields[name].metadata, raw[name], path[name])
-        for name in [n for n in fields if n not in tree] if self.complete else []:
-            if fields[name].metadata.get("required"):
-                problem = "is missing; give it, or name a `base` that has it"
-                raise InputError(self.source, path[name], problem)
-            if dataclasses.is_dataclass(hints[name]):
-                tree[name] = self.section(hints[name], {}, path[name])
-        return tree
+    def value(
+        self, kind: Any, value: Any, key: str = "", limits: Limits = types.MappingProxyType({})
+    ) -> Any:
+        """The checked value of a type, found at `key`."""
+        try:
+            return self._value(kind, value, key, limits)
+        except InputError:
+            raise
+        except ValueError as error:
+            raise InputError(self.source, key, str(error)) from error
 
-    def value(self, kind: Any, limits: Mapping[str, Any], value: Any, key: str) -> Any:
-        """The tree of a value of type `kind`."""
+    def _value(self, kind: Any, value: Any, key: str, limits: Limits) -> Any:
         if dataclasses.is_dataclass(value) and not isinstance(value, type):
             value = {TAG: f"!{type(value).__name__}", **tree_of(value)}
         elif hasattr(value, "tolist"):  # numpy's arrays and numbers
             value = value.tolist()
-        if value is None and types.NoneType in _members(kind):
+        if value is None and types.NoneType in typing.get_args(kind):
             return None
-        kinds = {f"!{k.__name__}": k for k in _members(kind) if k is not types.NoneType}
+        kinds = {f"!{k.__name__}": k for k in _kinds(kind)}
         if len(kinds) > 1:
             tag = str(value.get(TAG, "")) if isinstance(value, dict) else ""
             if tag not in kinds:
-                problem = f"found {tag or _describe(value)}; {_hint(tag, kinds)}"
-                raise InputError(self.source, key, problem)
-            return {TAG: tag, **self.section(kinds[tag], value, key)}
+                raise ValueError(f"found {tag or _describe(value)}; {_hint(tag, kinds)}")
+            section = self._section(kinds[tag], value, key)
+            return section if self.complete else {TAG: tag} | section
         (kind,) = kinds.values()
-        item, container = typing.get_args(kind)[-1:], typing.get_origin(kind)
         if dataclasses.is_dataclass(kind):
-            return self.section(kind, value, key)
+            return self._section(kind, value, key)
+        container, items = typing.get_origin(kind), typing.get_args(kind)
         if container is list:
             if not isinstance(value, (list, tuple)):
-                raise self._unexpected(key, value, "a list")
+                raise ValueError(f"found {_describe(value)}, expected a list")
             length = limits.get("length", len(value))
-            if len(value) != length and typing.get_origin(item[0]) is not list:
-                problem = f"found {len(value)} items, expected {length}"
-                raise InputError(self.source, key, problem)
-            return [self.value(item[0], limits, v, f"{key}[{i}]") for i, v in enumerate(value)]
+            if len(value) != length and typing.get_origin(items[0]) is not list:
+                raise ValueError(f"found {len(value)} items, expected {length}")
+            return [self.value(items[-1], v, f"{key}[{i}]", limits) for i, v in enumerate(value)]
         if container is dict:
             if not isinstance(value, dict) or any(not isinstance(name, str) for name in value):
-                raise self._unexpected(key, value, "a mapping with texts as keys")
-            return {
-                name: self.value(item[0], limits, v, f"{key}.{name}") for name, v in value.items()
-            }
-        try:
-            return self._scalar(kind, limits, value)
-        except ValueError as error:
-            raise InputError(self.source, key, str(error)) from error
+                raise ValueError(f"found {_describe(value)}, expected a mapping with texts as keys")
+            return {k: self.value(items[-1], v, f"{key}.{k}", limits) for k, v in value.items()}
+        return self._scalar(kind, value, limits)
 
-    def _scalar(self, kind: type, limits: Mapping[str, Any], value: Any) -> Any:
-        if isinstance(value, str) and value in limits.get("words", ()):
+    def _section(self, schema: Any, raw: Any, key: str) -> Any:
+        tag = f"!{schema.__name__}"
+        if not isinstance(raw, dict) or raw.get(TAG, tag) != tag:
+            raise ValueError(f"found {_describe(raw)}, expected a mapping of keys")
+        fields = {f.name: f for f in dataclasses.fields(schema)}
+        path = {name: f"{key}.{name}" if key else str(name) for name in (*raw, *fields)}
+        for name in raw:
+            if name not in fields and name != TAG:
+                raise InputError(self.source, path[name], f"unknown key; {_hint(name, fields)}")
+        tree: Tree = {}
+        for name, f in fields.items():
+            required = self.complete and f.default_factory is dataclasses.MISSING
+            if name in raw or (required and dataclasses.is_dataclass(f.type)):
+                tree[name] = self.value(f.type, raw.get(name, {}), path[name], f.metadata)
+            elif required:
+                problem = "is missing; give it, or name a `base` that has it"
+                raise InputError(self.source, path[name], problem)
+        return schema(**tree) if self.complete else tree
+
+    def _scalar(self, kind: type, value: Any, limits: Limits) -> Any:
+        found, choices, unit = _describe(value), limits.get("choices", ()), limits.get("unit")
+        if isinstance(value, str) and value in choices:
             return value
-        if "unit" in limits and isinstance(value, str):
-            return _within(limits, quantity_to_si(value, limits["unit"]), shown=f"'{value}'")
-        if "unit" in limits and not self.complete:
-            wanted = f"a quantity that converts to {limits['unit']}"
-            raise ValueError(f"found {_describe(value)} without a unit, expected {wanted}")
-        if kind is float and isinstance(value, str):  # YAML 1.1 takes 1e-3 for text
+        if unit and isinstance(value, str):
+            value = quantity_to_si(value, unit)
+        elif unit and not self.complete:
+            wanted = f"a quantity that converts to {unit}"
+            raise ValueError(f"found {found} without a unit, expected {wanted}")
+        elif kind is float and isinstance(value, str):  # YAML 1.1 takes 1e-3 for text
             with contextlib.suppress(ValueError):
                 value = float(value)
         if type(value) not in _SCALARS[kind][1:]:
-            raise ValueError(f"found {_describe(value)}, expected {_SCALARS[kind][0]}")
+            raise ValueError(f"found {found}, expected {_SCALARS[kind][0]}")
+        if kind is str and choices:
+            raise ValueError(f"found {found}, expected one of {', '.join(choices)}")
         if kind in (int, float) and not abs(value) < 1e300:  # NaN, infinity, beyond floating point
-            raise ValueError(f"found {str(value)[:40]}, expected a finite number")
-        if value not in limits.get("choices", (value,)):
-            raise ValueError(f"found '{value}', expected one of {', '.join(limits['choices'])}")
-        return kind(_within(limits, value, shown=str(value)))
-
-    def _unexpected(self, key: str, found: Any, wanted: str) -> InputError:
-        return InputError(self.source, key, f"found {_describe(found)}, expected {wanted}")
-
-
-def build(schema: type[T], tree: Tree) -> T:
-    """The dataclass of a complete tree that has been checked."""
-    built: T = yaml_load_typed(
-        schema=schema, data=dump_yaml(tree), defaults=schema(), retain_map_defaults=False
-    )
-    return built
+            raise ValueError(f"found {found}, expected a finite number")
+        for name, (words, holds) in _LIMITS.items():
+            if name in limits and not holds(value, limits[name]):
+                raise ValueError(f"found {found}, expected {words} {limits[name]}")
+        return kind(value)
 
 
 def tree_of(node: Any, show: Show | None = None) -> Tree:
     """The complete tree of a dataclass; with `show`, without defaults and with quantities as the
     text that show(number, unit) gives."""
-    hints, blank = typing.get_type_hints(type(node)), type(node)()
     return {
-        f.name: _tree(hints[f.name], getattr(node, f.name), f.metadata.get("unit"), show)
-        for f in dataclasses.fields(node)
-        if show is None or getattr(node, f.name) != getattr(blank, f.name)
+        f.name: _tree(f.type, value, f.metadata.get("unit"), show)
+        for f, value in ((f, getattr(node, f.name)) for f in dataclasses.fields(node))
+        if not (show and callable(f.default_factory) and value == f.default_factory())
     }
 
 
 def _tree(kind: Any, value: Any, unit: str | None, show: Show | None) -> Any:
-    kinds = [k for k in _members(kind) if k is not types.NoneType]
+    kind, *others = _kinds(kind)
     if dataclasses.is_dataclass(value):
-        tag = {TAG: f"!{type(value).__name__}"} if len(kinds) > 1 else {}
-        return tag | tree_of(value, show)
-    item = typing.get_args(kinds[0])[-1:]
+        return ({TAG: f"!{type(value).__name__}"} if others else {}) | tree_of(value, show)
     if isinstance(value, list):
-        return [_tree(item[0], v, unit, show) for v in value]
+        return [_tree(typing.get_args(kind)[0], v, unit, show) for v in value]
     if isinstance(value, dict):
-        return {name: _tree(item[0], v, unit, show) for name, v in value.items()}
+        return {k: _tree(typing.get_args(kind)[1], v, unit, show) for k, v in value.items()}
     return show(value, unit) if show and unit and value is not None else value
 
 
@@ -204,24 +204,23 @@ def with_values(tree: Tree, values: Mapping[str, Any], source: str) -> Tree:
 
 def merge(base: Any, changes: Any) -> Any:
     """The base with what `changes` gives; lists, and kinds of another tag, are replaced."""
-    if not (isinstance(base, dict) and isinstance(changes, dict)):
-        return changes
-    if base.get(TAG) != changes.get(TAG):
+    both = isinstance(base, dict) and isinstance(changes, dict)
+    if not both or base.get(TAG) != changes.get(TAG):
         return changes
     return base | {k: merge(base[k], v) if k in base else v for k, v in changes.items()}
 
 
-def parse_yaml(content: str) -> Any:
-    """What YAML text holds; raises ValueError if it is not YAML."""
+def parse_yaml(content: str, source: object) -> Any:
+    """What YAML text holds; raises InputError if it is not YAML."""
     try:
         return yaml.load(content, _Loader)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise ValueError(f"is not YAML: {error}") from error
+        raise InputError(source, "", f"is not YAML: {error}") from error
 
 
 def dump_yaml(tree: Tree) -> str:
     """The tree as YAML text."""
-    return yaml.dump(tree, Dumper=_Dumper, sort_keys=False)
+    return yaml.dump(tree, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
 
 
 class _Loader(yaml.SafeLoader):
@@ -234,35 +233,29 @@ class _Loader(yaml.SafeLoader):
                 raise yaml.MarkedYAMLError(f"found the key '{key}' twice", node.start_mark)
         return super().construct_mapping(node, deep)
 
-    def construct_kind(self, name: str, node: yaml.Node) -> dict[Any, Any]:
-        if isinstance(node, yaml.MappingNode):
-            return {TAG: f"!{name}", **self.construct_mapping(node, deep=True)}
-        if node.value:
+    def construct_kind(self, name: str, node: Any) -> dict[Any, Any]:
+        if node.value and not isinstance(node, yaml.MappingNode):
             raise yaml.MarkedYAMLError(f"found !{name} without a mapping of keys", node.start_mark)
-        return {TAG: f"!{name}"}
+        return {TAG: f"!{name}"} | (self.construct_mapping(node, deep=True) if node.value else {})
 
 
 class _Dumper(yaml.SafeDumper):
-    """YAML with tagged kinds, and with lists of scalars on one line."""
+    """YAML with tagged kinds and without mappings on one line."""
 
     def represent_dict(self, data: Any) -> yaml.MappingNode:
         entries = {name: value for name, value in data.items() if name != TAG}
-        return self.represent_mapping(data.get(TAG, "tag:yaml.org,2002:map"), entries)
-
-    def represent_list(self, data: Any) -> yaml.SequenceNode:
-        flat = not any(isinstance(item, (list, dict)) for item in data)
-        return self.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=flat)
+        tag = data.get(TAG, "tag:yaml.org,2002:map")
+        return self.represent_mapping(tag, entries, flow_style=False)
 
 
 _Loader.add_multi_constructor("!", _Loader.construct_kind)
 _Dumper.add_representer(dict, _Dumper.represent_dict)
-_Dumper.add_representer(list, _Dumper.represent_list)
 
 
-def _members(kind: Any) -> tuple[Any, ...]:
-    """The members of a union type; any other type alone."""
-    union = typing.get_origin(kind) in (typing.Union, types.UnionType)
-    return typing.get_args(kind) if union else (kind,)
+def _kinds(kind: Any) -> list[Any]:
+    """The members of a union type, None aside; any other type alone."""
+    members = typing.get_args(kind) if isinstance(kind, types.UnionType) else (kind,)
+    return [member for member in members if member is not types.NoneType]
 
 
 def _describe(value: Any) -> str:
@@ -270,18 +263,7 @@ def _describe(value: Any) -> str:
     if isinstance(value, dict):
         return str(value.get(TAG, "a mapping"))
     kinds = {types.NoneType: "nothing", list: "a list", bool: str(value).lower()}
-    return kinds.get(type(value), f"'{value}'" if isinstance(value, str) else str(value))
-
-
-def _within(limits: Mapping[str, Any], value: Any, *, shown: str) -> Any:
-    for name, words, holds in (
-        ("above", "more than", operator.gt),
-        ("at_least", "at least", operator.ge),
-        ("at_most", "at most", operator.le),
-    ):
-        if name in limits and not holds(value, limits[name]):
-            raise ValueError(f"found {shown}, expected {words} {limits[name]}")
-    return value
+    return kinds.get(type(value), f"'{value}'" if isinstance(value, str) else str(value)[:40])
 
 
 def _hint(name: Any, known: Iterable[str]) -> str:

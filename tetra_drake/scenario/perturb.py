@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from operator import attrgetter
 
 import numpy as np
 
-from tetra_drake.scenario.fields import tree_of
 from tetra_drake.scenario.schema import Scenario
 
 
 def scaled(scenario: Scenario, keys: Iterable[str], factor: float) -> Scenario:
     """The scenario with the values of dotted keys multiplied by `factor`."""
-    tree = tree_of(scenario)
-    parts = {key: key.split(".") for key in keys}
-    return scenario.with_changes({k: tree[a][b] * factor for k, (a, b) in parts.items()})
+    return scenario.with_changes({key: attrgetter(key)(scenario) * factor for key in keys})
 
 
 def displaced(scenario: Scenario, *, percent: float, seed: int) -> Scenario:

@@ -1,39 +1,42 @@
-"""Rules between the values of a scenario: balanced spacing, reference, relations; all on trees."""
+"""Rules between the values of a scenario: balanced spacing, reference, relations."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.fields import Tree
+
+if TYPE_CHECKING:
+    from tetra_drake.scenario.schema import Scenario
 
 BALANCED = "balanced"
 """Written as robot.spacing: the spacing at which the cables of a junction balance."""
 
 
-def with_balance(tree: Tree, source: str) -> Tree:
-    """A complete tree, with a number (m) for a spacing at which cables balance along x.
+def balance(scenario: Scenario, source: object) -> None:
+    """Gives a `balanced` spacing its number: there, the cables of a junction balance along x.
 
     Three outer cables of length s pull two tetrahedra together. Three inner ones, from a tip at
     height h to base nodes at s along and R across, push them apart while s < h.
     """
-    edge, cables = tree["robot"]["strut_length"], tree["cables"]
-    height, radius = edge * math.sqrt(2.0 / 3.0), edge / math.sqrt(3.0)
+    robot, cables = scenario.robot, scenario.cables
+    height, radius = robot.strut_length * math.sqrt(2.0 / 3.0), robot.strut_length / math.sqrt(3.0)
 
     def pull(s: float) -> float:
         length = math.hypot(radius, height - s)
-        inner = cables["inner_stiffness"] * (length - cables["free_length"]) * (height - s) / length
-        return cables["outer_stiffness"] * (s - cables["free_length"]) - inner
+        inner = cables.inner_stiffness * (length - cables.free_length) * (height - s) / length
+        return cables.outer_stiffness * (s - cables.free_length) - inner
 
-    if tree["robot"]["spacing"] != BALANCED:
-        return tree
-    near, far = 0.0, height + cables["free_length"]
+    if robot.spacing != BALANCED:
+        return
+    near, far = 0.0, height + cables.free_length
     if pull(near) >= 0.0:
         raise InputError(source, "robot.spacing", "the cables balance at no spacing; give one")
     while near < (middle := 0.5 * (near + far)) < far:
         near, far = (near, middle) if pull(middle) > 0.0 else (middle, far)
-    return tree | {"robot": tree["robot"] | {"spacing": far}}
+    robot.spacing = far
 
 
 def rebalanced(tree: Tree, *, base: Tree, given: Tree) -> Tree:
@@ -43,9 +46,9 @@ def rebalanced(tree: Tree, *, base: Tree, given: Tree) -> Tree:
     """
 
     def decisive(tree: Tree) -> list[Any]:
-        names = ("outer_stiffness", "inner_stiffness", "free_length")
-        cables = [tree.get("cables", {}).get(name) for name in names]
-        return [*cables, tree.get("robot", {}).get("strut_length")]
+        names = ("strut_length", "outer_stiffness", "inner_stiffness", "free_length")
+        values = tree.get("robot", {}) | tree.get("cables", {})
+        return [values.get(name) for name in names]
 
     if "spacing" in given.get("robot", {}) or decisive(tree) == decisive(base):
         return tree
@@ -64,22 +67,16 @@ def same_experiment(tree: Tree, base: Tree) -> bool:
     return relevant(tree) == relevant(base)
 
 
-def check_relations(tree: Tree, source: str) -> None:
-    """Checks values of a complete tree against each other; raises InputError."""
-    bounds, simulation, robot = tree["gait_bounds"], tree["simulation"], tree["robot"]
-    start, end, n = simulation["steady_from"], simulation["duration"], robot["tetrahedra"]
-    weight, tau_a = bounds["weight_min"], bounds["tau_a_min"]
-    offsets = len(robot.get("offsets", []))
+def check_relations(scenario: Scenario, source: object) -> None:
+    """Checks values of a scenario against each other; raises InputError."""
+    bounds, simulation, n = scenario.gait_bounds, scenario.simulation, scenario.robot.tetrahedra
+    weight, tau_a, offsets = bounds.weight_min, bounds.tau_a_min, len(scenario.robot.offsets)
+    start, end = simulation.steady_from, simulation.duration
     for wrong, key, found, expected in (
-        (weight > bounds["weight_max"], "gait_bounds.weight_min", weight, "at most weight_max"),
-        (tau_a > bounds["tau_a_max"], "gait_bounds.tau_a_min", f"{tau_a} s", "at most tau_a_max"),
+        (weight > bounds.weight_max, "gait_bounds.weight_min", weight, "at most weight_max"),
+        (tau_a > bounds.tau_a_max, "gait_bounds.tau_a_min", f"{tau_a} s", "at most tau_a_max"),
         (start >= end, "simulation.steady_from", f"{start} s", f"less than the duration, {end} s"),
-        (
-            offsets not in (0, n),
-            "robot.offsets",
-            f"{offsets} items",
-            f"none or one for each of {n}",
-        ),
+        (offsets not in (0, n), "robot.offsets", f"{offsets} items", f"none or {n}, one each"),
     ):
         if wrong:
             raise InputError(source, key, f"found {found}, expected {expected}")

@@ -2,23 +2,15 @@
 
 The file is text with units ("25 lbf/in"); the dataclasses below hold SI numbers. A field says its
 SI unit, its limits and, if a file may leave it out, its default, which means what was before the
-field existed. (Drake's YAML loader reads the annotations as types, so they are not postponed.)
+field existed.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Self
 
 from tetra_drake.scenario import rules
-from tetra_drake.scenario.fields import (
-    Check,
-    build,
-    choice,
-    quantity,
-    setting,
-    tree_of,
-    with_values,
-)
+from tetra_drake.scenario.fields import Check, choice, quantity, setting, tree_of, with_values
 
 ENGINES = ("drake", "compiled", "mujoco")
 SCHEMES = (
@@ -41,7 +33,7 @@ class RobotScenario:
     strut_diameter: float = quantity("m", above=0)
     node_diameter: float = quantity("m", above=0)
     density: float = quantity("kg/m^3", above=0)
-    spacing: float = quantity("m", above=0, words=(rules.BALANCED,))  # of base triangles, t = 0
+    spacing: float = quantity("m", above=0, choices=(rules.BALANCED,))  # of base triangles, t = 0
     gravity: float = quantity("m/s^2", at_least=0)
     offsets: list[list[float]] = quantity("m", default=[], length=3)
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
@@ -192,8 +184,7 @@ class EvolutionScenario:
 class ReferenceScenario:
     """Published results of this robot and experiment, shown beside ours; each may be left out.
 
-    A file inherits the reference of its base while it changes only name, evolution, engine and
-    integration.
+    A file inherits it from its base while it changes only name, evolution, engine and integration.
     """
 
     source: str = setting()
@@ -204,29 +195,29 @@ class ReferenceScenario:
     best_improvement: float | None = setting(default=None)  # % in the best trial
     iteration_time: float | None = quantity("s", above=0, default=None)  # wall time
     share_backward: str = setting(default="")  # of initial gaits, in words
-    two_best_fitness: float | None = setting(default=None)
-    """Absolute differences of the two best gaits of the best trial: in fitness (in) ..."""
-    two_best_weights: list[float] = setting(default=[])  # ... in each weight ...
-    two_best_tau: float | None = quantity("s", default=None)  # ... in either time constant
+    # Absolute differences of the two best gaits of the best trial:
+    two_best_fitness: float | None = setting(default=None)  # in fitness (in)
+    two_best_weights: list[float] = setting(default=[])  # in each weight
+    two_best_tau: float | None = quantity("s", default=None)  # in either time constant
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Scenario:
     """Everything that defines an experiment but the gait; all numbers in SI units."""
 
     name: str = setting()
-    robot: RobotScenario = field(default_factory=RobotScenario)
-    ground: GroundScenario = field(default_factory=GroundScenario)
-    friction: FrictionScenario = field(default_factory=FrictionScenario)
-    cables: CableScenario = field(default_factory=CableScenario)
-    cpg: CpgScenario = field(default_factory=CpgScenario)
-    gait_bounds: GaitBoundsScenario = field(default_factory=GaitBoundsScenario)
-    simulation: SimulationScenario = field(default_factory=SimulationScenario)
-    compiled: CompiledScenario = field(default_factory=CompiledScenario)
-    mujoco: MujocoScenario = field(default_factory=MujocoScenario)
-    fitness: FitnessScenario = field(default_factory=FitnessScenario)
-    evolution: EvolutionScenario = field(default_factory=EvolutionScenario)
-    reference: ReferenceScenario | None = None
+    robot: RobotScenario
+    ground: GroundScenario
+    friction: FrictionScenario
+    cables: CableScenario
+    cpg: CpgScenario
+    gait_bounds: GaitBoundsScenario
+    simulation: SimulationScenario
+    compiled: CompiledScenario
+    mujoco: MujocoScenario = setting(default=MujocoScenario())
+    fitness: FitnessScenario
+    evolution: EvolutionScenario
+    reference: ReferenceScenario | None = setting(default=None)
 
     @property
     def oscillators(self) -> int:
@@ -248,9 +239,9 @@ class Scenario:
         return changed
 
     @classmethod
-    def from_tree(cls, tree: dict[str, Any], source: str) -> Self:
+    def from_tree(cls, tree: dict[str, Any], source: object) -> Self:
         """The scenario of an SI tree; raises InputError that names `source` and key."""
-        tree = Check(source, complete=True).section(cls, tree)
-        tree = rules.with_balance(tree, source)
-        rules.check_relations(tree, source)
-        return build(cls, tree)
+        scenario: Self = Check(source, complete=True).value(cls, tree)
+        rules.balance(scenario, source)
+        rules.check_relations(scenario, source)
+        return scenario

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import functools
-import math
 import re
-from typing import Any
 
 INCH = 0.0254  # m, exact
 POUND_FORCE = 4.4482216152605  # N, exact
@@ -15,17 +12,10 @@ _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*({_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*)\s*")
 
 
-@functools.cache
-def _registry() -> Any:
-    import pint
-
-    return pint.UnitRegistry()
-
-
 def quantity_to_si(text: str, unit: str) -> float:
     """Reads a quantity such as "25 lbf/in" as a number in the SI unit `unit` ("N/m").
 
-    Raises ValueError if the text is no quantity, has another dimension, or is not finite.
+    Raises ValueError if the text is no quantity, or has another dimension.
     """
     import pint
 
@@ -34,11 +24,8 @@ def quantity_to_si(text: str, unit: str) -> float:
     if match is None:
         raise ValueError(f"found '{text}', which is not a quantity; {example}")
     try:
-        value = float(_registry().Quantity(float(match[1]), match[2]).to(unit).magnitude)
+        return float(pint.Quantity(float(match[1]), match[2]).to(unit).magnitude)
     except pint.DimensionalityError as error:
         raise ValueError(f"found '{text}', {example}") from error
     except Exception as error:  # pint raises tokenizer, syntax and type errors of many kinds
         raise ValueError(f"found '{text}', whose unit is unknown; {example}") from error
-    if not math.isfinite(value):
-        raise ValueError(f"found '{text}', {example} and is finite")
-    return value
