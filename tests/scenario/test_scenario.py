@@ -1,83 +1,50 @@
 """Scenario files: the thesis's numbers, files based on files, dumping, and bad files."""
 
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.fields import tree_of
-from tetra_drake.scenario.load import (
-    differences,
-    dump_scenario,
-    load_scenario,
-    shipped_scenarios,
-)
+from tetra_drake.scenario.load import differences, dump_scenario, load_scenario, shipped_scenarios
 
 # Exact by definition.
 IN = 0.0254
 LBF = 4.4482216152605
 
-THESIS = [
-    # Section 2.1 and appendix C.1
-    ("robot.tetrahedra", 5, 1),
-    ("robot.strut_length", 6, IN),
-    ("robot.strut_diameter", 0.125, IN),
-    ("robot.node_diameter", 0.2, IN),
-    ("robot.density", 2.7, 1e-3 / 1e-6),  # g/cm^3
-    ("robot.gravity", 9.80665, 1),
-    # Table 1
-    ("ground.restitution", 0.9, 1),
-    ("ground.velocity_correction", 0.72, 1 / IN),
-    ("ground.stiffness", 25, LBF / IN),
-    ("ground.damping", 27, LBF / IN**2),  # the table's lb s/in does not balance Eq. 1
-    # Table 2
-    ("friction.stiction_range", 0.004, IN),
-    ("friction.stiction_damping", 0.4, LBF / IN),
-    ("friction.stiction_switch", 0.7, 1),
-    ("friction.proportional_stiction", 0.3, LBF / IN**2),
-    # Table 3
-    ("cables.outer_stiffness", 0.2, LBF / IN),
-    ("cables.inner_stiffness", 0.3, LBF / IN),
-    ("cables.damping", 0.05, LBF / IN),
-    ("cables.free_length", 0.04, IN),
-    # Table 4
-    ("cpg.self_inhibition_weight", 2.5, 1),
-    ("cpg.external_input", 0.5, 1),
-    ("cpg.inner_state", 0.3, 1),
-    ("cpg.extensor_self_inhibition", 0.1, 1),
-    ("cpg.flexor_self_inhibition", 0.5, 1),
-    # Sections 2.2 and 2.3, appendix B
-    ("cpg.partner_weight", 1.5, 1),
-    ("cpg.gain", 2, LBF),
-    ("cpg.start_up", 2500 * 0.5e-3, 1),  # the listing zeroes its first 2500 samples
-    ("cpg.listing_step", 0.5e-3, 1),
-    # Table 5
-    ("gait_bounds.weight_min", 1, 1),
-    ("gait_bounds.weight_max", 3.4, 1),
-    ("gait_bounds.tau_a_min", 0.2, 1),
-    ("gait_bounds.tau_a_max", 0.5, 1),
-    # Table 6
-    ("simulation.duration", 15, 1),
-    ("evolution.population", 50, 1),
-    ("evolution.tournament", 5, 1),
-    ("evolution.trials", 10, 1),
-    ("evolution.max_iterations", 2000, 1),
-    ("evolution.crossover_probability", 0.2, 1),
-    ("evolution.mutation_probability", 0.7, 1),
-    ("evolution.weight_mutation", 0.2, 1),
-    ("evolution.tau_mutation_range", 0.05, 1),
-    # Section 2.3
-    ("simulation.steady_from", 3, 1),
-    ("evolution.stop_rise", 0.03, 1),
-    ("evolution.stop_window", 100, 1),
-    ("evolution.stop_after", 200, 1),  # appendix A
-    # Table 7
-    ("fitness.distance", 1, 1),
-    ("fitness.twist", -10, 1),
-    ("fitness.direction", 0, 1),
-    ("fitness.drift", -1, 1),
-]
+THESIS: dict[str, dict[str, list[float]]] = {
+    "robot": {  # section 2.1, appendix C.1
+        "tetrahedra gravity density": [5, 9.80665, 2.7e-3 / 1e-6],  # 2.7 g/cm^3
+        "strut_length strut_diameter node_diameter": [6 * IN, 0.125 * IN, 0.2 * IN],
+    },
+    "ground": {  # Table 1; damping by Eq. 2: the table's lb s/in does not balance Eq. 1
+        "restitution velocity_correction stiffness": [0.9, 0.72 / IN, 25 * LBF / IN],
+        "damping": [1.5 * 0.72 / IN * 25 * LBF / IN],
+    },
+    "friction": {  # Table 2
+        "stiction_range stiction_damping": [0.004 * IN, 0.4 * LBF / IN],
+        "stiction_switch proportional_stiction": [0.7, 0.3 * LBF / IN**2],
+    },
+    "cables": {  # Table 3
+        "outer_stiffness inner_stiffness": [0.2 * LBF / IN, 0.3 * LBF / IN],
+        "damping free_length": [0.05 * LBF / IN, 0.04 * IN],
+    },
+    "cpg": {  # Table 4, sections 2.2 and 2.3, appendix B (it zeroes its first 2500 samples)
+        "self_inhibition_weight external_input inner_state partner_weight": [2.5, 0.5, 0.3, 1.5],
+        "extensor_self_inhibition flexor_self_inhibition gain": [0.1, 0.5, 2 * LBF],
+        "start_up listing_step": [2500 * 0.5e-3, 0.5e-3],
+    },
+    "gait_bounds": {"weight_min weight_max tau_a_min tau_a_max": [1, 3.4, 0.2, 0.5]},  # Table 5
+    "simulation": {"duration steady_from": [15, 3]},  # Table 6, section 2.3
+    "evolution": {  # Table 6, section 2.3, appendix A
+        "population tournament trials max_iterations": [50, 5, 10, 2000],
+        "crossover_probability mutation_probability": [0.2, 0.7],
+        "weight_mutation tau_mutation_range": [0.2, 0.05],
+        "stop_rise stop_window stop_after": [0.03, 100, 200],
+    },
+    "fitness": {"distance twist direction drift": [1, -10, 0, -1]},  # Table 7
+}
 
 
 def write(folder: Path, text: str, name: str = "mine.yaml") -> Path:
@@ -87,36 +54,19 @@ def write(folder: Path, text: str, name: str = "mine.yaml") -> Path:
     return file
 
 
-@pytest.mark.parametrize(("key", "number", "si"), THESIS, ids=[row[0] for row in THESIS])
-def test_thesis_scenario_holds_the_number_of_the_thesis(scenario, key, number, si):
-    section, name = key.split(".")
-    assert tree_of(scenario)[section][name] == pytest.approx(number * si, rel=1e-12)
-
-
-def test_thesis_ground_damping_is_three_halves_alpha_k(scenario):
-    # Eq. 2: lambda = 3/2 alpha k = 1.5 * 0.72 s/in * 25 lbf/in = 27 lbf s/in^2.
-    ground = scenario.ground
-    expected = 1.5 * ground.velocity_correction * ground.stiffness
-    assert ground.damping == pytest.approx(expected, rel=1e-12)
+@pytest.mark.parametrize("section", THESIS)
+def test_thesis_scenario_holds_the_numbers_of_the_thesis(scenario, section):
+    for names, values in THESIS[section].items():
+        held = attrgetter(*names.split())(getattr(scenario, section))
+        assert held == pytest.approx(values[0] if len(values) == 1 else tuple(values), rel=1e-12)
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_shipped_scenarios_load_and_keep_the_thesis_reference(name, scenario):
     loaded = load_scenario(name)
-    assert loaded.name == name
-    assert loaded.reference == scenario.reference
+    assert (loaded.name, loaded.reference) == (name, scenario.reference)
     assert loaded.reference.best_distance == pytest.approx(14.34 * IN, rel=1e-12)
     assert len(loaded.reference.two_best_weights) == 24
-
-
-def test_thesis_is_the_default_and_each_load_gives_a_copy(scenario):
-    load_scenario().robot.tetrahedra = 9
-    assert load_scenario() == scenario
-
-
-def test_there_is_an_oscillator_for_each_junction(scenario):
-    assert scenario.oscillators == 4
-    assert scenario.with_changes({"robot.tetrahedra": 2}).oscillators == 1
 
 
 # Files written by earlier versions
@@ -134,8 +84,7 @@ def test_a_file_of_schema_1_means_what_it_meant(data, scenario):
     file = data / "scenario_schema_1.yaml"
     loaded = load_scenario(file)
     assert differences(loaded, scenario) == [("simulation.engine", "compiled")]
-    assert loaded.reference is None
-    assert loaded.robot.offsets == []
+    assert (loaded.reference, loaded.robot.offsets) == (None, [])
     assert dump_scenario(loaded) == file.read_text()
 
 
@@ -143,24 +92,10 @@ def test_a_file_of_schema_1_means_what_it_meant(data, scenario):
 
 
 def test_a_file_changes_only_what_it_gives(tmp_path, scenario):
-    file = write(
-        tmp_path,
-        """\
-        base: thesis
-        name: damped
-        cables: {damping: 1 N*s/m, slack: true}
-        simulation: {duration: 500 ms, steady_from: 0 s}
-        """,
-    )
-    assert load_scenario(file) == scenario.with_changes(
-        {
-            "name": "damped",
-            "cables.damping": 1.0,
-            "cables.slack": True,
-            "simulation.duration": 0.5,
-            "simulation.steady_from": 0,
-        }
-    )
+    given = "base: thesis\nname: damped\ncables: {damping: 1 N*s/m, slack: true}"
+    file = write(tmp_path, f"{given}\nsimulation: {{steady_from: 500 ms}}")
+    changes = {"name": "damped", "cables.damping": 1, "cables.slack": True}
+    assert load_scenario(file) == scenario.with_changes(changes | {"simulation.steady_from": 0.5})
 
 
 def test_a_base_file_is_found_beside_the_file_that_names_it(tmp_path, scenario):
@@ -169,25 +104,6 @@ def test_a_base_file_is_found_beside_the_file_that_names_it(tmp_path, scenario):
     file = write(tmp_path, "base: ../middle.yaml\nname: top\n", "mine/top.yaml")
     changes = {"name": "top", "robot.spacing": 2.0, "robot.gravity": 1.0}
     assert load_scenario(str(file)) == scenario.with_changes(changes)
-
-
-@pytest.mark.parametrize(
-    ("key", "written", "value"),
-    [
-        ("gait_bounds.weight_max", "4", 4.0),
-        ("simulation.accuracy", "1e-3", 1e-3),  # text in YAML 1.1
-        ("robot.tetrahedra", "2", 2),
-        ("robot.gravity", "0 m/s^2", 0.0),
-        ("gait_bounds.tau_a_min", "0.5 s", 0.5),
-        ("evolution.mutation_probability", "1", 1.0),
-    ],
-)
-def test_numbers_may_be_integers_and_reach_their_limits(tmp_path, key, written, value):
-    section, name = key.split(".")
-    file = write(tmp_path, f"base: thesis\n{section}: {{{name}: {written}}}\n")
-    loaded = tree_of(load_scenario(file))[section][name]
-    assert loaded == value
-    assert type(loaded) is type(value)
 
 
 # Dumping and comparing
@@ -202,23 +118,13 @@ def test_a_dumped_scenario_keeps_every_bit_and_needs_no_base(tmp_path, scenario)
     scenario.friction.stiction_range = 1e-5 / 3  # dumped with an exponent
     scenario.robot.offsets = [[0.1 / 3, 0.0, 1e-9]] * 5
     scenario.name = "a: 'name' that needs # quoting"
-    text = dump_scenario(scenario)
-    assert "gravity: " in text
-    assert "base" not in text.split()
-    assert load_scenario(write(tmp_path, text)) == scenario
+    assert load_scenario(write(tmp_path, dump_scenario(scenario))) == scenario
 
 
 def test_differences_are_keys_and_readable_values(scenario):
-    changed = scenario.with_changes(
-        {
-            "name": "other",
-            "friction.stiction_damping": "0.3 lbf*s/in",
-            "robot.offsets": [[0.001, 0, 0]] * 5,
-            "cables.slack": True,
-            "cpg.signals": "live",
-            "evolution.stop_rise": 0.1 + 0.2,
-        }
-    )
+    changes = {"cables.slack": True, "cpg.signals": "live", "evolution.stop_rise": 0.1 + 0.2}
+    changes |= {"name": "other", "friction.stiction_damping": "0.3 lbf*s/in"}
+    changed = scenario.with_changes(changes | {"robot.offsets": [[0.001, 0, 0]] * 5})
     assert differences(changed, scenario) == [
         ("robot.offsets", f"[{', '.join(['[0.001 m, 0 m, 0 m]'] * 5)}]"),
         ("friction.stiction_damping", "52.5381 N*s/m"),
@@ -232,34 +138,15 @@ def test_differences_are_keys_and_readable_values(scenario):
 
 BAD = [
     ("robot: {tetrahedron: 4}", "robot.tetrahedron", "'tetrahedra'"),
-    ("gait_bound: {}", "gait_bound", "'gait_bounds'"),
     ("fitness: {qqq: 1}", "fitness.qqq", "distance, twist, direction, drift"),
-    ("1: 2", "1", "unknown key"),
-    ("robot: 5", "robot", "5"),
     ("robot:", "robot", "nothing"),
-    ("robot: !Robot {}", "robot", "!Robot"),
-    ("robot: {tetrahedra: 4.5}", "robot.tetrahedra", "4.5"),
-    ("robot: {tetrahedra: true}", "robot.tetrahedra", "true"),
-    ("robot: {tetrahedra: 1}", "robot.tetrahedra", "1"),
-    ("fitness: {drift: little}", "fitness.drift", "'little'"),
-    ("fitness: {drift: .nan}", "fitness.drift", "nan"),
-    ("cables: {slack: 1}", "cables.slack", "1"),
-    ("name: 5", "name", "5"),
-    ("cpg: {signals: recording}", "cpg.signals", "'recording'"),
     ("robot: {spacing: 3}", "robot.spacing", "3 without a unit"),
-    ("robot: {spacing: 3 inchies}", "robot.spacing", "'3 inchies'"),
-    ("robot: {spacing: .nan}", "robot.spacing", "nan"),
-    ("robot: {offsets: [[1 m, 2 m]]}", "robot.offsets[0]", "2 items"),
+    ("reference: {best_distance: 3}", "reference.best_distance", "3 without a unit"),
     ("robot: {offsets: [[0 m, 0 m, 0 m]]}", "robot.offsets", "1 items"),
-    ("cables: {outer_stiffness: -0.2 lbf/in}", "cables.outer_stiffness", "'-0.2 lbf/in'"),
-    ("ground: {stiffness: 0 lbf/in}", "ground.stiffness", "'0 lbf/in'"),
-    ("simulation: {duration: 1e999 s}", "simulation.duration", "'1e999 s'"),
-    ("evolution: {crossover_probability: 20}", "evolution.crossover_probability", "20"),
     ("gait_bounds: {tau_a_min: 0.6 s}", "gait_bounds.tau_a_min", "0.6"),
     ("gait_bounds: {weight_max: 0.5}", "gait_bounds.weight_min", "1.0"),
     ("simulation: {steady_from: 15 s}", "simulation.steady_from", "15.0 s"),
     ("simulation: {duration: 2 s}", "simulation.steady_from", "3.0 s"),
-    ("reference: {best_distance: 3}", "reference.best_distance", "3 without a unit"),
     ("cables: {free_length: 1 km}", "robot.spacing", "balance"),
 ]
 BAD_FILES = [
@@ -275,7 +162,6 @@ BAD_FILES = [
     ("base: thesis\nrobot: {spacing: 2 in, spacing: 3 in}", "", "'spacing'"),
     ("!!python/object/apply:os.getcwd []", "", "YAML"),
     ("[" * 5000, "", "YAML"),
-    ("base: thesis\nfitness: {twist: 1" + "0" * 400 + "}", "fitness.twist", "1000"),
 ]
 
 
@@ -284,9 +170,7 @@ BAD_FILES = [
     [(f"base: thesis\n{text}", key, found) for text, key, found in BAD] + BAD_FILES,
     ids=[row[0][:40] for row in BAD + BAD_FILES],
 )
-def test_a_bad_file_is_told_the_file_the_key_and_what_was_found(
-    tmp_path, text, key, found, refused
-):
+def test_a_bad_file_is_refused(tmp_path, text, key, found, refused):
     file = write(tmp_path, text)
     with refused(file, key, found):
         load_scenario(file)

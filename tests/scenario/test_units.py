@@ -48,7 +48,7 @@ DIMENSION = ["6 lbf", "3 in^2", "25 lb/in", "27 lbf*s/in"]
 INCOMPLETE = ["6", "6.5e3", "in", "", "  ", "six in", "- 6 in", "1 000"]
 GARBAGE = ["6 furlings", "6 in foo", "6 in 7", "6 m*9", "6 in/0", "0x10 in", "6 in - 3 in"]
 TOWERS = ["6 in**9**9**9", "6 in**(9**9**9)", "6 in^99999999"]  # must not be evaluated
-NOT_FINITE = ["nan in", "inf in", "-inf m", "Infinity m", "1e999 m", "1e308 km"]
+NOT_FINITE = ["nan in", "inf in", "-inf m", "Infinity m"]
 CODE = ["__import__('os').getcwd()", "6 in; import os", "6 lambda: 1", "6 [m]", "6 m\n__class__"]
 
 

@@ -183,7 +183,7 @@ def _tree(kind: Any, value: Any, unit: str | None, show: Show | None) -> Any:
         return [_tree(typing.get_args(kind)[0], v, unit, show) for v in value]
     if isinstance(value, dict):
         return {k: _tree(typing.get_args(kind)[1], v, unit, show) for k, v in value.items()}
-    return show(value, unit) if show and unit and value is not None else value
+    return show(value, unit) if show and unit and isinstance(value, float) else value
 
 
 def with_values(tree: Tree, values: Mapping[str, Any], source: str) -> Tree:
