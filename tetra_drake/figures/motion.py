@@ -41,8 +41,6 @@ _PITCH_IN = 7.3
 _MARGIN_IN = 0.6
 """Free space around a time lapse, in inches of the robot's world."""
 
-_PANELS_PER_ROW = 5
-
 _ON_GROUND: Any = {"color": "0.25", "linewidth": 0.8, "linestyle": "-"}
 _LIFTED: Any = {"color": OKABE_ITO["vermillion"], "linewidth": 1.6, "linestyle": "-"}
 _PATH: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.1, "linestyle": "-"}
@@ -132,10 +130,9 @@ def one_step(trajectory: xarray.Dataset, *, instants: int = 5) -> Figure:
     samples = _nearest(step, np.linspace(start, end, instants))
     inches = step.p_WN.values / INCH
     size = _lapse_size(inches[samples], width_in=3.6, height_in=6.0)
-    paths_in = 1.5 * math.ceil(inches.shape[1] / _PANELS_PER_ROW)
     width = max(2 * size[0] + 1.2, 5.8)  # room for the legend
-    figure = Figure(figsize=(width, size[1] + paths_in + 1.6))
-    heights = [size[1] + 0.8, paths_in + 0.4]
+    figure = Figure(figsize=(width, size[1] + 3.1))
+    heights = [size[1] + 0.8, 1.9]
     above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
     _draw_step(above, step, samples)
     _draw_paths(below, step)
@@ -174,14 +171,8 @@ def _draw_step(figure: SubFigure, step: xarray.Dataset, samples: np.ndarray) -> 
 def _draw_paths(figure: SubFigure, step: xarray.Dataset) -> None:
     """The path of the bottom left node of each tetrahedron in the step, enlarged."""
     names, off = step.tetrahedron.values, measures.lifted(step)
-    rows = math.ceil(len(names) / _PANELS_PER_ROW)
-    columns = math.ceil(len(names) / rows)
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for panel in panels.flat[len(names) :]:
-        panel.set_axis_off()
-    for panel in panels.flat[len(names) - columns : len(names)]:
-        panel.tick_params(labelbottom=True)
-    for panel, name in zip(panels.flat, names, strict=False):
+    panels = figure.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
+    for panel, name in zip(panels, names, strict=True):
         node = step.p_WN.sel(tetrahedron=name).isel(node=BOTTOM_LEFT) / INCH
         x, z = node.sel(axis="x") - node.sel(axis="x")[0], node.sel(axis="z")
         up = off.sel(tetrahedron=name)
