@@ -24,18 +24,18 @@ HANDSHAKE = (
 
 
 class FakeTime:
-    """A clock that only sleeping advances."""
+    """A clock that sleeping advances, and each look at it by `look` s."""
 
-    def __init__(self) -> None:
-        self.now = 1000.0
-        self.sleeps: list[float] = []
+    def __init__(self, look: float = 0.0) -> None:
+        self.now, self.look, self.slept = 1000.0, look, 0.0
 
     def clock(self) -> float:
+        self.now += self.look
         return self.now
 
     def sleep(self, seconds: float) -> None:
         self.now += seconds
-        self.sleeps.append(seconds)
+        self.slept += seconds
 
 
 @pytest.fixture
@@ -72,13 +72,22 @@ def shown_position(meshcat: Meshcat, body: str) -> list[float]:
     return position
 
 
-def test_watching_changes_no_bit_of_the_result(
-    short: Scenario, gait: Gait, meshcat: Meshcat, visitor: socket.socket
+@pytest.mark.parametrize(("look", "slept"), [(0.0, 0.3), (1.0, 0.0)], ids=["fast", "slow"])
+def test_watching_changes_nothing_and_waits_for_real_time_only(
+    short: Scenario,
+    gait: Gait,
+    meshcat: Meshcat,
+    visitor: socket.socket,
+    look: float,
+    slept: float,
 ) -> None:
-    time = FakeTime()
+    time = FakeTime(look)
     view = LiveView(meshcat, short, clock=time.clock, sleep=time.sleep)
-    alone = simulate(scenario=short, gait=gait, record=True)
+    while meshcat.GetNumActiveConnections() == 0:
+        pass
     watched = simulate(scenario=short, gait=gait, record=True, viewer=view)
+    assert slept - 1.0 / FRAMES_PER_SECOND <= time.slept <= slept
+    alone = simulate(scenario=short, gait=gait, record=True)
     assert watched.metrics == alone.metrics
     assert watched.integrator == alone.integrator
     xarray.testing.assert_identical(watched.trajectory, alone.trajectory)
@@ -107,36 +116,6 @@ def test_shows_where_the_robot_is(
     assert len(times) <= 0.3 * FRAMES_PER_SECOND + 1
     # A frame is due every 33 ms and comes with the end of a step, which takes 8 ms at most.
     assert np.diff(times).max() < 1.0 / FRAMES_PER_SECOND + 0.009
-
-
-def test_goes_no_faster_than_time(
-    short: Scenario, gait: Gait, meshcat: Meshcat, visitor: socket.socket
-) -> None:
-    time = FakeTime()
-    view = LiveView(meshcat, short, clock=time.clock, sleep=time.sleep)
-    while meshcat.GetNumActiveConnections() == 0:
-        pass
-    started = time.now
-    simulate(scenario=short, gait=gait, viewer=view)
-    last_frame = 0.3 - 1.0 / FRAMES_PER_SECOND
-    assert last_frame < time.now - started <= 0.3
-
-
-def test_a_slow_simulation_is_not_held_up(
-    short: Scenario, gait: Gait, meshcat: Meshcat, visitor: socket.socket
-) -> None:
-    time = FakeTime()
-
-    def clock() -> float:
-        time.now += 1.0  # each look at the clock finds a second gone
-        return time.now
-
-    while meshcat.GetNumActiveConnections() == 0:
-        pass
-    simulate(
-        scenario=short, gait=gait, viewer=LiveView(meshcat, short, clock=clock, sleep=time.sleep)
-    )
-    assert sum(time.sleeps) == 0.0
 
 
 def test_waits_for_a_browser(short: Scenario, gait: Gait, meshcat: Meshcat) -> None:
