@@ -112,9 +112,8 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
         text += f", {part} {getattr(manifest.method, part).name}"
     if report:
         text += (
-            f"\nat the end, {directory / 'replay.html'} shows the best gait walking and "
-            f"{directory / 'report.html'} the results; before, make them with: "
-            f"tetra-drake figures {directory}"
+            f"\nat the end: {directory / 'replay.html'}, the best gait walking, and "
+            f"{directory / 'report.html'}; at any time before: tetra-drake figures {directory}"
         )
     return text
 

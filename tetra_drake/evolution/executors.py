@@ -229,6 +229,7 @@ def evaluate_all(
 
 
 _SOURCE = "worker processes"
+_INSTEAD = "or use threads: executor=concurrent.futures.ThreadPoolExecutor"
 
 
 def _check_sendable(evaluate: object) -> None:
@@ -236,15 +237,15 @@ def _check_sendable(evaluate: object) -> None:
     try:
         pickled = pickle.dumps(evaluate)
     except Exception as error:
-        problem = f"cannot be sent the evaluation: {error}; define it at the top of a module"
+        problem = f"cannot be sent the evaluation ({error}): define it in a module, {_INSTEAD}"
         raise EvaluationImpossible(_SOURCE, "", problem) from error
     program = sys.modules["__main__"]
     main = getattr(program, "__file__", None)
     if main is not None and program.__spec__ is None and not os.path.exists(main):
-        problem = f"import the program they belong to, and '{main}' is no file: save it as one"
+        problem = f"have to import the program, and '{main}' is no file: save it, {_INSTEAD}"
         raise EvaluationImpossible(_SOURCE, "", problem)
     if main is None and b"__main__" in pickled:
-        problem = "cannot import what was defined interactively: define it in a module"
+        problem = f"cannot import what is defined interactively: use a module, {_INSTEAD}"
         raise EvaluationImpossible(_SOURCE, "", problem)
 
 

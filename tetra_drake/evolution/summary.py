@@ -42,7 +42,11 @@ def summary(run: Run) -> str:
     source = reference.source if reference else ""
     rows = [("", "this run", source)]
     rows += [(row.name, row.ours, row.reference) for row in comparisons(run)]
-    return "\n".join([*lines, *(f"{name:<32}{o:>10}   {r}".rstrip() for name, o, r in rows)])
+    lines += [f"{name:<32}{ours:>10}   {theirs}".rstrip() for name, ours, theirs in rows]
+    replay, report = run.directory / "replay.html", run.directory / "report.html"
+    if replay.exists() and report.exists():
+        lines.append(f"open {replay} in a browser to see the best gait walk, {report} for more")
+    return "\n".join(lines)
 
 
 def whole_experiment(scenario: Scenario, *, seconds: float) -> str:
