@@ -1,8 +1,8 @@
-"""States of the robot to test forces, rates and the laws of conservation on."""
+"""States of the robot to test forces and rates on."""
 
 import numpy as np
 
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import Structure
 
 
 def disturbed(structure: Structure, seed: int, *, pose: float, speed: float) -> np.ndarray:
@@ -15,10 +15,3 @@ def disturbed(structure: Structure, seed: int, *, pose: float, speed: float) -> 
     quaternions = state[: 7 * bodies].reshape(bodies, 7)[:, :4]
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
     return state
-
-
-def stretched(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """How much longer than at rest each cable is (m)."""
-    p_WN, cables = node_positions(structure, state), structure.cables
-    lengths = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
-    return lengths - cables["free_length"]

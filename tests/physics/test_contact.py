@@ -101,32 +101,29 @@ def test_breaks_free_outward_at_the_range_and_sticks_when_the_velocity_changes_s
     assert next_friction_mode(velocity, deflection, mode, P0) == after
 
 
-def shifted(
-    structure: Structure, *, x: float = 0.0, z: float = 0.0, v_x: float = 0.0
-) -> np.ndarray:
-    """The start with all bodies shifted by x and z (m) and moving along x (m/s)."""
-    state = structure.initial_state
-    bodies = len(structure.bodies)
-    state[: 7 * bodies].reshape(bodies, 7)[:, 4] += x
-    state[: 7 * bodies].reshape(bodies, 7)[:, 6] += z
-    state[7 * bodies :].reshape(bodies, 6)[:, 3] = v_x
-    return state
-
-
 class Ground:
-    """The ground's law and the modes of the contact nodes, at first in the air."""
+    """The robot over the ground, and the modes of its contact nodes, at first in the air."""
 
     def __init__(self, structure: Structure, scenario: Scenario) -> None:
         self.structure = structure
         self.law = ground_law(scenario.ground, scenario.friction)
-        self.modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
         self.args = (structure.contacts, self.law)
+        self.modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
+
+    def state(self, *, x: float = 0.0, z: float = 0.0, v_x: float = 0.0) -> np.ndarray:
+        """The start with all bodies shifted by x and z (m) and moving along x (m/s)."""
+        state = self.structure.initial_state
+        state[4:35:7] += x
+        state[6:35:7] += z
+        state[38::6] = v_x
+        return state
 
     def motion(self, **change: float) -> np.ndarray:
-        """Of the nodes of `shifted`."""
-        return node_motion(shifted(self.structure, **change), self.structure.p_BN)
+        """Of the nodes, in that state."""
+        return node_motion(self.state(**change), self.structure.p_BN)
 
     def update(self, **change: float) -> np.ndarray:
+        """The modes updated in that state."""
         update_modes(self.motion(**change), *self.args, self.modes)
         return self.modes
 
@@ -162,15 +159,13 @@ def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground: Ground) 
     ground.modes[:, CONTACT] = ground.modes[:, MODE] = 1.0
     modes = ground.update(z=1e-3, v_x=0.1)
     assert not modes[:, : MODE + 2].any()
-    flying, p_BN = shifted(ground.structure, z=1e-3, v_x=0.1), ground.structure.p_BN
+    flying, p_BN = ground.state(z=1e-3, v_x=0.1), ground.structure.p_BN
     force, normal, friction = np.empty(30), np.empty(11), np.empty((11, 2))
     ground_forces(flying, modes, p_BN, *ground.args, force, normal, friction)
     assert not force.any() and not normal.any() and not friction.any()
 
 
-def test_the_margin_is_positive_between_mode_changes_and_crosses_zero_at_one(
-    ground: Ground,
-) -> None:
+def test_the_margin_crosses_zero_at_a_mode_change(ground: Ground) -> None:
     p0 = ground.law[0]["stiction_range"]
     modes = ground.update(z=-1e-4)
 
@@ -212,9 +207,8 @@ def test_a_mode_change_is_foreseen_when_it_comes(
     ground: Ground, v_x: float, upward: float, expected: float
 ) -> None:
     modes = ground.update(z=-1e-4)
-    state = shifted(ground.structure, z=-1e-4, v_x=v_x)
+    state, motion = ground.state(z=-1e-4, v_x=v_x), ground.motion(z=-1e-4, v_x=v_x)
     acceleration = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, upward], 5)
-    motion = node_motion(state, ground.structure.p_BN)
     time = time_to_mode_change(state, acceleration, motion, modes, *ground.args, 1.0)
     assert time == pytest.approx(expected, rel=1e-9)
 
@@ -237,10 +231,8 @@ def test_normal_force_is_drakes_hunt_crossley_point_contact(
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     ball = plant.AddRigidBody("ball", SpatialInertia.SolidSphereWithMass(mass, radius))
-    plant.RegisterCollisionGeometry(ball, RigidTransform(), Sphere(radius), "ball", properties)
-    plant.RegisterCollisionGeometry(
-        plant.world_body(), RigidTransform(), HalfSpace(), "floor", properties
-    )
+    for body, shape in ((ball, Sphere(radius)), (plant.world_body(), HalfSpace())):
+        plant.RegisterCollisionGeometry(body, RigidTransform(), shape, body.name(), properties)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
     plant.set_contact_model(ContactModel.kPoint)
     plant.Finalize()

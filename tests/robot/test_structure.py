@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 from helpers.states import disturbed
-from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
@@ -115,14 +114,6 @@ def test_ten_bodies_welded_together_have_the_inertia_of_the_tetrahedron(structur
     assert I_one == pytest.approx(I_welded, rel=1e-12, abs=1e-12 * I_welded[0, 0])
 
 
-def test_a_strut_lies_between_its_nodes(structure):
-    for i, j in STRUTS:
-        X_BS = strut_pose(structure, (i, j))
-        ends = [X_BS.multiply(np.array([0, 0, z])) for z in (-3 * IN, 3 * IN)]
-        assert ends[0] == pytest.approx(structure.p_BN[i], abs=1e-15)
-        assert ends[1] == pytest.approx(structure.p_BN[j], abs=1e-15)
-
-
 # Any number of tetrahedra
 
 
@@ -202,30 +193,13 @@ def test_the_ground_touches_all_bottom_nodes_and_the_lead_tip(row):
 # The bodies in a plant
 
 
-def test_the_plants_state_runs_body_by_body(row):
-    n, state = len(row.bodies), tumbling(row)
-    plant = MultibodyPlant(time_step=0.0)
-    AddTetrahedra(plant, row)
-    plant.Finalize()
-    assert (plant.num_positions(), plant.num_velocities()) == (7 * n, 6 * n)
-    context = plant.CreateDefaultContext()
-    plant.SetPositionsAndVelocities(context, state)
-    poses, velocities = state[: 7 * n].reshape(n, 7), state[7 * n :].reshape(n, 6)
-    for name, pose, velocity in zip(row.bodies, poses, velocities, strict=True):
-        body = plant.GetBodyByName(name)
-        inertia = body.default_spatial_inertia().CopyToFullMatrix6()
-        assert np.array_equal(inertia, tetrahedron_inertia(row).CopyToFullMatrix6())
-        X_WB = RigidTransform(Quaternion(pose[:4]), pose[4:])
-        assert plant.EvalBodyPoseInWorld(context, body).IsNearlyEqualTo(X_WB, 1e-15)
-        V_WB = plant.EvalBodySpatialVelocityInWorld(context, body).get_coeffs()
-        assert pytest.approx(velocity, abs=1e-15) == V_WB
-
-
 def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(row):
+    # This needs the plant's state to run body by body, T1 first.
     plant = MultibodyPlant(time_step=0.0)
+    bodies = AddTetrahedra(plant, row)
     frames = [
         plant.AddFrame(FixedOffsetFrame(f"{body.name()} {node}", body, RigidTransform(p_BNi)))
-        for body in AddTetrahedra(plant, row)
+        for body in bodies
         for node, p_BNi in zip(NODES, row.p_BN, strict=True)
     ]
     plant.Finalize()
@@ -237,6 +211,9 @@ def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(row):
     v_WN = [frame.CalcSpatialVelocityInWorld(context).translational() for frame in frames]
     assert node_positions(row, state) == pytest.approx(np.array(p_WN), abs=1e-12)
     assert node_velocities(row, state) == pytest.approx(np.array(v_WN), abs=1e-12)
+    inertia = tetrahedron_inertia(row).CopyToFullMatrix6()
+    for body in bodies:
+        assert np.array_equal(body.default_spatial_inertia().CopyToFullMatrix6(), inertia)
 
 
 def test_a_quaternion_that_drifted_off_unit_length_still_is_a_rotation(structure):

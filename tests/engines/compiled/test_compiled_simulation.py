@@ -1,18 +1,15 @@
-"""The compiled engine: against the Drake diagram, and the laws of conservation."""
+"""The compiled engine against the Drake diagram."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
-from helpers.states import stretched
 
-from tetra_drake.engines.compiled.engine import prepare
-from tetra_drake.engines.compiled.walk import DONE, walk
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import WALKING_SEED, load_gait, seeded_gait
 from tetra_drake.robot.model import make_model
-from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -119,59 +116,6 @@ def test_signals_integrated_with_error_control_are_those_of_the_diagram(
     compiled.cpg.signals = signals
     result = simulate(scenario=compiled, gait=load_gait(data / "gait_c.json", compiled))
     assert result.metrics.distance_in == pytest.approx(2.22, abs=0.05)
-
-
-class Flight:
-    """0.5 s of a robot thrown far above the ground, its bodies moving at random."""
-
-    def __init__(self, scenario: Scenario, **changes: float) -> None:
-        times = {"simulation.duration": 0.5, "simulation.steady_from": 0.1}
-        flying = {"cpg.gain": 0.0, "compiled.tolerance": 1e-7}
-        self.scenario = scenario.with_changes({**times, **flying, **changes})
-        self.structure = MakeStructure(self.scenario.robot, self.scenario.cables)
-        self.robot = make_model(self.scenario, self.structure)
-        self.start = self.structure.initial_state
-        self.start[6:35:7] += 10.0
-        self.start[35:] = np.random.default_rng(0).normal(scale=0.2, size=30)
-        gait = seeded_gait(self.scenario)
-        prepared = prepare(self.scenario, gait, self.structure, record=False)
-        prepared.state[:] = self.start
-        assert walk(*prepared)[0] == DONE
-        self.end = prepared.state
-
-    def momenta(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Total momentum, and angular momentum about the origin of World."""
-        p_WB, velocities = state[:35].reshape(5, 7)[:, 4:], state[35:].reshape(5, 6)
-        linear = self.robot.mass * velocities[:, 3:]
-        angular = self.robot.moment * velocities[:, :3] + np.cross(p_WB, linear)
-        return linear.sum(axis=0), angular.sum(axis=0)
-
-    def energy(self, state: np.ndarray) -> float:
-        """Kinetic and elastic."""
-        velocities = state[35:].reshape(5, 6)
-        inertia = [self.robot.moment] * 3 + [self.robot.mass] * 3
-        elastic = self.structure.cables["stiffness"] @ stretched(self.structure, state) ** 2
-        return 0.5 * float((velocities**2 @ inertia).sum() + elastic)
-
-
-def test_momentum_and_angular_momentum_stay_without_ground_and_gravity(compiled: Scenario) -> None:
-    flight = Flight(compiled, **{"robot.gravity": 0.0})
-    (momentum, angular), after = flight.momenta(flight.start), flight.momenta(flight.end)
-    # Momentum to rounding, angular momentum to the order of the method.
-    np.testing.assert_allclose(after[0], momentum, atol=1e-13)
-    np.testing.assert_allclose(after[1], angular, atol=2e-6 * np.abs(angular).max())
-
-
-def test_the_centre_of_mass_falls_as_galilei_says(compiled: Scenario) -> None:
-    flight = Flight(compiled, **{"robot.gravity": 9.80665})
-    # h + v t - g t² / 2 with t = 0.5 s; ROS2 is exact on parabolas.
-    height = flight.start[6:35:7].mean() + 0.5 * flight.start[40::6].mean() - 9.80665 / 8.0
-    assert flight.end[6:35:7].mean() == pytest.approx(height, abs=1e-12)
-
-
-def test_energy_stays_with_damping_off(compiled: Scenario) -> None:
-    flight = Flight(compiled, **{"robot.gravity": 0.0, "cables.damping": 0.0})
-    assert flight.energy(flight.end) == pytest.approx(flight.energy(flight.start), rel=1e-5)
 
 
 def test_structures_the_engine_cannot_simulate_are_refused(

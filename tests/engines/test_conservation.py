@@ -1,0 +1,58 @@
+"""Momentum, angular momentum and energy of a falling robot, on the engines of the package."""
+
+import numpy as np
+import pytest
+import xarray
+
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.model import make_model
+from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.schema import Scenario
+
+G = 9.80665
+FALLING = {
+    # Bodies are off their balance by some 5 mm, a metre above the ground.
+    "robot.offsets": np.random.default_rng(0).normal([0, 0, 1], 0.005, (5, 3)).tolist(),
+    "robot.gravity": G,
+    "cables.damping": 0.0,
+    "cpg.gain": 0.0,
+    "simulation.duration": 0.4,
+    "simulation.steady_from": 0.2,
+    "simulation.scheme": "runge_kutta3",
+    "simulation.accuracy": 1e-9,
+    "simulation.max_step": 1e-3,
+    "compiled.tolerance": 1e-7,
+}
+
+
+@pytest.mark.parametrize("engine", ["drake", "compiled"])
+def test_a_falling_robot_keeps_momentum_and_energy(scenario: Scenario, engine: str) -> None:
+    falling = scenario.with_changes({**FALLING, "simulation.engine": engine})
+    structure = MakeStructure(falling.robot, falling.cables)
+    robot = make_model(falling, structure)
+    flight = simulate(scenario=falling, gait=seeded_gait(falling), record=True).trajectory
+    assert flight is not None
+    p_WB, v_WB, w_WB = motion_of_bodies(structure, flight)
+    t = flight.time.values
+
+    # The centre of mass falls as Galilei says.
+    height = p_WB[0, :, 2].mean() - G * t**2 / 2.0
+    np.testing.assert_allclose(p_WB.mean(axis=1)[:, 2], height, atol=1e-9)
+    np.testing.assert_allclose(v_WB.mean(axis=1), np.outer(-G * t, [0, 0, 1]), atol=1e-9)
+    # About the centre of mass: angular momentum; kinetic and elastic energy.
+    p_CB, v_CB = p_WB - p_WB.mean(axis=1, keepdims=True), v_WB - v_WB.mean(axis=1, keepdims=True)
+    angular = robot.moment * w_WB + robot.mass * np.cross(p_CB, v_CB)
+    np.testing.assert_allclose(angular.sum(axis=1), 0.0, atol=1e-7 * np.abs(angular).max())
+    kinetic = 0.5 * (robot.mass * v_CB**2 + robot.moment * w_WB**2).sum(axis=(1, 2))
+    stretch = flight.length.values - structure.cables["free_length"]
+    elastic = 0.5 * stretch**2 @ structure.cables["stiffness"]
+    np.testing.assert_allclose(kinetic + elastic, elastic[0], atol=1e-6 * kinetic.max())
+
+
+def motion_of_bodies(structure: Structure, flight: xarray.Dataset) -> tuple[np.ndarray, ...]:
+    """p_WB, v_WB and w_WB (time, body, axis) from the nodes: sum r x (w x r) = 8/3 r^2 w."""
+    p_WN, v_WN = flight.p_WN.values, flight.v_WN.values
+    p_WB, v_WB = p_WN.mean(axis=2), v_WN.mean(axis=2)
+    turning = np.cross(p_WN - p_WB[:, :, None], v_WN - v_WB[:, :, None]).sum(axis=2)
+    return p_WB, v_WB, turning / (8 / 3 * (structure.p_BN[0] ** 2).sum())
