@@ -11,7 +11,6 @@ import pytest
 
 from tetra_drake.scenario.fields import (
     Check,
-    choice,
     dump_yaml,
     merge,
     parse_yaml,
@@ -30,7 +29,7 @@ class Flat:
 @dataclass
 class Incline:
     slope: float = quantity("rad", at_least=0, at_most=4)
-    surface: str = choice("rough", "smooth", default="rough")
+    surface: str = setting(choices=("rough", "smooth"), default="rough")
 
 
 @dataclass

@@ -18,7 +18,6 @@ import operator
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import yaml
@@ -64,12 +63,7 @@ def quantity(unit: str, **limits: Any) -> Any:
     return setting(unit=unit, **limits)
 
 
-def choice(*choices: str, **default: Any) -> Any:
-    """A field that holds one of the texts `choices`."""
-    return setting(choices=choices, **default)
-
-
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Check:
     """Checks raw values, as YAML holds them, against types; raises InputError.
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from tetra_drake.scenario import rules
-from tetra_drake.scenario.fields import Check, choice, quantity, setting, tree_of, with_values
+from tetra_drake.scenario.fields import Check, quantity, setting, tree_of, with_values
 
 ENGINES = ("drake", "compiled", "mujoco")
 SCHEMES = (
@@ -87,7 +87,7 @@ class CpgScenario:
     partner_weight: float = setting(at_least=0)  # between extensor and flexor of an oscillator
     gain: float = quantity("N")  # force per unit of y_extensor - y_flexor
     start_up: float = quantity("s", at_least=0)  # until then the cables are not actuated
-    signals: str = choice("listing", "recorded", "live")
+    signals: str = setting(choices=("listing", "recorded", "live"))
     listing_step: float = quantity("s", above=0)
 
 
@@ -109,13 +109,13 @@ class SimulationScenario:
     stiction (modes) change at the end of steps, or are localised by a witness function.
     """
 
-    engine: str = choice(*ENGINES)
+    engine: str = setting(choices=ENGINES)
     duration: float = quantity("s", above=0)
     steady_from: float = quantity("s", at_least=0)  # the fitness counts from here (section 2.3)
-    scheme: str = choice(*SCHEMES)
+    scheme: str = setting(choices=SCHEMES)
     accuracy: float = setting(above=0)  # per step; unused by schemes without an error estimate
     max_step: float = quantity("s", above=0)
-    mode_changes: str = choice("step_end", "witness")
+    mode_changes: str = setting(choices=("step_end", "witness"))
     look_ahead: float = quantity("s", at_least=0)
     """With step_end and an implicit scheme: shortest step that ends at a predicted mode change; 0
     for none."""
@@ -140,7 +140,7 @@ class CompiledScenario:
 class MujocoScenario:
     """How the engine `mujoco` simulates, and its friction, which is not that of Table 2."""
 
-    integrator: str = choice(*MUJOCO_INTEGRATORS, default="implicitfast")
+    integrator: str = setting(choices=MUJOCO_INTEGRATORS, default="implicitfast")
     step: float = quantity("s", above=0, default=0.125e-3)
     friction: float = setting(above=0, default=0.5)  # coefficient, as of metal on a floor
 
@@ -167,12 +167,12 @@ class EvolutionScenario:
     tournament: int = setting(at_least=1)
     trials: int = setting(at_least=1)
     max_iterations: int = setting(at_least=1)
-    crossover: str = choice("uniform")
+    crossover: str = setting(choices=("uniform",))
     crossover_probability: float = setting(at_least=0, at_most=1)
     mutation_probability: float = setting(at_least=0, at_most=1)
     weight_mutation: float = setting(at_least=0)  # largest change of a weight in one mutation
     tau_mutation_range: float = quantity("s", at_least=0)  # largest change of tau_A
-    tau_mutation: str = choice("intended", "listing")
+    tau_mutation: str = setting(choices=("intended", "listing"))
     stop_rise: float = setting(at_least=0)
     stop_window: int = setting(at_least=1)
     stop_after: int = setting(at_least=0)
