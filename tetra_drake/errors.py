@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 
 class InputError(ValueError):
     """Input a person gave cannot be used; the message is one line made for that person.
@@ -28,7 +30,7 @@ class SimulationFailure(RuntimeError):
 
     def __reduce__(self) -> tuple[object, ...]:
         # Keyword-only arguments defeat the default; failures must cross process borders.
-        return (_rebuild_failure, (type(self), self.time, self.reason))
+        return functools.partial(type(self), time=self.time, reason=self.reason), ()
 
 
 class Diverged(SimulationFailure):
@@ -37,7 +39,3 @@ class Diverged(SimulationFailure):
 
 class StepBudgetExceeded(SimulationFailure):
     """The integrator used up its allowance of derivative evaluations."""
-
-
-def _rebuild_failure(kind: type[SimulationFailure], time: float, reason: str) -> SimulationFailure:
-    return kind(time=time, reason=reason)

@@ -18,16 +18,14 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     Raises InputError if `path` cannot be written.
     """
     path = Path(path)
+    if os.path.isdir(path):
+        raise InputError(path, "", "is a directory, expected a file to write")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        if path.is_dir():
-            raise InputError(path, "", "is a directory, expected a file to write")
         handle, name = tempfile.mkstemp(
             dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix
         )
         os.close(handle)
-    except InputError:
-        raise
     except (FileExistsError, NotADirectoryError) as error:
         raise InputError(path, "", "cannot be written: its folder is a file") from error
     except (OSError, ValueError) as error:
@@ -35,7 +33,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        temporary.chmod(0o666 & ~_umask())
+        os.umask(mask := os.umask(0))  # can be read by setting it only
+        temporary.chmod(0o666 & ~mask)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
@@ -70,9 +69,3 @@ def write_whole(path: str | Path, text: str) -> None:
     """Writes a text file by rename, so that no reader ever sees half of it."""
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -11,8 +11,7 @@ LBF = 0.45359237 * 9.80665
 
 
 def test_displayed_units_have_their_exact_definitions():
-    assert INCH == IN
-    assert pytest.approx(LBF, rel=1e-15) == POUND_FORCE
+    assert pytest.approx((IN, LBF), rel=1e-15) == (INCH, POUND_FORCE)
 
 
 @pytest.mark.parametrize(

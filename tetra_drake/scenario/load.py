@@ -10,7 +10,7 @@ from pathlib import Path
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario import rules
-from tetra_drake.scenario.fields import TAG, Check, Tree, dump_yaml, merge, parse_yaml, tree_of
+from tetra_drake.scenario.fields import TAG, Check, Tree, dump_yaml, parse_yaml, tree_of
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -75,8 +75,4 @@ def _load_tree(file: Path, seen: tuple[Path, ...] = ()) -> Tree:
     base_file = _file(base, file.parent)
     if not os.path.exists(base_file):
         raise InputError(file, "base", f"'{base}': no such {expected}")
-    base_tree = _load_tree(base_file, (*seen, file.resolve()))
-    tree = rules.rebalanced(merge(base_tree, given), base=base_tree, given=given)
-    if not rules.same_experiment(tree, base_tree):
-        tree["reference"] = given.get("reference")
-    return tree
+    return rules.on_base(_load_tree(base_file, (*seen, file.resolve())), given)

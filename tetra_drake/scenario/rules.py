@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.fields import Tree
+from tetra_drake.scenario.fields import Tree, merge
 
 if TYPE_CHECKING:
     from tetra_drake.scenario.schema import Scenario
@@ -39,10 +39,10 @@ def balance(scenario: Scenario, source: object) -> None:
     robot.spacing = far
 
 
-def rebalanced(tree: Tree, *, base: Tree, given: Tree) -> Tree:
-    """The tree of a file on its base; balanced if the file decides the balance but no spacing.
+def on_base(base: Tree, given: Tree) -> Tree:
+    """The tree of a base with what a file gives, which may decide on spacing and reference.
 
-    Masses do not count: twice the density moves T1 by less than 0.003 in.
+    Masses do not count for the balance: twice the density moves T1 by less than 0.003 in.
     """
 
     def decisive(tree: Tree) -> list[Any]:
@@ -50,9 +50,12 @@ def rebalanced(tree: Tree, *, base: Tree, given: Tree) -> Tree:
         values = tree.get("robot", {}) | tree.get("cables", {})
         return [values.get(name) for name in names]
 
-    if "spacing" in given.get("robot", {}) or decisive(tree) == decisive(base):
-        return tree
-    return tree | {"robot": tree.get("robot", {}) | {"spacing": BALANCED}}
+    tree: Tree = merge(base, given)
+    if "spacing" not in given.get("robot", {}) and decisive(tree) != decisive(base):
+        tree["robot"] = tree.get("robot", {}) | {"spacing": BALANCED}
+    if not same_experiment(tree, base):
+        tree["reference"] = given.get("reference")
+    return tree
 
 
 def same_experiment(tree: Tree, base: Tree) -> bool:
