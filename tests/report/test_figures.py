@@ -21,7 +21,6 @@ OF_ONE_GAIT = {
 }
 OF_A_RUN = OF_ONE_GAIT | {
     "fitness_of_trials",
-    "best_worst_average",
     "initial_distances",
     "initial_fitness",
     "before_and_after",

@@ -66,7 +66,6 @@ def _of_evolution(run: Run, trial: int) -> Iterator[tuple[Any, ...]]:
     """Functions that draw figures of the record, and their arguments."""
     reference = run.manifest.scenario.reference
     yield evolution.fitness_of_trials, run
-    yield evolution.best_worst_average, run
     extremes = evolution.initial_extremes(run)
     if len(extremes):
         yield evolution.initial_distances, run, reference

@@ -31,9 +31,6 @@ _LEGEND_ROWS = 14
 _TICKS = 20
 """Largest number of trial numbers below the axes, and of error bars."""
 
-_LAST_DOT: dict[str, Any] = {"marker": "o", "markevery": [-1]}
-"""Marks the end of a line, and makes a line of one point visible."""
-
 
 def initial_extremes(run: Run) -> pandas.DataFrame:
     """Distances (in) of the fittest and the least fit initial gait of each trial.
@@ -110,80 +107,54 @@ def initial_fitness(run: Run, trial: int, reference: ReferenceScenario | None = 
     return figure
 
 
-def fitness_by_trial(run: Run) -> pandas.DataFrame:
-    """Mean fitness of each trial's population. Index: iteration, columns: trial.
+def average_over_trials(run: Run, fitness: pandas.DataFrame) -> pandas.DataFrame:
+    """Mean and standard deviation over the trials, columns of `fitness`. Index: iteration.
 
-    The best fitness instead, where the optimiser reports no mean. NaN after a trial's last
-    iteration, and before any gait has a fitness; trials without any are left out.
+    A trial that has ended counts with its last value, as its population no longer changes; the
+    average ends where the first unfinished trial does.
     """
-    column = "mean_fitness" if "mean_fitness" in run.iterations else "best_fitness"
-    table = run.iterations.pivot(index="iteration", columns="trial", values=column)
-    return table.dropna(axis="columns", how="all")
-
-
-def average_over_trials(run: Run) -> pandas.DataFrame:
-    """Mean and standard deviation over trials of their mean fitness. Index: iteration.
-
-    A trial that has ended counts with its last mean fitness, as its population no longer
-    changes; the average ends where the first unfinished trial does.
-    """
-    table = fitness_by_trial(run)
-    stops = run.iterations.dropna(subset="stop").set_index("trial")["stop"]
-    ended = [trial for trial in table if trial in stops.index]
-    going_on = [table[trial].last_valid_index() for trial in table if trial not in stops.index]
-    table[ended] = table[ended].ffill()
-    table = table.loc[: min(going_on, default=table.index[-1])]
+    ended = run.iterations.dropna(subset="stop")["trial"]
+    going_on = [fitness[t].last_valid_index() for t in fitness if t not in ended.values]
+    table = fitness.ffill().loc[: min(going_on, default=fitness.index[-1])]
     return pandas.DataFrame({"mean": table.mean(axis=1), "deviation": table.std(axis=1)})
 
 
 @common_style()
 def fitness_of_trials(run: Run) -> Figure:
-    """Fitness of each trial over iterations; the legend is sorted by the last values."""
-    table = fitness_by_trial(run)
+    """Mean fitness of each trial's population over iterations (best fitness where the optimiser
+    reports no mean), and the average over trials with its standard deviation.
+
+    The legend is sorted by the last values; trials that have ended count in the average with
+    theirs."""
+    kind = "mean" if "mean_fitness" in run.iterations else "best"
+    table = run.iterations.pivot(index="iteration", columns="trial", values=f"{kind}_fitness")
+    table = table.dropna(axis="columns", how="all")
     figure, axes = _axes(height_in=4.0)
-    for trial in _by_last_value(table):
+    for trial in table.ffill().iloc[-1].sort_values(ascending=False, kind="stable").index:
         series = table[trial].dropna()
-        axes.plot(series.index, series, label=f"trial {trial}", **line_style(trial), **_LAST_DOT)
-    _label_iterations(axes, run)
-    columns = math.ceil(table.shape[1] / _LEGEND_ROWS)
-    figure.legend(loc="outside right center", ncols=columns, handlelength=3.2)
-    rises = (table.ffill().iloc[-1] > table.bfill().iloc[0]).sum()
-    figure.suptitle(f"Fitness of each trial\nrises in {rises} of {table.shape[1]}")
-    return figure
-
-
-@common_style()
-def best_worst_average(run: Run) -> Figure:
-    """Fitness over iterations of the trials that end highest and lowest, and the average of all.
-
-    Error bars: standard deviation over trials."""
-    table = fitness_by_trial(run)
-    ranked = _by_last_value(table)
-    figure, axes = _axes(height_in=4.0)
-    lines = [(ranked[0], "best", {"color": OKABE_ITO["blue"], "linestyle": "-"})]
-    note = "one trial only"
-    if len(ranked) > 1:
-        average = average_over_trials(run)
+        # The dot marks the end of a line, and makes a line of one point visible.
+        dot: Any = {"marker": "o", "markevery": [-1]}
+        axes.plot(series.index, series, label=f"trial {trial}", **line_style(trial), **dot)
+    if table.shape[1] > 1:
+        average = average_over_trials(run, table)
         axes.errorbar(
             average.index,
             average["mean"],
             yerr=average["deviation"],
             errorevery=math.ceil(len(average) / _TICKS),
-            color=OKABE_ITO["black"],
-            linestyle=(0, (1.2, 1.2)),
+            color="0.45",
+            linestyle="-",
+            linewidth=2.5,
             elinewidth=0.7,
             capsize=2.0,
-            label=f"average of {len(ranked)} trials, with standard deviation",
+            label="average",
         )
-        lines.append((ranked[-1], "worst", {"color": OKABE_ITO["vermillion"], "linestyle": "--"}))
-        note = "trials that have ended count in the average with their last value"
-    for trial, rank, style in lines:
-        series = table[trial].dropna()
-        look: dict[str, Any] = style | _LAST_DOT | {"linewidth": 1.8}
-        axes.plot(series.index, series, label=f"{rank}, trial {trial}", **look)
-    _label_iterations(axes, run)
-    axes.legend(loc="lower right", handlelength=3.6)
-    figure.suptitle(f"Fitness: best trial, worst trial and average\n{note}")
+    axes.set(xlabel="iteration", ylabel=f"{kind} fitness", xmargin=0.02)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    columns = math.ceil((table.shape[1] + 1) / _LEGEND_ROWS)
+    figure.legend(loc="outside right center", ncols=columns, handlelength=3.2)
+    rises = (table.ffill().iloc[-1] > table.bfill().iloc[0]).sum()
+    figure.suptitle(f"Fitness of each trial\nrises in {rises} of {table.shape[1]}")
     return figure
 
 
@@ -212,16 +183,3 @@ def two_best(
 def _axes(*, height_in: float) -> tuple[Figure, Axes]:
     figure, panels = make_figure(width_in=_WIDTH, height_in=height_in)
     return figure, panels[0, 0]
-
-
-def _by_last_value(table: pandas.DataFrame) -> list[int]:
-    """The trials in descending order of their last mean fitness."""
-    last = table.ffill().iloc[-1]
-    return [int(trial) for trial in last.sort_values(ascending=False, kind="stable").index]
-
-
-def _label_iterations(axes: Axes, run: Run) -> None:
-    mean = "mean_fitness" in run.iterations
-    label = "mean fitness of the population" if mean else "best fitness"
-    axes.set(xlabel="iteration", ylabel=label, xmargin=0.02)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))

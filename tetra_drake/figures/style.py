@@ -89,7 +89,8 @@ def draw_reference(axes: Axes, reference: ReferenceScenario | None, name: str) -
     inches = getattr(reference, name) / INCH
     axes.axhline(inches, **REFERENCE)
     place: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
-    axes.annotate(f"{reference.source}: {inches:.4g} in", (0.02, inches), (0, 3), **place)
+    place["bbox"] = {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.0}
+    axes.annotate(f"{reference.source}: {inches:.4g} in", (0.02, inches), (0, 4), **place)
 
 
 @common_style()
