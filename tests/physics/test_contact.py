@@ -43,28 +43,6 @@ def test_normal_force_is_equation_1(depth: float, rate: float, force: float) -> 
     assert normal_force(depth, rate, 4000.0, 2e5) == pytest.approx(force, rel=1e-14)
 
 
-@pytest.mark.parametrize("speed_in_s", [0.03, 0.06, 0.12])
-def test_a_dropped_mass_bounces_with_the_restitution_of_equation_2(
-    scenario: Scenario, speed_in_s: float
-) -> None:
-    # Lafarge (the thesis's [18]): lambda = 3/2 alpha k gives e = 1 - alpha v for small alpha v;
-    # the next term of the series is of order (alpha v)^2.
-    ground = scenario.ground
-    mass, speed = 5e-3, speed_in_s * 0.0254
-    depth, rate, step = 0.0, speed, 1e-7
-
-    def deceleration(depth: float, rate: float) -> float:
-        return normal_force(depth, rate, ground.stiffness, ground.damping) / mass
-
-    while depth > 0.0 or rate > 0.0:  # midpoint rule, without gravity as in Eq. 2's derivation
-        mid_depth = depth + 0.5 * step * rate
-        mid_rate = rate - 0.5 * step * deceleration(depth, rate)
-        rate -= step * deceleration(mid_depth, mid_rate)
-        depth += step * mid_rate
-    alpha_v = ground.velocity_correction * speed
-    assert -rate / speed == pytest.approx(1.0 - alpha_v, abs=alpha_v**2)
-
-
 @pytest.mark.parametrize("velocity", [-0.02, 0.02])
 @pytest.mark.parametrize("mode", [-1.0, 1.0])
 def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity: float, mode: float) -> None:

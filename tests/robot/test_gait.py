@@ -66,19 +66,14 @@ def test_a_gait_has_the_weights_of_its_robot(tmp_path, scenario, tetrahedra, ref
         load_gait(file, scenario)
 
 
-@pytest.mark.parametrize("tau_b", [2 * 0.1 / 3, 0.45], ids=["default", "own"])
-def test_a_saved_gait_loads_back_to_the_last_bit(tmp_path, tau_b, scenario):
+@pytest.mark.parametrize(("tau_b", "written"), [(2 * 0.1 / 3, False), (0.45, True)])
+def test_a_saved_gait_loads_back_to_the_last_bit(tmp_path, tau_b, written, scenario):
     weights = tuple(np.random.default_rng(1).uniform(0, 5, 24).tolist())
     gait = Gait(name="λ „quoted“", weights=weights, tau_a=0.1 / 3, tau_b=tau_b)
     save_gait(gait, tmp_path / "gait.json")
     assert load_gait(tmp_path / "gait.json", scenario) == gait
     assert gait_from_json(gait.to_json(), source="result.json", scenario=scenario) == gait
-
-
-@pytest.mark.parametrize(("tau_b", "written"), [(0.5, {"tau_b_s": 0.5}), (0.6, {})])
-def test_tau_b_is_written_only_where_it_is_not_the_default(tau_b, written):
-    gait = Gait(name="mine", weights=tuple(WEIGHTS), tau_a=0.3, tau_b=tau_b)
-    assert gait.to_json() == gait_file(**written)
+    assert ("tau_b_s" in gait.to_json()) == written, "only where it is not the default"
 
 
 BAD_TIMES = [-0.3, 0, math.nan, math.inf, "0.3", True]

@@ -49,11 +49,6 @@ def test_the_friction_brings_no_continuous_state(scenario: Scenario, gait: Gait)
     assert live.CreateDefaultContext().num_continuous_states() == 13 * 5 + 4 * 4
 
 
-def test_gravity_is_the_scenarios(scenario: Scenario, gait: Gait) -> None:
-    plant = MakeTensegrityDiagram(scenario, gait).GetSubsystemByName("plant")
-    assert plant.gravity_field().gravity_vector().tolist() == [0.0, 0.0, -9.80665]
-
-
 def resident_megabytes() -> float:
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
