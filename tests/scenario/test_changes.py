@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.common.yaml import yaml_load_typed
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.fields import dump_yaml, tree_of
 from tetra_drake.scenario.load import differences, load_scenario
 from tetra_drake.scenario.perturb import displaced, scaled
 from tetra_drake.scenario.schema import ReferenceScenario, Scenario
@@ -154,3 +156,15 @@ def test_displaced_starts_are_seeded_and_move_every_tetrahedron(scenario):
     assert np.array_equal(moved.p_WB, structure.p_WB + moves)
     assert displaced(scenario, percent=5, seed=3) == displaced(scenario, percent=5, seed=3)
     assert math.isclose(np.ptp(moved.p_BN), np.ptp(structure.p_BN))
+
+
+def test_a_difference_to_a_base_with_other_than_default_values_is_seen(scenario):
+    base = scenario.with_changes({"mujoco.friction": 0.7})
+    assert differences(scenario, base) == [("mujoco.friction", "0.5")]
+    assert differences(base, scenario) == [("mujoco.friction", "0.7")]
+
+
+def test_drakes_own_loader_reads_what_is_written_in_si(scenario):
+    changed = scenario.with_changes({"robot.tetrahedra": 3, "robot.offsets": [[0.0, 0.0, 0.1]] * 3})
+    text = dump_yaml(tree_of(changed))
+    assert yaml_load_typed(schema=Scenario, data=text, defaults=scenario) == changed

@@ -159,24 +159,28 @@ class Check:
         return kind(value)
 
 
-def tree_of(node: Any, show: Show | None = None) -> Tree:
-    """The complete tree of a dataclass; with `show`, without defaults and with quantities as the
-    text that show(number, unit) gives."""
+def tree_of(node: Any, show: Show | None = None, *, sparse: bool = False) -> Tree:
+    """The tree of a dataclass; `show` gives the text of a quantity from number and unit.
+
+    If `sparse`, values that are their fields' defaults are left out.
+    """
     return {
-        f.name: _tree(f.type, value, f.metadata.get("unit"), show)
+        f.name: _tree(f.type, value, f.metadata.get("unit"), show, sparse)
         for f, value in ((f, getattr(node, f.name)) for f in dataclasses.fields(node))
-        if not (show and callable(f.default_factory) and value == f.default_factory())
+        if not (sparse and callable(f.default_factory) and value == f.default_factory())
     }
 
 
-def _tree(kind: Any, value: Any, unit: str | None, show: Show | None) -> Any:
+def _tree(kind: Any, value: Any, unit: str | None, show: Show | None, sparse: bool) -> Any:
     kind, *others = _kinds(kind)
     if dataclasses.is_dataclass(value):
-        return ({TAG: f"!{type(value).__name__}"} if others else {}) | tree_of(value, show)
+        return ({TAG: f"!{type(value).__name__}"} if others else {}) | tree_of(
+            value, show, sparse=sparse
+        )
     if isinstance(value, list):
-        return [_tree(typing.get_args(kind)[0], v, unit, show) for v in value]
+        return [_tree(typing.get_args(kind)[0], v, unit, show, sparse) for v in value]
     if isinstance(value, dict):
-        return {k: _tree(typing.get_args(kind)[1], v, unit, show) for k, v in value.items()}
+        return {k: _tree(typing.get_args(kind)[1], v, unit, show, sparse) for k, v in value.items()}
     return show(value, unit) if show and unit and isinstance(value, float) else value
 
 

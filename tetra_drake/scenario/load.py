@@ -30,7 +30,8 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
 
 def dump_scenario(scenario: Scenario) -> str:
     """The scenario as a complete scenario file: SI units, loads back to the same numbers."""
-    return dump_yaml(tree_of(scenario, lambda number, unit: f"{number!r} {unit}"))
+    show = "{!r} {}".format
+    return dump_yaml(tree_of(scenario, show, sparse=True))
 
 
 def differences(scenario: Scenario, base: Scenario) -> list[tuple[str, str]]:
