@@ -65,7 +65,7 @@ def load(text: str) -> Settings:
 
 
 def shown(settings: Settings) -> str:
-    return dump_yaml(tree_of(settings, lambda number, unit: f"{number!r} {unit}"))
+    return dump_yaml(tree_of(settings, "{!r} {}".format, sparse=True))
 
 
 GOOD: list[tuple[str, str, Any]] = [
