@@ -25,7 +25,6 @@ from tetra_drake.figures.evolution import (
     initial_fitness,
     two_best,
 )
-from tetra_drake.figures.style import line_style
 from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.units import INCH
 
@@ -112,15 +111,6 @@ def test_the_best_fitness_is_shown_where_the_optimiser_reports_no_mean(run_of: R
     run = run_of([[(1.0, 0), (3.0, 1)], [(2.0, 0)], [(4.0, 0)]])
     run = dataclasses.replace(run, iterations=run.iterations.drop(columns="mean_fitness"))
     assert lines(fitness_of_trials(run)) == {"trial 0": [[0, 3.0], [1, 3.0], [2, 4.0]]}
-
-
-def test_trials_keep_their_look_whatever_their_rank(run_of: RunOf) -> None:
-    run = run_of(*(iterations_with_means([float(n), n + 1.0]) for n in range(10)))
-    turned = run.iterations.assign(mean_fitness=-run.iterations["mean_fitness"])
-    for tables in (run, dataclasses.replace(run, iterations=turned)):
-        drawn = fitness_of_trials(tables).axes[0].lines
-        colours = {line.get_label(): line.get_color() for line in drawn[:10]}
-        assert colours == {f"trial {n}": line_style(n)["color"] for n in range(10)}
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ import pytest
 import xarray
 from helpers.made_up_walk import HEIGHT, PERIOD, SPEED, make_walk
 
-from tetra_drake.engines.simulate import simulate
 from tetra_drake.results.measures import (
     distance_walked,
     dominant_frequency,
@@ -22,7 +21,6 @@ from tetra_drake.results.measures import (
     shares_off_ground,
     signal_frequencies,
 )
-from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.schema import Scenario
 
 TIMES = np.linspace(0.0, 15.0, 1501)
@@ -32,18 +30,6 @@ UNEVEN = np.sort(np.concatenate([TIMES, np.linspace(4.0, 5.0, 37)]))
 @pytest.fixture(scope="module")
 def walk() -> xarray.Dataset:
     return make_walk()
-
-
-def test_the_walk_of_these_tests_is_like_a_recorded_one(
-    walk: xarray.Dataset, scenario: Scenario
-) -> None:
-    scenario.simulation.duration, scenario.simulation.steady_from = 0.05, 0.02
-    recorded = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
-    assert recorded is not None
-    for name, variable in walk.data_vars.items():
-        assert variable.dims == recorded[name].dims
-    for name in set(walk.coords) - {"time"}:
-        assert walk[name].values.tolist() == recorded[name].values.tolist()
 
 
 def test_distances(walk: xarray.Dataset, scenario: Scenario) -> None:

@@ -180,20 +180,6 @@ def test_traces_end_where_the_robot_is(page: Page) -> None:
         assert time - 0.2 < max(shown) <= time
 
 
-def test_a_lifted_foot_has_no_arrow(page: Page, trajectory: xarray.Dataset) -> None:
-    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
-    force = frames["normal_force"].sel(contact="T2 bottom_left").values
-    lifted = np.flatnonzero((force[:-1] == 0.0) & (force[1:] == 0.0))
-    standing = np.flatnonzero(force > 0.05)
-    assert len(lifted) and len(standing)
-    for frame, length in ((lifted[-1], 0.0), (standing[-1], 0.17 * force[standing[-1]])):
-        animation.show_instant(page, float(frames["time"].values[frame]))
-        scale = page.evaluate(
-            "viewer.scene_tree.find(['forces', 'normal', 'T2 bottom_left']).object.scale.z"
-        )
-        assert scale == pytest.approx(length, rel=0.02, abs=1e-3)
-
-
 def test_every_window_shows_the_whole_robot_and_its_path(
     browser: Browser, replay: Path, trajectory: xarray.Dataset
 ) -> None:

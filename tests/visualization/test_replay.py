@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import html
 import re
 from pathlib import Path
@@ -16,7 +15,7 @@ from pydrake.math import RotationMatrix
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.formatting import fixed
-from tetra_drake.robot.gait import random_gait
+from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -36,11 +35,15 @@ Tracks = dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]
 """By path and property: times (frames,) in s and values (frames, ...) of the key frames."""
 
 
+def recorded(scenario: Scenario) -> xarray.Dataset:
+    trajectory = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
+    assert trajectory is not None
+    return trajectory
+
+
 @pytest.fixture(scope="module")
 def scenario() -> Scenario:
-    thesis = load_scenario()
-    settings = dataclasses.replace(thesis.simulation, duration=0.2, steady_from=0.1)
-    return dataclasses.replace(thesis, simulation=settings)
+    return load_scenario().with_changes({"simulation.duration": 0.2, "simulation.steady_from": 0.1})
 
 
 @pytest.fixture(scope="module")
@@ -50,10 +53,13 @@ def structure(scenario: Scenario) -> Structure:
 
 @pytest.fixture(scope="module")
 def trajectory(scenario: Scenario) -> xarray.Dataset:
-    gait = random_gait(scenario, np.random.default_rng(0), name="any")
-    recorded = simulate(scenario=scenario, gait=gait, record=True).trajectory
-    assert recorded is not None
-    return recorded
+    return recorded(scenario)
+
+
+@pytest.fixture(scope="module")
+def frames(trajectory: xarray.Dataset) -> xarray.Dataset:
+    """The samples that the page shows."""
+    return trajectory.isel(time=frame_samples(trajectory["time"].values))
 
 
 @pytest.fixture(scope="module")
@@ -104,23 +110,25 @@ def test_frames_are_evenly_spread_over_the_samples(
         assert 1 <= steps.min() <= steps.max() <= steps.min() + 1
 
 
+def rotation(xyzw: np.ndarray) -> np.ndarray:
+    return RotationMatrix(Quaternion(np.roll(xyzw, 1))).matrix()
+
+
 def test_bodies_move_as_recorded(
-    structure: Structure, trajectory: xarray.Dataset, animation: Tracks
+    structure: Structure, frames: xarray.Dataset, animation: Tracks
 ) -> None:
-    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     for i, body in enumerate(structure.bodies):
         times, positions = animation[f"/robot/{body}"][".position"]
         _, quaternions = animation[f"/robot/{body}"][".quaternion"]
         np.testing.assert_allclose(times, frames["time"], rtol=0, atol=1e-5)
         for p_WN, p, xyzw in zip(frames["p_WN"].values[:, i], positions, quaternions, strict=True):
-            R = RotationMatrix(Quaternion(np.roll(xyzw, 1))).matrix()
-            np.testing.assert_allclose(p + structure.p_BN @ R.T, p_WN, rtol=0, atol=1e-9)
+            shown = p + structure.p_BN @ rotation(xyzw).T
+            np.testing.assert_allclose(shown, p_WN, rtol=0, atol=1e-9)
 
 
 def test_traces_show_only_what_has_been_walked(
-    trajectory: xarray.Dataset, page: str, animation: Tracks
+    frames: xarray.Dataset, page: str, animation: Tracks
 ) -> None:
-    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     traces = {path: tracks for path, tracks in animation.items() if path.startswith("/traces/")}
     lines = {}
     for command in commands(page, "/traces/"):
@@ -141,11 +149,8 @@ def test_traces_show_only_what_has_been_walked(
 
 
 def test_cables_reach_from_node_to_node_and_swell_with_tension(
-    structure: Structure,
-    trajectory: xarray.Dataset,
-    animation: Tracks,
+    structure: Structure, frames: xarray.Dataset, animation: Tracks
 ) -> None:
-    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
     paths = {path.rsplit("/", 1)[1]: path for path in animation if path.startswith("/cables/")}
     assert sorted(paths) == sorted(structure.cable_names)
@@ -155,8 +160,7 @@ def test_cables_reach_from_node_to_node_and_swell_with_tension(
         tracks = animation[paths[name]]
         middle, xyzw, scale = (tracks[key][1] for key in (".position", ".quaternion", ".scale"))
         for f in range(len(middle)):
-            R = RotationMatrix(Quaternion(np.roll(xyzw[f], 1))).matrix()
-            half = R[:, 2] * scale[f, 2] / 2
+            half = rotation(xyzw[f])[:, 2] * scale[f, 2] / 2
             ends = [middle[f] - half, middle[f] + half]
             nodes = [p_WN[f, cable["node_a"]], p_WN[f, cable["node_b"]]]
             np.testing.assert_allclose(ends, nodes, rtol=0, atol=1e-9)
@@ -166,11 +170,9 @@ def test_cables_reach_from_node_to_node_and_swell_with_tension(
 
 
 def test_arrows_stand_on_their_nodes_and_are_as_long_as_the_force(
-    trajectory: xarray.Dataset,
-    animation: Tracks,
+    frames: xarray.Dataset, animation: Tracks
 ) -> None:
-    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
-    for contact in trajectory["contact"].values:
+    for contact in frames["contact"].values:
         body, node = contact.split()
         p_WN = frames["p_WN"].sel(tetrahedron=body, node=node).values
         normal = frames["normal_force"].sel(contact=contact).values
@@ -181,7 +183,7 @@ def test_arrows_stand_on_their_nodes_and_are_as_long_as_the_force(
             np.testing.assert_allclose(tracks[".position"][1], p_WN, rtol=0, atol=1e-12)
             length = ARROW_LENGTH * size.clip(min=HIDDEN)
             np.testing.assert_allclose(tracks[".scale"][1][:, 2], length, rtol=1e-9)
-    assert (trajectory["normal_force"].values > 0.0).any()
+    assert (frames["normal_force"].values > 0.0).any()
 
 
 def test_the_title_is_text_and_not_markup(page: str) -> None:
@@ -213,12 +215,10 @@ def test_a_long_replay_stays_small(page: str) -> None:
 def test_another_robot_and_a_slice_of_a_recording_replay_too(
     scenario: Scenario, tmp_path: Path
 ) -> None:
-    two = dataclasses.replace(scenario, robot=dataclasses.replace(scenario.robot, tetrahedra=2))
-    gait = random_gait(two, np.random.default_rng(0), name="any")
-    recorded = simulate(scenario=two, gait=gait, record=True).trajectory
-    assert recorded is not None
+    two = scenario.with_changes({"robot.tetrahedra": 2})
+    later = recorded(two).isel(time=slice(5, None))
     path = tmp_path / "replay.html"
-    save_replay(path, scenario=two, trajectory=recorded.isel(time=slice(5, None)), title="two")
+    save_replay(path, scenario=two, trajectory=later, title="two")
     tracks = read_animation(read_page(path))
     assert sum(name.startswith("/robot/") for name in tracks) == 2
     assert sum(name.startswith("/cables/") for name in tracks) == 6
