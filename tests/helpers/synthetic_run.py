@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tetra_drake.evolution.optimizers.base import Evaluation
-from tetra_drake.evolution.record import RunRecord, evaluation_entry
+from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, trial_folder
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -47,9 +47,9 @@ def write_run(
     """
     scenario = scenario or tiny_scenario()
     scenario.evolution.trials = len(trials)
-    with RunRecord.create(directory, scenario=scenario, seed=7) as record:
+    with RunRecord.create(directory, scenario=scenario, seed=7):
         for number, iterations in enumerate(trials):
-            trial = record.open_trial(number)
+            trial = TrialRecord(trial_folder(directory, number))
             for entries, line in _lines(iterations, scenario, ends=number not in unfinished):
                 trial.complete(entries, line)
     return directory

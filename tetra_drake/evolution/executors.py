@@ -67,9 +67,8 @@ def process_executor(workers: int) -> ProcessPoolExecutor:
     return executor
 
 
-def thread_executor(workers: int) -> ThreadPoolExecutor:
-    """Threads, for evaluations that let other threads run meanwhile, as the compiled engine."""
-    return ThreadPoolExecutor(workers)
+thread_executor: MakeExecutor = ThreadPoolExecutor
+"""Threads, for evaluations that let other threads run meanwhile, as the compiled engine."""
 
 
 def available_cores() -> int:
@@ -113,12 +112,13 @@ class _Task:
 class EvaluationPool(Generic[JobT]):
     """Evaluates tasks (mostly vectors), at most `workers` at a time; `job` identifies each.
 
-    The queue is kept here, and an executor never has more tasks than workers: with a
-    backlog, Python's process pool can forget to replace recycled workers and then hangs.
     If a worker dies, what was under way runs again, one at a time; a task that ends its worker
-    when alone counts as failed. While no task has succeeded yet such failures are held back, as
-    the cause may be that none can run: then EvaluationImpossible is raised.
+    when alone counts as failed. Until any task has succeeded such failures are held back, as the
+    cause may be that none can run: then EvaluationImpossible is raised.
     """
+
+    # The queue is kept here, and an executor never has more tasks than workers: with a backlog,
+    # Python's process pool can forget to replace recycled workers and then hangs.
 
     def __init__(
         self,
@@ -151,7 +151,7 @@ class EvaluationPool(Generic[JobT]):
     @property
     def busy(self) -> bool:
         """Whether anything is under way or waiting."""
-        return bool(self._running or self._queue or self._suspects)
+        return any((self._running, self._queue, self._suspects))
 
     def submit(self, job: JobT, task: object) -> None:
         """Puts a task in the queue."""
@@ -212,15 +212,16 @@ def evaluate_all(
     evaluate: Callable[[TaskT], Evaluation],
     tasks: Sequence[TaskT],
     *,
-    workers: int,
+    workers: int | None = None,
     executor: MakeExecutor = process_executor,
 ) -> Iterator[tuple[int, Evaluation]]:
     """Evaluates tasks (mostly vectors) and yields each one's index and evaluation when ready.
 
-    Raises EvaluationImpossible, and whatever `evaluate` raises.
+    `workers`: one per core by default. Raises EvaluationImpossible, and what `evaluate` raises.
     """
     if not tasks:
         return
+    workers = workers or available_cores()
     with EvaluationPool[int](evaluate, workers=workers, executor=executor) as pool:
         for index, task in enumerate(tasks):
             pool.submit(index, task)

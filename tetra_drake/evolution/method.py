@@ -6,15 +6,12 @@ a run is never resumed with anything else.
 
 from __future__ import annotations
 
-import ast
-import contextlib
 import dataclasses
 import functools
 import hashlib
 import inspect
 import json
 import sys
-import textwrap
 import types
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -109,12 +106,11 @@ def _pieces(value: Any, seen: dict[int, Any]) -> Iterator[str]:
     elif id(value) not in seen:
         seen[id(value)] = value  # kept, so that no other object gets its id
         yield type(value).__qualname__
-        if isinstance(value, functools.partial):
-            yield from _pieces([value.func, value.args, value.keywords], seen)
-        elif isinstance(value, types.MethodType):
-            yield from _pieces([value.__func__, value.__self__], seen)
-        elif isinstance(value, types.FunctionType):
-            yield from _function_pieces(value, seen)
+        if isinstance(value, (type, types.FunctionType)):
+            yield f"{value.__module__}.{value.__qualname__}"
+            if _is_own(value.__module__):
+                inner = _class(value, seen) if isinstance(value, type) else _function(value, seen)
+                yield from inner
         elif isinstance(value, types.CodeType):
             yield f"{value.co_code.hex()} {value.co_names}"
             yield from _pieces(value.co_consts, seen)
@@ -124,47 +120,43 @@ def _pieces(value: Any, seen: dict[int, Any]) -> Iterator[str]:
             yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
         elif isinstance(value, (types.ModuleType, types.BuiltinFunctionType)):
             yield value.__name__
-        elif isinstance(value, type):
-            yield from _class_pieces(value, seen)
         else:
-            if isinstance(value, (list, tuple)):
-                items: Mapping[Any, Any] = dict(enumerate(value))
-            elif isinstance(value, Mapping):
-                items = value
-            else:
-                items = {"class": type(value), "values": getattr(value, "__dict__", {})}
-            for key in items:
+            for key, item in _contents(value).items():
                 yield repr(key)
-                yield from _pieces(items[key], seen)
+                yield from _pieces(item, seen)
 
 
-def _function_pieces(function: types.FunctionType, seen: dict[int, Any]) -> Iterator[str]:
+def _contents(value: Any) -> Mapping[Any, Any]:
+    """What an object consists of."""
+    if isinstance(value, Mapping):
+        return value
+    if isinstance(value, (list, tuple)):
+        return dict(enumerate(value))
+    if isinstance(value, functools.partial):
+        return {"function": value.func, "arguments": value.args, "keywords": value.keywords}
+    if isinstance(value, types.MethodType):
+        return {"function": value.__func__, "object": value.__self__}
+    return {"class": type(value), "values": getattr(value, "__dict__", {})}
+
+
+def _function(function: types.FunctionType, seen: dict[int, Any]) -> Iterator[str]:
     """Its source, or else its bytecode, its defaults, and the values it finds outside."""
-    yield f"{function.__module__}.{function.__qualname__}"
-    if not _is_own(function.__module__):
-        return
     try:
-        source = textwrap.dedent(inspect.getsource(function))
-        with contextlib.suppress(SyntaxError):  # a part of a line
-            source = ast.unparse(ast.parse(source))  # without comments
-        yield source
+        yield inspect.getsource(function)
     except (OSError, TypeError):  # typed into an interpreter, or read from standard input
         yield from _pieces(function.__code__, seen)
     outside = inspect.getclosurevars(function)
-    yield from _pieces([function.__defaults__, function.__kwdefaults__], seen)
-    yield from _pieces([dict(outside.nonlocals), dict(outside.globals)], seen)
+    defaults = [function.__defaults__, function.__kwdefaults__]
+    yield from _pieces([*defaults, dict(outside.nonlocals), dict(outside.globals)], seen)
 
 
-def _class_pieces(kind: type, seen: dict[int, Any]) -> Iterator[str]:
-    yield f"{kind.__module__}.{kind.__qualname__}"
-    if not _is_own(kind.__module__):
-        return
+def _class(kind: type, seen: dict[int, Any]) -> Iterator[str]:
+    """Its bases and members, without what Python and decorators add."""
     yield from _pieces(kind.__bases__, seen)
     for name, member in sorted(vars(kind).items()):
         if not name.startswith("__") or name in ("__init__", "__call__"):
             inner = getattr(member, "fget", getattr(member, "__func__", member))
-            yield name
-            yield from _pieces(inner, seen)
+            yield from _pieces([name, inner], seen)
 
 
 def _is_own(module: str | None) -> bool:

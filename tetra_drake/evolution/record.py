@@ -22,11 +22,10 @@ import fcntl
 import hashlib
 import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import yaml
 
@@ -41,7 +40,6 @@ from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
-_Kinds = dict[str, tuple[type, ...]]
 _Lines = Sequence[dict[str, Any]]
 
 SCHEMA, FIRST_SCHEMA = 2, 1
@@ -50,17 +48,12 @@ EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS = "reevaluations.jsonl"
 
-_NUMBER = (int, float)
-_OPTIONAL = (int, float, type(None))
-_EVALUATION_KEYS: _Kinds = {
-    **{"index": (int,), "iteration": (int,), "genome": (list,), "metrics": (dict,)},
-    **{"fitness": _OPTIONAL, "failure": (str, type(None)), "wall_time_s": _NUMBER},
-    "engine": (str,),
-}
-_ITERATION_KEYS: _Kinds = {
-    **{"iteration": (int,), "evaluations": (int,), "best_fitness": _OPTIONAL},
-    **{"best_evaluation": (int, type(None)), "stop": (str, type(None))},
-}
+_NONE = type(None)
+_ITERATION_KEYS: dict[str, Any] = {"iteration": int, "evaluations": int, "stop": (str, _NONE)}
+_ITERATION_KEYS |= {"best_fitness": (int, float, _NONE), "best_evaluation": (int, _NONE)}
+_EVALUATION_KEYS: dict[str, Any] = {"index": int, "iteration": int, "genome": list, "engine": str}
+_EVALUATION_KEYS |= {"metrics": dict, "failure": (str, _NONE), "fitness": (int, float, _NONE)}
+_EVALUATION_KEYS |= {"wall_time_s": (int, float)}
 _FIRST_METRICS = {
     "distance_in": "distance",
     "steady_distance_in": "steady_distance",
@@ -98,27 +91,26 @@ def read_manifest(directory: Path) -> Manifest:
     schema = raw.get("schema") if isinstance(raw, dict) else None
     if schema not in (SCHEMA, FIRST_SCHEMA):
         raise InputError(path, "schema", f"found {schema!r}, expected {FIRST_SCHEMA} or {SCHEMA}")
-    scenario_key = ("scenario", dict) if schema == FIRST_SCHEMA else ("scenario_sha256", str)
-    for key, kind in (scenario_key, ("seed", int), ("versions", dict)):
+    for key, kind in (("seed", int), ("versions", dict)):
         if not isinstance(raw.get(key), kind):
             raise InputError(path, key, "is missing or damaged")
     scenario = load_scenario(scenario_file)
     text = scenario_file.read_text(encoding="utf-8")
     if schema == FIRST_SCHEMA:
-        unchanged = raw["scenario"] == yaml.safe_load(text)
+        unchanged = raw.get("scenario") == yaml.safe_load(text)
         method = Method.of(scenario)
     else:
-        unchanged = raw["scenario_sha256"] == _sha256(text)
+        unchanged = raw.get("scenario_sha256") == _sha256(text)
         method = Method.from_json(raw, path)
     if not unchanged:
-        raise InputError(scenario_file, "", "was changed after the run had begun")
+        raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
     return Manifest(scenario, raw["seed"], raw["versions"], method)
 
 
 class RunRecord:
     """An open run directory, locked against other processes until closed."""
 
-    def __init__(self, directory: Path, manifest: Manifest, lock: int) -> None:
+    def __init__(self, directory: Path, manifest: Manifest, lock: BinaryIO) -> None:
         self.directory = directory
         self.manifest = manifest
         self._lock = lock
@@ -144,7 +136,7 @@ class RunRecord:
             manifest = Manifest(scenario, seed, now, method or Method.of(scenario))
             _write_manifest(directory, manifest)
         except BaseException:
-            os.close(lock)
+            lock.close()
             raise
         return cls(directory, manifest, lock)
 
@@ -169,15 +161,11 @@ class RunRecord:
             manifest.method.check_same(method, directory)
         return cls(directory, manifest, _lock(directory))
 
-    def open_trial(self, number: int) -> TrialRecord:
-        """The record of one trial."""
-        return TrialRecord(trial_folder(self.directory, number))
-
     def __enter__(self) -> RunRecord:
         return self
 
     def __exit__(self, *_: object) -> None:
-        os.close(self._lock)
+        self._lock.close()
 
 
 class TrialRecord:
@@ -190,12 +178,12 @@ class TrialRecord:
             leftover.unlink()
         for name in (EVALUATIONS, ITERATIONS, IN_PROGRESS):
             repair_torn_line(folder / name)
-        self._evaluations = read_evaluations(folder / EVALUATIONS)
+        self._evaluations = read_entries(folder / EVALUATIONS)
         for index, entry in enumerate(self._evaluations):
             if entry["index"] != index:
                 self._refuse(EVALUATIONS, index, f"index is {entry['index']}, expected {index}")
-        self._iterations = read_iterations(folder / ITERATIONS)
-        in_progress = read_evaluations(folder / IN_PROGRESS)
+        self._iterations = read_entries(folder / ITERATIONS)
+        in_progress = read_entries(folder / IN_PROGRESS)
         self._in_progress = {entry["index"]: (i, entry) for i, entry in enumerate(in_progress)}
 
     def recall(self, index: int, vector: Vector) -> Evaluation | None:
@@ -225,10 +213,8 @@ class TrialRecord:
         append_lines(self._folder / IN_PROGRESS, [entry])
 
     def complete(self, evaluations: _Lines, iteration: dict[str, Any]) -> None:
-        """Writes an iteration's lines, or checks those that are there.
-
-        In this order: a kill in between leaves nothing that repeating the run would not complete.
-        """
+        """Writes an iteration's lines, or checks those that are there."""
+        # In this order: a kill in between leaves nothing that repeating the run cannot complete.
         self._write(EVALUATIONS, self._evaluations, evaluations, first=evaluations[0]["index"])
         self._write(ITERATIONS, self._iterations, [iteration], first=iteration["iteration"])
         if evaluations[-1]["index"] >= len(self._evaluations):
@@ -274,34 +260,22 @@ def evaluation_entry(
     }
 
 
-def read_evaluations(path: Path) -> list[dict[str, Any]]:
-    """The lines of a file of evaluations; InputError, with file and line, where one is none."""
-    return [_upgraded(entry) for entry in _checked(path, _EVALUATION_KEYS)]
+def read_entries(path: Path) -> list[dict[str, Any]]:
+    """The lines of a file of evaluations or iterations in today's form, whatever their schema.
 
-
-def read_iterations(path: Path) -> list[dict[str, Any]]:
-    """The lines of a file of iterations; InputError, with file and line, where one is none."""
-    return [_upgraded(entry) for entry in _checked(path, _ITERATION_KEYS)]
-
-
-def _checked(path: Path, keys: _Kinds) -> list[dict[str, Any]]:
+    Raises InputError, naming file and line, where a line is damaged.
+    """
+    keys = _ITERATION_KEYS if path.name == ITERATIONS else _EVALUATION_KEYS
     entries = read_lines(path)
     for line, entry in enumerate(entries, start=1):
-        for key, kinds in keys.items():
-            if key not in entry or not isinstance(entry[key], kinds):
+        for key, kind in keys.items():
+            if key not in entry or not isinstance(entry[key], kind):
                 raise InputError(path, f"line {line}", f"is damaged: {key} is missing or invalid")
+        entry.pop("best_distance_in", None)
+        if "distance_in" in entry.get("metrics", {}):
+            inches = entry["metrics"]
+            entry["metrics"] = {_FIRST_METRICS[name]: _from_inches(inches[name]) for name in inches}
     return entries
-
-
-def _upgraded(entry: dict[str, Any]) -> dict[str, Any]:
-    """A line of either schema in the form of today's."""
-    entry.pop("best_distance_in", None)
-    metrics = entry.get("metrics", {})
-    if "distance_in" in metrics:
-        entry["metrics"] = {
-            _FIRST_METRICS[name]: _from_inches(value) for name, value in metrics.items()
-        }
-    return entry
 
 
 def _from_inches(value: float) -> float:
@@ -339,16 +313,16 @@ def _refuse_a_used(directory: Path) -> None:
         raise InputError(directory, "", "is not empty, expected a new directory")
 
 
-def _lock(directory: Path) -> int:
-    """Takes the run's lock, which the system releases whenever this process ends."""
+def _lock(directory: Path) -> BinaryIO:
+    """The run's locked file, which the system releases whenever this process ends."""
     try:
-        lock = os.open(directory / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        lock = (directory / LOCK).open("ab")
     except OSError as error:
         raise InputError(directory, "", f"cannot be written to: {error.strerror}") from error
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        os.close(lock)
+        lock.close()
         taken = isinstance(error, BlockingIOError)
         problem = "another process is at work on this run" if taken else "cannot be locked"
         raise InputError(directory, "", problem) from error

@@ -10,12 +10,7 @@ import math
 from pathlib import Path
 
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
-from tetra_drake.evolution.executors import (
-    MakeExecutor,
-    available_cores,
-    evaluate_all,
-    process_executor,
-)
+from tetra_drake.evolution.executors import MakeExecutor, evaluate_all, process_executor
 from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
 from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers.base import Evaluate
@@ -57,14 +52,10 @@ def reevaluate(
     missing = [row for row in rows if row[:2] not in done]
     vectors = [run.vector(trial, index) for trial, index, _ in missing]
     progress = progress or Progress()
-    title = "initial gaits on the Drake diagram" if initial else "best gaits on the Drake diagram"
+    title = f"{'initial' if initial else 'best'} gaits on the Drake diagram"
     progress.stage(title, 0, len(missing))
-    results = evaluate_all(
-        evaluate or GaitEvaluation(scenario, objective),
-        vectors,
-        workers=workers or available_cores(),
-        executor=executor,
-    )
+    evaluate = evaluate or GaitEvaluation(scenario, objective)
+    results = evaluate_all(evaluate, vectors, workers=workers, executor=executor)
     for finished, (i, evaluation) in enumerate(results, start=1):
         trial, index, iteration = missing[i]
         entry = evaluation_entry(index, iteration, vectors[i], evaluation)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(NamedTuple):
     """A number of ours and the reference's, with units; "" where the reference has none."""
 
     name: str
@@ -40,8 +39,7 @@ def summary(run: Run) -> str:
             lines[trial] += f" ({fixed(on_diagram)} in on the Drake diagram)"
     reference = run.manifest.scenario.reference
     source = reference.source if reference else ""
-    rows = [("", "this run", source)]
-    rows += [(row.name, row.ours, row.reference) for row in comparisons(run)]
+    rows = [Comparison("", "this run", source), *comparisons(run)]
     lines += [f"{name:<32}{ours:>10}   {theirs}".rstrip() for name, ours, theirs in rows]
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
@@ -73,30 +71,21 @@ def comparisons(run: Run) -> list[Comparison]:
     rises = [status.improvement_percent for status in statuses]
     best_trial = max(statuses, key=lambda status: status.best_fitness)
 
-    def row(name: str, ours: float, key: str, unit: str, scale: float = 1.0) -> Comparison:
+    def row(name: str, values: Sequence[float], key: str, unit: str) -> Comparison:
         theirs = getattr(reference, key, None)
-        shown = "" if theirs is None else f"{theirs / scale:.4g} {unit}"
+        shown = "" if theirs is None else f"{theirs / (INCH if unit == 'in' else 1.0):.4g} {unit}"
+        finite = [value for value in values if math.isfinite(value)] or [math.nan]
+        ours = max(finite) if unit == "in" else float(np.mean(finite))
         return Comparison(name, f"{fixed(ours)} {unit}", shown)
 
-    initial = _largest([status.initial_best_distance_in for status in statuses])
-    best = _largest([status.best_distance_in for status in statuses])
     evaluations = sum(status.evaluations for status in statuses)
-    wall_time = sum(status.wall_time for status in statuses)
-    iteration_time = CHILDREN * wall_time / evaluations if evaluations else math.nan
-    rise = best_trial.improvement_percent
+    times = [CHILDREN * status.wall_time / max(evaluations, 1) for status in statuses]
+    initial = [status.initial_best_distance_in for status in statuses]
+    best = [status.best_distance_in for status in statuses]
     return [
-        row("best initial gait", initial, "best_initial_distance", "in", INCH),
-        row("best evolved gait", best, "best_distance", "in", INCH),
-        row("improvement, mean of trials", _mean(rises), "mean_improvement", "%"),
-        row("improvement, best trial", rise, "best_improvement", "%"),
-        row("time per two simulations", iteration_time, "iteration_time", "s"),
+        row("best initial gait", initial, "best_initial_distance", "in"),
+        row("best evolved gait", best, "best_distance", "in"),
+        row("improvement, mean of trials", rises, "mean_improvement", "%"),
+        row("improvement, best trial", [best_trial.improvement_percent], "best_improvement", "%"),
+        row("time per two simulations", [sum(times)], "iteration_time", "s"),
     ]
-
-
-def _largest(values: Sequence[float]) -> float:
-    return max((value for value in values if math.isfinite(value)), default=math.nan)
-
-
-def _mean(values: Sequence[float]) -> float:
-    finite = [value for value in values if math.isfinite(value)]
-    return float(np.mean(finite)) if finite else math.nan

@@ -18,8 +18,7 @@ from tetra_drake.evolution.record import (
     ITERATIONS,
     REEVALUATIONS,
     Manifest,
-    read_evaluations,
-    read_iterations,
+    read_entries,
     read_manifest,
     trial_folder,
 )
@@ -134,33 +133,28 @@ def load_run(path: str | Path) -> Run:
     """
     directory = Path(path)
     manifest = read_manifest(directory)
-    evaluations = _table(directory, manifest, EVALUATIONS, read_evaluations, _flat)
-    iterations = _table(directory, manifest, ITERATIONS, read_iterations, dict)
+    evaluations = _table(directory, manifest, EVALUATIONS, _flat)
+    iterations = _table(directory, manifest, ITERATIONS, dict)
     return Run(
         directory=directory,
         manifest=manifest,
         evaluations=evaluations,
         iterations=_with_best_distance(iterations, evaluations),
-        reevaluations=_table(directory, manifest, REEVALUATIONS, read_evaluations, _flat),
+        reevaluations=_table(directory, manifest, REEVALUATIONS, _flat),
     )
 
 
 def _table(
-    directory: Path,
-    manifest: Manifest,
-    name: str,
-    read: Callable[[Path], list[dict[str, Any]]],
-    row: Callable[[dict[str, Any]], dict[str, Any]],
+    directory: Path, manifest: Manifest, name: str, row: Callable[[dict[str, Any]], dict[str, Any]]
 ) -> pandas.DataFrame:
     import pandas
 
     rows = [
         {"trial": trial, **row(entry)}
         for trial in range(manifest.scenario.evolution.trials)
-        for entry in read(trial_folder(directory, trial) / name)
+        for entry in read_entries(trial_folder(directory, trial) / name)
     ]
-    columns = None if rows else _EMPTY
-    table = pandas.DataFrame(rows, columns=columns)
+    table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
     whole = [column for column in ("placed", "best_evaluation") if column in table]
     numbers = [
         column for column in table if column in (*_METRICS, "distance_in") or "fitness" in column

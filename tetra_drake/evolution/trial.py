@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from tetra_drake.evolution.optimizers.base import Evaluation, Optimizer
@@ -84,19 +85,13 @@ class Trial:
     """
 
     def __init__(
-        self,
-        *,
-        number: int,
-        name: str,
-        space: ParameterSpace,
-        optimizer: Optimizer,
-        record: TrialRecord,
+        self, number: int, name: str, *, space: ParameterSpace, optimizer: Optimizer, folder: Path
     ) -> None:
-        self.status = TrialStatus(number=number, evaluations_at_most=optimizer.evaluations_at_most)
+        self.status = TrialStatus(number, optimizer.evaluations_at_most)
         self._name = name
         self._space = space
         self._optimizer = optimizer
-        self._record = record
+        self._record = TrialRecord(folder)
         self._batch: dict[int, Vector] = {}
         """By the numbers of their evaluations, in the order asked."""
         self._results: dict[int, Evaluation] = {}

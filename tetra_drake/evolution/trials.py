@@ -8,7 +8,7 @@ from tetra_drake.evolution.executors import EvaluationPool, MakeExecutor, proces
 from tetra_drake.evolution.optimizers.base import Evaluate, MakeOptimizer
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.record import RunRecord
+from tetra_drake.evolution.record import RunRecord, trial_folder
 from tetra_drake.evolution.trial import Trial, TrialStatus
 from tetra_drake.robot.gait import ParameterSpace
 
@@ -58,11 +58,11 @@ def _open_trials(record: RunRecord, optimizer: MakeOptimizer) -> list[Trial]:
     seeds = np.random.SeedSequence(seed).spawn(scenario.evolution.trials)
     return [
         Trial(
-            number=number,
-            name=f"{scenario.name}, seed {seed}, trial {number}",
+            number,
+            f"{scenario.name}, seed {seed}, trial {number}",
             space=space,
             optimizer=optimizer(space, scenario.evolution, np.random.default_rng(own_seed)),
-            record=record.open_trial(number),
+            folder=trial_folder(record.directory, number),
         )
         for number, own_seed in enumerate(seeds)
     ]
