@@ -65,16 +65,13 @@ def test_at_rest_the_ground_bears_the_weight_and_the_pose_is_that_of_the_other_e
 ) -> None:
     times = {"simulation.duration": 1.2, "simulation.steady_from": 1.0}
     resting = scenario.with_changes({"simulation.engine": "mujoco", **times})
-    trajectory = trajectory_of(resting)
-    end = trajectory.isel(time=-1)
+    end = trajectory_of(resting).isel(time=-1)
     settled = json.loads((data / "expected.json").read_text())["settled"]
     borne = float(end["normal_force"].sum()) / POUND_FORCE
     assert borne == pytest.approx(settled["normal_sum_lbf"], rel=1e-3)
     # Forces are on the nodes that are in the ground, by their depth.
-    height = end["p_WN"].sel(axis="z").stack(contact=["tetrahedron", "node"]).values
-    names = [f"{body} {node}" for body in end["tetrahedron"].values for node in end["node"].values]
-    contacts = [names.index(name) for name in end["contact"].values]
-    expected = scenario.ground.stiffness * np.maximum(-height[contacts], 0.0)
+    height = end["p_WN"].sel(axis="z").values.ravel()[structure.contacts]
+    expected = scenario.ground.stiffness * np.maximum(-height, 0.0)
     np.testing.assert_allclose(end["normal_force"], expected, atol=0.02 * expected.max())
     np.testing.assert_array_equal(end["in_contact"], end["normal_force"] > 0.0)
     spacing = np.diff(end["p_WB"].sel(axis="x")) / INCH

@@ -104,7 +104,6 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
         (gait_file(weights=[*WEIGHTS, 1]), "weights", "25"),
         (gait_file(weights=1.5), "weights", "24"),
         (gait_file(weights={"w1": 1}), "weights", "24"),
-        (gait_file(weights=None), "weights", "24"),
         (without("schema"), "schema", ""),
         (without("weights"), "weights", ""),
         (without("tau_a_s"), "tau_a_s", ""),
@@ -112,7 +111,6 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
         (gait_file(tau_a=0.3), "tau_a", "tau_a_s"),
         (gait_file(tau_a_s=10**400), "tau_a_s", "1000"),
         ([1, 2], "", "JSON object"),
-        (5, "", "JSON object"),
         (None, "", "JSON object"),
         ('{"schema": 1, "schema": 1, "weights": [], "tau_a_s": 0.3}', "", "twice"),
         ('{"tau_a_s": 1' + "0" * 5000 + "}", "", "JSON"),  # beyond Python's limit of digits

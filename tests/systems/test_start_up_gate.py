@@ -7,16 +7,6 @@ from pydrake.systems.analysis import Simulator
 from tetra_drake.systems import StartUpGate
 
 
-def signals_at(time: float, *, start_up: float) -> list[float]:
-    gate = StartUpGate(2, start_up=start_up)
-    simulator = Simulator(gate)
-    gate.GetInputPort("ungated").FixValue(simulator.get_mutable_context(), np.array([1.0, -2.0]))
-    simulator.Initialize()
-    simulator.AdvanceTo(time)
-    simulator.AdvancePendingEvents()
-    return gate.GetOutputPort("signals").Eval(simulator.get_context()).tolist()
-
-
 @pytest.mark.parametrize(
     ("time", "start_up", "is_open"),
     [(0.0, 1.25, 0), (1.2499, 1.25, 0), (1.25, 1.25, 1), (15.0, 1.25, 1), (0.0, 0.0, 1)],
@@ -24,4 +14,12 @@ def signals_at(time: float, *, start_up: float) -> list[float]:
 def test_passes_signals_from_the_start_up_time_on(
     time: float, start_up: float, is_open: int
 ) -> None:
-    assert signals_at(time, start_up=start_up) == [is_open * 1.0, is_open * -2.0]
+    signals = np.array([1.0, -2.0])
+    gate = StartUpGate(2, start_up=start_up)
+    simulator = Simulator(gate)
+    context = simulator.get_mutable_context()
+    gate.GetInputPort("ungated").FixValue(context, signals)
+    simulator.Initialize()
+    simulator.AdvanceTo(time)
+    simulator.AdvancePendingEvents()
+    np.testing.assert_array_equal(gate.GetOutputPort("signals").Eval(context), is_open * signals)
