@@ -1,4 +1,4 @@
-"""The Drake diagram: against the independent simulation, the laws of conservation, and live."""
+"""The Drake diagram: against the independent simulation, and with live signals."""
 
 import json
 from pathlib import Path
@@ -60,20 +60,6 @@ def test_a_step_ends_at_the_start_up_jump(scenario: Scenario, gait: Gait) -> Non
     simulator.set_monitor(lambda context: ends.append(context.get_time()))
     simulator.AdvanceTo(1.5)
     assert scenario.cpg.start_up in ends
-
-
-def test_momentum_changes_only_by_the_grounds_forces(scenario: Scenario, gait: Gait) -> None:
-    diagram = MakeTensegrityDiagram(scenario, gait)
-    simulator = MakeSimulator(diagram, scenario.simulation)
-    simulator.AdvanceTo(2.0)
-    context = simulator.get_context()
-    plant = diagram.GetSubsystemByName("plant")
-    mass = plant.CalcTotalMass(plant.GetMyContextFromRoot(context))
-    acceleration = diagram.EvalTimeDerivatives(context).get_generalized_velocity().CopyToVector()
-    total = mass / 5 * acceleration.reshape(5, 6)[:, 3:].sum(axis=0)
-    friction = diagram.GetOutputPort("friction_forces").Eval(context).reshape(-1, 2).sum(axis=0)
-    normal = diagram.GetOutputPort("normal_forces").Eval(context).sum()
-    np.testing.assert_allclose(total, [*friction, normal - mass * 9.80665], atol=1e-11)
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 3, 8])

@@ -32,11 +32,6 @@ def test_tension_is_equation_6() -> None:
     assert cable_tension(0.3, -0.25, 1.5, 35.0, 8.0, 0.1, False) == pytest.approx(6.5, rel=1e-15)
 
 
-@pytest.mark.parametrize(("slack", "tension"), [(False, -1.75), (True, 0.0)])
-def test_a_cable_pushes_unless_it_may_go_slack(slack: bool, tension: float) -> None:
-    assert cable_tension(0.05, 0.0, 0.0, 35.0, 8.0, 0.1, slack) == pytest.approx(tension)
-
-
 def test_cables_keep_momentum_and_angular_momentum(structure: Structure, state: np.ndarray) -> None:
     wrench = forces_of_cables(structure, state, 1.0, -2.0, 0.5, 3.0)[0].reshape(5, 6)
     p_WB = state[:35].reshape(5, 7)[:, 4:]
