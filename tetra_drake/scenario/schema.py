@@ -5,10 +5,12 @@ SI unit, its limits and, if a file may leave it out, its default, which means wh
 field existed.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+from tetra_drake.errors import InputError
 from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import Check, quantity, setting, tree_of, with_values
 
@@ -242,6 +244,45 @@ class Scenario:
     def from_tree(cls, tree: dict[str, Any], source: object) -> Self:
         """The scenario of an SI tree; raises InputError that names `source` and key."""
         scenario: Self = Check(source, complete=True).value(cls, tree)
-        rules.balance(scenario, source)
-        rules.check_relations(scenario, source)
+        _balance(scenario, source)
+        _check_relations(scenario, source)
         return scenario
+
+
+def _balance(scenario: Scenario, source: object) -> None:
+    """Gives a `balanced` spacing its number: there, the cables of a junction balance along x.
+
+    Three outer cables of length s pull two tetrahedra together. Three inner ones, from a tip at
+    height h to base nodes at s along and R across, push them apart while s < h.
+    """
+    robot, cables = scenario.robot, scenario.cables
+    height, radius = robot.strut_length * math.sqrt(2.0 / 3.0), robot.strut_length / math.sqrt(3.0)
+
+    def pull(s: float) -> float:
+        length = math.hypot(radius, height - s)
+        inner = cables.inner_stiffness * (length - cables.free_length) * (height - s) / length
+        return cables.outer_stiffness * (s - cables.free_length) - inner
+
+    if robot.spacing != rules.BALANCED:
+        return
+    near, far = 0.0, height + cables.free_length
+    if pull(near) >= 0.0:
+        raise InputError(source, "robot.spacing", "the cables balance at no spacing; give one")
+    while near < (middle := 0.5 * (near + far)) < far:
+        near, far = (near, middle) if pull(middle) > 0.0 else (middle, far)
+    robot.spacing = far
+
+
+def _check_relations(scenario: Scenario, source: object) -> None:
+    """Checks values of a scenario against each other; raises InputError."""
+    bounds, simulation, n = scenario.gait_bounds, scenario.simulation, scenario.robot.tetrahedra
+    weight, tau_a, offsets = bounds.weight_min, bounds.tau_a_min, len(scenario.robot.offsets)
+    start, end = simulation.steady_from, simulation.duration
+    for wrong, key, found, expected in (
+        (weight > bounds.weight_max, "gait_bounds.weight_min", weight, "at most weight_max"),
+        (tau_a > bounds.tau_a_max, "gait_bounds.tau_a_min", f"{tau_a} s", "at most tau_a_max"),
+        (start >= end, "simulation.steady_from", f"{start} s", f"less than the duration, {end} s"),
+        (offsets not in (0, n), "robot.offsets", f"{offsets} items", f"none or {n}, one each"),
+    ):
+        if wrong:
+            raise InputError(source, key, f"found {found}, expected {expected}")
