@@ -11,6 +11,7 @@ from tetra_drake.evolution.executors import (
     EvaluationImpossible,
     MakeExecutor,
     available_cores,
+    check_sendable,
     process_executor,
     thread_executor,
 )
@@ -61,30 +62,30 @@ def evolve(
     out, progress, workers = Path(out), progress or Progress(), workers or available_cores()
     if isinstance(scenario, (str, Path)):
         scenario = load_scenario(scenario)
-    if resume:
-        own = read_manifest(out).scenario
-        method = Method.of(own, objective=objective, optimizer=optimizer)
-        record = RunRecord.resume(out, scenario=scenario, seed=seed, method=method)
-    elif scenario is None:
+    own = read_manifest(out).scenario if resume else scenario
+    if own is None:
         raise InputError("scenario", "", "is needed to begin a run")
+    method = Method.of(own, objective=objective, optimizer=optimizer)
+    evaluate, compiled = GaitEvaluation(own, objective), own.simulation.engine == "compiled"
+    where = executor or (thread_executor if compiled else process_executor)
+    if resume:
+        record = RunRecord.resume(out, scenario=scenario, seed=seed, method=method)
     else:
-        method = Method.of(scenario, objective=objective, optimizer=optimizer)
-        record = RunRecord.create(out, scenario=scenario, seed=seed or 0, method=method)
+        check_sendable(evaluate, where)  # before there is a directory
+        record = RunRecord.create(out, scenario=own, seed=seed or 0, method=method)
     with record, progress:
-        scenario = record.manifest.scenario
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
-        prepare(scenario, say=progress.say)
-        compiled = scenario.simulation.engine == "compiled"
+        prepare(own, say=progress.say)
         run_trials(
             record,
-            evaluate=GaitEvaluation(scenario, objective),
+            evaluate=evaluate,
             workers=workers,
-            executor=executor or (thread_executor if compiled else process_executor),
+            executor=where,
             optimizer=optimizer,
             progress=progress,
         )
-        if reevaluate and scenario.simulation.engine != "drake":
+        if reevaluate and own.simulation.engine != "drake":
             try:
                 reevaluate_gaits(
                     out,

@@ -130,8 +130,7 @@ class EvaluationPool(Generic[JobT]):
         self._evaluate = evaluate
         self._workers = workers
         self._make_executor = executor
-        if executor is process_executor:
-            _check_sendable(evaluate)
+        check_sendable(evaluate, executor)
         self._executor = executor(workers)
         self._queue: deque[_Task] = deque()
         self._suspects: deque[_Task] = deque()
@@ -233,8 +232,10 @@ _SOURCE = "worker processes"
 _INSTEAD = "or use threads: executor=concurrent.futures.ThreadPoolExecutor"
 
 
-def _check_sendable(evaluate: object) -> None:
-    """Raises EvaluationImpossible if worker processes cannot get the function."""
+def check_sendable(evaluate: object, executor: MakeExecutor) -> None:
+    """Raises EvaluationImpossible if worker processes are to get the function and cannot."""
+    if executor is not process_executor:
+        return
     try:
         pickled = pickle.dumps(evaluate)
     except Exception as error:

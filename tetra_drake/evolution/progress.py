@@ -159,5 +159,5 @@ class BarProgress(Progress):
     def _move(self, title: str, done: int, total: int, text: str = "") -> None:
         if title not in self._tasks:
             # Begun with what is done, so that the speed counts only what is made now.
-            self._tasks[title] = self._bars.add_task(title, completed=done, text=text)
+            self._tasks[title] = self._bars.add_task(title, completed=done, total=total, text=text)
         self._bars.update(self._tasks[title], completed=done, total=total, text=text)
