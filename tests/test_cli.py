@@ -14,7 +14,7 @@ import xarray
 
 import tetra_drake
 from tetra_drake.cli import main
-from tetra_drake.robot.gait import Gait, gait_from_json, random_gait, save_gait
+from tetra_drake.robot.gait import Gait, load_gait, random_gait, save_gait
 from tetra_drake.scenario.load import load_scenario
 
 SHORT = """\
@@ -105,7 +105,7 @@ BAD_GAITS = {
     "23.json": ("weights", "23", "24"),
     "nan.json": ("weights[0]", "nan"),
     "negative.json": ("tau_a_s", "-0.3"),
-    "key.json": ("tau: ", "tau_a_s"),
+    "key.json": ("tau: ", "tau_b_s"),
     "missing.json": (),
     "folder": (),
     "short.yaml": (),
@@ -273,8 +273,8 @@ def test_the_result_holds_what_was_asked_for_and_done(result, scenario):
         assert result[f"{name}_in"] == pytest.approx(metres / INCH)
 
 
-def test_the_result_holds_its_gait(result, gait_3, scenario):
-    assert gait_from_json(result["gait"], source="result.json", scenario=scenario) == gait_3
+def test_the_result_holds_its_gait(simulated, gait_3, scenario):
+    assert load_gait(simulated[0] / "result.json", scenario, key="gait") == gait_3
 
 
 def test_fitness_follows_from_the_result(result):

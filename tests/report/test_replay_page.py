@@ -135,7 +135,7 @@ def test_a_gait_that_is_not_the_scenarios_is_refused(folder: Path) -> None:
     (folder / "result.json").write_text(json.dumps(content))
     with pytest.raises(InputError) as caught:
         load_recording(folder)
-    assert (caught.value.source, caught.value.key) == (str(folder / "result.json"), "weights")
+    assert (caught.value.source, caught.value.key) == (str(folder / "result.json"), "gait.weights")
 
 
 def test_a_result_stands_for_files_that_are_complete(

@@ -13,7 +13,6 @@ from tetra_drake.robot.gait import (
     TAU_B,
     Gait,
     ParameterSpace,
-    gait_from_json,
     load_gait,
     random_gait,
     save_gait,
@@ -72,7 +71,8 @@ def test_a_saved_gait_loads_back_to_the_last_bit(tmp_path, tau_b, written, scena
     gait = Gait(name="λ „quoted“", weights=weights, tau_a=0.1 / 3, tau_b=tau_b)
     save_gait(gait, tmp_path / "gait.json")
     assert load_gait(tmp_path / "gait.json", scenario) == gait
-    assert gait_from_json(gait.to_json(), source="result.json", scenario=scenario) == gait
+    write(tmp_path, {"gait": gait.to_json()})
+    assert load_gait(tmp_path / "mine.json", scenario, key="gait") == gait
     assert ("tau_b_s" in gait.to_json()) == written, "only where it is not the default"
 
 
@@ -93,7 +93,8 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
     weights = [*WEIGHTS[:7], value, *WEIGHTS[8:]]
     bad = gait_file(weights=weights) if key == "weights[7]" else gait_file(**{key: value})
     file = write(tmp_path, bad)
-    with refused(file, key, f"{value:g}" if isinstance(value, float) else json.dumps(value)):
+    shown = {None: "nothing", True: "true"}.get(value) if value is None or value is True else ""
+    with refused(file, key, shown or ("a list" if isinstance(value, list) else str(value))):
         load_gait(file, scenario)
 
 
@@ -102,16 +103,16 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
     [
         (gait_file(weights=WEIGHTS[:23]), "weights", "23"),
         (gait_file(weights=[*WEIGHTS, 1]), "weights", "25"),
-        (gait_file(weights=1.5), "weights", "24"),
-        (gait_file(weights={"w1": 1}), "weights", "24"),
+        (gait_file(weights=1.5), "weights", "1.5"),
+        (gait_file(weights={"w1": 1}), "weights", "mapping"),
         (without("schema"), "schema", ""),
         (without("weights"), "weights", ""),
         (without("tau_a_s"), "tau_a_s", ""),
-        (gait_file(tau_c_s=1), "tau_c_s", "tau_a_s, tau_b_s"),
+        (gait_file(tau_c_s=1), "tau_c_s", "tau_"),
         (gait_file(tau_a=0.3), "tau_a", "tau_a_s"),
         (gait_file(tau_a_s=10**400), "tau_a_s", "1000"),
-        ([1, 2], "", "JSON object"),
-        (None, "", "JSON object"),
+        ([1, 2], "", "list"),
+        (None, "", "nothing"),
         ('{"schema": 1, "schema": 1, "weights": [], "tau_a_s": 0.3}', "", "twice"),
         ('{"tau_a_s": 1' + "0" * 5000 + "}", "", "JSON"),  # beyond Python's limit of digits
         ("weights: [1, 2]", "", "JSON"),

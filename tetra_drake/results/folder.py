@@ -8,16 +8,15 @@ result.json       the numbers and the gait
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import check_folder, write_whole
-from tetra_drake.robot.gait import Gait, gait_from_json
+from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -85,19 +84,9 @@ def load_result_folder(folder: Path) -> Recording:
     structure = MakeStructure(scenario.robot, scenario.cables)
     return Recording(
         scenario=scenario,
-        gait=_load_gait(folder / RESULT, scenario),
+        gait=load_gait(folder / RESULT, scenario, key="gait"),
         trajectory=_load_trajectory(folder / TRAJECTORY, structure),
     )
-
-
-def _load_gait(path: Path, scenario: Scenario) -> Gait:
-    try:
-        raw: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(path, "", f"cannot be read: {error}") from error
-    if not isinstance(raw, dict) or "gait" not in raw:
-        raise InputError(path, "gait", "is missing")
-    return gait_from_json(raw["gait"], source=str(path), scenario=scenario)
 
 
 def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
@@ -113,24 +102,15 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
 
 def _check_trajectory(path: Path, trajectory: xarray.Dataset, structure: Structure) -> None:
     """Raises InputError unless the file holds the motion of this robot."""
-    names = [structure.node_names[node] for node in structure.contacts]
-    expected = {"tetrahedron": structure.bodies, "cable": structure.cable_names, "contact": names}
-    for name, labels in expected.items():
-        if name not in trajectory.coords or trajectory[name].values.tolist() != list(labels):
+    contacts = [structure.node_names[node] for node in structure.contacts]
+    labels = {"tetrahedron": structure.bodies, "cable": structure.cable_names, "contact": contacts}
+    for name, expected in labels.items():
+        if name not in trajectory.coords or trajectory[name].values.tolist() != list(expected):
             raise InputError(path, name, f"is not that of the robot in {SCENARIO}")
-    dims = {
-        "time": ("time",),
-        "p_WN": ("time", "tetrahedron", "node", "axis"),
-        "p_WB": ("time", "tetrahedron", "axis"),
-        "q_WB": ("time", "tetrahedron", "quaternion"),
-        "tension": ("time", "cable"),
-        "signal": ("time", "junction"),
-        "normal_force": ("time", "contact"),
-        "friction_force": ("time", "contact", "horizontal"),
-    }
-    for name, wanted in dims.items():
-        if name not in trajectory.variables or trajectory[name].dims != wanted:
-            raise InputError(path, name, f"is missing, or not over {', '.join(wanted)}")
+    forces = ("tension", "signal", "normal_force", "friction_force")
+    for name in ("time", "p_WN", "p_WB", "q_WB", *forces):
+        if name not in trajectory or trajectory[name].dims[0] != "time":
+            raise InputError(path, name, "is missing, or not over time")
         if trajectory[name].size == 0 or not np.isfinite(trajectory[name].values).all():
             raise InputError(path, name, "is empty, or holds numbers that are not finite")
     if not (np.diff(trajectory["time"].values) > 0.0).all():

@@ -1,18 +1,16 @@
 """A gait, its file, and the space of parameters that evolution searches."""
 
-from __future__ import annotations
-
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text, write_whole
+from tetra_drake.scenario.fields import Check, setting
 from tetra_drake.scenario.schema import Scenario
 
 SCHEMA = 1
@@ -72,7 +70,7 @@ class ParameterSpace:
     """Whether tau_B is kept at 2 tau_A."""
 
     @classmethod
-    def of(cls, scenario: Scenario) -> ParameterSpace:
+    def of(cls, scenario: Scenario) -> Self:
         """The space of a scenario.
 
         With equal bounds of tau_A it is fixed. With `tau_mutation: listing` it does not mutate:
@@ -149,8 +147,19 @@ def save_gait(gait: Gait, path: str | Path) -> None:
     write_whole(path, json.dumps(gait.to_json(), indent=1) + "\n")
 
 
-def load_gait(path: str | Path, scenario: Scenario) -> Gait:
-    """Reads a gait file for the scenario's robot.
+@dataclass
+class _GaitFile:
+    """The keys of a gait file."""
+
+    weights: list[float] = setting(at_least=0)
+    tau_a_s: float = setting(above=0)
+    schema: int = setting(at_least=SCHEMA, at_most=SCHEMA)
+    tau_b_s: float | None = setting(default=None, above=0)
+    name: str = setting(default="")
+
+
+def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
+    """Reads a gait file, or the gait under `key` of a JSON file, for the scenario's robot.
 
     Raises InputError, naming file and key, for whatever is wrong in the file.
     """
@@ -159,54 +168,21 @@ def load_gait(path: str | Path, scenario: Scenario) -> Gait:
         raw = json.loads(text, object_pairs_hook=_unique_keys)
     except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"is not JSON: {error}") from error
-    return gait_from_json(raw, source=str(path), scenario=scenario)
-
-
-def gait_from_json(raw: Any, *, source: str, scenario: Scenario) -> Gait:
-    """Checks the content of a gait file; raises InputError that names `source` and key."""
-    if not isinstance(raw, dict):
-        raise InputError(source, "", "expected a JSON object with the keys of a gait")
-    known = {"schema", "name", "weights", "tau_a_s", "tau_b_s"}
-    for key in raw:
-        if key not in known:
-            expected = ", ".join(sorted(known))
-            raise InputError(source, key, f"unknown key, expected one of {expected}")
-    for key in ("schema", "weights", "tau_a_s"):
-        if key not in raw:
-            raise InputError(source, key, "is missing")
-    if type(raw["schema"]) is not int or raw["schema"] != SCHEMA:
-        found = json.dumps(raw["schema"])
-        raise InputError(source, "schema", f"found {found}, expected {SCHEMA}")
-    name = raw.get("name", Path(source).stem)
-    if not isinstance(name, str):
-        raise InputError(source, "name", f"found {json.dumps(name)}, expected text")
-    tau_a = _number(raw["tau_a_s"], source, "tau_a_s", above=0.0)
-    tau_b = _number(raw.get("tau_b_s", TAU_B_PER_TAU_A * tau_a), source, "tau_b_s", above=0.0)
-    weights = _weights(raw["weights"], source, scenario.oscillators)
-    return Gait(name=name, weights=weights, tau_a=tau_a, tau_b=tau_b)
-
-
-def _weights(raw: Any, source: str, oscillators: int) -> tuple[float, ...]:
-    expected = f"expected {weight_count(oscillators)} numbers for {oscillators} oscillators"
-    if not isinstance(raw, list):
-        raise InputError(source, "weights", f"found {json.dumps(raw)}, {expected}")
-    if len(raw) != weight_count(oscillators):
-        raise InputError(source, "weights", f"found {len(raw)} numbers, {expected}")
-    return tuple(_number(w, source, f"weights[{i}]", at_least=0.0) for i, w in enumerate(raw))
-
-
-def _number(
-    value: Any, source: str, key: str, *, above: float = -math.inf, at_least: float = -math.inf
-) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(source, key, f"found {json.dumps(value)}, expected a number")
-    if not abs(value) < 1e300:  # NaN, infinity, and integers beyond floating point
-        raise InputError(source, key, f"found {str(value)[:40]}, expected a finite number")
-    if not value > above:
-        raise InputError(source, key, f"found {value}, expected more than {above:g}")
-    if not value >= at_least:
-        raise InputError(source, key, f"found {value}, expected at least {at_least:g}")
-    return float(value)
+    if key and isinstance(raw, dict):
+        raw = raw.get(key)
+    file: _GaitFile = Check(path, complete=True).value(_GaitFile, raw, key)
+    count, expected = len(file.weights), weight_count(scenario.oscillators)
+    if count != expected:
+        problem = (
+            f"found {count} numbers, expected {expected} for {scenario.oscillators} oscillators"
+        )
+        raise InputError(path, f"{key}.weights".strip("."), problem)
+    return Gait(
+        name=file.name or Path(path).stem,
+        weights=tuple(file.weights),
+        tau_a=file.tau_a_s,
+        tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
+    )
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

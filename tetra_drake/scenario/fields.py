@@ -144,7 +144,7 @@ class Check:
         elif unit and not self.complete:
             wanted = f"a quantity that converts to {unit}"
             raise ValueError(f"found {found} without a unit, expected {wanted}")
-        elif kind is float and isinstance(value, str):  # YAML 1.1 takes 1e-3 for text
+        elif kind is float and isinstance(value, str) and "e" in value:  # YAML 1.1: 1e-3 is text
             with contextlib.suppress(ValueError):
                 value = float(value)
         if type(value) not in _SCALARS[kind][1:]:
