@@ -21,10 +21,7 @@ def run_small(tmp_path):
             record = RunRecord.create(directory, scenario=small_scenario(**options), seed=seed)
         with record:
             run_trials(
-                record,
-                evaluate=evaluate or Bowl(),
-                workers=workers,
-                executor=ThreadPoolExecutor,
+                record, evaluate=evaluate or Bowl(), workers=workers, executor=ThreadPoolExecutor
             )
         return directory
 

@@ -13,12 +13,7 @@ from helpers.analytic import Bowl, read_record, small_scenario
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers.base import Evaluation
-from tetra_drake.evolution.record import (
-    RunRecord,
-    TrialRecord,
-    evaluation_entry,
-    read_manifest,
-)
+from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, read_manifest
 from tetra_drake.results.result import versions
 
 
@@ -68,8 +63,7 @@ def test_a_directory_without_manifest_is_no_run(tmp_path, refused):
 
 
 @pytest.mark.parametrize(
-    ("key", "value"),
-    [("seed", "x"), ("schema", 3), ("versions", []), ("objective", 7)],
+    ("key", "value"), [("seed", "x"), ("schema", 3), ("versions", []), ("objective", 7)]
 )
 def test_a_damaged_manifest_is_reported(run_small, refused, key, value):
     run = run_small(population=4, iterations=1)
@@ -185,13 +179,7 @@ def test_a_damaged_line_is_reported(run_small, refused, line, content):
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [
-        ("genome", [2.0] * 26),
-        ("placed", 77),
-        ("index", 77),
-        ("fitness", "high"),
-        ("iteration", 3),
-    ],
+    [("genome", [2.0] * 26), ("placed", 77), ("index", 77), ("fitness", "high"), ("iteration", 3)],
 )
 def test_a_line_that_does_not_follow_is_reported(run_small, refused, key, value):
     run = run_small(trials=1)

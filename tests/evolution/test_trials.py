@@ -145,11 +145,7 @@ class RandomSearch:
 def test_another_optimiser_reports_its_own_numbers(tmp_path):
     with RunRecord.create(tmp_path / "run", scenario=small_scenario(), seed=2) as record:
         statuses = run_trials(
-            record,
-            evaluate=Bowl(),
-            workers=2,
-            executor=ThreadPoolExecutor,
-            optimizer=RandomSearch,
+            record, evaluate=Bowl(), workers=2, executor=ThreadPoolExecutor, optimizer=RandomSearch
         )
     assert [(status.evaluations, status.stop) for status in statuses] == [(8, "done")] * 2
     run = load_run(tmp_path / "run")

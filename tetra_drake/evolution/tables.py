@@ -135,13 +135,12 @@ def load_run(path: str | Path) -> Run:
     manifest = read_manifest(directory)
     evaluations = _table(directory, manifest, EVALUATIONS, _flat)
     iterations = _table(directory, manifest, ITERATIONS, dict)
-    return Run(
-        directory=directory,
-        manifest=manifest,
-        evaluations=evaluations,
-        iterations=_with_best_distance(iterations, evaluations),
-        reevaluations=_table(directory, manifest, REEVALUATIONS, _flat),
-    )
+    reevaluations = _table(directory, manifest, REEVALUATIONS, _flat)
+    if not iterations.empty:
+        distances = evaluations.set_index(["trial", "index"])["distance_in"].to_dict()
+        best = zip(iterations["trial"], iterations["best_evaluation"], strict=True)
+        iterations["best_distance_in"] = [distances.get(each, math.nan) for each in best]
+    return Run(directory, manifest, evaluations, iterations, reevaluations)
 
 
 def _table(
@@ -169,16 +168,3 @@ def _flat(entry: dict[str, Any]) -> dict[str, Any]:
     numbered = {f"weight_{i}": weight for i, weight in enumerate(weights, start=1)}
     inches = {"distance_in": metrics["distance"] / INCH}
     return plain | metrics | inches | numbered | {"tau_a_s": tau_a, "tau_b_s": tau_b}
-
-
-def _with_best_distance(
-    iterations: pandas.DataFrame, evaluations: pandas.DataFrame
-) -> pandas.DataFrame:
-    """The iterations with the distance of each one's best evaluation."""
-    if iterations.empty:
-        return iterations
-    found = evaluations[["trial", "index", "distance_in"]].rename(
-        columns={"index": "best_evaluation", "distance_in": "best_distance_in"}
-    )
-    found["best_evaluation"] = found["best_evaluation"].astype("Int64")
-    return iterations.merge(found, how="left", on=["trial", "best_evaluation"])
