@@ -1,12 +1,9 @@
 """Quantities derived from a trajectory, on walks of which everything is known."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-import xarray
 from helpers.made_up_walk import HEIGHT, PERIOD, SPEED, make_walk
 
 from tetra_drake.results.measures import (
@@ -21,18 +18,17 @@ from tetra_drake.results.measures import (
     shares_off_ground,
     signal_frequencies,
 )
-from tetra_drake.scenario.schema import Scenario
 
 TIMES = np.linspace(0.0, 15.0, 1501)
 UNEVEN = np.sort(np.concatenate([TIMES, np.linspace(4.0, 5.0, 37)]))
 
 
 @pytest.fixture(scope="module")
-def walk() -> xarray.Dataset:
+def walk():
     return make_walk()
 
 
-def test_distances(walk: xarray.Dataset, scenario: Scenario) -> None:
+def test_distances(walk, scenario):
     later = walk.sel(time=slice(1.0, None))
     np.testing.assert_allclose(distance_walked(later), SPEED * (later.time - 1.0), atol=1e-12)
     apart = relative_distances(walk)
@@ -41,19 +37,15 @@ def test_distances(walk: xarray.Dataset, scenario: Scenario) -> None:
     np.testing.assert_allclose(apart, expected, atol=1e-12)
 
 
-def test_a_tetrahedron_is_lifted_when_none_of_its_nodes_bears_a_force() -> None:
-    walk = make_walk(bodies=11)  # T1 and T11 begin alike
-    heights = walk.p_WN.sel(node="bottom_left", axis="z")
-    np.testing.assert_array_equal(lifted(walk), heights > 1e-9)
+def test_a_tetrahedron_is_lifted_when_none_of_its_nodes_bears_a_force(walk):
+    eleven = make_walk(bodies=11)  # T1 and T11 begin alike
+    heights = eleven.p_WN.sel(node="bottom_left", axis="z")
+    np.testing.assert_array_equal(lifted(eleven), heights > 1e-9)
     assert float(heights.max()) == pytest.approx(HEIGHT, rel=1e-3)
-
-
-def test_a_lead_that_stands_on_its_tip_is_not_lifted(walk: xarray.Dataset) -> None:
-    touching = walk.copy(deep=True)
-    touching.normal_force.loc[{"contact": "T5 tip"}] = 0.1
+    on_its_tip = walk.copy(deep=True)
+    on_its_tip.normal_force.loc[{"contact": "T5 tip"}] = 0.1
     assert lifted(walk).sel(tetrahedron="T5").any()
-    assert not lifted(touching).sel(tetrahedron="T5").any()
-    assert lifted(touching).sel(tetrahedron="T3").any()
+    assert not lifted(on_its_tip).sel(tetrahedron="T5").any()
 
 
 @pytest.mark.parametrize(
@@ -65,16 +57,14 @@ def test_a_lead_that_stands_on_its_tip_is_not_lifted(walk: xarray.Dataset) -> No
         ([0, 0, 0, 0, 0], []),
     ],
 )
-def test_intervals(active: list[int], expected: list[tuple[float, float]]) -> None:
-    times = np.array([0.0, 1.0, 2.0, 4.0, 8.0])
-    assert intervals(times, np.array(active, dtype=bool)) == expected
+def test_intervals(active, expected):
+    assert intervals(np.array([0.0, 1.0, 2.0, 4.0, 8.0]), np.array(active, dtype=bool)) == expected
 
 
-def test_shares_of_time(walk: xarray.Dataset) -> None:
-    periods = walk.sel(time=slice(0.0, 4 * PERIOD))
-    share = share_of_time(off_ground(periods).sel(contact="T1 bottom_left"))
-    assert share == pytest.approx(0.5, abs=0.01)
-    assert share_of_time(off_ground(periods).sel(contact="T5 tip")) == pytest.approx(1.0)
+def test_shares_of_time(walk):
+    off = off_ground(walk.sel(time=slice(0.0, 4 * PERIOD)))
+    assert share_of_time(off.sel(contact="T1 bottom_left")) == pytest.approx(0.5, abs=0.01)
+    assert share_of_time(off.sel(contact="T5 tip")) == pytest.approx(1.0)
     late = walk.copy(deep=True)
     late.normal_force[{"time": walk.time.values >= 8.0}] = 0.1
     assert shares_off_ground(late, since=8.0) == {f"T{i}": 0.0 for i in range(1, 6)}
@@ -83,7 +73,7 @@ def test_shares_of_time(walk: xarray.Dataset) -> None:
 
 @pytest.mark.parametrize("times", [TIMES, UNEVEN], ids=["even", "uneven"])
 @pytest.mark.parametrize("hertz", [0.31, 0.53, 0.8])
-def test_the_frequency_is_that_of_the_strongest_sine(hertz: float, times: np.ndarray) -> None:
+def test_the_frequency_is_that_of_the_strongest_sine(hertz, times):
     phase = 2.0 * np.pi * hertz * times
     assert dominant_frequency(times, 3.0 + np.sin(phase)) == pytest.approx(hertz, abs=0.003)
     both = np.sin(phase) + 0.8 * np.sin(2.0 * phase)
@@ -91,27 +81,20 @@ def test_the_frequency_is_that_of_the_strongest_sine(hertz: float, times: np.nda
 
 
 @pytest.mark.parametrize("signal", [0.0 * TIMES, 0.7 + 0.0 * TIMES, 1.0 + 1e-9 * np.sin(TIMES)])
-def test_a_constant_has_no_frequency(signal: np.ndarray) -> None:
+def test_a_constant_has_no_frequency(signal):
     assert math.isnan(dominant_frequency(TIMES, signal))
 
 
-def test_frequencies_of_the_signals(walk: xarray.Dataset) -> None:
-    frequencies = signal_frequencies(walk, since=1.0)
-    assert frequencies == dict.fromkeys(
-        ["T1-T2", "T2-T3", "T3-T4", "T4-T5"], pytest.approx(1.0 / PERIOD, abs=0.01)
-    )
+def test_frequencies_of_the_signals(walk):
+    frequency = pytest.approx(1.0 / PERIOD, abs=0.01)
+    expected = dict.fromkeys(["T1-T2", "T2-T3", "T3-T4", "T4-T5"], frequency)
+    assert signal_frequencies(walk, since=1.0) == expected
 
 
-def test_the_last_step_is_one_period_and_ends_late(walk: xarray.Dataset) -> None:
-    step = last_step(walk)
-    assert step is not None
-    start, end = step
+def test_the_last_step_is_one_period_and_ends_late(walk):
+    start, end = last_step(walk)
     assert end - start == pytest.approx(PERIOD, rel=0.03)
-    last = float(walk.time[-1])
-    assert last - PERIOD <= end <= last
-
-
-def test_without_two_periods_there_is_no_step(walk: xarray.Dataset) -> None:
-    assert last_step(walk.assign(signal=0.0 * walk.signal)) is None
-    assert last_step(walk.assign(signal=1.0 + 1e-9 * walk.signal)) is None
-    assert last_step(make_walk(duration=1.5)) is None
+    assert float(walk.time[-1]) - PERIOD <= end <= float(walk.time[-1])
+    for signal in (0.0 * walk.signal, 1.0 + 1e-9 * walk.signal):
+        assert last_step(walk.assign(signal=signal)) is None
+    assert last_step(make_walk(duration=1.5)) is None  # holds no two periods
