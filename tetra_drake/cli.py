@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import inspect
 import json
 import math
 import os
@@ -63,35 +64,17 @@ def make_parser() -> argparse.ArgumentParser:
     shtab.add_argument_to(parser, help="print a completion script for the shell: bash, zsh, tcsh")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
-    def add(name: str, run: Callable[[Options], None], what: str, description: str) -> Command:
-        command = commands.add_parser(name, help=what, description=description)
+    for run, add_options in _COMMANDS:
+        text = inspect.cleandoc(run.__doc__ or "")
+        what, _, description = text.partition("\n\n")
+        name = run.__name__.removeprefix("_")
+        command = commands.add_parser(name, help=what.rstrip("."), description=description)
+        add_options(command)
         command.set_defaults(run=run)
-        return command
-
-    _add_simulate(add)
-    _add_evolve(add)
-    _add_reevaluate(add)
-    _add_replay(add)
-    _add_figures(add)
-    _add_robustness(add)
-    _add_benchmark(add)
-    _add_cpg(add)
-    _add_diagram(add)
     return parser
 
 
-Add = Callable[[str, Callable[[Options], None], str, str], Command]
-
-
-def _add_simulate(add: Add) -> None:
-    command = add(
-        "simulate",
-        _simulate,
-        "simulate one gait",
-        "Simulates one gait, prints how far and how straight the robot walked, and writes "
-        "result.json (the numbers), trajectory.nc (motion and forces over time, for xarray), "
-        "replay.html (open it in a browser) and scenario.yaml (the scenario in full).",
-    )
+def _simulate_options(command: Command) -> None:
     _add_scenario(command)
     _add_gait(command)
     _add_engine(command)
@@ -105,6 +88,12 @@ def _add_simulate(add: Add) -> None:
 
 
 def _simulate(options: Options) -> None:
+    """Simulate one gait.
+
+    Simulates one gait, prints how far and how straight the robot walked, and writes result.json
+    (the numbers), trajectory.nc (motion and forces over time, for xarray), replay.html (open it
+    in a browser) and scenario.yaml (the scenario in full).
+    """
     from tetra_drake.engines.simulate import prepare, simulate
     from tetra_drake.results.folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.results.result import summary
@@ -133,16 +122,7 @@ def _simulate(options: Options) -> None:
             input("the browser repeats the motion; press Enter to end ")
 
 
-def _add_evolve(add: Add) -> None:
-    command = add(
-        "evolve",
-        _evolve,
-        "evolve gaits that walk far",
-        "Evolves gaits by the thesis's evolutionary algorithm, one simulation per candidate, and "
-        "records every evaluation in a run directory. Ctrl-C ends it; the same command with "
-        "--resume continues it. The result depends on scenario and seed only. At the end it writes "
-        "report.html, replay.html and figures/ into the run directory.",
-    )
+def _evolve_options(command: Command) -> None:
     _add_scenario(
         command,
         default=None,
@@ -164,6 +144,13 @@ def _add_evolve(add: Add) -> None:
 
 
 def _evolve(options: Options) -> None:
+    """Evolve gaits that walk far.
+
+    Evolves gaits by the thesis's evolutionary algorithm, one simulation per candidate, and
+    records every evaluation in a run directory. Ctrl-C ends it; the same command with --resume
+    continues it. The result depends on scenario and seed only. At the end it writes
+    report.html, replay.html and figures/ into the run directory.
+    """
     from tetra_drake.evolution.progress import make_progress
     from tetra_drake.evolution.summary import summary, whole_experiment
     from tetra_drake.run import evolve
@@ -201,16 +188,7 @@ def _scenario_to_evolve(options: Options) -> Scenario | None:
     return load_scenario(options.scenario or FIRST_SCENARIO).with_changes(changes)
 
 
-def _add_reevaluate(add: Add) -> None:
-    command = add(
-        "reevaluate",
-        _reevaluate,
-        "evaluate gaits of a run once more, on the Drake diagram",
-        "Evaluates gaits of a run made on another engine once more, on the Drake diagram, and adds "
-        "them to the run's record (reevaluations.jsonl of each trial): the best gaits of each "
-        "trial, which evolve itself does at its end, or all initial gaits. Gaits that have been "
-        "evaluated so already are skipped.",
-    )
+def _reevaluate_options(command: Command) -> None:
     _add_path(command, "run_directory", "RUN", "the run directory")
     command.add_argument(
         "--initial", action="store_true", help="the initial gaits instead of the best"
@@ -219,6 +197,13 @@ def _add_reevaluate(add: Add) -> None:
 
 
 def _reevaluate(options: Options) -> None:
+    """Evaluate gaits of a run once more, on the Drake diagram.
+
+    Evaluates gaits of a run made on another engine once more, on the Drake diagram, and adds
+    them to the run's record (reevaluations.jsonl of each trial): the best gaits of each trial,
+    which evolve itself does at its end, or all initial gaits. Gaits that have been evaluated so
+    already are skipped.
+    """
     from tetra_drake.evolution.progress import make_progress
     from tetra_drake.evolution.reevaluation import reevaluate
     from tetra_drake.evolution.summary import summary
@@ -233,15 +218,7 @@ def _reevaluate(options: Options) -> None:
     print(summary(run))
 
 
-def _add_replay(add: Add) -> None:
-    command = add(
-        "replay",
-        _replay,
-        "write a page that shows a gait in a browser",
-        "Writes one HTML page that shows the robot walking, in any browser, without server or "
-        "network: from the trajectory that `simulate` recorded, or by simulating a gait file, or "
-        "the best gait of a run of `evolve` on the run's scenario.",
-    )
+def _replay_options(command: Command) -> None:
     source = "a folder written by `simulate`, a gait file, or a folder written by `evolve`"
     _add_path(command, "source", "RESULT_DIR|GAIT|RUN_DIR", source)
     _add_scenario(command, default=None, note="thesis; for gait files only")
@@ -249,43 +226,39 @@ def _add_replay(add: Add) -> None:
 
 
 def _replay(options: Options) -> None:
+    """Write a page that shows a gait in a browser.
+
+    Writes one HTML page that shows the robot walking, in any browser, without server or
+    network: from the trajectory that `simulate` recorded, or by simulating a gait file, or the
+    best gait of a run of `evolve` on the run's scenario.
+    """
     from tetra_drake.report.replay_page import write_replay
 
     title = write_replay(options.source, options.out, scenario=options.scenario)
     print(f"{title}\nto watch the robot, open in a browser: {options.out}")
 
 
-def _add_figures(add: Add) -> None:
-    command = add(
-        "figures",
-        _figures,
-        "draw the figures of a run or a simulation",
-        "Draws figures as SVG and PNG, and the table of the two best gaits as CSV. For a run of "
-        "`evolve`, finished or not: into figures/ in its directory, where report.html and "
-        "replay.html are written anew, too. For a folder written by `simulate`: the figures of one "
-        "gait, into figures/ in it.",
-    )
+def _figures_options(command: Command) -> None:
     source = "a folder written by `evolve` or by `simulate`"
     _add_path(command, "source", "RUN_DIR|RESULT_DIR", source)
     _add_path(command, "--out", "DIR", "draw into this folder; leave the source as it is")
 
 
 def _figures(options: Options) -> None:
+    """Draw the figures of a run or a simulation.
+
+    Draws figures as SVG and PNG, and the table of the two best gaits as CSV. For a run of
+    `evolve`, finished or not: into figures/ in its directory, where report.html and replay.html
+    are written anew, too. For a folder written by `simulate`: the figures of one gait, into
+    figures/ in it.
+    """
     from tetra_drake.report.run_page import write_figures
 
     written = write_figures(options.source, options.out)
     print(f"wrote {', '.join(str(path) for path in written)}")
 
 
-def _add_robustness(add: Add) -> None:
-    command = add(
-        "robustness",
-        _robustness,
-        "simulate gaits with the robot or its surroundings slightly changed",
-        "Simulates a gait, or the best gait of each trial of a run, on the compiled engine with "
-        "starting pose, friction, cables and ground changed by a few percent, one at a time, and "
-        "prints how much that changes the distance.",
-    )
+def _robustness_options(command: Command) -> None:
     _add_path(command, "source", "GAIT|RUN", "a gait file, or a folder written by `evolve`")
     _add_scenario(command, default=None, note="the run's, thesis for a gait file")
     command.add_argument(
@@ -301,6 +274,12 @@ def _add_robustness(add: Add) -> None:
 
 
 def _robustness(options: Options) -> None:
+    """Simulate gaits with the robot or its surroundings slightly changed.
+
+    Simulates a gait, or the best gait of each trial of a run, on the compiled engine with
+    starting pose, friction, cables and ground changed by a few percent, one at a time, and
+    prints how much that changes the distance.
+    """
     from tetra_drake.engines.simulate import prepare
     from tetra_drake.evolution.robustness import describe, gaits_of, robustness, save_table
 
@@ -314,16 +293,7 @@ def _robustness(options: Options) -> None:
         print(f"wrote {options.out}")
 
 
-def _add_benchmark(add: Add) -> None:
-    command = add(
-        "benchmark",
-        _benchmark,
-        "measure speed and accuracy of the engines and their settings",
-        "Simulates gaits on the engines with different settings and prints how many times faster "
-        "than real time each is, the errors of its distances against converged ones, and the "
-        "compiled engine's cost per step by number of tetrahedra. Takes some minutes; the set "
-        "integrators takes longer. Times are meaningful on an idle machine only.",
-    )
+def _benchmark_options(command: Command) -> None:
     _add_path(command, "gaits", "GAIT", "gait files (default: random gaits)", nargs="*")
     gaits = f"number of random gaits, of seeds 0, 1 ... (default: {BENCHMARK_GAITS})"
     _add_count(command, "--gaits", gaits, dest="number")
@@ -346,6 +316,13 @@ def _add_benchmark(add: Add) -> None:
 
 
 def _benchmark(options: Options) -> None:
+    """Measure speed and accuracy of the engines and their settings.
+
+    Simulates gaits on the engines with different settings and prints how many times faster than
+    real time each is, the errors of its distances against converged ones, and the compiled
+    engine's cost per step by number of tetrahedra. Takes some minutes; the set integrators
+    takes longer. Times are meaningful on an idle machine only.
+    """
     scenario = load_scenario(options.scenario)
     if options.gaits and options.number is not None:
         raise InputError("--gaits", "", "not allowed with gait files")
@@ -368,16 +345,7 @@ def _benchmark(options: Options) -> None:
             file.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _add_cpg(add: Add) -> None:
-    command = add(
-        "cpg",
-        _cpg,
-        "write the oscillator signals of a gait to a CSV file",
-        "Writes the signals that the cables of a gait are fed: time_s, signal_1, signal_2 ..., a "
-        "column per junction, from 0 to the scenario's duration, zero before the start-up time. A "
-        "positive signal shortens the two bottom outer cables of its junction. The file's first "
-        "lines, which begin with #, say what each column is.",
-    )
+def _cpg_options(command: Command) -> None:
     _add_scenario(command)
     _add_gait(command)
     _add_path(command, "--out", "FILE", "the CSV file to write", required=True)
@@ -399,6 +367,13 @@ def _add_cpg(add: Add) -> None:
 
 
 def _cpg(options: Options) -> None:
+    """Write the oscillator signals of a gait to a CSV file.
+
+    Writes the signals that the cables of a gait are fed: time_s, signal_1, signal_2 ..., a
+    column per junction, from 0 to the scenario's duration, zero before the start-up time. A
+    positive signal shortens the two bottom outer cables of its junction. The file's first
+    lines, which begin with #, say what each column is.
+    """
     from tetra_drake.robot.signals import save_signals
 
     scenario = load_scenario(options.scenario)
@@ -408,19 +383,17 @@ def _cpg(options: Options) -> None:
     save_signals(options.out, scenario, gait, unit=options.unit, rate=options.rate, raw=options.raw)
 
 
-def _add_diagram(add: Add) -> None:
-    command = add(
-        "diagram",
-        _diagram,
-        "draw the block diagram",
-        "Draws the block diagram of the robot. FILE.dot is Graphviz source; .svg, .png and .pdf "
-        "are drawn by Graphviz's program `dot`, which must be installed.",
-    )
+def _diagram_options(command: Command) -> None:
     _add_scenario(command)
     _add_path(command, "--out", "FILE", "the file to write", required=True)
 
 
 def _diagram(options: Options) -> None:
+    """Draw the block diagram.
+
+    Draws the block diagram of the robot. FILE.dot is Graphviz source; .svg, .png and .pdf are
+    drawn by Graphviz's program `dot`, which must be installed.
+    """
     from tetra_drake.figures.block_diagram import save_block_diagram
     from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -500,3 +473,17 @@ def _positive(text: str) -> float:
 
 def _say(text: str) -> None:
     print(text, flush=True)
+
+
+_COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ...] = (
+    (_simulate, _simulate_options),
+    (_evolve, _evolve_options),
+    (_reevaluate, _reevaluate_options),
+    (_replay, _replay_options),
+    (_figures, _figures_options),
+    (_robustness, _robustness_options),
+    (_benchmark, _benchmark_options),
+    (_cpg, _cpg_options),
+    (_diagram, _diagram_options),
+)
+"""Each command, whose docstring is its help, and what adds its options."""
