@@ -6,7 +6,8 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.physics.cable import cable_forces, cable_tension
+from tetra_drake.physics.cable import add_cable_forces, cable_tension
+from tetra_drake.physics.kinematics import gather_forces, move_nodes
 from tetra_drake.robot.bodies import AddTetrahedra
 from tetra_drake.robot.structure import Structure, node_positions, node_velocities
 
@@ -21,10 +22,9 @@ def forces_of_cables(
     structure: Structure, state: np.ndarray, *signals: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The generalized force and the tensions."""
-    force, tensions, lengths = np.empty(30), np.empty(24), np.empty(24)
-    driven = np.array(signals)
-    cable_forces(state, driven, structure.p_BN, structure.cables, False, force, tensions, lengths)
-    return force, tensions
+    nodes = move_nodes(state, structure.p_BN)
+    tensions, _ = add_cable_forces(nodes, np.array(signals), structure.cables, False)
+    return gather_forces(nodes, 5), tensions
 
 
 def test_tension_is_equation_6() -> None:

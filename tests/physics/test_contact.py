@@ -10,37 +10,40 @@ from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.physics.contact import (
     CONTACT,
+    GROUND,
     MODE,
     MODE_COLUMNS,
+    STICK,
     STICK_POINT,
+    add_ground_forces,
     first_zero,
-    ground_forces,
+    friction_force,
     mode_margin,
+    next_friction_mode,
     normal_force,
     time_to_mode_change,
     update_modes,
 )
-from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
-from tetra_drake.physics.kinematics import node_motion
+from tetra_drake.physics.kinematics import FORCE, move_nodes
 from tetra_drake.robot.model import ground_law
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
 
 P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0
-FRICTION = (P0, SIGMA_1, A_C, SIGMA_0)
+LAW = np.array([(4000.0, 2e5, P0, SIGMA_1, A_C, SIGMA_0)], dtype=GROUND)[0]
 
 
 def test_normal_force_is_equation_1() -> None:
     # k d + lambda d dd/dt = 4000*1e-3 + 2e5*1e-3*0.01 = 4 + 2; 4 - 6 < 0: it does not pull.
-    assert normal_force(1e-3, 0.01, 4000.0, 2e5) == pytest.approx(6.0, rel=1e-14)
-    assert normal_force(1e-3, -0.03, 4000.0, 2e5) == 0.0
+    assert normal_force(1e-3, 0.01, LAW) == pytest.approx(6.0, rel=1e-14)
+    assert normal_force(1e-3, -0.03, LAW) == 0.0
 
 
 @pytest.mark.parametrize("velocity", [-0.02, 0.02])
 @pytest.mark.parametrize("mode", [-1.0, 1.0])
 def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity: float, mode: float) -> None:
     # F = -s0 abs(v) x with x held at +-p0: it opposes a slip in the direction of `mode`.
-    force = friction_force(velocity, 12.3, mode, *FRICTION)
+    force = friction_force(velocity, 12.3, mode, LAW)
     assert force == pytest.approx(-mode * SIGMA_0 * 0.02 * P0, rel=1e-14)
 
 
@@ -48,7 +51,7 @@ def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity: float, m
 @pytest.mark.parametrize("x", [0.5 * P0, -0.9 * P0])
 def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity: float, x: float) -> None:
     expected = -(SIGMA_0 * 0.02 * (1.0 + A_C) * x + SIGMA_1 * velocity)
-    assert friction_force(velocity, x, STICK, *FRICTION) == pytest.approx(expected, rel=1e-14)
+    assert friction_force(velocity, x, STICK, LAW) == pytest.approx(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -89,13 +92,13 @@ class Ground:
         state[38::6] = v_x
         return state
 
-    def motion(self, **change: float) -> np.ndarray:
-        """Of the nodes, in that state."""
-        return node_motion(self.state(**change), self.structure.p_BN)
+    def nodes(self, **change: float) -> np.ndarray:
+        """The nodes in that state."""
+        return move_nodes(self.state(**change), self.structure.p_BN)
 
     def update(self, **change: float) -> np.ndarray:
         """The modes updated in that state."""
-        update_modes(self.motion(**change), *self.args, self.modes)
+        update_modes(self.nodes(**change), *self.args, self.modes)
         return self.modes
 
 
@@ -130,10 +133,9 @@ def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground: Ground) 
     ground.modes[:, CONTACT] = ground.modes[:, MODE] = 1.0
     modes = ground.update(z=1e-3, v_x=0.1)
     assert not modes[:, : MODE + 2].any()
-    flying, p_BN = ground.state(z=1e-3, v_x=0.1), ground.structure.p_BN
-    force, normal, friction = np.empty(30), np.empty(11), np.empty((11, 2))
-    ground_forces(flying, modes, p_BN, *ground.args, force, normal, friction)
-    assert not force.any() and not normal.any() and not friction.any()
+    nodes = ground.nodes(z=1e-3, v_x=0.1)
+    assert not add_ground_forces(nodes, modes, *ground.args).any()
+    assert not nodes[:, FORCE:].any()
 
 
 def test_the_margin_crosses_zero_at_a_mode_change(ground: Ground) -> None:
@@ -141,7 +143,7 @@ def test_the_margin_crosses_zero_at_a_mode_change(ground: Ground) -> None:
     modes = ground.update(z=-1e-4)
 
     def margin(x: float = 0.0, z: float = -1e-4) -> float:
-        return mode_margin(ground.motion(x=x, z=z), modes, *ground.args)
+        return mode_margin(ground.nodes(x=x, z=z), modes, *ground.args)
 
     assert margin(x=0.9 * p0) > 0.0 > margin(x=1.1 * p0)
     assert margin(z=-1e-6) > 0.0 > margin(z=1e-6)
@@ -178,9 +180,9 @@ def test_a_mode_change_is_foreseen_when_it_comes(
     ground: Ground, v_x: float, upward: float, expected: float
 ) -> None:
     modes = ground.update(z=-1e-4)
-    state, motion = ground.state(z=-1e-4, v_x=v_x), ground.motion(z=-1e-4, v_x=v_x)
+    state, nodes = ground.state(z=-1e-4, v_x=v_x), ground.nodes(z=-1e-4, v_x=v_x)
     acceleration = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, upward], 5)
-    time = time_to_mode_change(state, acceleration, motion, modes, *ground.args, 1.0)
+    time = time_to_mode_change(state, acceleration, nodes, modes, *ground.args, 1.0)
     assert time == pytest.approx(expected, rel=1e-9)
 
 
@@ -212,5 +214,5 @@ def test_normal_force_is_drakes_hunt_crossley_point_contact(
     state = np.array([1.0, 0, 0, 0, 0, 0, radius - depth, 0, 0, 0, 0, 0, -rate])
     plant.GetMyMutableContextFromRoot(context).SetContinuousState(state)
     force = mass * diagram.EvalTimeDerivatives(context).CopyToVector()[12]
-    expected = normal_force(depth, rate, ground.stiffness, ground.damping)
+    expected = normal_force(depth, rate, ground_law(ground, scenario.friction)[0])
     assert force == pytest.approx(expected, rel=1e-9, abs=1e-12)

@@ -18,7 +18,8 @@ import numpy as np
 
 from tetra_drake.engines.viewer import Viewer, show_recording
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
-from tetra_drake.physics.cable import PASSIVE, cable_forces
+from tetra_drake.physics.cable import PASSIVE, add_cable_forces
+from tetra_drake.physics.kinematics import move_nodes
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
@@ -170,12 +171,11 @@ class _Robot:
 
     def dataset(self, times: Array, found: Array) -> xarray.Dataset:
         """The trajectory: MuJoCo's states at `times` (s), and the forces there."""
-        structure, rows = self.structure, len(times)
+        structure = self.structure
         states, signals = self.states(found), self._signals(times)
-        tensions, lengths = np.empty((2, rows, len(structure.cables)))
-        laws, force = (structure.p_BN, structure.cables, False), np.empty(6 * len(structure.bodies))
-        for i in range(rows):
-            cable_forces(states[i], signals[i], *laws, force, tensions[i], lengths[i])
+        nodes = [move_nodes(state, structure.p_BN) for state in states]
+        pulls = zip(nodes, signals, strict=True)
+        cables = np.array([add_cable_forces(*pull, structure.cables, False) for pull in pulls])
         ground = np.array([self._ground_forces(*row) for row in zip(found, signals, strict=True)])
         modes = np.zeros_like(ground)  # of friction: 0, as MuJoCo's has none
         modes[:, :, 0] = ground[:, :, 2] > 0.0
@@ -184,8 +184,8 @@ class _Robot:
             times=times,
             states=states,
             signals=signals,
-            tensions=tensions,
-            lengths=lengths,
+            tensions=cables[:, 0],
+            lengths=cables[:, 1],
             normal_forces=ground[:, :, 2],
             friction_forces=ground[:, :, :2],
             modes=modes,

@@ -98,7 +98,6 @@ def _between(before: Sample, after: Sample, time: float) -> Sample:
         return after
     step = after.time - before.time
     part = (time - before.time) / step
-    state = np.empty_like(after.state)
-    interpolate_state(before.state, after.state, step, part, state)
+    state = interpolate_state(before.state, after.state, step, part)
     misc = before.misc + part * (after.misc - before.misc)
     return Sample(time=time, state=state, misc=misc, discrete=after.discrete)

@@ -29,7 +29,9 @@ def compiled(function: F, *, nogil: bool = False) -> F:
     if not hasattr(kernel, "_cache"):  # compilation is switched off (NUMBA_DISABLE_JIT)
         return cast(F, kernel)
     # Numba looks for changes in the kernel's own file only; what it calls is compiled into it.
-    kernel._cache._cache_file._source_stamp = source_stamp(inspect.getfile(function))
+    # Its version is compared before signatures are unpickled, whose classes may be gone.
+    file, stamp = kernel._cache._cache_file, source_stamp(inspect.getfile(function))
+    file._source_stamp, file._version = stamp, f"{file._version} {stamp}"
     return cast(F, kernel)
 
 

@@ -1,4 +1,4 @@
-"""Ground contact: normal force (Eq. 1), contact and friction modes of the contact nodes.
+"""Ground contact: normal force (Eq. 1), reset-integrator friction (Eq. 3-5), and their modes.
 
 What a contact node remembers is a row of `modes`, (contacts, 5): whether it touches the
 ground, per horizontal axis its friction mode (STICK, or the sign of the direction it slips
@@ -8,24 +8,28 @@ in), and per axis the stick point: where its bristle deflection is zero.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
 from tetra_drake.physics.kinematics import (
-    P_BN_W,
+    FORCE,
     P_WN,
     V_WN,
     gather_forces,
+    move_nodes,
     node_acceleration,
-    node_motion,
 )
 
 Array = np.ndarray
 
 CONTACT, MODE, STICK_POINT, MODE_COLUMNS = 0, 1, 3, 5
 """Columns of `modes`: contact (0 or 1), mode (x, y), stick point (x, y) in m; and their number."""
+
+STICK = 0.0
+"""The friction mode of an axis that sticks; +1 or -1 slips in that direction."""
+
 
 GROUND = np.dtype(
     [
@@ -37,101 +41,95 @@ GROUND = np.dtype(
         ("proportional_stiction", np.float64),
     ]
 )
-"""The constants of Tables 1 and 2 in SI units; kernels take an array of one of these."""
+"""The constants of the ground's laws (Tables 1 and 2) in SI units: `law` is one of these, `ground`
+an array of one."""
 
 
 @compiled
-def normal_force(depth: float, depth_rate: float, stiffness: float, damping: float) -> float:
+def normal_force(depth: float, depth_rate: float, law: Any) -> float:
     """Upward force (N) on a node `depth` (m) below the ground, sinking at `depth_rate` (m/s).
 
     Eq. 1 with n = 1; the ground never pulls.
     """
     if depth <= 0.0:
         return 0.0
-    return max(0.0, stiffness * depth + damping * depth * depth_rate)
+    return max(0.0, law.stiffness * depth + law.damping * depth * depth_rate)
 
 
 @compiled
-def add_ground_forces(
-    motion: Array,
-    modes: Array,
-    contacts: Array,
-    ground: Array,
-    node_force: Array,
-    normal: Array,
-    friction: Array,
-) -> None:
-    """Adds the forces of the ground to those at the nodes.
+def friction_force(velocity: float, deflection: float, mode: float, law: Any) -> float:
+    """Friction (N) along one horizontal axis of a node on the ground (Eq. 3-5).
 
-    Args:
-        motion: (nodes, MOTION_COLUMNS) of `kinematics`.
-        modes: (contacts, MODE_COLUMNS).
-        contacts: (contacts,), the indices of the nodes that may touch the ground.
-        ground: (1,) of dtype GROUND.
-        node_force: (nodes, 3), added to, in N.
-        normal: (contacts,), written, in N.
-        friction: (contacts, 2), written, along x and y in N.
+    `velocity` (m/s) is along the axis and `deflection` (m) from the stick point; in slip
+    the deflection is held at the stiction range, on the side the node slips to.
     """
-    law = ground[0]
+    sigma_0 = law.proportional_stiction * abs(velocity)
+    if mode == STICK:
+        bristle = sigma_0 * (1.0 + law.stiction_switch) * deflection
+        return -(bristle + law.stiction_damping * velocity)
+    return -sigma_0 * law.stiction_range * mode
+
+
+@compiled
+def next_friction_mode(
+    velocity: float, deflection: float, mode: float, stiction_range: float
+) -> float:
+    """The mode that follows `mode`: breaks free at the stiction range moving outward,
+    sticks again when the velocity changes sign."""
+    if mode == STICK:
+        if deflection >= stiction_range and velocity > 0.0:
+            return 1.0
+        if deflection <= -stiction_range and velocity < 0.0:
+            return -1.0
+        return STICK
+    return mode if mode * velocity > 0.0 else STICK
+
+
+@compiled
+def add_ground_forces(nodes: Array, modes: Array, contacts: Array, ground: Array) -> Array:
+    """Adds the forces of the ground to those on the `nodes` of `kinematics`.
+
+    `contacts`, (contacts,), are the indices of the nodes that may touch the ground; `modes` is
+    (contacts, MODE_COLUMNS), `ground` (1,) of dtype GROUND. Returns the forces on the contact
+    nodes, (contacts, 3): friction along x and y, normal force.
+    """
+    law, forces = ground[0], np.zeros((contacts.size, 3))
     for i in range(contacts.size):
         node = contacts[i]
-        normal[i] = normal_force(
-            -motion[node, P_WN + 2], -motion[node, V_WN + 2], law.stiffness, law.damping
-        )
-        node_force[node, 2] += normal[i]
+        forces[i, 2] = normal_force(-nodes[node, P_WN + 2], -nodes[node, V_WN + 2], law)
+        nodes[node, FORCE + 2] += forces[i, 2]
+        if modes[i, CONTACT] == 0.0:
+            continue
         for axis in range(2):
-            friction[i, axis] = 0.0
-            if modes[i, CONTACT] != 0.0:
-                friction[i, axis] = friction_force(
-                    motion[node, V_WN + axis],
-                    motion[node, P_WN + axis] - modes[i, STICK_POINT + axis],
-                    modes[i, MODE + axis],
-                    law.stiction_range,
-                    law.stiction_damping,
-                    law.stiction_switch,
-                    law.proportional_stiction,
-                )
-                node_force[node, axis] += friction[i, axis]
+            deflection = nodes[node, P_WN + axis] - modes[i, STICK_POINT + axis]
+            velocity, mode = nodes[node, V_WN + axis], modes[i, MODE + axis]
+            forces[i, axis] = friction_force(velocity, deflection, mode, law)
+            nodes[node, FORCE + axis] += forces[i, axis]
+    return forces
 
 
 @compiled
 def ground_forces(
-    state: Array,
-    modes: Array,
-    p_BN: Array,
-    contacts: Array,
-    ground: Array,
-    generalized_force: Array,
-    normal: Array,
-    friction: Array,
+    state: Array, modes: Array, p_BN: Array, contacts: Array, ground: Array, generalized: Array
 ) -> None:
-    """Forces of the ground on the bodies.
-
-    Args:
-        state: [q; v] of the bodies, 13 numbers a body.
-        p_BN: (nodes a body, 3), in m.
-        generalized_force: (6 bodies,), written, [t_W; f_W] at each Bo.
-        modes, contacts, ground, normal, friction: as in `add_ground_forces`.
-    """
-    motion = node_motion(state, p_BN)
-    node_force = np.zeros((motion.shape[0], 3))
-    add_ground_forces(motion, modes, contacts, ground, node_force, normal, friction)
-    gather_forces(motion, node_force, generalized_force)
+    """Writes [t_W; f_W] of the ground at each Bo, (6 bodies,), for a state of the bodies."""
+    nodes = move_nodes(state, p_BN)
+    add_ground_forces(nodes, modes, contacts, ground)
+    generalized[:] = gather_forces(nodes, state.size // 13)
 
 
 @compiled
-def update_modes(motion: Array, contacts: Array, ground: Array, modes: Array) -> bool:
-    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with `motion`; whether they changed.
+def update_modes(nodes: Array, contacts: Array, ground: Array, modes: Array) -> bool:
+    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with `nodes`; whether they changed.
 
     A node that lands sticks where it lands; one that sticks again does so where it is
     (the reset of the integrator). The arguments are those of `add_ground_forces`.
     """
-    stiction_range = ground[0].stiction_range
     changed = False
     for i in range(contacts.size):
         node = contacts[i]
         touched = modes[i, CONTACT] != 0.0
-        touches = motion[node, P_WN + 2] <= 0.0
+        touches = nodes[node, P_WN + 2] <= 0.0
         if not (touched or touches):
             continue
         if touched != touches:
@@ -140,11 +138,11 @@ def update_modes(motion: Array, contacts: Array, ground: Array, modes: Array) ->
         for axis in range(2):
             before = modes[i, MODE + axis]
             after = STICK
-            position = motion[node, P_WN + axis]
+            position = nodes[node, P_WN + axis]
             if touched and touches:
                 deflection = position - modes[i, STICK_POINT + axis]
-                velocity = motion[node, V_WN + axis]
-                after = next_friction_mode(velocity, deflection, before, stiction_range)
+                velocity = nodes[node, V_WN + axis]
+                after = next_friction_mode(velocity, deflection, before, ground[0].stiction_range)
             if after == STICK and (before != STICK or not touched):
                 modes[i, STICK_POINT + axis] = position
             if after != before:
@@ -154,7 +152,7 @@ def update_modes(motion: Array, contacts: Array, ground: Array, modes: Array) ->
 
 
 @compiled
-def mode_margin(motion: Array, modes: Array, contacts: Array, ground: Array) -> float:
+def mode_margin(nodes: Array, modes: Array, contacts: Array, ground: Array) -> float:
     """Positive while no mode is due to change; crosses zero where the first one is.
 
     The least of: height in the air, depth on the ground (m), stiction range less deflection
@@ -164,16 +162,16 @@ def mode_margin(motion: Array, modes: Array, contacts: Array, ground: Array) -> 
     for i in range(contacts.size):
         node = contacts[i]
         if modes[i, CONTACT] == 0.0:
-            margin = min(margin, motion[node, P_WN + 2])
+            margin = min(margin, nodes[node, P_WN + 2])
             continue
-        margin = min(margin, -motion[node, P_WN + 2])
+        margin = min(margin, -nodes[node, P_WN + 2])
         for axis in range(2):
             mode = modes[i, MODE + axis]
             if mode == STICK:
-                deflection = motion[node, P_WN + axis] - modes[i, STICK_POINT + axis]
+                deflection = nodes[node, P_WN + axis] - modes[i, STICK_POINT + axis]
                 margin = min(margin, ground[0].stiction_range - abs(deflection))
             else:
-                margin = min(margin, mode * motion[node, V_WN + axis])
+                margin = min(margin, mode * nodes[node, V_WN + axis])
     return margin
 
 
@@ -200,38 +198,34 @@ def first_zero(value: float, rate: float, rate_rate: float, horizon: float) -> f
 def time_to_mode_change(
     state: Array,
     acceleration: Array,
-    motion: Array,
+    nodes: Array,
     modes: Array,
     contacts: Array,
     ground: Array,
     horizon: float,
 ) -> float:
-    """Time (s) to the next mode change, extrapolating with constant node accelerations.
+    """Time (s) to the next mode change, at most `horizon`, at constant node accelerations.
 
-    `acceleration` is dv/dt, 6 numbers a body; no answer exceeds `horizon` (s). `motion`
-    belongs to `state`. The other arguments are those of `add_ground_forces`.
+    `acceleration` is dv/dt, 6 numbers a body, and `nodes` that of `state`; the other arguments
+    are those of `add_ground_forces`.
     """
-    nodes_a_body = motion.shape[0] // (state.size // 13)
-    stiction_range = ground[0].stiction_range
     time = horizon
     for i in range(contacts.size):
         node = contacts[i]
-        a_WN = node_acceleration(
-            state, acceleration, node // nodes_a_body, motion[node, P_BN_W : P_BN_W + 3]
-        )
-        p_z, v_z, a_z = motion[node, P_WN + 2], motion[node, V_WN + 2], a_WN[2]
+        a_WN = node_acceleration(state, acceleration, nodes, node)
+        p_z, v_z, a_z = nodes[node, P_WN + 2], nodes[node, V_WN + 2], a_WN[2]
         if modes[i, CONTACT] == 0.0:
             time = min(time, first_zero(p_z, v_z, a_z, horizon))
             continue
         time = min(time, first_zero(-p_z, -v_z, -a_z, horizon))
         for axis in range(2):
-            velocity = motion[node, V_WN + axis]
+            velocity = nodes[node, V_WN + axis]
             mode = modes[i, MODE + axis]
             if mode == STICK:
-                x = motion[node, P_WN + axis] - modes[i, STICK_POINT + axis]
+                x = nodes[node, P_WN + axis] - modes[i, STICK_POINT + axis]
                 a = a_WN[axis]
-                time = min(time, first_zero(stiction_range - x, -velocity, -a, horizon))
-                time = min(time, first_zero(stiction_range + x, velocity, a, horizon))
+                time = min(time, first_zero(ground[0].stiction_range - x, -velocity, -a, horizon))
+                time = min(time, first_zero(ground[0].stiction_range + x, velocity, a, horizon))
             else:
                 time = min(time, first_zero(mode * velocity, mode * a_WN[axis], 0.0, horizon))
     return time

@@ -8,23 +8,22 @@ from tetra_drake.physics.compiling import compiled
 
 Array = np.ndarray
 
-
-P_BN_W, P_WN, V_WN, MOTION_COLUMNS = 0, 3, 6, 9
-"""Columns of `motion`, (nodes, 9), a row a node: the vectors from body origin to node (m),
-its position (m) and velocity (m/s), all in World; and their number. Nodes run body by body."""
+P_BN_W, P_WN, V_WN, FORCE, NODE_COLUMNS = 0, 3, 6, 9, 12
+"""Columns of `nodes`, (nodes, 12), a row a node: the vector from the body's origin to the node (m),
+its position (m), its velocity (m/s), the force on it (N), all in World; and their number. Nodes
+run body by body."""
 
 
 @compiled
-def move_nodes(state: Array, p_BN: Array, motion: Array) -> None:
-    """Moves the body-fixed nodes with their bodies.
+def move_nodes(state: Array, p_BN: Array) -> Array:
+    """The `nodes`, fixed to the bodies, without forces.
 
-    Args:
-        state: [q; v] of the bodies, 13 numbers a body.
-        p_BN: (nodes a body, 3), the same for every body, in m.
-        motion: (nodes, MOTION_COLUMNS), written.
+    `state` is [q; v] of the bodies, 13 numbers a body; `p_BN`, (nodes a body, 3) in m, is the same
+    for every body.
     """
     bodies = state.size // 13
-    nodes = p_BN.shape[0]
+    per_body = p_BN.shape[0]
+    nodes = np.zeros((per_body * bodies, NODE_COLUMNS))
     for body in range(bodies):
         q = 7 * body
         v = 7 * bodies + 6 * body
@@ -34,43 +33,35 @@ def move_nodes(state: Array, p_BN: Array, motion: Array) -> None:
         r_10, r_11, r_12 = s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)
         r_20, r_21, r_22 = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
         w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
-        for k in range(nodes):
+        for k in range(per_body):
             a, b, c = p_BN[k, 0], p_BN[k, 1], p_BN[k, 2]
             p_x = r_00 * a + r_01 * b + r_02 * c
             p_y = r_10 * a + r_11 * b + r_12 * c
             p_z = r_20 * a + r_21 * b + r_22 * c
-            node = nodes * body + k
-            motion[node, P_BN_W] = p_x
-            motion[node, P_BN_W + 1] = p_y
-            motion[node, P_BN_W + 2] = p_z
-            motion[node, P_WN] = state[q + 4] + p_x
-            motion[node, P_WN + 1] = state[q + 5] + p_y
-            motion[node, P_WN + 2] = state[q + 6] + p_z
-            motion[node, V_WN] = state[v + 3] + w_y * p_z - w_z * p_y
-            motion[node, V_WN + 1] = state[v + 4] + w_z * p_x - w_x * p_z
-            motion[node, V_WN + 2] = state[v + 5] + w_x * p_y - w_y * p_x
-
-
-@compiled
-def node_motion(state: Array, p_BN: Array) -> Array:
-    """The `motion` of the nodes in a new array; the arguments are those of `move_nodes`."""
-    motion = np.empty((p_BN.shape[0] * (state.size // 13), MOTION_COLUMNS))
-    move_nodes(state, p_BN, motion)
-    return motion
+            node = per_body * body + k
+            nodes[node, P_BN_W] = p_x
+            nodes[node, P_BN_W + 1] = p_y
+            nodes[node, P_BN_W + 2] = p_z
+            nodes[node, P_WN] = state[q + 4] + p_x
+            nodes[node, P_WN + 1] = state[q + 5] + p_y
+            nodes[node, P_WN + 2] = state[q + 6] + p_z
+            nodes[node, V_WN] = state[v + 3] + w_y * p_z - w_z * p_y
+            nodes[node, V_WN + 1] = state[v + 4] + w_z * p_x - w_x * p_z
+            nodes[node, V_WN + 2] = state[v + 5] + w_x * p_y - w_y * p_x
+    return nodes
 
 
 @compiled
 def node_acceleration(
-    state: Array, acceleration: Array, body: int, p_BN_W: Array
+    state: Array, acceleration: Array, nodes: Array, node: int
 ) -> tuple[float, float, float]:
-    """Acceleration (m/s²) in World of the node at `p_BN_W` (3,) on `body`.
-
-    `acceleration` is dv/dt of the bodies, 6 numbers a body.
-    """
-    v = 7 * (state.size // 13) + 6 * body
+    """Acceleration (m/s²) of a node in World from dv/dt of the bodies, 6 numbers a body."""
+    bodies = state.size // 13
+    body = node // (nodes.shape[0] // bodies)
+    v = 7 * bodies + 6 * body
     a = 6 * body
     w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
-    p_x, p_y, p_z = p_BN_W[0], p_BN_W[1], p_BN_W[2]
+    p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     u_x = w_y * p_z - w_z * p_y
     u_y = w_z * p_x - w_x * p_z
     u_z = w_x * p_y - w_y * p_x
@@ -83,19 +74,16 @@ def node_acceleration(
 
 
 @compiled
-def gather_forces(motion: Array, node_force: Array, generalized_force: Array) -> None:
-    """Sums forces at the nodes, (nodes, 3) in World (N), body by body.
-
-    `generalized_force`, (6 bodies,), is written: [t_W; f_W] at each Bo, as Drake's
-    applied_generalized_force port wants them.
-    """
-    bodies = generalized_force.size // 6
-    nodes = motion.shape[0] // bodies
+def gather_forces(nodes: Array, bodies: int) -> Array:
+    """The forces on the nodes as [t_W; f_W] at each Bo, (6 bodies,): Drake's
+    applied_generalized_force."""
+    per_body = nodes.shape[0] // bodies
+    generalized_force = np.empty(6 * bodies)
     for body in range(bodies):
         t_x = t_y = t_z = f_x = f_y = f_z = 0.0
-        for node in range(nodes * body, nodes * (body + 1)):
-            p_x, p_y, p_z = motion[node, P_BN_W], motion[node, P_BN_W + 1], motion[node, P_BN_W + 2]
-            x, y, z = node_force[node, 0], node_force[node, 1], node_force[node, 2]
+        for node in range(per_body * body, per_body * (body + 1)):
+            p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
+            x, y, z = nodes[node, FORCE], nodes[node, FORCE + 1], nodes[node, FORCE + 2]
             t_x += p_y * z - p_z * y
             t_y += p_z * x - p_x * z
             t_z += p_x * y - p_y * x
@@ -109,21 +97,20 @@ def gather_forces(motion: Array, node_force: Array, generalized_force: Array) ->
         generalized_force[g + 3] = f_x
         generalized_force[g + 4] = f_y
         generalized_force[g + 5] = f_z
+    return generalized_force
 
 
 @compiled
-def interpolate_state(
-    before: Array, after: Array, step: float, part: float, between: Array
-) -> None:
+def interpolate_state(before: Array, after: Array, step: float, part: float) -> Array:
     """A state (13 bodies,) within a step, at `part` (0 to 1) of its length `step` (s).
 
     Positions follow the cubic polynomial that has the velocities of both ends; velocities are
-    linear. `between` is written; at part 1 it equals `after`.
+    linear. At part 1 it equals `after`.
     """
     bodies = before.size // 13
-    between[:] = after
+    between = after.copy()
     if part == 1.0:
-        return
+        return between
     rest = 1.0 - part
     from_before = (1.0 + 2.0 * part) * rest * rest
     rate_before = step * part * rest * rest
@@ -149,3 +136,4 @@ def interpolate_state(
             )
         between[q : q + 4] /= np.sqrt((between[q : q + 4] ** 2).sum())
         between[v : v + 6] = rest * before[v : v + 6] + part * after[v : v + 6]
+    return between

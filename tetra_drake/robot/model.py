@@ -34,6 +34,8 @@ class Model(NamedTuple):
     """Moment of inertia of a body about any axis through its centre of mass."""
     radius: float
     """Distance of the nodes from the centre of mass."""
+    inertia: Array
+    """(6 bodies,): the diagonal of the mass matrix."""
     gravity: float
 
 
@@ -56,6 +58,7 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
         slack=scenario.cables.slack,
         mass=mass,
         moment=float(moments[0]),
+        inertia=np.tile(3 * [moments[0]] + 3 * [mass], len(structure.bodies)),
         radius=float(np.linalg.norm(structure.p_BN, axis=1).max()),
         gravity=scenario.robot.gravity,
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetra_drake.physics.cable import CABLE, PASSIVE
-from tetra_drake.physics.kinematics import P_WN, V_WN, node_motion
+from tetra_drake.physics.kinematics import P_WN, V_WN, move_nodes
 from tetra_drake.scenario.schema import CableScenario, RobotScenario
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
@@ -111,9 +111,9 @@ def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
     """p_WN (nodes, 3) in m from the state (13 n,) of the bodies."""
-    return node_motion(state, structure.p_BN)[:, P_WN : P_WN + 3]
+    return move_nodes(state, structure.p_BN)[:, P_WN : P_WN + 3]
 
 
 def node_velocities(structure: Structure, state: np.ndarray) -> np.ndarray:
     """v_WN (nodes, 3) in m/s from the state (13 n,) of the bodies."""
-    return node_motion(state, structure.p_BN)[:, V_WN : V_WN + 3]
+    return move_nodes(state, structure.p_BN)[:, V_WN : V_WN + 3]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.physics.cable import cable_forces
+from tetra_drake.physics.cable import add_cable_forces, cable_forces
+from tetra_drake.physics.kinematics import move_nodes
 from tetra_drake.robot.structure import Structure
 
 
@@ -28,38 +29,26 @@ class CableNetwork(LeafSystem):
         self._p_BN = structure.p_BN
         self._cables = structure.cables
         self._slack = slack
-        count = len(structure.cables)
-        self._tensions, self._lengths = np.empty(count), np.empty(count)
-        self._generalized_force = np.empty(6 * len(structure.bodies))
-
-        self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
+        bodies, count = len(structure.bodies), len(structure.cables)
+        self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self._signals = self.DeclareVectorInputPort("signals", structure.signals)
         inputs = {self._state.ticket(), self._signals.ticket()}
-        self.DeclareVectorOutputPort(
-            "generalized_force", self._generalized_force.size, self._calc_force, inputs
-        )
+        self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, inputs)
         self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
 
-    def _calc(self, context: Context, generalized_force: np.ndarray) -> None:
-        cable_forces(
-            self._state.Eval(context),
-            self._signals.Eval(context),
-            self._p_BN,
-            self._cables,
-            self._slack,
-            generalized_force,
-            self._tensions,
-            self._lengths,
-        )
-
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._calc(context, output.get_mutable_value())
+        state, signals = self._state.Eval(context), self._signals.Eval(context)
+        force = output.get_mutable_value()
+        cable_forces(state, signals, self._p_BN, self._cables, self._slack, force)
+
+    def _pull(self, context: Context) -> np.ndarray:
+        """Tensions and lengths."""
+        nodes = move_nodes(self._state.Eval(context), self._p_BN)
+        return add_cable_forces(nodes, self._signals.Eval(context), self._cables, self._slack)
 
     def _calc_tensions(self, context: Context, output: BasicVector) -> None:
-        self._calc(context, self._generalized_force)
-        output.SetFromVector(self._tensions)
+        output.SetFromVector(self._pull(context)[0])
 
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
-        self._calc(context, self._generalized_force)
-        output.SetFromVector(self._lengths)
+        output.SetFromVector(self._pull(context)[1])

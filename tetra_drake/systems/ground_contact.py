@@ -18,12 +18,13 @@ from pydrake.systems.framework import (
 from tetra_drake.physics.contact import (
     MODE_COLUMNS,
     STICK_POINT,
+    add_ground_forces,
     ground_forces,
     mode_margin,
     time_to_mode_change,
     update_modes,
 )
-from tetra_drake.physics.kinematics import node_motion
+from tetra_drake.physics.kinematics import move_nodes
 from tetra_drake.robot.model import ground_law
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import FrictionScenario, GroundScenario
@@ -65,9 +66,6 @@ class GroundContact(LeafSystem):
         self._contacts = structure.contacts
         self._law = ground_law(ground, friction)
         bodies, count = len(structure.bodies), len(structure.contacts)
-        self._generalized_force = np.empty(6 * bodies)
-        self._normal, self._friction = np.empty(count), np.empty((count, 2))
-
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self.DeclareDiscreteState(MODE_COLUMNS * count)
         self.DeclareInitializationDiscreteUpdateEvent(self._start)
@@ -99,12 +97,10 @@ class GroundContact(LeafSystem):
         `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
         Changes due right now count as made.
         """
-        state, rows = self._state.Eval(context), self._rows(context).copy()
-        motion = node_motion(state, self._p_BN)
-        update_modes(motion, self._contacts, self._law, rows)
-        return time_to_mode_change(
-            state, acceleration, motion, rows, self._contacts, self._law, horizon
-        )
+        nodes, rows = self._nodes(context), self._rows(context).copy()
+        update_modes(nodes, self._contacts, self._law, rows)
+        state, ground = self._state.Eval(context), (self._contacts, self._law)
+        return time_to_mode_change(state, acceleration, nodes, rows, *ground, horizon)
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """The one witness, if asked for."""
@@ -113,8 +109,8 @@ class GroundContact(LeafSystem):
     def _rows(self, context: Context) -> np.ndarray:
         return context.get_discrete_state_vector().value().reshape(-1, MODE_COLUMNS)
 
-    def _motion(self, context: Context) -> np.ndarray:
-        return node_motion(self._state.Eval(context), self._p_BN)
+    def _nodes(self, context: Context) -> np.ndarray:
+        return move_nodes(self._state.Eval(context), self._p_BN)
 
     def _start(self, context: Context, values: DiscreteValues) -> EventStatus:
         # From "nowhere in contact", an update makes every node at or below 0 stick where it is.
@@ -124,36 +120,29 @@ class GroundContact(LeafSystem):
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         rows = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
-        if update_modes(self._motion(context), self._contacts, self._law, rows):
+        if update_modes(self._nodes(context), self._contacts, self._law, rows):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
     def _margin(self, context: Context) -> float:
         rows = self._rows(context)
-        return mode_margin(self._motion(context), rows, self._contacts, self._law)
-
-    def _calc(self, context: Context, generalized_force: np.ndarray) -> None:
-        ground_forces(
-            self._state.Eval(context),
-            self._rows(context),
-            self._p_BN,
-            self._contacts,
-            self._law,
-            generalized_force,
-            self._normal,
-            self._friction,
-        )
+        return mode_margin(self._nodes(context), rows, self._contacts, self._law)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._calc(context, output.get_mutable_value())
+        state, rows = self._state.Eval(context), self._rows(context)
+        force = output.get_mutable_value()
+        ground_forces(state, rows, self._p_BN, self._contacts, self._law, force)
+
+    def _push(self, context: Context) -> np.ndarray:
+        """(m, 3): friction along x and y, normal force."""
+        nodes, rows = self._nodes(context), self._rows(context)
+        return add_ground_forces(nodes, rows, self._contacts, self._law)
 
     def _calc_normal(self, context: Context, output: BasicVector) -> None:
-        self._calc(context, self._generalized_force)
-        output.SetFromVector(self._normal)
+        output.SetFromVector(self._push(context)[:, 2])
 
     def _calc_friction(self, context: Context, output: BasicVector) -> None:
-        self._calc(context, self._generalized_force)
-        output.SetFromVector(self._friction.ravel())
+        output.SetFromVector(self._push(context)[:, :2].ravel())
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._rows(context)[:, :STICK_POINT].ravel())

@@ -1,4 +1,4 @@
-"""The equations of motion: free rigid bodies under the forces of cables, ground and gravity.
+"""The equations of nodes: free rigid bodies under the forces of cables, ground and gravity.
 
 Vectors over bodies hold 6 numbers a body, rotation before translation, in World.
 """
@@ -12,100 +12,43 @@ import numpy as np
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW, add_outer_product
 from tetra_drake.physics.cable import add_cable_forces
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.contact import CONTACT, MODE, add_ground_forces
-from tetra_drake.physics.friction import STICK
-from tetra_drake.physics.kinematics import (
-    MOTION_COLUMNS,
-    P_BN_W,
-    P_WN,
-    gather_forces,
-    move_nodes,
-)
+from tetra_drake.physics.contact import CONTACT, MODE, STICK, add_ground_forces
+from tetra_drake.physics.kinematics import P_BN_W, P_WN, gather_forces
 from tetra_drake.robot.model import Model
 
 Array = np.ndarray
 
 
 class Forces(NamedTuple):
-    """Room for the forces at one state; shapes and units are those of `physics`."""
+    """The forces at a state; as in `physics`."""
 
-    motion: Array
-    node_force: Array
-    generalized_force: Array
-    tensions: Array
-    lengths: Array
-    normal: Array
-    friction: Array
-
-
-@compiled
-def make_forces(robot: Model, bodies: int) -> Forces:
-    """Room for the forces on a robot of this many bodies."""
-    nodes, cables, contacts = robot.p_BN.shape[0] * bodies, robot.cables.size, robot.contacts.size
-    return Forces(
-        np.empty((nodes, MOTION_COLUMNS)),
-        np.empty((nodes, 3)),
-        np.empty(BLOCK * bodies),
-        np.empty(cables),
-        np.empty(cables),
-        np.empty(contacts),
-        np.empty((contacts, 2)),
-    )
+    nodes: Array
+    generalized: Array
+    """(6 bodies,)."""
+    cables: Array
+    """(2, cables): tensions and lengths."""
+    contacts: Array
+    """(contacts, 3): on the contact nodes."""
 
 
 @compiled
-def compute_forces(
-    robot: Model, state: Array, modes: Array, signals: Array, forces: Forces
-) -> None:
-    """All forces at a state (13 bodies,), gathered body by body, gravity among them.
+def compute_forces(robot: Model, nodes: Array, modes: Array, signals: Array) -> Forces:
+    """All forces on nodes that have just been moved, and gravity; arguments as in `physics`."""
+    cables = add_cable_forces(nodes, signals, robot.cables, robot.slack)
+    contacts = add_ground_forces(nodes, modes, robot.contacts, robot.ground)
+    generalized = gather_forces(nodes, robot.inertia.size // BLOCK)
+    for i in range(5, generalized.size, BLOCK):
+        generalized[i] -= robot.mass * robot.gravity
+    return Forces(nodes, generalized, cables, contacts)
 
-    `modes`, (contacts, MODE_COLUMNS), and `signals`, (signals,) in N, as in `physics`.
+
+@compiled
+def move_bodies(state: Array, velocities: Array, time: float) -> Array:
+    """The state (13 bodies,) with its bodies moved for a time (s) at velocities (6 bodies,).
+
+    Its own velocities stay as they are; quaternions get the length 1.
     """
-    move_nodes(state, robot.p_BN, forces.motion)
-    forces.node_force[:] = 0.0
-    add_cable_forces(
-        forces.motion,
-        signals,
-        robot.cables,
-        robot.slack,
-        forces.node_force,
-        forces.tensions,
-        forces.lengths,
-    )
-    add_ground_forces(
-        forces.motion,
-        modes,
-        robot.contacts,
-        robot.ground,
-        forces.node_force,
-        forces.normal,
-        forces.friction,
-    )
-    gather_forces(forces.motion, forces.node_force, forces.generalized_force)
-    for body in range(forces.generalized_force.size // BLOCK):
-        forces.generalized_force[BLOCK * body + 5] -= robot.mass * robot.gravity
-
-
-@compiled
-def multiply_by_mass(robot: Model, acceleration: Array, force: Array) -> None:
-    """The mass matrix times an acceleration; both (6 bodies,)."""
-    for i in range(acceleration.size):
-        force[i] = acceleration[i] * (robot.moment if i % BLOCK < 3 else robot.mass)
-
-
-@compiled
-def divide_by_mass(robot: Model, force: Array, acceleration: Array) -> None:
-    """Newton and Euler: dv/dt from forces; both (6 bodies,). Isotropic bodies do not precess."""
-    for i in range(force.size):
-        acceleration[i] = force[i] / (robot.moment if i % BLOCK < 3 else robot.mass)
-
-
-@compiled
-def move_bodies(state: Array, velocities: Array, time: float, moved: Array) -> None:
-    """Moves the bodies of `state` for some time (s) at constant velocities (6 bodies,).
-
-    Of `moved`, (13 bodies,), only the positions are written; quaternions stay of length 1.
-    """
+    moved = state.copy()
     for body in range(state.size // 13):
         q, v = 7 * body, BLOCK * body
         # The rotation's quaternion, to fourth order in its angle (some thousandths a step).
@@ -127,58 +70,54 @@ def move_bodies(state: Array, velocities: Array, time: float, moved: Array) -> N
         moved[q + 4] = state[q + 4] + time * velocities[v + 3]
         moved[q + 5] = state[q + 5] + time * velocities[v + 4]
         moved[q + 6] = state[q + 6] + time * velocities[v + 5]
+    return moved
 
 
 @compiled
-def implicit_matrix(
-    robot: Model, modes: Array, forces: Forces, time: float, row: Array, rows: Array
-) -> None:
-    """Mass matrix + time * damping matrix + time² * contact stiffness, into `rows` of
-    block_tridiagonal.
+def implicit_matrix(robot: Model, modes: Array, forces: Forces, time: float) -> Array:
+    """Mass matrix + time * damping matrix + time² * contact stiffness, as rows of
+    block_tridiagonal; time in s.
 
     Damping is what makes the equations stiff: that of cables, normal forces and stiction.
-    `row`, (ROW,), is room to work in; `time` in s.
     """
-    nodes = robot.p_BN.shape[0]
-    rows[:] = 0.0
-    for body in range(rows.shape[0]):
-        for k in range(BLOCK):
-            rows[body, k, k] = robot.moment if k < 3 else robot.mass
-    motion = forces.motion
+    per_body, nodes, law = robot.p_BN.shape[0], forces.nodes, robot.ground[0]
+    rows, row = np.zeros((robot.inertia.size // BLOCK, BLOCK, ROW)), np.zeros(ROW)
+    for k in range(robot.inertia.size):
+        rows[k // BLOCK, k % BLOCK, k % BLOCK] = robot.inertia[k]
     for i in range(robot.cables.size):
         cable = robot.cables[i]
         a, b = cable.node_a, cable.node_b
-        scale = 1.0 / forces.lengths[i]
-        d_x = (motion[b, P_WN] - motion[a, P_WN]) * scale
-        d_y = (motion[b, P_WN + 1] - motion[a, P_WN + 1]) * scale
-        d_z = (motion[b, P_WN + 2] - motion[a, P_WN + 2]) * scale
-        speed_row(motion, a, -d_x, -d_y, -d_z, row[:BLOCK])
-        speed_row(motion, b, d_x, d_y, d_z, row[BLOCK:])
-        add_outer_product(time * cable.damping, row, a // nodes, ROW, rows)
-    law = robot.ground[0]
+        scale = 1.0 / forces.cables[1, i]
+        d_x = (nodes[b, P_WN] - nodes[a, P_WN]) * scale
+        d_y = (nodes[b, P_WN + 1] - nodes[a, P_WN + 1]) * scale
+        d_z = (nodes[b, P_WN + 2] - nodes[a, P_WN + 2]) * scale
+        speed_row(nodes, a, -d_x, -d_y, -d_z, row[:BLOCK])
+        speed_row(nodes, b, d_x, d_y, d_z, row[BLOCK:])
+        add_outer_product(time * cable.damping, row, a // per_body, ROW, rows)
     for i in range(robot.contacts.size):
         if modes[i, CONTACT] == 0.0:
             continue
         node = robot.contacts[i]
-        body = node // nodes
-        if forces.normal[i] > 0.0:
-            depth = -motion[node, P_WN + 2]
-            speed_row(motion, node, 0.0, 0.0, 1.0, row)
+        body = node // per_body
+        if forces.contacts[i, 2] > 0.0:
+            depth = -nodes[node, P_WN + 2]
+            speed_row(nodes, node, 0.0, 0.0, 1.0, row)
             damping = time * (law.damping * depth + time * law.stiffness)
             add_outer_product(damping, row, body, BLOCK, rows)
         damping = time * law.stiction_damping
         if modes[i, MODE] == STICK:
-            speed_row(motion, node, 1.0, 0.0, 0.0, row)
+            speed_row(nodes, node, 1.0, 0.0, 0.0, row)
             add_outer_product(damping, row, body, BLOCK, rows)
         if modes[i, MODE + 1] == STICK:
-            speed_row(motion, node, 0.0, 1.0, 0.0, row)
+            speed_row(nodes, node, 0.0, 1.0, 0.0, row)
             add_outer_product(damping, row, body, BLOCK, rows)
+    return rows
 
 
 @compiled
-def speed_row(motion: Array, node: int, d_x: float, d_y: float, d_z: float, row: Array) -> None:
+def speed_row(nodes: Array, node: int, d_x: float, d_y: float, d_z: float, row: Array) -> None:
     """The row (BLOCK,) whose product with its body's velocity is the node's speed along d."""
-    p_x, p_y, p_z = motion[node, P_BN_W], motion[node, P_BN_W + 1], motion[node, P_BN_W + 2]
+    p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     row[0] = p_y * d_z - p_z * d_y
     row[1] = p_z * d_x - p_x * d_z
     row[2] = p_x * d_y - p_y * d_x

@@ -18,20 +18,18 @@ It enters by its product with the velocities, a difference of forces along the m
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW, factorise, solve
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, factorise, solve
 from tetra_drake.engines.compiled.dynamics import (
     Forces,
     compute_forces,
     implicit_matrix,
-    make_forces,
     move_bodies,
-    multiply_by_mass,
 )
 from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.kinematics import move_nodes
 from tetra_drake.robot.model import Model
 
 Array = np.ndarray
@@ -39,88 +37,50 @@ Array = np.ndarray
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
-class Stages(NamedTuple):
-    """Room for a step to work in."""
-
-    forces: Forces
-    rows: Array
-    row: Array
-    state: Array
-    force_change: Array
-    rates_1: Array
-    rates_2: Array
-    velocities: Array
-
-
-@compiled
-def make_stages(robot: Model, bodies: int) -> Stages:
-    """Room for the steps of a robot of this many bodies."""
-    size = BLOCK * bodies
-    return Stages(
-        make_forces(robot, bodies),
-        np.empty((bodies, BLOCK, ROW)),
-        np.zeros(ROW),
-        np.empty(13 * bodies),
-        np.empty(size),
-        np.empty(size),
-        np.empty(size),
-        np.empty(size),
-    )
-
-
 @compiled
 def take_step(
-    robot: Model,
-    state: Array,
-    modes: Array,
-    forces: Forces,
-    signals: Array,
-    step: float,
-    stages: Stages,
-) -> float:
-    """Takes a step (s); the new state is left in `stages.state`.
+    robot: Model, state: Array, modes: Array, forces: Forces, signals: Array, step: float
+) -> tuple[Array, float]:
+    """The state after a step (s) from `state`, where `forces` are; `signals` are the end's.
 
-    `forces` are those at `state`, `signals` those at the step's end. Returns the difference to
-    the first-order solution within: the largest of any body's velocity (m/s), of rotation
-    that of its nodes.
+    Also returns the difference to the first-order solution within: the largest of any body's
+    velocity (m/s), of rotation that of its nodes.
     """
-    bodies = state.size // 13
-    first = 7 * bodies
+    first = state.size // 13 * 7
     velocities = state[first:]
-    end, change, k1, k2 = stages.forces, stages.force_change, stages.rates_1, stages.rates_2
-
-    stages.state[first:] = velocities
-    move_bodies(state, velocities, step, stages.state)
-    compute_forces(robot, stages.state, modes, signals, end)
+    moved = move_bodies(state, velocities, step)
+    nodes = move_nodes(moved, robot.p_BN)
+    change = compute_forces(robot, nodes, modes, signals).generalized
+    k1, stage_1 = np.empty(change.size), np.empty(change.size)
     for i in range(change.size):
-        change[i] = GAMMA * (end.generalized_force[i] - forces.generalized_force[i])
-    implicit_matrix(robot, modes, forces, GAMMA * step, stages.row, stages.rows)
-    factorise(stages.rows)
+        change[i] = GAMMA * (change[i] - forces.generalized[i])
+        k1[i] = forces.generalized[i] + change[i]
+    rows = implicit_matrix(robot, modes, forces, GAMMA * step)
+    factorise(rows)
+    solve(rows, k1)
+    for i in range(change.size):
+        stage_1[i] = velocities[i] + GAMMA * step * k1[i]
+    end = move_bodies(state, stage_1, step)
+    for i in range(change.size):
+        end[first + i] = velocities[i] + step * k1[i]
 
-    for i in range(k1.size):
-        k1[i] = forces.generalized_force[i] + change[i]
-    solve(stages.rows, k1)
-    for i in range(k1.size):
-        stages.velocities[i] = velocities[i] + GAMMA * step * k1[i]
-        stages.state[first + i] = velocities[i] + step * k1[i]
-    move_bodies(state, stages.velocities, step, stages.state)
-
-    compute_forces(robot, stages.state, modes, signals, end)
-    multiply_by_mass(robot, k1, k2)
-    for i in range(k2.size):
-        k2[i] = end.generalized_force[i] - 2.0 * k2[i] - change[i]
-    solve(stages.rows, k2)
+    nodes = move_nodes(end, robot.p_BN)
+    k2 = compute_forces(robot, nodes, modes, signals).generalized
+    for i in range(change.size):
+        k2[i] = k2[i] - 2.0 * (robot.inertia[i] * k1[i]) - change[i]
+    solve(rows, k2)
 
     error = 0.0
-    for i in range(k2.size):
+    for i in range(change.size):
         # The position's second stage is stage 2's velocity - 2 (stage 1's rate) + γ h k2.
-        second = stages.state[first + i] - 2.0 * stages.velocities[i] + GAMMA * step * k2[i]
-        stages.velocities[i] = 1.5 * stages.velocities[i] + 0.5 * second
-        stages.state[first + i] = velocities[i] + step * (1.5 * k1[i] + 0.5 * k2[i])
+        stage_2 = end[first + i] - 2.0 * stage_1[i] + GAMMA * step * k2[i]
+        stage_1[i] = 1.5 * stage_1[i] + 0.5 * stage_2
         difference = 0.5 * step * abs(k1[i] + k2[i])
         if i % BLOCK < 3:
             difference *= robot.radius
         if difference > error or math.isnan(difference):
             error = difference
-    move_bodies(state, stages.velocities, step, stages.state)
-    return error
+    end = move_bodies(state, stage_1, step)
+    for i in range(change.size):
+        end[first + i] = velocities[i] + step * (1.5 * k1[i] + 0.5 * k2[i])
+    return end, error

@@ -8,15 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import (
-    compute_forces,
-    divide_by_mass,
-    make_forces,
-)
-from tetra_drake.engines.compiled.rosenbrock import make_stages, take_step
+from tetra_drake.engines.compiled.dynamics import compute_forces
+from tetra_drake.engines.compiled.rosenbrock import take_step
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.contact import time_to_mode_change, update_modes
-from tetra_drake.physics.kinematics import P_WN, interpolate_state, move_nodes
+from tetra_drake.physics.contact import MODE_COLUMNS, time_to_mode_change, update_modes
+from tetra_drake.physics.kinematics import interpolate_state, move_nodes
 from tetra_drake.robot.model import Model
 
 Array = np.ndarray
@@ -24,7 +20,6 @@ Array = np.ndarray
 DONE, TOO_FAST, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS = range(4)
 """How a simulation ends."""
 
-EVALUATIONS_A_STEP = 3
 LEAST_STEP = 1e-9  # s
 SAFETY, SHRINK, GROW = 0.85, 0.2, 3.0
 """The next step is the one whose error would be the tolerance, times SAFETY, within factors."""
@@ -54,10 +49,8 @@ class Actuation(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """A recording; with no rows, nothing is recorded."""
+    """A recording."""
 
-    times: Array
-    """(samples,), ascending, from 0 to the end: when to take samples."""
     states: Array
     """(samples, 13 bodies)."""
     modes: Array
@@ -67,17 +60,16 @@ class Samples(NamedTuple):
 
 
 @compiled
-def signals_at(actuation: Actuation, time: float, active: bool, signals: Array) -> None:
+def signals_at(actuation: Actuation, time: float, active: bool) -> Array:
     """The signals (signals,) at a time (s); zeros unless `active`."""
-    if not active:
-        signals[:] = 0.0
-        return
-    place = time / actuation.step
-    i = min(int(place), actuation.samples.shape[0] - 2)
-    part = place - i
-    for k in range(signals.size):
-        before, after = actuation.samples[i, k], actuation.samples[i + 1, k]
-        signals[k] = before + part * (after - before)
+    signals = np.zeros(actuation.samples.shape[1])
+    if active:
+        place = time / actuation.step
+        i = min(int(place), actuation.samples.shape[0] - 2)
+        for k in range(signals.size):
+            before, after = actuation.samples[i, k], actuation.samples[i + 1, k]
+            signals[k] = before + (place - i) * (after - before)
+    return signals
 
 
 @compiled
@@ -87,74 +79,43 @@ def next_step(error: float, step: float, settings: Settings) -> float:
     return min(settings.max_step, step * min(GROW, max(SHRINK, factor)))
 
 
-@compiled
-def keep(
-    samples: Samples,
-    kept: int,
-    before: Array,
-    after: Array,
-    modes: Array,
-    actuation: Actuation,
-    active: bool,
-    time: float,
-    step: float,
-) -> int:
-    """Writes the samples due in the step (s) that ends at `time` (s); how many are written now."""
-    while kept < samples.times.size and samples.times[kept] <= time:
-        due = samples.times[kept]
-        part = 1.0 if due == time else (due - (time - step)) / step
-        interpolate_state(before, after, step, part, samples.states[kept])
-        samples.modes[kept] = modes
-        signals_at(actuation, due, active, samples.signals[kept])
-        kept += 1
-    return kept
-
-
 @functools.partial(compiled, nogil=True)
 def walk(
     robot: Model,
     settings: Settings,
     actuation: Actuation,
-    marks: Array,
     state: Array,
-    modes: Array,
-    positions: Array,
-    samples: Samples,
-) -> tuple[int, float, int, int]:
-    """Simulates the robot from time 0 to the last mark.
+    marks: Array,
+    times: Array,
+) -> tuple[int, float, int, int, Samples]:
+    """Simulates the robot from `state`, (13 bodies,), at time 0 to the last mark.
 
-    Args:
-        marks: (marks,), times in s, ascending, at which steps end, the start-up among them.
-        state: (13 bodies,), the start; left at the end.
-        modes: (contacts, MODE_COLUMNS), zeros; left at the end.
-        positions: (marks, nodes, 3), written: p_WN at the marks.
-        samples: written at its times.
+    `marks`, (marks,), are the times (s) at which steps end, the start-up among them; `times`,
+    (samples,), those of samples, of which the first is 0. Both ascend.
 
-    Returns:
-        How it ended, when (s), steps taken, force evaluations.
+    Returns how it ended, when (s), steps taken, force evaluations, and the samples.
     """
-    bodies = state.size // 13
-    first = 7 * bodies
-    stages = make_stages(robot, bodies)
-    forces = make_forces(robot, bodies)
-    acceleration = np.empty(6 * bodies)
-    signals = np.zeros(actuation.samples.shape[1])
-    time, step = 0.0, settings.look_ahead
-    steps = evaluations = kept = 0
-
-    move_nodes(state, robot.p_BN, forces.motion)
-    update_modes(forces.motion, robot.contacts, robot.ground, modes)
-    kept = keep(samples, 0, state, state, modes, actuation, False, 0.0, 0.0)
-    for mark in range(marks.size):
+    bodies, contacts = state.size // 13, robot.contacts.size
+    samples = Samples(
+        np.empty((times.size, state.size)),
+        np.empty((times.size, contacts, MODE_COLUMNS)),
+        np.zeros((times.size, actuation.samples.shape[1])),
+    )
+    modes = np.zeros((contacts, MODE_COLUMNS))
+    nodes = move_nodes(state, robot.p_BN)
+    update_modes(nodes, robot.contacts, robot.ground, modes)
+    samples.states[0], samples.modes[0] = state, modes
+    time, step, kept = 0.0, settings.look_ahead, 1
+    steps = evaluations = 0
+    for mark in marks:
         active = time >= actuation.start_up
-        while time < marks[mark]:
-            signals_at(actuation, time, active, signals)
-            compute_forces(robot, state, modes, signals, forces)
-            divide_by_mass(robot, forces.generalized_force, acceleration)
+        while time < mark:
+            forces = compute_forces(robot, nodes, modes, signals_at(actuation, time, active))
+            acceleration = forces.generalized / robot.inertia
             change = time_to_mode_change(
                 state,
                 acceleration,
-                forces.motion,
+                nodes,
                 modes,
                 robot.contacts,
                 robot.ground,
@@ -164,28 +125,32 @@ def walk(
             evaluations += 1
             error = math.inf
             while not error <= settings.tolerance:
-                remaining = marks[mark] - time
+                remaining = mark - time
                 if step > remaining - LEAST_STEP:
                     step = remaining
                 elif 2.0 * step > remaining:
                     step = 0.5 * remaining
-                signals_at(actuation, time + step, active, signals)
-                error = take_step(robot, state, modes, forces, signals, step, stages)
+                signals = signals_at(actuation, time + step, active)
+                end, error = take_step(robot, state, modes, forces, signals, step)
                 evaluations += 2
                 if evaluations > settings.max_evaluations:
-                    return TOO_MANY_EVALUATIONS, time, steps, evaluations
+                    return TOO_MANY_EVALUATIONS, time, steps, evaluations, samples
                 taken, step = step, next_step(error, step, settings)
                 if not step > LEAST_STEP:
-                    return STEP_TOO_SMALL, time, steps, evaluations
+                    return STEP_TOO_SMALL, time, steps, evaluations, samples
             steps += 1
-            time = marks[mark] if taken == remaining else time + taken
-            kept = keep(samples, kept, state, stages.state, modes, actuation, active, time, taken)
-            state[:] = stages.state
-            for i in range(bodies):
-                for k in range(first + 6 * i + 3, first + 6 * i + 6):
-                    if not abs(state[k]) <= settings.max_speed:
-                        return TOO_FAST, time, steps, evaluations
-            move_nodes(state, robot.p_BN, forces.motion)
-            update_modes(forces.motion, robot.contacts, robot.ground, modes)
-        positions[mark] = forces.motion[:, P_WN : P_WN + 3]
-    return DONE, time, steps, evaluations
+            time = mark if taken == remaining else time + taken
+            while kept < times.size and times[kept] <= time:
+                due = times[kept]
+                part = 1.0 if due == time else (due - (time - taken)) / taken
+                samples.states[kept] = interpolate_state(state, end, taken, part)
+                samples.modes[kept] = modes
+                samples.signals[kept] = signals_at(actuation, due, active)
+                kept += 1
+            state = end
+            speeds = np.abs(state[7 * bodies :].reshape((bodies, 6))[:, 3:])
+            if not speeds.max() <= settings.max_speed:
+                return TOO_FAST, time, steps, evaluations, samples
+            nodes = move_nodes(state, robot.p_BN)
+            update_modes(nodes, robot.contacts, robot.ground, modes)
+    return DONE, time, steps, evaluations, samples
