@@ -1,24 +1,13 @@
 """Figures and tables of a run show what its record holds."""
 
-from __future__ import annotations
-
 import dataclasses
-from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.synthetic_run import (
-    PER_DISTANCE,
-    Child,
-    iterations_with_means,
-    tiny_scenario,
-    write_run,
-)
+from helpers.synthetic_run import PER_DISTANCE, iterations_with_means, write_run
 from matplotlib.container import BarContainer, ErrorbarContainer
-from matplotlib.figure import Figure
 
-from tetra_drake.evolution.tables import Run, load_run
+from tetra_drake.evolution.tables import load_run
 from tetra_drake.figures.evolution import (
     fitness_of_trials,
     initial_distances,
@@ -28,36 +17,32 @@ from tetra_drake.figures.evolution import (
 from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.units import INCH
 
-RunOf = Callable[..., Run]
-Trial = list[list[Child]]
-
 
 @pytest.fixture
-def run_of(tmp_path: Path) -> RunOf:
+def run_of(tmp_path):
     """run_of(trial, ...): a recorded run of these trials."""
-
-    def load(*trials: Trial, **options: object) -> Run:
-        return load_run(write_run(tmp_path / "run", trials, **options))  # type: ignore[arg-type]
-
-    return load
+    return lambda *trials, **options: load_run(write_run(tmp_path / "run", trials, **options))
 
 
-def initial(*fitnesses: float | None) -> Trial:
+def initial(*fitnesses):
     return [[(fitness, place) for place, fitness in enumerate(fitnesses)]]
 
 
-def lines(figure: Figure) -> dict[str, list[list[float]]]:
+def lines(figure):
     """The points of the lines with a label of their own."""
-    found = {str(line.get_label()): line.get_xydata().tolist() for line in figure.axes[0].lines}
+    found = {line.get_label(): line.get_xydata().tolist() for line in figure.axes[0].lines}
     return {label: points for label, points in found.items() if not label.startswith("_")}
 
 
-def bars(figure: Figure) -> list[list[float]]:
-    groups = [c for c in figure.axes[0].containers if isinstance(c, BarContainer)]
-    return [[bar.get_height() for bar in group] for group in groups]
+def bar_groups(figure):
+    return [c for c in figure.axes[0].containers if isinstance(c, BarContainer)]
 
 
-def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of: RunOf) -> None:
+def bars(figure):
+    return [[bar.get_height() for bar in group] for group in bar_groups(figure)]
+
+
+def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of):
     run = run_of(
         initial(4.0, -6.0, None, 1.0), initial(None, None), [*initial(2.0, 3.0), [(9.0, 0)]]
     )
@@ -71,25 +56,22 @@ def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of: RunOf)
     assert len(initial_distances(run).axes[0].lines) == 1  # without a reference, zero only
 
 
-def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of: RunOf) -> None:
+def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of):
     fitnesses = np.random.default_rng(2).normal(0.5, 2.0, 40)
     run = run_of(initial(1.0), initial(*fitnesses.tolist(), None))
     figure = initial_fitness(run, 1)
     forward, backward = bars(figure)
-    group = next(c for c in figure.axes[0].containers if isinstance(c, BarContainer))
+    group = bar_groups(figure)[0]
     edges = [bar.get_x() for bar in group]
     edges.append(edges[-1] + group[0].get_width())
     assert forward == np.histogram(fitnesses[fitnesses >= 0.0], edges)[0].tolist()
     assert backward == np.histogram(fitnesses[fitnesses < 0.0], edges)[0].tolist()
     assert abs(min(edges, key=abs)) < 1e-12
     assert f"{100 * (fitnesses < 0.0).mean():.0f} %" in figure.get_suptitle()
+    assert sum(map(sum, bars(initial_fitness(run, 0)))) == 1
 
 
-def test_a_histogram_of_one_gait(run_of: RunOf) -> None:
-    assert sum(map(sum, bars(initial_fitness(run_of(initial(2.5)), 0)))) == 1
-
-
-def test_fitness_lines_are_the_recorded_means_in_the_order_of_their_ends(run_of: RunOf) -> None:
+def test_fitness_lines_are_the_recorded_means_in_the_order_of_their_ends(run_of):
     run = run_of(
         iterations_with_means([1.0, 2.0, 5.0]),
         iterations_with_means([3.0, 3.5]),
@@ -107,7 +89,7 @@ def test_fitness_lines_are_the_recorded_means_in_the_order_of_their_ends(run_of:
     assert legend == [*expected, "average"]
 
 
-def test_the_best_fitness_is_shown_where_the_optimiser_reports_no_mean(run_of: RunOf) -> None:
+def test_the_best_fitness_is_shown_where_the_optimiser_reports_no_mean(run_of):
     run = run_of([[(1.0, 0), (3.0, 1)], [(2.0, 0)], [(4.0, 0)]])
     run = dataclasses.replace(run, iterations=run.iterations.drop(columns="mean_fitness"))
     assert lines(fitness_of_trials(run)) == {"trial 0": [[0, 3.0], [1, 3.0], [2, 4.0]]}
@@ -121,36 +103,29 @@ def test_the_best_fitness_is_shown_where_the_optimiser_reports_no_mean(run_of: R
     ],
     ids=["ended trials count with their last mean", "the average ends with an unfinished trial"],
 )
-def test_the_average_over_trials(
-    run_of: RunOf,
-    means: Sequence[Sequence[float]],
-    unfinished: Sequence[int],
-    average: Sequence[float],
-) -> None:
+def test_the_average_over_trials(run_of, means, unfinished, average):
     run = run_of(*map(iterations_with_means, means), unfinished=unfinished)
     axes = fitness_of_trials(run).axes[0]
     (errorbars,) = (c for c in axes.containers if isinstance(c, ErrorbarContainer))
     line, _, (segments,) = errorbars
     assert line.get_ydata().tolist() == pytest.approx(average)
-    first = [mean[0] for mean in means]
-    deviations = [np.ptp(segment[:, 1]) / 2 for segment in segments.get_segments()]
-    assert deviations[0] == pytest.approx(np.std(first, ddof=1))
+    deviation = np.ptp(segments.get_segments()[0][:, 1]) / 2
+    assert deviation == pytest.approx(np.std([mean[0] for mean in means], ddof=1))
 
 
-def test_one_iteration_is_a_dot(run_of: RunOf) -> None:
+def test_one_iteration_is_a_dot(run_of):
     (line,) = fitness_of_trials(run_of(initial(1.0, 2.0))).axes[0].lines
     assert line.get_xydata().tolist() == [[0, 1.5]]
     assert line.get_marker() == "o"
 
 
-def test_the_two_best_gaits_beside_the_reference(run_of: RunOf) -> None:
-    run = run_of([*initial(1.0, 4.0, 2.5, 5.0), [(5.0, 1), (3.0, None)]])
+def test_the_two_best_gaits_beside_the_reference(run_of):
+    run = run_of([*initial(1.0, 4.0, 2.5, 5.0), [(5.0, 1), (3.0, None)]], initial(1.0, None))
     weights = [0.1, 0.2, 0.3, 0.4]
     reference = ReferenceScenario(
         "a paper", two_best_fitness=0.5, two_best_weights=weights, two_best_tau=0.0
     )
     table = two_best(run, 0, reference)
-    assert table is not None
     # Equal fitnesses come with equal genomes, so the second best is the fittest different one.
     for column, index, fitness in (("best", 3, 5.0), ("second", 1, 4.0)):
         assert table[column].tolist() == [fitness, *run.vector(0, index)]
@@ -158,10 +133,6 @@ def test_the_two_best_gaits_beside_the_reference(run_of: RunOf) -> None:
     assert table["difference"].tolist() == [1.0, *np.abs(difference)]
     assert table["reference"].tolist() == [0.5, *weights, 0.0, 0.0]
     assert table.index.tolist()[-2:] == ["tau_A", "tau_B"]
-
-
-def test_a_reference_of_another_robot_is_not_in_the_table(run_of: RunOf) -> None:
-    run = run_of(initial(1.0, 2.0), initial(1.0, None), scenario=tiny_scenario())
-    table = two_best(run, 0, ReferenceScenario("a paper", two_best_weights=[0.1] * 24))
-    assert table is not None and "reference" not in table
+    of_another_robot = ReferenceScenario("a paper", two_best_weights=[0.1] * 24)
+    assert "reference" not in two_best(run, 0, of_another_robot)
     assert two_best(run, 1) is None
