@@ -1,37 +1,33 @@
 """A tetrahedron alone on the ground: settling_node.py and sliding_tetrahedron.py."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-from helpers.integral import integral
-from one_tetrahedron import LEADING, TRAILING, Motion, weight
+from one_tetrahedron import LEADING, TRAILING, weight
 from settling_node import IMPACT_SPEED, bounce, contact_speeds, settle
 from sliding_tetrahedron import INITIAL_SPEED, draw, flights, slide, slips, travel
 
 from tetra_drake.robot.structure import BASE
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
 STICKS = [1.0, 0.0, 0.0]
 
 
 @pytest.fixture(scope="module")
-def settling() -> Motion:
-    return settle(load_scenario("thesis"))
-
-
-@pytest.fixture(scope="module")
-def sliding() -> Motion:
+def sliding():
     return slide(load_scenario("thesis"))
 
 
-def test_it_meets_the_ground_as_asked_for_and_rests_on_its_weight(
-    scenario: Scenario, settling: Motion
-) -> None:
+def impulse(forces, times):
+    """The integral of the forces of all nodes, (samples, nodes, ...), by the trapezoidal rule."""
+    total = forces.sum(axis=1)
+    return np.tensordot(np.diff(times), (total[:-1] + total[1:]) / 2.0, axes=1)
+
+
+def test_it_meets_the_ground_as_asked_for_and_rests_on_its_weight(scenario):
+    settling = settle(scenario)
     impact, rebound = contact_speeds(settling)
     assert impact == pytest.approx(IMPACT_SPEED, rel=1e-2)
     assert math.isnan(rebound)
@@ -42,7 +38,7 @@ def test_it_meets_the_ground_as_asked_for_and_rests_on_its_weight(
 
 
 @pytest.mark.parametrize("inches_per_second", [0.03, 0.12, 0.3])
-def test_restitution_is_that_of_the_law(scenario: Scenario, inches_per_second: float) -> None:
+def test_restitution_is_that_of_the_law(scenario, inches_per_second):
     # Eq. 1 without weight, m dv/dt = -k x (1 + d v) with d = lambda / k = 3/2 alpha and
     # v = dx/dt, separates: v dv / (1 + d v) = -k/m x dx. The right-hand side gives
     # the same on the way in (v from v_i to 0) and out (0 to -v_o), so
@@ -60,14 +56,11 @@ def test_restitution_is_that_of_the_law(scenario: Scenario, inches_per_second: f
     if inches_per_second < 0.2:
         linear = 1.0 - scenario.ground.velocity_correction * impact
         assert rebound / impact == pytest.approx(linear, rel=2e-2)
-    impulse = integral(bouncing.normal_forces.sum(axis=1), bouncing.times)
-    mass = weight(scenario) / scenario.robot.gravity
-    assert impulse == pytest.approx(mass * (impact + rebound), rel=1e-2)
+    momentum = weight(scenario) / scenario.robot.gravity * (impact + rebound)
+    assert impulse(bouncing.normal_forces, bouncing.times) == pytest.approx(momentum, rel=1e-2)
 
 
-def test_it_breaks_free_at_the_stiction_range_and_sticks_again(
-    scenario: Scenario, sliding: Motion
-) -> None:
+def test_it_breaks_free_at_the_stiction_range_and_sticks_again(scenario, sliding):
     [(start, end)] = slips(sliding, LEADING)
     way = travel(sliding, LEADING)[sliding.times == start]
     np.testing.assert_allclose(way, scenario.friction.stiction_range, rtol=1e-3)
@@ -77,25 +70,18 @@ def test_it_breaks_free_at_the_stiction_range_and_sticks_again(
     assert (sliding.modes[after, LEADING] == STICKS).all()
     [(lifted, landed)] = flights(sliding, TRAILING)
     assert lifted < 1e-3 < landed < end
-
-
-def test_friction_takes_all_the_momentum(scenario: Scenario, sliding: Motion) -> None:
-    impulse = integral(sliding.friction_forces.sum(axis=1), sliding.times)
-    start = weight(scenario) / scenario.robot.gravity * INITIAL_SPEED
-    np.testing.assert_allclose(impulse, [-start, 0.0], rtol=1e-2, atol=1e-6 * start)
-    assert np.abs(sliding.v_WN[-1]).max() < 1e-3 * INCH
-    np.testing.assert_array_equal(sliding.modes[-1], [STICKS] * 3)
-    assert sliding.normal_forces[-1].sum() == pytest.approx(weight(scenario), rel=1e-2)
-
-
-def test_a_slow_one_never_breaks_free(scenario: Scenario) -> None:
-    motion = slide(scenario, speed=3.0 * INCH, duration=0.03)
-    assert all(slips(motion, node) == [] for node in BASE)
-    assert 0.0 < travel(motion, LEADING)[-1] < scenario.friction.stiction_range
-
-
-def test_the_time_of_slipping_is_shaded(scenario: Scenario, sliding: Motion) -> None:
-    [(start, end)] = slips(sliding, LEADING)
+    slow = slide(scenario, speed=3.0 * INCH, duration=0.03)
+    assert all(slips(slow, node) == [] for node in BASE)
+    assert 0.0 < travel(slow, LEADING)[-1] < scenario.friction.stiction_range
     for panel in draw(sliding, stiction_range=scenario.friction.stiction_range).axes:
         [span] = panel.patches
         assert (span.get_x(), span.get_width()) == pytest.approx((1e3 * start, 1e3 * (end - start)))
+
+
+def test_friction_takes_all_the_momentum(scenario, sliding):
+    start = weight(scenario) / scenario.robot.gravity * INITIAL_SPEED
+    taken = impulse(sliding.friction_forces, sliding.times)
+    np.testing.assert_allclose(taken, [-start, 0.0], rtol=1e-2, atol=1e-6 * start)
+    assert np.abs(sliding.v_WN[-1]).max() < 1e-3 * INCH
+    np.testing.assert_array_equal(sliding.modes[-1], [STICKS] * 3)
+    assert sliding.normal_forces[-1].sum() == pytest.approx(weight(scenario), rel=1e-2)

@@ -1,10 +1,7 @@
 """The scripts in diagrams/ as they are run, and the robot's diagram against the package's."""
 
-from __future__ import annotations
-
 import shutil
 import sys
-from pathlib import Path
 
 import pytest
 import robot
@@ -15,7 +12,6 @@ from pydrake.systems.analysis import Simulator
 
 from tetra_drake.figures.block_diagram import graphviz_source
 from tetra_drake.robot.gait import load_gait
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
@@ -24,7 +20,7 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
     ("script", "files"),
     [(single_oscillator, 3), (settling_node, 2), (sliding_tetrahedron, 2), (robot, 2)],
 )
-def test_a_script_writes_its_pictures(script, files: int, tmp_path: Path, monkeypatch) -> None:
+def test_a_script_writes_its_pictures(script, files, tmp_path, monkeypatch):
     options = ["--duration", "0.1"] if script is robot else []
     monkeypatch.setattr(sys, "argv", ["script", "--out", str(tmp_path), *options])
     script.main()
@@ -34,7 +30,7 @@ def test_a_script_writes_its_pictures(script, files: int, tmp_path: Path, monkey
 
 
 @pytest.mark.parametrize("signals", ["listing", "live"])
-def test_the_robot_of_the_script_is_that_of_the_package(scenario: Scenario, signals: str) -> None:
+def test_the_robot_of_the_script_is_that_of_the_package(scenario, signals):
     scenario = scenario.with_changes({"cpg.signals": signals, "cpg.start_up": 0.02})
     gait = load_gait(robot.BEST_GAIT, scenario)
     states = []

@@ -1,7 +1,5 @@
 """One oscillator alone, against the linear theory of its neurons."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -9,11 +7,10 @@ import pytest
 from single_oscillator import THESIS_FREQUENCY, linear_frequency, make_diagram, simulate
 
 from tetra_drake.results.measures import dominant_frequency
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import POUND_FORCE
 
 
-def oscillation(scenario: Scenario, **parameters: float) -> tuple[float, float]:
+def oscillation(scenario, **parameters):
     """Frequency in Hz and swing in lbf, after the transient."""
     times, signal = simulate(make_diagram(scenario, **parameters), duration=25.0)
     late, end = times > 5.0, times > 20.0
@@ -21,7 +18,7 @@ def oscillation(scenario: Scenario, **parameters: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("tau_a", [0.2, 0.3, 1.0 / (2.0 * math.pi * THESIS_FREQUENCY)])
-def test_without_damping_it_is_a_sine_of_known_frequency(scenario: Scenario, tau_a: float) -> None:
+def test_without_damping_it_is_a_sine_of_known_frequency(scenario, tau_a):
     theory = linear_frequency(scenario, tau_a=tau_a)
     assert theory == pytest.approx(1.0 / (2.0 * math.pi * tau_a))
     frequency, swing = oscillation(scenario, tau_a=tau_a)
@@ -30,7 +27,7 @@ def test_without_damping_it_is_a_sine_of_known_frequency(scenario: Scenario, tau
     assert scenario.gait_bounds.tau_a_min <= tau_a <= scenario.gait_bounds.tau_a_max
 
 
-def test_weight_and_ratio_decide_between_dying_and_growing(scenario: Scenario) -> None:
+def test_weight_and_ratio_decide_between_dying_and_growing(scenario):
     (f0, sine), (heavy_f, heavy) = oscillation(scenario), oscillation(scenario, weight=2.0)
     assert heavy_f / f0 == pytest.approx(0.83, abs=0.02)
     assert heavy > 1.2 * sine

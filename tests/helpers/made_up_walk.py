@@ -1,7 +1,5 @@
 """A walk made up for tests of figures and measures, of which everything is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray
 
