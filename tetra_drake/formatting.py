@@ -46,10 +46,13 @@ def markdown_table(
 
 
 def render(template: str, **values: object) -> str:
-    """A page from a Jinja template of the package, as "report/report.html.jinja"; values are
-    escaped."""
+    """A page from a Jinja template of the package, as "report/report.html.jinja".
+
+    Values are escaped; fixed() and duration() are filters.
+    """
     from jinja2 import Environment, StrictUndefined
 
     source = (resources.files("tetra_drake") / template).read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined)
+    environment.filters.update(fixed=fixed, duration=duration)
     return environment.from_string(source).render(values)

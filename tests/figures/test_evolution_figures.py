@@ -3,12 +3,15 @@
 import dataclasses
 
 import numpy as np
+import pandas
 import pytest
 from helpers.synthetic_run import PER_DISTANCE, iterations_with_means, write_run
 from matplotlib.container import BarContainer, ErrorbarContainer
 
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.figures.evolution import (
+    both_engines,
+    distances_on_both,
     fitness_of_trials,
     initial_distances,
     initial_fitness,
@@ -22,6 +25,12 @@ from tetra_drake.scenario.units import INCH
 def run_of(tmp_path):
     """run_of(trial, ...): a recorded run of these trials."""
     return lambda *trials, **options: load_run(write_run(tmp_path / "run", trials, **options))
+
+
+def with_reference(run, reference):
+    scenario = dataclasses.replace(run.manifest.scenario, reference=reference)
+    manifest = dataclasses.replace(run.manifest, scenario=scenario)
+    return dataclasses.replace(run, manifest=manifest)
 
 
 def initial(*fitnesses):
@@ -47,13 +56,13 @@ def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of):
         initial(4.0, -6.0, None, 1.0), initial(None, None), [*initial(2.0, 3.0), [(9.0, 0)]]
     )
     reference = ReferenceScenario("a paper", best_initial_distance=6.6 * INCH)
-    figure = initial_distances(run, reference)
+    figure = initial_distances(with_reference(run, reference))
     best, worst = bars(figure)
     assert best == pytest.approx([4.0 / PER_DISTANCE, 3.0 / PER_DISTANCE])
     assert worst == pytest.approx([-6.0 / PER_DISTANCE, 2.0 / PER_DISTANCE])
     assert figure.axes[0].get_xticks().tolist() == [0, 2]
     assert figure.axes[0].lines[-1].get_ydata()[0] == pytest.approx(6.6)
-    assert len(initial_distances(run).axes[0].lines) == 1  # without a reference, zero only
+    assert len(initial_distances(with_reference(run, None)).axes[0].lines) == 1  # zero only
 
 
 def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of):
@@ -125,7 +134,7 @@ def test_the_two_best_gaits_beside_the_reference(run_of):
     reference = ReferenceScenario(
         "a paper", two_best_fitness=0.5, two_best_weights=weights, two_best_tau=0.0
     )
-    table = two_best(run, 0, reference)
+    table = two_best(with_reference(run, reference), 0)
     # Equal fitnesses come with equal genomes, so the second best is the fittest different one.
     for column, index, fitness in (("best", 3, 5.0), ("second", 1, 4.0)):
         assert table[column].tolist() == [fitness, *run.vector(0, index)]
@@ -134,5 +143,25 @@ def test_the_two_best_gaits_beside_the_reference(run_of):
     assert table["reference"].tolist() == [0.5, *weights, 0.0, 0.0]
     assert table.index.tolist()[-2:] == ["tau_A", "tau_B"]
     of_another_robot = ReferenceScenario("a paper", two_best_weights=[0.1] * 24)
-    assert "reference" not in two_best(run, 0, of_another_robot)
+    assert "reference" not in two_best(with_reference(run, of_another_robot), 0)
     assert two_best(run, 1) is None
+
+
+def test_both_engines_shows_every_gait_with_median_and_percentile():
+    compiled = np.linspace(-5.0, 8.0, 40)
+    both = pandas.DataFrame({"compiled_in": compiled, "drake_in": compiled + 0.02})
+    scatter, shares = both_engines(both).axes
+    (dots,) = [line for line in scatter.lines if line.get_linestyle() == "None"]
+    np.testing.assert_array_equal(dots.get_xydata(), both)
+    marks = [line.get_xydata()[0] for line in shares.lines[1:]]
+    np.testing.assert_allclose(marks, [(0.02, 50.0), (0.02, 95.0)])
+
+
+def test_distances_on_both_are_those_of_reevaluated_gaits(run_of):
+    run = run_of([[(2.0, 0), (1.0, 1), (None, 2)], [(3.0, 1), (1.0, None)]])
+    assert distances_on_both(run).empty
+    again = run.evaluations.head(4).drop(columns="placed")
+    found = distances_on_both(dataclasses.replace(run, reevaluations=again))
+    assert found["index"].tolist() == [0, 1, 2, 3]
+    np.testing.assert_allclose(found["compiled_in"], [1.0, 0.5, np.nan, 1.5])
+    np.testing.assert_array_equal(found["drake_in"], found["compiled_in"])

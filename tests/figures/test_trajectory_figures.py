@@ -61,7 +61,7 @@ def test_the_time_lapse_shows_instants_from_start_to_end(walk):
 def test_distances_before_and_after_have_one_scale(walk):
     slow = walk.assign(p_WN=0.5 * walk.p_WN)
     reference = ReferenceScenario("a paper", best_distance=8.0 * INCH)
-    figure = before_and_after(slow, walk, (r"$\cost$ " + "long " * 100, "$"), reference)
+    figure = before_and_after([(r"$\cost$ " + "long " * 100, slow), ("$", walk)], reference)
     before, after = figure.axes
     assert before.get_ylim() == after.get_ylim()
     for panel, speed in ((before, 0.5 * SPEED), (after, SPEED)):

@@ -6,36 +6,24 @@ A figure's files are named after the function that draws it, whose docstring is 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from matplotlib.figure import Figure
+import xarray
 
-from tetra_drake.figures import engines, evolution, forces, motion
+from tetra_drake.figures import evolution, forces, motion
+from tetra_drake.figures.study import Study
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
-
-if TYPE_CHECKING:
-    import xarray
-
-    from tetra_drake.evolution.tables import Run
-    from tetra_drake.figures.study import Study
 
 TWO_BEST = "two_best.csv"
 
 
-@dataclass(frozen=True)
-class Picture:
-    """The name of a written figure's files, without suffix, and its caption."""
+def draw_trajectory(trajectory: xarray.Dataset, folder: Path) -> dict[str, str]:
+    """Writes the figures of one simulation; returns their captions by name of file, no suffix.
 
-    name: str
-    caption: str
-
-
-def draw_trajectory(trajectory: xarray.Dataset, folder: Path) -> list[Picture]:
-    """Writes the figures of one simulation; InputError if the folder cannot be written to."""
+    Raises InputError if the folder cannot be written to.
+    """
     draws = (
         motion.time_lapse,
         motion.relative_distances,
@@ -43,39 +31,34 @@ def draw_trajectory(trajectory: xarray.Dataset, folder: Path) -> list[Picture]:
         forces.signals_and_tensions,
         forces.ground_forces,
     )
-    return [_save(folder, draw, trajectory) for draw in draws]
+    return _save(folder, *((draw, trajectory) for draw in draws))
 
 
-def draw_run(study: Study, folder: Path) -> list[Picture]:
-    """Writes the figures of a run, and the table of its two best gaits as CSV.
-
-    Raises InputError if the folder cannot be written to.
-    """
+def draw_run(study: Study, folder: Path) -> dict[str, str]:
+    """As draw_trajectory() of its best gait, with the figures of a run and, as CSV, the table of
+    its two best gaits."""
     run, initial, best = study.run, study.initial, study.best
-    reference = run.manifest.scenario.reference
-    table = evolution.two_best(run, study.trial, reference)
+    table = evolution.two_best(run, study.trial)
     if table is not None:
         write_whole(folder / TWO_BEST, table.to_csv())
-    pictures = [_save(folder, *picture) for picture in _of_evolution(run, study.trial)]
-    labels = initial.label, best.label
-    walks = (motion.before_and_after, initial.trajectory, best.trajectory, labels, reference)
-    return [*pictures, _save(folder, *walks), *draw_trajectory(best.trajectory, folder)]
-
-
-def _of_evolution(run: Run, trial: int) -> Iterator[tuple[Any, ...]]:
-    """Functions that draw figures of the record, and their arguments."""
-    reference = run.manifest.scenario.reference
-    yield evolution.fitness_of_trials, run
-    extremes = evolution.initial_extremes(run)
-    if len(extremes):
-        yield evolution.initial_distances, run, reference
-    if trial in extremes.index:
-        yield evolution.initial_fitness, run, trial, reference
-    both = engines.distances_on_both(run).query("iteration == 0").dropna()
+    pictures: list[tuple[Any, ...]] = [(evolution.fitness_of_trials, run)]
+    trials = evolution.initial_extremes(run).index
+    if len(trials):
+        pictures.append((evolution.initial_distances, run))
+    if study.trial in trials:
+        pictures.append((evolution.initial_fitness, run, study.trial))
+    both = evolution.distances_on_both(run).query("iteration == 0").dropna()
     if len(both):
-        yield engines.both_engines, both
+        pictures.append((evolution.both_engines, both))
+    walks = [(walk.label, walk.trajectory) for walk in (initial, best)]
+    pictures.append((motion.before_and_after, walks, run.manifest.scenario.reference))
+    return _save(folder, *pictures) | draw_trajectory(best.trajectory, folder)
 
 
-def _save(folder: Path, draw: Callable[..., Figure], *data: Any) -> Picture:
-    save_figure(draw(*data), folder, draw.__name__)
-    return Picture(draw.__name__, " ".join((inspect.getdoc(draw) or "").split()))
+def _save(folder: Path, *pictures: tuple[Any, ...]) -> dict[str, str]:
+    """Saves figures, each given as the function that draws it and its arguments."""
+    captions = {}
+    for draw, *data in pictures:
+        save_figure(draw(*data), folder, draw.__name__)
+        captions[draw.__name__] = " ".join((inspect.getdoc(draw) or "").split())
+    return captions

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
 import pandas
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from tetra_drake.evolution.tables import Run
 from tetra_drake.figures.style import (
     OKABE_ITO,
+    REFERENCE,
     common_style,
     draw_reference,
     line_style,
@@ -20,11 +22,6 @@ from tetra_drake.figures.style import (
 from tetra_drake.formatting import fixed
 from tetra_drake.robot.gait import ParameterSpace
 
-if TYPE_CHECKING:
-    from tetra_drake.evolution.tables import Run
-    from tetra_drake.scenario.schema import ReferenceScenario
-
-_WIDTH = 7.0
 _LEGEND_ROWS = 14
 """Trials per column of a legend beside the axes."""
 
@@ -43,23 +40,20 @@ def initial_extremes(run: Run) -> pandas.DataFrame:
 
 
 @common_style()
-def initial_distances(run: Run, reference: ReferenceScenario | None = None) -> Figure:
+def initial_distances(run: Run) -> Figure:
     """Distances of the fittest and the least fit initial gait of each trial; no failed gaits."""
-    extremes = initial_extremes(run)
-    figure, axes = _axes(height_in=3.6)
-    width = 0.4
-    for side, colour, column, label in (
-        (-1, "blue", "best", "fittest of a trial"),
-        (1, "orange", "worst", "least fit of a trial"),
-    ):
-        place = extremes.index + side * width / 2
-        axes.bar(place, extremes[column], width, color=OKABE_ITO[colour], label=label)
+    extremes, scenario, width = initial_extremes(run), run.manifest.scenario, 0.4
+    figure, [[axes]] = make_figure(width_in=7.0, height_in=3.6)
+    best, worst = extremes.index - width / 2, extremes.index + width / 2
+    blue, orange = OKABE_ITO["blue"], OKABE_ITO["orange"]
+    axes.bar(best, extremes["best"], width, color=blue, label="fittest of a trial")
+    axes.bar(worst, extremes["worst"], width, color=orange, label="least fit of a trial")
     axes.axhline(0.0, color="black", linewidth=0.8)
-    draw_reference(axes, reference, "best_initial_distance")
+    draw_reference(axes, scenario.reference, "best_initial_distance")
     margin = max(0.9, 2.0 - len(extremes) / 2)  # else the bars of a single trial fill the axes
     axes.set(
         xlabel="trial",
-        ylabel=f"distance in {run.manifest.scenario.simulation.duration:g} s (in)",
+        ylabel=f"distance in {scenario.simulation.duration:g} s (in)",
         xlim=(extremes.index.min() - margin, extremes.index.max() + margin),
         xticks=extremes.index[:: math.ceil(len(extremes) / _TICKS)],
     )
@@ -73,20 +67,19 @@ def initial_distances(run: Run, reference: ReferenceScenario | None = None) -> F
 
 
 @common_style()
-def initial_fitness(run: Run, trial: int, reference: ReferenceScenario | None = None) -> Figure:
+def initial_fitness(run: Run, trial: int) -> Figure:
     """Histogram of the fitness of a trial's initial gaits; those that walk backward stand out."""
     initial = run.initial().query("trial == @trial")
     walked = initial.dropna(subset="fitness")
-    backward = walked["distance_in"] < 0.0
-    figure, axes = _axes(height_in=3.6)
-    groups = {"forward": walked["fitness"][~backward], "backward": walked["fitness"][backward]}
+    fitness, backward = walked["fitness"], walked["distance_in"] < 0.0
+    figure, [[axes]] = make_figure(width_in=7.0, height_in=3.6)
     # Bin edges at round numbers, zero among them where the values pass it.
     locator = MaxNLocator(nbins=20, steps=[1, 2, 2.5, 5, 10])
     axes.hist(
-        list(groups.values()),
-        bins=list(locator.tick_values(walked["fitness"].min(), walked["fitness"].max())),
+        [fitness[~backward], fitness[backward]],
+        bins=list(locator.tick_values(fitness.min(), fitness.max())),
         stacked=True,
-        label=[f"{len(fitness)} walk {way}" for way, fitness in groups.items()],
+        label=[f"{(~backward).sum()} walk forward", f"{backward.sum()} walk backward"],
         color=[OKABE_ITO["blue"], OKABE_ITO["orange"]],
         hatch=["", "//"],
         edgecolor="white",
@@ -96,14 +89,12 @@ def initial_fitness(run: Run, trial: int, reference: ReferenceScenario | None = 
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.grid(visible=False, axis="x")
     axes.legend(loc="best")
-    failed = len(initial) - len(walked)
-    theirs = reference.share_backward if reference else ""
-    figure.suptitle(
-        f"Fitness of the initial population, trial {trial}\n"
-        f"{fixed(100.0 * float(backward.mean()), 0)} % walk backward"
-        + (f" ({reference.source}: {theirs})" if reference and theirs else "")
-        + (f"; {failed} failed" if failed else "")
-    )
+    title = f"Fitness of the initial population, trial {trial}\n"
+    title += f"{fixed(100.0 * float(backward.mean()), 0)} % walk backward"
+    reference, failed = run.manifest.scenario.reference, len(initial) - len(walked)
+    if reference and reference.share_backward:
+        title += f" ({reference.source}: {reference.share_backward})"
+    figure.suptitle(title + (f"; {failed} failed" if failed else ""))
     return figure
 
 
@@ -129,57 +120,81 @@ def fitness_of_trials(run: Run) -> Figure:
     kind = "mean" if "mean_fitness" in run.iterations else "best"
     table = run.iterations.pivot(index="iteration", columns="trial", values=f"{kind}_fitness")
     table = table.dropna(axis="columns", how="all")
-    figure, axes = _axes(height_in=4.0)
-    for trial in table.ffill().iloc[-1].sort_values(ascending=False, kind="stable").index:
+    first, last = table.bfill().iloc[0], table.ffill().iloc[-1]
+    figure, [[axes]] = make_figure(width_in=7.0, height_in=4.0)
+    for trial in last.sort_values(ascending=False, kind="stable").index:
         series = table[trial].dropna()
         # The dot marks the end of a line, and makes a line of one point visible.
         dot: Any = {"marker": "o", "markevery": [-1]}
         axes.plot(series.index, series, label=f"trial {trial}", **line_style(trial), **dot)
-    if table.shape[1] > 1:
+    if len(last) > 1:
         average = average_over_trials(run, table)
-        axes.errorbar(
-            average.index,
-            average["mean"],
-            yerr=average["deviation"],
-            errorevery=math.ceil(len(average) / _TICKS),
-            color="0.45",
-            linestyle="-",
-            linewidth=2.5,
-            elinewidth=0.7,
-            capsize=2.0,
-            label="average",
-        )
+        look: Any = {"color": "0.45", "linewidth": 2.5, "elinewidth": 0.7, "capsize": 2.0}
+        every = math.ceil(len(average) / _TICKS)
+        axes.errorbar(*average.reset_index().values.T, label="average", errorevery=every, **look)
     axes.set(xlabel="iteration", ylabel=f"{kind} fitness", xmargin=0.02)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    columns = math.ceil((table.shape[1] + 1) / _LEGEND_ROWS)
+    columns = math.ceil((len(last) + 1) / _LEGEND_ROWS)
     figure.legend(loc="outside right center", ncols=columns, handlelength=3.2)
-    rises = (table.ffill().iloc[-1] > table.bfill().iloc[0]).sum()
-    figure.suptitle(f"Fitness of each trial\nrises in {rises} of {table.shape[1]}")
+    figure.suptitle(f"Fitness of each trial\nrises in {(last > first).sum()} of {len(last)}")
     return figure
 
 
-def two_best(
-    run: Run, trial: int, reference: ReferenceScenario | None = None
-) -> pandas.DataFrame | None:
+def two_best(run: Run, trial: int) -> pandas.DataFrame | None:
     """The two fittest different gaits of a trial. Index: fitness and the names of the parameters.
 
     Columns: best, second, difference (absolute) and, where there is a reference with as many
     parameters, reference. None if there are no two such gaits.
     """
-    pair = run.best(2).query("trial == @trial")
+    pair, scenario = run.best(2).query("trial == @trial"), run.manifest.scenario
     if len(pair) < 2:
         return None
     rows = zip(pair["fitness"], pair["index"], strict=True)
     best, second = ([fitness, *run.vector(trial, index)] for fitness, index in rows)
-    names = ["fitness", *ParameterSpace.of(run.manifest.scenario).names]
-    table = pandas.DataFrame({"best": best, "second": second}, index=pandas.Index(names))
+    names = pandas.Index(["fitness", *ParameterSpace.of(scenario).names], name="parameter")
+    table = pandas.DataFrame({"best": best, "second": second}, index=names)
     table["difference"] = (table["best"] - table["second"]).abs()
-    if reference is not None and len(reference.two_best_weights) == len(table) - 3:
-        taus = 2 * [reference.two_best_tau]
-        table["reference"] = [reference.two_best_fitness, *reference.two_best_weights, *taus]
-    return table.rename_axis("parameter")
+    theirs = scenario.reference
+    if theirs is not None and len(theirs.two_best_weights) == len(table) - 3:
+        taus = 2 * [theirs.two_best_tau]
+        table["reference"] = [theirs.two_best_fitness, *theirs.two_best_weights, *taus]
+    return table
 
 
-def _axes(*, height_in: float) -> tuple[Figure, Axes]:
-    figure, panels = make_figure(width_in=_WIDTH, height_in=height_in)
-    return figure, panels[0, 0]
+def distances_on_both(run: Run) -> pandas.DataFrame:
+    """Distances of the gaits that were evaluated again on the Drake diagram.
+
+    Columns: trial, index, iteration, compiled_in and drake_in (NaN where a gait failed).
+    """
+    key = ["trial", "index"]
+    compiled = run.evaluations[[*key, "iteration", "distance_in"]]
+    drake = run.reevaluations.reindex(columns=[*key, "distance_in"])
+    both = compiled.merge(drake, on=key, validate="one_to_one")
+    return both.rename(columns={"distance_in_x": "compiled_in", "distance_in_y": "drake_in"})
+
+
+@common_style()
+def both_engines(distances: pandas.DataFrame) -> Figure:
+    """Distances of gaits on the diagram over those on the compiled engine (left), and the share
+    of the gaits below each absolute difference (right)."""
+    compiled, drake = distances["compiled_in"], distances["drake_in"]
+    difference = (compiled - drake).abs().clip(lower=1e-4).sort_values()  # logarithmic axis
+    figure, [[scatter, shares]] = make_figure(width_in=8.0, height_in=4.2, columns=2)
+    ends = [min(compiled.min(), drake.min()), max(compiled.max(), drake.max())]
+    scatter.plot(ends, ends, label="equal", **REFERENCE)
+    dots: Any = {"alpha": 0.6, "markersize": 2.5, "markeredgewidth": 0.0}
+    scatter.plot(compiled, drake, "o", color=OKABE_ITO["blue"], label="gait", **dots)
+    scatter.set(aspect="equal", xlabel="compiled engine (in)", ylabel="Drake diagram (in)")
+    scatter.margins(0.04)
+    scatter.legend(loc="upper left")
+    percent = 100.0 * np.arange(1, len(difference) + 1) / len(difference)
+    shares.step(difference, percent, where="post", color=OKABE_ITO["blue"])
+    for height in (50, 95):
+        value = difference.quantile(height / 100)
+        shares.plot(value, height, "o", color=OKABE_ITO["vermillion"])
+        place: Any = {"xytext": (-6, 4), "textcoords": "offset points", "ha": "right"}
+        shares.annotate(f"{height} %: {value:.2g} in", (value, height), **place)
+    shares.set(xscale="log", xlabel="absolute difference (in)")
+    shares.set(ylim=(0.0, 102.0), ylabel="gaits with a smaller difference (%)")
+    figure.suptitle(f"Distances of {len(distances)} gaits on both engines")
+    return figure

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+import pandas
+import xarray
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.tables import Run
 from tetra_drake.results.measures import distance_walked
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.units import INCH
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
 
 
 @dataclass(frozen=True)
@@ -59,9 +57,8 @@ def study_run(run: Run) -> Study:
     trial, index = run.fittest()
     rows = run.evaluations.query("trial == @trial").dropna(subset="fitness").set_index("index")
     first = int(rows[rows["iteration"] == rows["iteration"].min()]["fitness"].idxmax())
-    best = _walk(run, trial, index)
-    initial = best if first == index else _walk(run, trial, first)
-    return Study(run=run, trial=trial, initial=initial, best=best)
+    walks = {i: _walk(run, trial, i) for i in {first, index}}
+    return Study(run=run, trial=trial, initial=walks[first], best=walks[index])
 
 
 def _walk(run: Run, trial: int, index: int) -> Walk:

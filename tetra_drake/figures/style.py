@@ -7,22 +7,21 @@ figure; save_figure() writes it. Neither a display nor pyplot is needed.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import matplotlib
 import matplotlib.style
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 
 from tetra_drake.files import whole_file
+from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.units import INCH
-
-if TYPE_CHECKING:
-    from tetra_drake.scenario.schema import ReferenceScenario
 
 OKABE_ITO = {
     "black": "#000000",
@@ -48,38 +47,34 @@ SHADE = "0.9"
 REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 """Line style of reference values."""
 
-PNG_DPI = 150
-
 
 def line_style(index: int) -> dict[str, Any]:
     """Colour and dashes of a series by its index."""
-    return {
-        "color": LINE_COLOURS[index % len(LINE_COLOURS)],
-        "linestyle": DASHES[index % len(DASHES)],
-    }
+    dashes = DASHES[index % len(DASHES)]
+    return {"color": LINE_COLOURS[index % len(LINE_COLOURS)], "linestyle": dashes}
 
 
 @contextlib.contextmanager
 def common_style() -> Iterator[None]:
-    """The common look for what is drawn inside, whatever the user's matplotlibrc says.
-
-    `@common_style()` decorates a function that draws.
-    """
-    series = [line_style(index) for index in range(len(LINE_COLOURS) * len(DASHES))]
-    columns = {key: [style[key] for style in series] for key in ("color", "linestyle")}
+    """The common look for what is drawn inside, whatever the user's matplotlibrc says."""
     sheet = Path(__file__).with_name("tetra_drake.mplstyle")
-    with matplotlib.style.context(["default", sheet]):
-        matplotlib.rcParams["axes.prop_cycle"] = cycler(**columns)
+    cycle = cycler(color=LINE_COLOURS * len(DASHES), linestyle=DASHES * len(LINE_COLOURS))
+    with matplotlib.style.context(["default", sheet, {"axes.prop_cycle": cycle}]):
         yield
 
 
-@common_style()
 def make_figure(
     *, width_in: float, height_in: float, rows: int = 1, columns: int = 1, **layout: Any
 ) -> tuple[Figure, np.ndarray]:
     """A figure and its axes (rows, columns); sizes in inches on paper, `layout` for subplots."""
     figure = Figure(figsize=(width_in, height_in))
     return figure, figure.subplots(rows, columns, squeeze=False, **layout)
+
+
+def legend_below(figure: Figure, lines: Mapping[str, Any], *others: Artist) -> None:
+    """Adds a legend of line styles, by label, and other artists below the axes."""
+    handles = [*(Line2D([], [], label=text, **style) for text, style in lines.items()), *others]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
 
 
 def draw_reference(axes: Axes, reference: ReferenceScenario | None, name: str) -> None:
@@ -97,11 +92,11 @@ def draw_reference(axes: Axes, reference: ReferenceScenario | None, name: str) -
 def save_figure(
     figure: Figure, folder: str | Path, name: str, *, kinds: Sequence[str] = ("svg", "png")
 ) -> None:
-    """Writes NAME.svg and NAME.png (150 dpi) to the folder, each whole or not at all.
+    """Writes NAME.svg and NAME.png to the folder, each whole or not at all.
 
     Equal data give equal bytes. Raises InputError if a file cannot be written.
     """
     for kind in kinds:
         metadata = {"Date": None} if kind == "svg" else None
         with whole_file(Path(folder) / f"{name}.{kind}") as file:
-            figure.savefig(file, format=kind, dpi=PNG_DPI, metadata=metadata)
+            figure.savefig(file, format=kind, metadata=metadata)
