@@ -140,6 +140,17 @@ def test_bodies_and_the_ends_of_traces_are_where_they_were(page, trajectory):
         assert time - 0.21 < max(traced) <= time + 1e-5
 
 
+def test_traces_grow_while_the_page_plays(page):
+    page.evaluate("viewer.animator.reset(); viewer.animator.play()")
+    page.wait_for_function("viewer.animator.time > 1.0")
+    time, ends = page.evaluate(
+        """() => [viewer.animator.time, viewer.scene_tree.find(['traces']).object.children
+            .filter(trace => trace.visible).map(trace => parseFloat(trace.name))]"""
+    )
+    assert ends == pytest.approx([0.2 * i for i in range(1, len(ends) + 1)])
+    assert time - 0.4 < max(ends) <= time
+
+
 def test_every_window_shows_the_whole_robot_and_its_path(page, trajectory):
     animation.show_instant(page, 0.0)
     points = trajectory["p_WN"].values[::50].reshape(-1, 3).tolist()

@@ -130,7 +130,8 @@ class _Film:
             path = f"/traces/{self._ticks[last] / TICKS_PER_SECOND:g} s"
             self._meshcat.SetLineSegments(path, start, end, rgba=rgba("trace"))
             self._animation.SetProperty(0, path, "visible", False)
-            self._animation.SetProperty(self._ticks[last], path, "visible", True)
+            for tick in {self._ticks[last], self._ticks[-1]}:  # a motion that ends earlier repeats
+                self._animation.SetProperty(tick, path, "visible", True)
 
     def add(self, motion: Motion) -> None:
         """Key frames of one object's motion; without animation it stands in the first."""
