@@ -111,11 +111,12 @@ def main() -> None:
     # Contact and stiction change where a step ends, so no step may be long.
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.001)
-    recorder = Recorder(sample_times(options.duration, 0.01))
+    structure = MakeStructure(scenario.robot, scenario.cables)
+    recorder = Recorder(diagram, structure, sample_times(options.duration, 0.01))
     simulator.set_monitor(recorder.after_step)
     simulator.AdvanceTo(options.duration)
 
-    trajectory = recorder.dataset(diagram, MakeStructure(scenario.robot, scenario.cables))
+    trajectory = recorder.dataset()
     title = replay_title(gait.name, trajectory)
     save_replay(options.out / "robot.html", scenario=scenario, trajectory=trajectory, title=title)
     print(title)

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
-from pydrake.systems.framework import Context, Diagram, EventStatus
+from pydrake.systems.framework import Context, Diagram
 
 from tetra_drake.engines.recorder import Recorder, Sample, make_dataset
 from tetra_drake.engines.viewer import Viewer
@@ -33,37 +33,50 @@ def simulate_drake(
     diagram = MakeTensegrityDiagram(scenario, gait)
     structure = MakeStructure(scenario.robot, scenario.cables)
     simulator = MakeSimulator(diagram, settings)
-    guard = _Guard(diagram, simulator, settings)
+    integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
     aimer = _StepAimer(diagram, simulator, settings)
-    recorder = Recorder(sample_times(settings.duration, settings.sample_period))
+    times = sample_times(settings.duration, settings.sample_period)
+    recorder = Recorder(diagram, structure, times)
 
-    def after_step(context: Context) -> EventStatus:
+    def after_step(context: Context) -> None:
         # What is done here must not depend on whether somebody records or watches.
-        if guard.check(context) is not None:
-            return EventStatus.ReachedTermination(diagram, "the simulation has failed")
-        aimer.aim(context)
+        velocities = state.Eval(context)[7 * len(structure.bodies) :]
+        _check(settings, context.get_time(), velocities, integrator)
+        aimer.aim(context, velocities)
         if record:
             recorder.after_step(context)
         if viewer is not None and viewer.wants(context.get_time()):
             viewer.show(make_dataset(diagram, structure, [Sample.of(context)]))
-        return EventStatus.Succeeded()
 
     simulator.set_monitor(after_step)
     started = time.perf_counter()
     positions = []
-    for instant in (0.0, settings.steady_from, settings.duration):
-        guard.advance_to(instant)
-        state = diagram.GetOutputPort("state").Eval(simulator.get_context())
-        positions.append(node_positions(structure, state))
+    try:
+        for instant in (0.0, settings.steady_from, settings.duration):
+            simulator.AdvanceTo(instant)
+            positions.append(node_positions(structure, state.Eval(simulator.get_context())))
+    except SimulationFailure:
+        raise
+    except RuntimeError as error:
+        # Drake's own reasons: a step below the least, a state that is not finite.
+        now, reason = simulator.get_context().get_time(), str(error).strip()
+        raise Diverged(time=now, reason=reason.splitlines()[0]) from error
     wall_time = time.perf_counter() - started
 
+    for_jacobian = "integrator_num_derivative_evaluations_for_jacobian"
     return make_result(
         scenario,
         structure,
         positions=positions,
         wall_time=wall_time,
-        integrator=_integrator_work(simulator.get_integrator(), settings),
-        trajectory=recorder.dataset(diagram, structure) if record else None,
+        integrator=IntegratorWork(
+            scheme=settings.scheme,
+            accuracy=settings.accuracy,
+            steps=integrator.get_num_steps_taken(),
+            derivative_evaluations=integrator.get_num_derivative_evaluations(),
+            jacobian_evaluations=int(dict(integrator.GetStatisticsSummary()).get(for_jacobian, 0)),
+        ),
+        trajectory=recorder.dataset() if record else None,
     )
 
 
@@ -81,43 +94,18 @@ def MakeSimulator(diagram: Diagram, settings: SimulationScenario) -> Simulator:
     return simulator
 
 
-class _Guard:
-    """Ends a simulation that has failed, with the reason."""
-
-    def __init__(
-        self, diagram: Diagram, simulator: Simulator, settings: SimulationScenario
-    ) -> None:
-        self._simulator = simulator
-        self._integrator = simulator.get_integrator()
-        self._settings = settings
-        self._state = diagram.GetOutputPort("state")
-        self._failure: SimulationFailure | None = None
-
-    def advance_to(self, time: float) -> None:
-        """Simulates up to `time` (s); raises Diverged or StepBudgetExceeded."""
-        try:
-            self._simulator.AdvanceTo(time)
-        except RuntimeError as error:
-            # Drake's own reasons: a step below the least, a state that is not finite.
-            now, reason = self._simulator.get_context().get_time(), str(error).strip()
-            raise Diverged(time=now, reason=reason.splitlines()[0]) from error
-        if self._failure is not None:
-            raise self._failure
-
-    def check(self, context: Context) -> SimulationFailure | None:
-        """Why the simulation has failed; None if it has not."""
-        settings, time = self._settings, context.get_time()
-        state = self._state.Eval(context)
-        v_WB = state[state.size // 13 * 7 :].reshape(-1, 6)[:, 3:]
-        speed = np.abs(v_WB).max()
-        used = self._integrator.get_num_derivative_evaluations()
-        if not speed <= settings.max_speed:
-            reason = f"a body moves at {speed:g} m/s, the limit is {settings.max_speed:g} m/s"
-            self._failure = Diverged(time=time, reason=reason)
-        elif used > settings.max_evaluations:
-            reason = f"{used} derivative evaluations, the budget is {settings.max_evaluations}"
-            self._failure = StepBudgetExceeded(time=time, reason=reason)
-        return self._failure
+def _check(
+    settings: SimulationScenario, now: float, velocities: np.ndarray, integrator: IntegratorBase
+) -> None:
+    """Raises Diverged or StepBudgetExceeded if the simulation has failed."""
+    speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
+    used = integrator.get_num_derivative_evaluations()
+    if not speed <= settings.max_speed:
+        reason = f"a body moves at {speed:g} m/s, the limit is {settings.max_speed:g} m/s"
+        raise Diverged(time=now, reason=reason)
+    if used > settings.max_evaluations:
+        reason = f"{used} derivative evaluations, the budget is {settings.max_evaluations}"
+        raise StepBudgetExceeded(time=now, reason=reason)
 
 
 class _StepAimer:
@@ -129,11 +117,9 @@ class _StepAimer:
     def __init__(
         self, diagram: Diagram, simulator: Simulator, settings: SimulationScenario
     ) -> None:
-        self._integrator = simulator.get_mutable_integrator()
-        self._settings = settings
+        self._integrator, self._settings = simulator.get_mutable_integrator(), settings
         self._ground = diagram.GetSubsystemByName("ground")
         self._ground_context = self._ground.GetMyContextFromRoot(simulator.get_mutable_context())
-        self._state = diagram.GetOutputPort("state")
         self._aims = (
             settings.mode_changes == "step_end"
             and settings.look_ahead > 0.0
@@ -142,18 +128,16 @@ class _StepAimer:
         self._last_time = 0.0
         self._last_velocities = self._acceleration = np.zeros(0)
 
-    def aim(self, context: Context) -> None:
+    def aim(self, context: Context, velocities: np.ndarray) -> None:
         """Limits the next step; call it after each step."""
         if not self._aims:
             return
-        time, state = context.get_time(), self._state.Eval(context)
-        velocities = state[state.size // 13 * 7 :]
-        step_taken = time - self._last_time
+        step_taken = context.get_time() - self._last_time
         if step_taken > 0.0:
             self._acceleration = (velocities - self._last_velocities) / step_taken
         elif not self._acceleration.size:
             self._acceleration = np.zeros(velocities.size)
-        self._last_time, self._last_velocities = time, velocities
+        self._last_time, self._last_velocities = context.get_time(), velocities
         horizon = self._settings.max_step
         predicted = self._ground.TimeToModeChange(
             self._ground_context, acceleration=self._acceleration, horizon=horizon
@@ -161,16 +145,3 @@ class _StepAimer:
         factor, margin = _AIM_BEYOND
         step = max(self._settings.look_ahead, factor * predicted + margin)
         self._integrator.set_maximum_step_size(min(horizon, step))
-
-
-def _integrator_work(integrator: IntegratorBase, settings: SimulationScenario) -> IntegratorWork:
-    statistics = dict(integrator.GetStatisticsSummary())
-    return IntegratorWork(
-        scheme=settings.scheme,
-        accuracy=settings.accuracy,
-        steps=int(integrator.get_num_steps_taken()),
-        derivative_evaluations=int(integrator.get_num_derivative_evaluations()),
-        jacobian_evaluations=int(
-            statistics.get("integrator_num_derivative_evaluations_for_jacobian", 0)
-        ),
-    )
