@@ -1,7 +1,5 @@
 """Runs made up for tests of what is shown of them, written as the real ones are."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,15 +20,10 @@ PER_DISTANCE = 2.0
 """Fitness per inch of distance, so that no figure can mistake one for the other."""
 
 
-def tiny_scenario(*, trials: int = 1, name: str = "tiny") -> Scenario:
+def tiny_scenario(*, name: str = "tiny") -> Scenario:
     """A robot of three tetrahedra that walks for a moment."""
-    scenario = load_scenario("thesis")
-    scenario.name = name
-    scenario.robot.tetrahedra = 3
-    scenario.simulation.duration = 0.3
-    scenario.simulation.steady_from = 0.1
-    scenario.evolution.trials = trials
-    return scenario
+    times = {"simulation.duration": 0.3, "simulation.steady_from": 0.1}
+    return load_scenario("thesis").with_changes({"name": name, "robot.tetrahedra": 3} | times)
 
 
 def write_run(
@@ -50,37 +43,27 @@ def write_run(
     with RunRecord.create(directory, scenario=scenario, seed=7):
         for number, iterations in enumerate(trials):
             trial = TrialRecord(trial_folder(directory, number))
-            for entries, line in _lines(iterations, scenario, ends=number not in unfinished):
-                trial.complete(entries, line)
+            entries, population = [], {}
+            for iteration, children in enumerate(iterations):
+                begin = len(entries)
+                for fitness, placed in children:
+                    entry = _entry(len(entries), iteration, fitness, scenario)
+                    entries.append(entry | {"placed": placed})
+                    population |= {} if placed is None else {placed: fitness}
+                finite = [fitness for fitness in population.values() if fitness is not None]
+                given = [entry for entry in entries if entry["fitness"] is not None]
+                best = max(given, key=lambda entry: entry["fitness"], default={})
+                ends = iteration == len(iterations) - 1 and number not in unfinished
+                line = {
+                    "iteration": iteration,
+                    "evaluations": len(entries),
+                    "mean_fitness": sum(finite) / len(finite) if finite else None,
+                    "best_fitness": best.get("fitness"),
+                    "best_evaluation": best.get("index"),
+                    "stop": "all iterations done" if ends else None,
+                }
+                trial.complete(entries[begin:], line)
     return directory
-
-
-def _lines(iterations, scenario, *, ends):
-    population: dict[int, float | None] = {}
-    count = 0
-    best: tuple[float, int] | None = None
-    for iteration, children in enumerate(iterations):
-        entries = []
-        for fitness, placed in children:
-            entries.append(_entry(count, iteration, fitness, scenario) | {"placed": placed})
-            if placed is not None:
-                population[placed] = fitness
-            if fitness is not None and (best is None or fitness > best[0]):
-                best = fitness, count
-            count += 1
-        finite = [fitness for fitness in population.values() if fitness is not None]
-        last = iteration == len(iterations) - 1
-        yield (
-            entries,
-            {
-                "iteration": iteration,
-                "evaluations": count,
-                "mean_fitness": sum(finite) / len(finite) if finite else None,
-                "best_fitness": best[0] if best else None,
-                "best_evaluation": best[1] if best else None,
-                "stop": "all iterations done" if last and ends else None,
-            },
-        )
 
 
 def _entry(index, iteration, fitness, scenario):
@@ -88,18 +71,13 @@ def _entry(index, iteration, fitness, scenario):
     genome = ParameterSpace.of(scenario).random(np.random.default_rng(seed))
     evaluation = Evaluation(-math.inf, failure="fell over", wall_time=0.5)
     if fitness is not None:
-        distances = {
-            "distance": fitness / PER_DISTANCE * INCH,
-            "steady_distance": fitness * INCH,
-            "twist": 0.0,
-            "lead": 9.0 * INCH,
-            "lateral_drift": 0.0,
-        }
-        evaluation = Evaluation(fitness, distances, wall_time=0.5)
+        inches = {"distance": fitness / PER_DISTANCE, "steady_distance": fitness, "lead": 9.0}
+        inches |= {"twist": 0.0, "lateral_drift": 0.0}
+        metrics = {name: value * INCH for name, value in inches.items()}
+        evaluation = Evaluation(fitness, metrics, wall_time=0.5)
     return evaluation_entry(index, iteration, genome, evaluation)
 
 
 def iterations_with_means(means: Sequence[float]) -> list[list[Child]]:
     """Iterations of a trial whose population of one has these fitnesses, one after the other."""
-    assert all(math.isfinite(mean) for mean in means)
     return [[(mean, 0)] for mean in means]
