@@ -44,8 +44,7 @@ def load_recording(source: Path, *, scenario: str | None = None) -> Recording:
     if (source / RESULT).exists():
         return load_result_folder(source)
     if not source.is_file():
-        expected = "a folder of `simulate` or `evolve`, or a gait file"
-        raise InputError(source, "", f"expected {expected}")
+        raise InputError(source, "", "expected a folder of `simulate` or `evolve`, or a gait file")
     given = load_scenario(scenario or "thesis")
     return _simulate(load_gait(source, given), given)
 

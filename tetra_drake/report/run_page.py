@@ -10,7 +10,6 @@ from urllib.parse import quote
 import pandas
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.method import Part
 from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.summary import comparisons
@@ -19,7 +18,7 @@ from tetra_drake.figures.book import TWO_BEST, draw_run, draw_trajectory
 from tetra_drake.figures.evolution import two_best
 from tetra_drake.figures.study import Study, study_run
 from tetra_drake.files import check_folder, write_whole
-from tetra_drake.formatting import fixed, render
+from tetra_drake.formatting import render
 from tetra_drake.results.folder import RESULT, RUN_MANIFEST, load_result_folder
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import ParameterSpace
@@ -78,7 +77,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         best=study.best,
         changed={label: inches for label, inches in walks.items() if inches > 1e-6},
         versions=versions(),
-        method={name: _described(part) for name, part in vars(manifest.method).items()},
+        json=json.dumps,
         differences=differences(manifest.scenario, load_scenario("thesis")),
         comparisons=comparisons(run),
         on_diagram={trial: distance for trial, _, distance in best_distances(run)},
@@ -91,27 +90,13 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
     )
 
 
-_NAMES = {
-    "drake": "the Drake diagram",
-    "compiled": "the compiled engine",
-    "fitness": "the scenario's fitness",
-    "SteadyState": "the steady-state evolutionary algorithm of the scenario",
-}
-
-
-def _described(part: Part) -> str:
-    text = _NAMES.get(part.name, part.name)
-    text += f" {json.dumps(part.settings)}" if part.settings else ""
-    return text + (f", given from Python (SHA-256 {part.digest[:16]})" if part.digest else "")
-
-
 def _parameters(study: Study) -> pandas.DataFrame:
     """The best gait, beside the second best of its trial if there is one; rows: parameters."""
     table = two_best(study.run, study.trial)
-    if table is None:
-        space = ParameterSpace.of(study.run.manifest.scenario)
-        table = pandas.DataFrame({"best": space.vector(study.best.gait)}, index=space.names)
-    return table.map(lambda value: fixed(value, 4))
+    if table is not None:
+        return table
+    space = ParameterSpace.of(study.run.manifest.scenario)
+    return pandas.DataFrame({"best": space.vector(study.best.gait)}, index=space.names)
 
 
 def _embedded(picture: Path) -> str:
