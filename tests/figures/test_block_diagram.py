@@ -59,27 +59,25 @@ def test_pictures_are_drawn(robot, tmp_path):
     assert len(list(tmp_path.iterdir())) == 3
 
 
-def test_unknown_suffix_is_refused(robot, tmp_path, refused):
-    for path in (tmp_path / "robot.gif", tmp_path / "robot"):
-        with refused(path, "", ".dot, .svg, .png, .pdf"):
-            save_block_diagram(robot, path)
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(
-    ("program", "problem"),
-    [(None, "Graphviz"), ("#!/bin/sh\necho 'Error: no layout' >&2\nexit 1\n", "Error: no layout")],
-    ids=["missing", "failing"],
+    ("name", "program", "problem"),
+    [
+        ("robot.gif", "#!/bin/sh\n", ".dot, .svg, .png, .pdf"),
+        ("robot", "#!/bin/sh\n", ".dot, .svg, .png, .pdf"),
+        ("robot.svg", None, "Graphviz"),
+        ("robot.svg", "#!/bin/sh\necho 'Error: no layout' >&2\nexit 1\n", "Error: no layout"),
+    ],
+    ids=["suffix", "no suffix", "no dot", "failing dot"],
 )
-def test_without_a_working_dot_only_source_is_written(
-    robot, tmp_path, refused, monkeypatch, program, problem
+def test_a_picture_that_cannot_be_drawn_is_refused(
+    robot, tmp_path, refused, monkeypatch, name, program, problem
 ):
     monkeypatch.setenv("PATH", str(tmp_path))
     if program is not None:
         (tmp_path / "dot").write_text(program)
         (tmp_path / "dot").chmod(0o755)
     out = tmp_path / "out"
-    with refused(out / "robot.svg", "", problem):
-        save_block_diagram(robot, out / "robot.svg")
-    save_block_diagram(robot, out / "robot.dot")
+    with refused(out / name, "", problem):
+        save_block_diagram(robot, out / name)
+    save_block_diagram(robot, out / "robot.dot")  # the source needs no program
     assert [path.name for path in out.iterdir()] == ["robot.dot"]

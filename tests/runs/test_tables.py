@@ -23,13 +23,22 @@ BEST = {"thesis": {0: (3, 20.0), 1: (3, 5.0)}, "thesis-listing": {0: (3, 6.0)}}
 BEST["thesis-drake"] = {0: (0, 4.0)}
 """Evaluation and distance (in) of the best gait of each trial."""
 
-CHANGES = (("nothing", 0.0, 0.0), ("spacing", -2.0, -1.0), ("spacing", 2.0, 0.2))
-"""What is changed by how many percent, and by how much (in) that changes the distance."""
-
 
 def write_analysis(path, best):
     """An analysis in which every gait changes alike, and one of two simulations at 5 % fails."""
+
+    def rows(*changes):
+        """A row per gait and change: how its distance changes (None: it fails), and the rest."""
+        return [
+            {"trial": trial, "distance_in": change if change is None else distance + change}
+            | {"failure": "fell" if change is None else None}
+            | rest
+            for trial, (_, distance) in best.items()
+            for change, rest in changes
+        ]
+
     walk = {"off_ground": {"T1": 0.25, "T2": 0.5}, "frequencies_hz": {"T1-T2": 0.8, "T2-T3": None}}
+    settings = (("default", 0.0), ("finer", 0.01), ("coarser", -0.5))
     content = {
         "schema": 1,
         "oscillator": {"tau_a_s": 0.3, "frequency_hz": 0.53},
@@ -37,22 +46,13 @@ def write_analysis(path, best):
             {"trial": trial, "evaluation": index, "distance_in": distance} | walk
             for trial, (index, distance) in best.items()
         ],
-        "resimulations": [
-            {"trial": trial, "setting": name, "distance_in": distance + off, "failure": None}
-            for trial, (_, distance) in best.items()
-            for name, off in (("default", 0.0), ("finer", 0.01), ("coarser", -0.5))
-        ],
-        "variations": [
-            {"trial": trial, "what": what, "percent": percent, "failure": None}
-            | {"distance_in": distance + change}
-            for trial, (_, distance) in best.items()
-            for what, percent, change in CHANGES
-        ]
-        + [
-            {"trial": trial, "what": "spacing", "percent": 5.0, "failure": "fell"}
-            | {"distance_in": None}
-            for trial in best
-        ],
+        "resimulations": rows(*((change, {"setting": name}) for name, change in settings)),
+        "variations": rows(
+            (0.0, {"what": "nothing", "percent": 0.0}),
+            (-1.0, {"what": "spacing", "percent": -2.0}),
+            (0.2, {"what": "spacing", "percent": 2.0}),
+            (None, {"what": "spacing", "percent": 5.0}),
+        ),
     }
     path.write_text(json.dumps(content))
 
@@ -73,42 +73,33 @@ def cells(name, folder):
     return {row[0]: row[1:] for row in rows}
 
 
-@pytest.mark.parametrize(
-    ("row", "expected"),
-    [
-        ("best initial distance, in", ["about 6.6", "4.00", "4.00", "4.00"]),
-        ("initial gaits that go backward", ["nearly half", "50 % of 4", "50 % of 2", "50 % of 2"]),
-        ("best evolved distance, in", ["14.34", "20.00", "6.00", "4.00"]),
-        ("the same gait on the Drake diagram, in", ["–", "20.00", "6.00", "4.00"]),
-        ("mean fitness, best trial, in", ["–", "2.00 → 24.00", "2.00 → 10.00", "2.00 → 2.00"]),
-        ("rise of the best distance, average trial", ["32 %", "212 %", "50 %", "0 %"]),
-        ("frequency of each signal, best gait, Hz", ["no number", *["0.80, -"] * 3]),
-        ("seconds per iteration", ["22", "1", "1", "1"]),
-    ],
-)
-def test_the_comparison_shows_each_run_beside_the_thesis(folder, row, expected):
-    assert cells("comparison", folder)[row] == expected
+def test_the_comparison_shows_each_run_beside_the_thesis(folder):
+    rows = cells("comparison", folder)
+    for row, expected in {
+        "best initial distance, in": ["about 6.6", "4.00", "4.00", "4.00"],
+        "initial gaits that go backward": ["nearly half", "50 % of 4", "50 % of 2", "50 % of 2"],
+        "best evolved distance, in": ["14.34", "20.00", "6.00", "4.00"],
+        "the same gait on the Drake diagram, in": ["–", "20.00", "6.00", "4.00"],
+        "mean fitness, best trial, in": ["–", "2.00 → 24.00", "2.00 → 10.00", "2.00 → 2.00"],
+        "rise of the best distance, average trial": ["32 %", "212 %", "50 %", "0 %"],
+        "frequency of each signal, best gait, Hz": ["no number", *["0.80, -"] * 3],
+        "seconds per iteration": ["22", "1", "1", "1"],
+    }.items():
+        assert rows[row] == expected
 
 
-def test_each_trial_has_its_best_gait(folder):
-    gaits = cells("best-gaits", folder)
-    distance, _, hertz, *lifted = gaits["`thesis`, trial 1"]
+def test_gaits_are_shown_per_trial_and_their_robustness_as_median_change_with_range(folder):
+    distance, _, hertz, *lifted = cells("best-gaits", folder)["`thesis`, trial 1"]
     assert (distance, hertz, lifted) == ("5.00", "0.80", ["25", "50"])
     again = cells("resimulation", folder)
     assert again["`thesis`, trial 1"] == ["5.00", "5.00", "5.01", "4.50"]
     assert again["*`thesis`: median difference*"] == ["0.00", "", "0.01", "0.50"]
-
-
-def test_robustness_is_the_median_change_with_its_range(folder):
     row = cells("robustness", folder)["spacing"]
     assert row == ["0.60 (-1.00 to +0.20)", "- (- to -, 2 failed)"]
     gaits = cells("robust-gaits", folder)
     assert gaits["`thesis`, trial 0"][:3] == ["20.00", "0.60 (-1.00 to +0.20)", "0 %"]
     assert gaits["`thesis`, trial 1"][:3] == ["5.00", "0.60 (-1.00 to +0.20)", "50 %"]
     assert gaits["`thesis`, trial 0"][4] == "100 %"
-
-
-def test_the_two_mutations_stand_side_by_side(folder):
     rows = cells("tau-mutation", folder)
     assert (rows["0"][0::4], rows["0"][3::4]) == (["20.00", "6.00"], ["1", "1"])
     assert rows["1"][4:] == ["-"] * 4
@@ -133,22 +124,16 @@ def test_an_analysis_of_other_gaits_is_refused(folder, refused):
         tables.load_all(folder)
 
 
-BEGIN, END = "<!-- table {}: made by runs/tables.py -->", "<!-- end -->"
-PAGE = (
-    f"# Title\n\n{BEGIN.format('one')}\nold\n\nolder\n{END}\n\ntext\n{BEGIN.format('two')}\n{END}\n"
-)
+BEGIN, END = "<!-- table {}: made by runs/tables.py -->\n", "<!-- end -->\n"
+FIRST, SECOND = BEGIN.format("one"), BEGIN.format("two")
+PAGE = f"# Title\n\n{FIRST}old\n\nolder\n{END}\ntext\n{SECOND}{END}"
 
 
 def test_tables_replace_what_stands_between_their_markers():
-    expected = PAGE.replace("old\n\nolder", "\n| 1 |\n").replace(
-        "two: made by runs/tables.py -->", "two: made by runs/tables.py -->\n\n| 2 |\n"
-    )
+    expected = f"# Title\n\n{FIRST}\n| 1 |\n\n{END}\ntext\n{SECOND}\n| 2 |\n\n{END}"
     make = {"one": "| 1 |", "two": "| 2 |"}.__getitem__
     assert tables.filled(PAGE, make) == expected
     assert tables.filled(expected, make) == expected
-
-
-@pytest.mark.parametrize("page", [PAGE.rsplit(END, 1)[0], PAGE.replace(END, "", 1)])
-def test_a_table_without_an_end_is_refused(page):
-    with pytest.raises(ValueError, match="table"):
-        tables.filled(page, str)
+    for page in (PAGE.rsplit(END, 1)[0], PAGE.replace(END, "", 1)):
+        with pytest.raises(ValueError, match="table"):
+            tables.filled(page, str)
