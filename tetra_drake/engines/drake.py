@@ -14,7 +14,7 @@ from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.structure import MakeStructure, node_positions
+from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario, SimulationScenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -50,11 +50,11 @@ def simulate_drake(
 
     simulator.set_monitor(after_step)
     started = time.perf_counter()
-    positions = []
+    states = []
     try:
         for instant in (0.0, settings.steady_from, settings.duration):
             simulator.AdvanceTo(instant)
-            positions.append(node_positions(structure, state.Eval(simulator.get_context())))
+            states.append(state.Eval(simulator.get_context()))
     except SimulationFailure:
         raise
     except RuntimeError as error:
@@ -67,7 +67,7 @@ def simulate_drake(
     return make_result(
         scenario,
         structure,
-        positions=positions,
+        states=states,
         wall_time=wall_time,
         integrator=IntegratorWork(
             scheme=settings.scheme,

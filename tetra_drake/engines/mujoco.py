@@ -16,7 +16,6 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
-from tetra_drake.engines.viewer import Viewer, show_recording
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE, add_cable_forces
 from tetra_drake.physics.kinematics import move_nodes
@@ -25,7 +24,7 @@ from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
+from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -48,15 +47,11 @@ _MAX_SPEED = 1.0
 at times far forward; a walking robot stays below 0.2 m/s."""
 
 
-def simulate_mujoco(
-    *, scenario: Scenario, gait: Gait, record: bool = False, viewer: Viewer | None = None
-) -> SimulationResult:
+def simulate_mujoco(*, scenario: Scenario, gait: Gait, record: bool) -> SimulationResult:
     """Simulates a gait as simulate() does, in MuJoCo, in steps of `scenario.mujoco.step`.
 
     Instants asked for, as of samples, are those of the nearest steps. Other threads run meanwhile.
-    The viewer is shown the recording.
-
-    Raises Diverged or StepBudgetExceeded; InputError if MuJoCo is missing or cannot do it.
+    Raises InputError, too, if MuJoCo is missing or cannot do it.
     """
     check_mujoco(scenario)
     simulation, step = scenario.simulation, scenario.mujoco.step
@@ -65,28 +60,20 @@ def simulate_mujoco(
         limit = f"the budget of {simulation.max_evaluations}"
         raise StepBudgetExceeded(time=0.0, reason=f"{steps} steps exceed {limit}")
     times = sample_times(simulation.duration, simulation.sample_period)
-    times = times if record or viewer is not None else times[:0]
-    instants = np.array([0.0, simulation.steady_from, simulation.duration, *times])
+    ends = (0.0, simulation.steady_from, simulation.duration)
+    instants = np.array([*ends, *(times if record else ())])
     robot = _Robot(scenario, gait, steps=steps)
     started = time.perf_counter()
     found = robot.walk(np.rint(instants / step).astype(int))
     wall_time = time.perf_counter() - started
 
-    trajectory = robot.dataset(times, found[3:]) if times.size else None
-    if viewer is not None and trajectory is not None:
-        show_recording(viewer, trajectory)
     return make_result(
         scenario,
         robot.structure,
-        positions=[node_positions(robot.structure, state) for state in robot.states(found[:3])],
+        states=robot.states(found[:3]),
         wall_time=wall_time,
-        integrator=IntegratorWork(
-            scheme=scenario.mujoco.integrator,
-            accuracy=step,
-            steps=steps,
-            derivative_evaluations=steps,
-        ),
-        trajectory=trajectory if record else None,
+        integrator=IntegratorWork(scenario.mujoco.integrator, step, steps, steps),
+        trajectory=robot.dataset(times, found[3:]) if record else None,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 from tetra_drake.engines.viewer import Viewer
@@ -21,17 +22,22 @@ def simulate(
 
     Raises Diverged or StepBudgetExceeded, which say when and why.
     """
+    if scenario.simulation.engine == "drake":
+        from tetra_drake.engines.drake import simulate_drake
+
+        return simulate_drake(scenario=scenario, gait=gait, record=record, viewer=viewer)
     if scenario.simulation.engine == "compiled":
-        from tetra_drake.engines.compiled.engine import simulate_compiled
-
-        return simulate_compiled(scenario=scenario, gait=gait, record=record, viewer=viewer)
-    if scenario.simulation.engine == "mujoco":
-        from tetra_drake.engines.mujoco import simulate_mujoco
-
-        return simulate_mujoco(scenario=scenario, gait=gait, record=record, viewer=viewer)
-    from tetra_drake.engines.drake import simulate_drake
-
-    return simulate_drake(scenario=scenario, gait=gait, record=record, viewer=viewer)
+        from tetra_drake.engines.compiled.engine import simulate_compiled as run
+    else:
+        from tetra_drake.engines.mujoco import simulate_mujoco as run
+    result = run(scenario=scenario, gait=gait, record=record or viewer is not None)
+    if viewer is None or result.trajectory is None:
+        return result
+    # These engines are too fast to be watched: the viewer is shown the recording.
+    for i, time in enumerate(result.trajectory["time"].values):
+        if viewer.wants(time):
+            viewer.show(result.trajectory.isel(time=[i]))
+    return result if record else dataclasses.replace(result, trajectory=None)
 
 
 def prepare(scenario: Scenario, *, say: Callable[[str], None] = lambda text: None) -> None:

@@ -16,10 +16,3 @@ class Viewer(Protocol):
 
     def show(self, frame: xarray.Dataset) -> None:
         """Takes one sample of a trajectory (see trajectory.make_dataset)."""
-
-
-def show_recording(viewer: Viewer, trajectory: xarray.Dataset) -> None:
-    """Shows a viewer what has been recorded, for engines that are not watched as they run."""
-    for i, time in enumerate(trajectory["time"].values):
-        if viewer.wants(time):
-            viewer.show(trajectory.isel(time=[i]))

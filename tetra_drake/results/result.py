@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -18,7 +18,7 @@ from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed
 from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.schema import ReferenceScenario, Scenario
 from tetra_drake.scenario.units import INCH
 
@@ -62,17 +62,17 @@ def make_result(
     scenario: Scenario,
     structure: Structure,
     *,
-    positions: Sequence[np.ndarray],
+    states: Iterable[np.ndarray],
     wall_time: float,
     integrator: IntegratorWork,
     trajectory: xarray.Dataset | None,
 ) -> SimulationResult:
     """The result of a simulation on the scenario's engine.
 
-    `positions` are p_WN (nodes, 3) in m at t = 0, at the start of the steady stretch, and at the
-    end; `wall_time` in s.
+    `states` are [q; v] of the bodies at t = 0, at the start of the steady stretch, and at the end;
+    `wall_time` in s.
     """
-    start, steady, end = positions
+    start, steady, end = (node_positions(structure, state) for state in states)
     metrics = compute_metrics(structure, start=start, steady=steady, end=end)
     return SimulationResult(
         metrics=metrics,

@@ -20,7 +20,6 @@ from tetra_drake.engines.compiled.walk import (
     Settings,
     walk,
 )
-from tetra_drake.engines.viewer import Viewer, show_recording
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.contact import STICK_POINT
 from tetra_drake.physics.kinematics import move_nodes
@@ -29,7 +28,7 @@ from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
+from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -38,24 +37,15 @@ if TYPE_CHECKING:
 SCHEME = "ros2"
 
 
-def simulate_compiled(
-    *, scenario: Scenario, gait: Gait, record: bool = False, viewer: Viewer | None = None
-) -> SimulationResult:
-    """Simulates a gait as simulate() does, without Drake.
-
-    Deterministic: the numbers depend on scenario and gait only. Other threads run meanwhile.
-    It is too fast to be watched: the viewer is shown the recording.
-
-    Raises Diverged or StepBudgetExceeded, which say when and why.
-    """
+def simulate_compiled(*, scenario: Scenario, gait: Gait, record: bool) -> SimulationResult:
+    """Simulates a gait as simulate() does, without Drake. Other threads run meanwhile."""
     compile_engine(scenario)
     simulation = scenario.simulation
     structure = MakeStructure(scenario.robot, scenario.cables)
     constants, start = kernel_constants(scenario, gait, structure), structure.initial_state
     ends = (0.0, simulation.steady_from, simulation.duration)
     times = sample_times(simulation.duration, simulation.sample_period)
-    times = times if record or viewer is not None else times[:0]
-    instants = np.unique([*ends, *times])
+    instants = np.unique([*ends, *(times if record else ())])
     marks = np.unique([t for t in (scenario.cpg.start_up, *ends) if t <= simulation.duration])
     started = time.perf_counter()
     status, ended, steps, evaluations, samples = walk(*constants, start, marks, instants)
@@ -63,26 +53,18 @@ def simulate_compiled(
     if status != DONE:
         raise _failure(status, ended, scenario)
 
-    states = samples.states[np.searchsorted(instants, ends)]
     trajectory = None
-    if times.size:
+    if record:
         chosen = np.searchsorted(instants, times)
         kept = Samples(*(column[chosen] for column in samples))
         trajectory = _dataset(structure, constants[0], times, kept)
-    if viewer is not None and trajectory is not None:
-        show_recording(viewer, trajectory)
     return make_result(
         scenario,
         structure,
-        positions=[node_positions(structure, state) for state in states],
+        states=samples.states[np.searchsorted(instants, ends)],
         wall_time=wall_time,
-        integrator=IntegratorWork(
-            scheme=SCHEME,
-            accuracy=scenario.compiled.tolerance,
-            steps=steps,
-            derivative_evaluations=evaluations,
-        ),
-        trajectory=trajectory if record else None,
+        integrator=IntegratorWork(SCHEME, scenario.compiled.tolerance, steps, evaluations),
+        trajectory=trajectory,
     )
 
 
@@ -107,10 +89,8 @@ def kernel_constants(
 
 
 def compile_engine(scenario: Scenario, announce: Callable[[str], None] | None = None) -> None:
-    """Compiles the engine, or loads it from numba's cache; again, it returns at once.
-
-    `announce` is told if that takes longer than a moment.
-    """
+    """Compiles the engine, or loads it from numba's cache, unless that is done already;
+    `announce` is told if it takes longer than a moment."""
     if walk.signatures:  # type: ignore[attr-defined]
         return
     message = "compiling the engine, which takes some seconds the first time ..."
