@@ -13,17 +13,15 @@ from tetra_drake.physics.contact import (
     GROUND,
     MODE,
     MODE_COLUMNS,
-    STICK,
     STICK_POINT,
     add_ground_forces,
     first_zero,
-    friction_force,
     mode_margin,
-    next_friction_mode,
     normal_force,
     time_to_mode_change,
     update_modes,
 )
+from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
 from tetra_drake.physics.kinematics import FORCE, move_nodes
 from tetra_drake.robot.model import ground_law
 from tetra_drake.robot.structure import Structure

@@ -10,7 +10,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK
+from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS
+from tetra_drake.physics.friction import STICK
 from tetra_drake.robot.bodies import AddTetrahedra
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.schema import Scenario

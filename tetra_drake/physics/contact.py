@@ -1,4 +1,4 @@
-"""Ground contact: normal force (Eq. 1), reset-integrator friction (Eq. 3-5), and their modes.
+"""Ground contact: normal force (Eq. 1), and the contact and friction modes of contact nodes.
 
 What a contact node remembers is a row of `modes`, (contacts, 5): whether it touches the
 ground, per horizontal axis its friction mode (STICK, or the sign of the direction it slips
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
 from tetra_drake.physics.kinematics import (
     FORCE,
     P_WN,
@@ -26,10 +27,6 @@ Array = np.ndarray
 
 CONTACT, MODE, STICK_POINT, MODE_COLUMNS = 0, 1, 3, 5
 """Columns of `modes`: contact (0 or 1), mode (x, y), stick point (x, y) in m; and their number."""
-
-STICK = 0.0
-"""The friction mode of an axis that sticks; +1 or -1 slips in that direction."""
-
 
 GROUND = np.dtype(
     [
@@ -54,35 +51,6 @@ def normal_force(depth: float, depth_rate: float, law: Any) -> float:
     if depth <= 0.0:
         return 0.0
     return max(0.0, law.stiffness * depth + law.damping * depth * depth_rate)
-
-
-@compiled
-def friction_force(velocity: float, deflection: float, mode: float, law: Any) -> float:
-    """Friction (N) along one horizontal axis of a node on the ground (Eq. 3-5).
-
-    `velocity` (m/s) is along the axis and `deflection` (m) from the stick point; in slip
-    the deflection is held at the stiction range, on the side the node slips to.
-    """
-    sigma_0 = law.proportional_stiction * abs(velocity)
-    if mode == STICK:
-        bristle = sigma_0 * (1.0 + law.stiction_switch) * deflection
-        return -(bristle + law.stiction_damping * velocity)
-    return -sigma_0 * law.stiction_range * mode
-
-
-@compiled
-def next_friction_mode(
-    velocity: float, deflection: float, mode: float, stiction_range: float
-) -> float:
-    """The mode that follows `mode`: breaks free at the stiction range moving outward,
-    sticks again when the velocity changes sign."""
-    if mode == STICK:
-        if deflection >= stiction_range and velocity > 0.0:
-            return 1.0
-        if deflection <= -stiction_range and velocity < 0.0:
-            return -1.0
-        return STICK
-    return mode if mode * velocity > 0.0 else STICK
 
 
 @compiled

@@ -12,7 +12,8 @@ import numpy as np
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW, add_outer_product
 from tetra_drake.physics.cable import add_cable_forces
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.contact import CONTACT, MODE, STICK, add_ground_forces
+from tetra_drake.physics.contact import CONTACT, MODE, add_ground_forces
+from tetra_drake.physics.friction import STICK
 from tetra_drake.physics.kinematics import P_BN_W, P_WN, gather_forces
 from tetra_drake.robot.model import Model
 
