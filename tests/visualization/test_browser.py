@@ -59,34 +59,31 @@ def browser():
 
 
 @contextlib.contextmanager
-def new_page(browser, *, size=WINDOW, offline=True):
+def opened(browser, address, *, size=WINDOW, offline=True, received=None):
+    """A page, which must not complain, nor ask for anything but what lies beside it; what comes
+    through a socket is `received`."""
+    complaints, requests, messages = [], [], [] if received is None else received
     viewport = dict(zip(("width", "height"), size, strict=True))
     with contextlib.closing(browser.new_context(viewport=viewport, offline=offline)) as context:
         page = context.new_page()
         page.set_default_timeout(PATIENCE)
-        yield page
-
-
-@contextlib.contextmanager
-def opened(browser, path, size=WINDOW):
-    """A file's page, loaded with the network off; it must not complain, nor ask for anything
-    but what lies beside it."""
-    complaints, requests = [], []
-    with new_page(browser, size=size) as page:
         page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("request", lambda request: requests.append(request.url))
-        page.goto(path.as_uri())
+        page.on(
+            "websocket", lambda socket: socket.on("framereceived", lambda m: messages.append(m))
+        )
+        page.goto(address)
         yield page
     assert not complaints
-    local = ("data:", "blob:", path.parent.as_uri())
+    local = ("data:", "blob:", address.rpartition("/")[0])
     assert not [url for url in requests if not url.startswith(local)]
 
 
 @pytest.fixture(scope="module")
 def page(browser, replay):
     """The replay page once it plays by itself; tests may stop and resize it."""
-    with opened(browser, replay) as loaded:
+    with opened(browser, replay.as_uri()) as loaded:
         loaded.wait_for_function("parseFloat(document.getElementById('clock').value) > 0.1")
         yield loaded
 
@@ -173,7 +170,7 @@ def test_every_window_shows_the_whole_robot_and_its_path(page, trajectory):
 
 def test_a_page_is_filmed(browser, replay, tmp_path, monkeypatch):
     monkeypatch.setattr(animation, "STEP", 1.5)
-    with opened(browser, replay, size=(animation.WIDTH, animation.HEIGHT)) as page:
+    with opened(browser, replay.as_uri(), size=(animation.WIDTH, animation.HEIGHT)) as page:
         animation.wait_until_loaded(page)
         animation.save_gif(list(animation.film(page)), tmp_path / "walking.gif")
     with Image.open(tmp_path / "walking.gif") as gif:
@@ -201,14 +198,11 @@ def test_a_simulation_can_be_watched_as_it_runs(browser, tmp_path):
         text=True,
     )
     messages = []
-    with process, new_page(browser, offline=False) as page:
+    with process:
         try:
-            page.on(
-                "websocket",
-                lambda socket: socket.on("framereceived", lambda frame: messages.append(frame)),
-            )
-            page.goto(re.findall(r"http://\S+", process.stdout.readline())[0])
-            page.wait_for_function("viewer.animator.duration > 0.9")
+            (address,) = re.findall(r"http://\S+", process.stdout.readline())
+            with opened(browser, f"{address}/", offline=False, received=messages) as page:
+                page.wait_for_function("viewer.animator.duration > 0.9")
             _, errors = process.communicate(input="\n", timeout=60)
         finally:
             process.kill()
@@ -231,7 +225,7 @@ def test_the_report_of_a_run_shows_its_figures_and_leads_to_the_replay(browser, 
     options = ["--scenario", str(tmp_path / "tiny.yaml"), "--out", str(tmp_path / "run")]
     counts = ["--trials", "1", "--iterations", "1", "--workers", "1"]
     assert main(["evolve", *options, *counts]) == 0
-    with opened(browser, tmp_path / "run" / "report.html") as page:
+    with opened(browser, (tmp_path / "run" / "report.html").as_uri()) as page:
         page.wait_for_load_state("networkidle")
         assert page.title().startswith('tiny <i>"run"</i> &, seed 0')
         assert page.locator("i").count() == 0

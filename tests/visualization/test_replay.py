@@ -11,7 +11,6 @@ from pydrake.math import RotationMatrix
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.visualization.replay import (
     FRAMES_PER_SECOND,
@@ -32,11 +31,6 @@ def recorded(scenario):
 @pytest.fixture(scope="module")
 def scenario():
     return load_scenario().with_changes({"simulation.duration": 0.2, "simulation.steady_from": 0.1})
-
-
-@pytest.fixture(scope="module")
-def structure(scenario):
-    return MakeStructure(scenario.robot, scenario.cables)
 
 
 @pytest.fixture(scope="module")
