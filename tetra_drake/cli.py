@@ -10,10 +10,10 @@ import math
 import os
 import sys
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from tetra_drake import __version__
 from tetra_drake.benchmark.settings import SETS
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import whole_file
@@ -60,7 +60,9 @@ def make_parser() -> argparse.ArgumentParser:
         "central pattern generator, as a Drake diagram, and evolve its gaits.",
         epilog="`tetra-drake COMMAND --help` explains a command.",
     )
-    parser.add_argument("--version", action="version", version=f"tetra-drake {__version__}")
+    parser.add_argument(
+        "--version", action="version", version=f"tetra-drake {version('tetra_drake')}"
+    )
     shtab.add_argument_to(parser, help="print a completion script for the shell: bash, zsh, tcsh")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 

@@ -9,17 +9,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake import __version__
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed
 from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.schema import ReferenceScenario, Scenario
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
@@ -87,14 +86,14 @@ def make_result(
 
 def versions(engine: str = "") -> dict[str, str]:
     """The versions on which the last digits of a result of an engine depend."""
-    names = ["drake", "numpy", "numba"] + (["mujoco"] if engine == "mujoco" else [])
-    libraries = {name: metadata.version(name) for name in names}
-    return {"tetra_drake": __version__, "python": platform.python_version(), **libraries}
+    names = ["tetra_drake", "drake", "numpy", "numba"] + ["mujoco"] * (engine == "mujoco")
+    packages = {name: metadata.version(name) for name in names}
+    return packages | {"python": platform.python_version()}
 
 
-def result_to_json(scenario: Scenario, gait: Gait, result: SimulationResult) -> dict[str, Any]:
-    """The content of result.json: metrics in SI, lengths in inches beside them, times in s."""
-    return {
+def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult) -> None:
+    """Writes result.json: metrics in SI, lengths in inches beside them, times in s."""
+    content = {
         "schema": SCHEMA,
         "scenario": scenario.name,
         "metrics": dataclasses.asdict(result.metrics),
@@ -108,11 +107,6 @@ def result_to_json(scenario: Scenario, gait: Gait, result: SimulationResult) -> 
         "versions": versions(result.engine),
         "gait": gait.to_json(),
     }
-
-
-def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult) -> None:
-    """Writes result.json."""
-    content = result_to_json(scenario, gait, result)
     write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
@@ -133,7 +127,9 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     lines.append(f"  {'fitness':<16}{fixed(result.fitness):>8}")
     reference = scenario.reference
     if reference is not None:
-        lines.append(f"  {reference.source}: {_best_distances(reference)}")
+        best = {"random": reference.best_initial_distance, "evolved": reference.best_distance}
+        texts = [f"{name} {d / INCH:.4g} in" for name, d in best.items() if d is not None]
+        lines.append(f"  {reference.source}: best distances {', '.join(texts)}")
     speed = fixed(result.duration / result.wall_time, 1)
     lines.append(
         f"  simulated in {fixed(result.wall_time, 1)} s, {speed} times real time: {work.scheme}, "
@@ -141,9 +137,3 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
         f"{work.derivative_evaluations} derivative evaluations"
     )
     return "\n".join(lines)
-
-
-def _best_distances(reference: ReferenceScenario) -> str:
-    named = {"random": reference.best_initial_distance, "evolved": reference.best_distance}
-    found = [f"{name} {d / INCH:.4g} in" for name, d in named.items() if d is not None]
-    return f"best distances {', '.join(found)}"
