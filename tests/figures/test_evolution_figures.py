@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pandas
 import pytest
-from helpers.synthetic_run import PER_DISTANCE, iterations_with_means, write_run
+from helpers.synthetic_run import PER_DISTANCE, with_reference, write_run
 from matplotlib.container import BarContainer, ErrorbarContainer
 
 from tetra_drake.evolution.tables import load_run
@@ -27,14 +27,13 @@ def run_of(tmp_path):
     return lambda *trials, **options: load_run(write_run(tmp_path / "run", trials, **options))
 
 
-def with_reference(run, reference):
-    scenario = dataclasses.replace(run.manifest.scenario, reference=reference)
-    manifest = dataclasses.replace(run.manifest, scenario=scenario)
-    return dataclasses.replace(run, manifest=manifest)
-
-
 def initial(*fitnesses):
     return [[(fitness, place) for place, fitness in enumerate(fitnesses)]]
+
+
+def with_means(*means):
+    """A trial whose population of one has these fitnesses, one after the other."""
+    return [[(mean, 0)] for mean in means]
 
 
 def lines(figure):
@@ -82,10 +81,10 @@ def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of):
 
 def test_fitness_lines_are_the_recorded_means_in_the_order_of_their_ends(run_of):
     run = run_of(
-        iterations_with_means([1.0, 2.0, 5.0]),
-        iterations_with_means([3.0, 3.5]),
-        [[(None, 0)], [(7.0, 0)], [(8.0, 0)]],
-        [[(None, 0)], [(None, 0)]],
+        with_means(1.0, 2.0, 5.0),
+        with_means(3.0, 3.5),
+        with_means(None, 7.0, 8.0),
+        with_means(None, None),
     )
     expected = {
         "trial 2": [[1, 7.0], [2, 8.0]],
@@ -113,7 +112,7 @@ def test_the_best_fitness_is_shown_where_the_optimiser_reports_no_mean(run_of):
     ids=["ended trials count with their last mean", "the average ends with an unfinished trial"],
 )
 def test_the_average_over_trials(run_of, means, unfinished, average):
-    run = run_of(*map(iterations_with_means, means), unfinished=unfinished)
+    run = run_of(*(with_means(*each) for each in means), unfinished=unfinished)
     axes = fitness_of_trials(run).axes[0]
     (errorbars,) = (c for c in axes.containers if isinstance(c, ErrorbarContainer))
     line, _, (segments,) = errorbars

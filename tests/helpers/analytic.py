@@ -37,7 +37,7 @@ class Deadly:
     """Kills its process for about one genome in eight."""
 
     def __call__(self, genome):
-        if hash(tuple(genome.tolist())) % 8 == 0:
+        if is_deadly(genome.tolist()):
             os.kill(os.getpid(), signal.SIGKILL)
         return Bowl()(genome)
 

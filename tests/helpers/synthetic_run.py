@@ -1,5 +1,6 @@
 """Runs made up for tests of what is shown of them, written as the real ones are."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,9 +9,10 @@ import numpy as np
 
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, trial_folder
+from tetra_drake.evolution.tables import Run
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import ReferenceScenario, Scenario
 from tetra_drake.scenario.units import INCH
 
 Child = tuple[float | None, int | None]
@@ -78,6 +80,8 @@ def _entry(index, iteration, fitness, scenario):
     return evaluation_entry(index, iteration, genome, evaluation)
 
 
-def iterations_with_means(means: Sequence[float]) -> list[list[Child]]:
-    """Iterations of a trial whose population of one has these fitnesses, one after the other."""
-    return [[(mean, 0)] for mean in means]
+def with_reference(run: Run, reference: ReferenceScenario | None) -> Run:
+    """The run with other numbers to be compared with."""
+    scenario = dataclasses.replace(run.manifest.scenario, reference=reference)
+    manifest = dataclasses.replace(run.manifest, scenario=scenario)
+    return dataclasses.replace(run, manifest=manifest)

@@ -1,6 +1,7 @@
 """Watching a simulation in Meshcat: when what is shown, and that it changes nothing."""
 
 import socket
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -69,17 +70,9 @@ def test_watching_changes_nothing_and_waits_for_real_time_only(
 
 
 def test_shows_where_the_robot_is_and_afterwards_the_recording(short, meshcat, visitor):
-    view = LiveView(meshcat, short, sleep=lambda seconds: None)
-    shown = []
-
-    class Onlooker:
-        wants = staticmethod(view.wants)
-
-        def show(self, frame):
-            view.show(frame)
-            shown.append(frame)
-
-    result = simulate(scenario=short, gait=seeded_gait(short), record=True, viewer=Onlooker())
+    view = Mock(wraps=LiveView(meshcat, short, sleep=lambda seconds: None))
+    result = simulate(scenario=short, gait=seeded_gait(short), record=True, viewer=view)
+    shown = [call.args[0] for call in view.show.call_args_list]
     matrices = {
         command["path"]: command["matrix"]
         for command in commands(meshcat.StaticHtml(), "set_transform")
@@ -99,16 +92,8 @@ def test_shows_where_the_robot_is_and_afterwards_the_recording(short, meshcat, v
 
 
 def test_waits_for_a_browser(short, meshcat):
-    class GivenUp(Exception):
-        pass
-
-    looks = []
-
-    def sleep(seconds):
-        looks.append(seconds)
-        if len(looks) == 3:
-            raise GivenUp
-
+    sleep = Mock(side_effect=[None, None, TimeoutError])
     view = LiveView(meshcat, short, sleep=sleep)
-    with pytest.raises(GivenUp):
+    with pytest.raises(TimeoutError):
         simulate(scenario=short, gait=seeded_gait(short), viewer=view)
+    assert sleep.call_count == 3
