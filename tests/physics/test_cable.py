@@ -6,7 +6,7 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.physics.cable import add_cable_forces, cable_tension
+from tetra_drake.physics.cable import CABLE, PASSIVE, add_cable_forces, cable_tension
 from tetra_drake.physics.kinematics import gather_forces, move_nodes
 from tetra_drake.robot.bodies import AddTetrahedra
 from tetra_drake.robot.structure import Structure, node_positions, node_velocities
@@ -28,8 +28,9 @@ def forces_of_cables(
 
 
 def test_tension_is_equation_6() -> None:
+    cable = np.array([(0, 1, PASSIVE, 35.0, 8.0, 0.1)], dtype=CABLE)[0]
     # 35 N/m (0.3 m - 0.1 m) + 8 N s/m * -0.25 m/s + 1.5 N = 7 - 2 + 1.5
-    assert cable_tension(0.3, -0.25, 1.5, 35.0, 8.0, 0.1, False) == pytest.approx(6.5, rel=1e-15)
+    assert cable_tension(0.3, -0.25, 1.5, cable, False) == pytest.approx(6.5, rel=1e-15)
 
 
 def test_cables_keep_momentum_and_angular_momentum(structure: Structure, state: np.ndarray) -> None:

@@ -12,8 +12,7 @@ import pytest
 import tetra_drake
 
 PROGRAM = (
-    "from tetra_drake.physics.cable import cable_tension;"
-    "print(cable_tension(0.3, 0.0, 0.0, 10.0, 0.0, 0.1, False))"
+    "from tetra_drake.physics.contact import first_zero;print(first_zero(1.0, -0.5, 0.0, 9.0))"
 )
 
 
@@ -38,7 +37,7 @@ def run(package: Path, cache_home: Path, program: str = PROGRAM) -> str:
 
 def test_a_read_only_installation_caches_in_the_users_folder(package: Path, tmp_path: Path) -> None:
     assert float(run(package, tmp_path / "cache")) == pytest.approx(2.0)
-    assert list((tmp_path / "cache").rglob("cable.cable_tension*.nbi"))
+    assert list((tmp_path / "cache").rglob("contact.first_zero*.nbi"))
 
 
 def test_without_any_folder_for_a_cache_kernels_still_work(package: Path, tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def test_stepped_as_the_listing_steps_it_gives_the_listings_output(
 ) -> None:
     rows, reference = reference_output(data, name)
     gait = load_gait(data / f"{name}.json", scenario)
-    output = raw_output(scenario.cpg, gait, oscillators=4, duration=15.0)
+    output = raw_output(scenario, gait)
     assert output.shape == (30_000, 4)
     np.testing.assert_allclose(output[rows], reference, rtol=0, atol=1e-9)
 
@@ -40,7 +40,7 @@ def test_the_converged_network_stays_within_the_listings_own_error(
     rows, reference = reference_output(data, name)
     scenario.cpg.signals = "recorded"
     gait = load_gait(data / f"{name}.json", scenario)
-    output = raw_output(scenario.cpg, gait, oscillators=4, duration=15.0)
+    output = raw_output(scenario, gait)
     error = np.abs(output[rows + 1] - reference).max(axis=1)
     assert error[rows * 0.5e-3 <= 3.0].max() < 2e-3
     assert error.max() < 2e-2

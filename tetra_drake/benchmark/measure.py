@@ -63,9 +63,10 @@ class Row:
             started = time.perf_counter()
             results = list(run(self.simulate, itertools.islice(itertools.cycle(gaits), number)))
             taken = time.perf_counter() - started
-        self.distances_in.append(_distance_in(results[0]))
-        if results[0] is not None:
-            self.evaluations.append(results[0].integrator.derivative_evaluations)
+        first = results[0]
+        self.distances_in.append(math.nan if first is None else first.metrics.distance_in)
+        if first is not None:
+            self.evaluations.append(first.integrator.derivative_evaluations)
             self.wall_time += taken
             self.simulated += sum(result.duration for result in results if result is not None)
 
@@ -106,9 +107,8 @@ def measure(
     """Measures sets of settings (of SETS) on gaits, and the cost per step by robot size.
 
     All settings simulate the first gait, then the second, and so on, so that whatever else runs on
-    the machine affects all alike. All is done in this process, of which Drake before 1.56 keeps
-    about 2 MB per simulation on the diagram. Returns what tables.to_markdown() prints and JSON can
-    hold: lengths in inches, times in s, None for what failed. `say` is told which stage begins.
+    the machine affects all alike. Returns what tables.to_markdown() prints and JSON can hold:
+    lengths in inches, times in s, None for what failed. `say` is told which stage begins.
 
     Raises InputError if MuJoCo is asked for by its set and cannot simulate the scenario.
     """
@@ -191,11 +191,8 @@ def _distances(scenario: Scenario, changes: Changes, gaits: Sequence[Gait]) -> A
     """(gaits,): how far (in) gaits walk with a setting; simulated on all cores."""
     row = Row(scenario.with_changes(changes))
     with thread_executor(available_cores()) as executor:
-        return np.array([_distance_in(result) for result in executor.map(row.simulate, gaits)])
-
-
-def _distance_in(result: SimulationResult | None) -> float:
-    return math.nan if result is None else result.metrics.distance_in
+        results = executor.map(row.simulate, gaits)
+        return np.array([math.nan if r is None else r.metrics.distance_in for r in results])
 
 
 def _finite(values: list[float]) -> list[float | None]:

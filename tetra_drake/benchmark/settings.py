@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 from tetra_drake.scenario.schema import Scenario
@@ -15,7 +16,8 @@ SETS = ("default", "integrators", "compiled", "mujoco")
 def settings_of(name: str) -> list[Changes]:
     """The settings of one of SETS, the scenario's own first."""
     if name == "compiled":
-        return [own("compiled"), *_compiled_settings()]
+        axes = (1.0, 0.3, 0.1, 0.03), (2, 3, 4), (0.05, 0.02, 0.005)
+        return [own("compiled"), *itertools.starmap(compiled, itertools.product(*axes))]
     if name == "integrators":
         return [own("drake"), *_drake_settings()]
     if name == "mujoco":
@@ -40,15 +42,18 @@ def drake(
 ) -> Changes:
     """The Drake diagram, times in ms. Mode changes are at step ends, or located by a witness
     function to within the time `witness`."""
-    settings = {
-        "scheme": scheme,
-        "accuracy": accuracy,
-        "max_step": f"{max_step} ms",
-        "look_ahead": f"{look_ahead} ms",
-        "mode_changes": "witness" if witness else "step_end",
-    }
-    settings |= {"witness_window": f"{witness} ms"} if witness else {}
-    return own("drake") | {f"simulation.{key}": value for key, value in settings.items()}
+    window = {"simulation.witness_window": f"{witness} ms"} if witness else {}
+    return (
+        own("drake")
+        | window
+        | {
+            "simulation.scheme": scheme,
+            "simulation.accuracy": accuracy,
+            "simulation.max_step": f"{max_step} ms",
+            "simulation.look_ahead": f"{look_ahead} ms",
+            "simulation.mode_changes": "witness" if witness else "step_end",
+        }
+    )
 
 
 def compiled(tolerance: float, max_step: float, look_ahead: float) -> Changes:
@@ -85,29 +90,14 @@ def describe(scenario: Scenario) -> str:
 
 def _drake_settings() -> list[Changes]:
     step_end, look_ahead, witness = (0.0, 0.0), (0.25, 0.0), (0.0, 0.02)
-    explicit = [
-        drake("runge_kutta3", accuracy, 2, *placement)
-        for accuracy in (1e-2, 1e-3, 1e-4)
-        for placement in (step_end, witness)
-    ]
-    implicit = [
-        drake("radau3", accuracy, max_step, *placement)
-        for max_step in (2, 4, 8)
-        for accuracy in (5e-3, 1e-3)
-        for placement in (step_end, look_ahead, witness)
-    ]
+    explicit = itertools.product((1e-2, 1e-3, 1e-4), (step_end, witness))
+    implicit = itertools.product((2, 4, 8), (5e-3, 1e-3), (step_end, look_ahead, witness))
     first_order = ("implicit_euler", "velocity_implicit_euler", "radau1")
-    others = [drake(scheme, 1e-2, 2) for scheme in first_order]
-    others += [drake("semi_explicit_euler", 1e-3, 0.1), drake("runge_kutta3", 1e-5, 0.05)]
-    return [*explicit, *implicit, *others]
-
-
-def _compiled_settings() -> list[Changes]:
     return [
-        compiled(tolerance, max_step, look_ahead)
-        for tolerance in (1.0, 0.3, 0.1, 0.03)
-        for max_step in (2, 3, 4)
-        for look_ahead in (0.05, 0.02, 0.005)
+        *(drake("runge_kutta3", accuracy, 2, *place) for accuracy, place in explicit),
+        *(drake("radau3", accuracy, step, *place) for step, accuracy, place in implicit),
+        *(drake(scheme, 1e-2, 2) for scheme in first_order),
+        *(drake("semi_explicit_euler", 1e-3, 0.1), drake("runge_kutta3", 1e-5, 0.05)),
     ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
@@ -13,33 +15,19 @@ PASSIVE = -1
 """The `signal` of a cable that no signal drives."""
 
 CABLE = np.dtype(
-    [
-        ("node_a", np.int64),
-        ("node_b", np.int64),
-        ("stiffness", np.float64),
-        ("damping", np.float64),
-        ("free_length", np.float64),
-        ("signal", np.int64),
-    ]
+    [(name, np.int64) for name in ("node_a", "node_b", "signal")]
+    + [(name, np.float64) for name in ("stiffness", "damping", "free_length")]
 )
 """One cable: the two nodes it joins, its law in SI, and the signal that drives it."""
 
 
 @compiled
-def cable_tension(
-    length: float,
-    rate: float,
-    signal: float,
-    stiffness: float,
-    damping: float,
-    free_length: float,
-    slack: bool,
-) -> float:
+def cable_tension(length: float, rate: float, signal: float, cable: Any, slack: bool) -> float:
     """Tension (N) of a cable of `length` (m) that lengthens at `rate` (m/s).
 
     Eq. 6, with the actuation `signal` (N) superimposed. With `slack`, never negative.
     """
-    tension = stiffness * (length - free_length) + damping * rate + signal
+    tension = cable.stiffness * (length - cable.free_length) + cable.damping * rate + signal
     if slack and tension < 0.0:
         return 0.0
     return tension
@@ -70,9 +58,7 @@ def add_cable_forces(nodes: Array, signals: Array, cables: Array, slack: bool) -
             + (nodes[b, V_WN + 2] - nodes[a, V_WN + 2]) * d_z
         )
         signal = signals[cable.signal] if cable.signal >= 0 else 0.0
-        tension = cable_tension(
-            length, rate, signal, cable.stiffness, cable.damping, cable.free_length, slack
-        )
+        tension = cable_tension(length, rate, signal, cable, slack)
         f_x, f_y, f_z = tension * d_x, tension * d_y, tension * d_z
         nodes[a, FORCE] += f_x
         nodes[a, FORCE + 1] += f_y

@@ -28,16 +28,9 @@ Array = np.ndarray
 CONTACT, MODE, STICK_POINT, MODE_COLUMNS = 0, 1, 3, 5
 """Columns of `modes`: contact (0 or 1), mode (x, y), stick point (x, y) in m; and their number."""
 
-GROUND = np.dtype(
-    [
-        ("stiffness", np.float64),
-        ("damping", np.float64),
-        ("stiction_range", np.float64),
-        ("stiction_damping", np.float64),
-        ("stiction_switch", np.float64),
-        ("proportional_stiction", np.float64),
-    ]
-)
+NORMAL = ("stiffness", "damping")
+FRICTION = ("stiction_range", "stiction_damping", "stiction_switch", "proportional_stiction")
+GROUND = np.dtype([(name, np.float64) for name in (*NORMAL, *FRICTION)])
 """The constants of the ground's laws (Tables 1 and 2) in SI units: `law` is one of these, `ground`
 an array of one."""
 

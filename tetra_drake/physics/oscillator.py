@@ -68,10 +68,10 @@ def oscillator_output(u: Array, output: Array) -> None:
 
 @compiled
 def listing_output(network: Network, u: Array, v: Array, step: float, output: Array) -> None:
-    """The outputs (steps, n) of the network stepped as listing B.1 steps it: forward Euler.
+    """Writes `output`, (steps, n), as listing B.1 does: forward Euler from u and v (2n,).
 
-    Row i is the state after i + 1 steps of `step` (s); the listing stamps it with i steps.
-    `u` and `v`, (2n,), hold the initial state and are overwritten with the last.
+    Row i is the state after i + 1 steps (s); the listing stamps it with i steps. `u` and `v` end
+    as the last state.
     """
     u_rate, v_rate, feedback = np.empty_like(u), np.empty_like(v), np.zeros_like(u)
     for i in range(output.shape[0]):
@@ -84,11 +84,7 @@ def listing_output(network: Network, u: Array, v: Array, step: float, output: Ar
 
 @compiled
 def network_output(network: Network, u: Array, v: Array, step: float, output: Array) -> None:
-    """The outputs (steps, n) of the network by the classical Runge-Kutta method of order 4.
-
-    Row i is the state after i steps of `step` (s). The other arguments are those of
-    `listing_output`.
-    """
+    """As `listing_output` by the classical Runge-Kutta method of order 4; row i after i steps."""
     neurons = u.size
     weights = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
     reaches = (0.0, 0.5, 0.5, 1.0)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.physics.contact import GROUND
+from tetra_drake.physics.contact import FRICTION, GROUND, NORMAL
 from tetra_drake.physics.oscillator import Network, inhibition_matrix
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import Gait
@@ -29,9 +29,8 @@ class Model(NamedTuple):
     """(1,) of dtype GROUND."""
     slack: bool
     mass: float
-    """Of a body."""
     moment: float
-    """Moment of inertia of a body about any axis through its centre of mass."""
+    """Mass of a body, and its moment of inertia about any axis through its centre of mass."""
     radius: float
     """Distance of the nodes from the centre of mass."""
     inertia: Array
@@ -66,19 +65,8 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
 
 def ground_law(ground: GroundScenario, friction: FrictionScenario) -> np.ndarray:
     """The constants of the ground's laws as `physics.contact` takes them: (1,) of dtype GROUND."""
-    return np.array(
-        [
-            (
-                ground.stiffness,
-                ground.damping,
-                friction.stiction_range,
-                friction.stiction_damping,
-                friction.stiction_switch,
-                friction.proportional_stiction,
-            )
-        ],
-        dtype=GROUND,
-    )
+    normal = [getattr(ground, name) for name in NORMAL]
+    return np.array([(*normal, *(getattr(friction, name) for name in FRICTION))], dtype=GROUND)
 
 
 def make_network(cpg: CpgScenario, gait: Gait, *, oscillators: int) -> Network:

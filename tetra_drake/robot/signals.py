@@ -15,24 +15,24 @@ from tetra_drake.files import whole_file
 from tetra_drake.physics.oscillator import listing_output, network_output
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import initial_state, make_network
-from tetra_drake.scenario.schema import CpgScenario, Scenario
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import POUND_FORCE
 
 UNITS = {"lbf": POUND_FORCE, "N": 1.0}
 """Units of force that save_signals() writes, in N."""
 
 
-def raw_output(cpg: CpgScenario, gait: Gait, *, oscillators: int, duration: float) -> np.ndarray:
+def raw_output(scenario: Scenario, gait: Gait) -> np.ndarray:
     """y_extensor - y_flexor (samples, n) at 0, one `listing_step`, two ... from `cpg.signals`.
 
     `listing`: forward Euler as in listing B, which stamps the state after i + 1 steps with the
-    time of i steps; the last sample is one step before `duration` (s). `recorded` and `live`:
-    the classical Runge-Kutta method of order 4, whose error is 1e-5, to `duration` or beyond.
+    time of i steps; the last sample is one step before the end. `recorded` and `live`: the
+    classical Runge-Kutta method of order 4, whose error is 1e-5, to the end or beyond.
     """
+    cpg, oscillators = scenario.cpg, scenario.oscillators
     network = make_network(cpg, gait, oscillators=oscillators)
-    state = initial_state(cpg, oscillators)
-    u, v = state[: 2 * oscillators].copy(), state[2 * oscillators :].copy()
-    steps = duration / cpg.listing_step
+    u, v = np.split(initial_state(cpg, oscillators), 2)
+    steps = scenario.simulation.duration / cpg.listing_step
     listing = cpg.signals == "listing"
     output = np.empty((round(steps) if listing else math.ceil(steps) + 1, oscillators))
     (listing_output if listing else network_output)(network, u, v, cpg.listing_step, output)
@@ -44,12 +44,7 @@ def signal_samples(scenario: Scenario, gait: Gait) -> np.ndarray:
 
     Between samples the signals are linear. Start-up is not applied.
     """
-    raw = raw_output(
-        scenario.cpg,
-        gait,
-        oscillators=scenario.oscillators,
-        duration=scenario.simulation.duration,
-    )
+    raw = raw_output(scenario, gait)
     return scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
 
 
@@ -100,11 +95,5 @@ def save_signals(
         ",".join(["time_s", *names]),
     ]
     with whole_file(path) as temporary:
-        np.savetxt(
-            temporary,
-            np.column_stack([times, signals]),
-            delimiter=",",
-            header="\n".join(header),
-            comments="",
-            fmt="%.12g",
-        )
+        columns, top = np.column_stack([times, signals]), "\n".join(header)
+        np.savetxt(temporary, columns, delimiter=",", header=top, comments="", fmt="%.12g")

@@ -89,11 +89,11 @@ def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
         for node in BASE:
             a, b = 4 * i + node, 4 * (i + 1) + node
             signal = PASSIVE if node == TOP else i
-            rows.append((a, b, cables.outer_stiffness, cables.damping, cables.free_length, signal))
+            rows.append((a, b, signal, cables.outer_stiffness, cables.damping, cables.free_length))
             names.append(f"{junction} outer {NODES[node]}")
         for node in BASE:
             a, b = 4 * i + TIP, 4 * (i + 1) + node
-            rows.append((a, b, cables.inner_stiffness, cables.damping, cables.free_length, PASSIVE))
+            rows.append((a, b, PASSIVE, cables.inner_stiffness, cables.damping, cables.free_length))
             names.append(f"{junction} inner {NODES[node]}")
     bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
     return Structure(

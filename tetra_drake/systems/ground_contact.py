@@ -42,15 +42,12 @@ class GroundContact(LeafSystem):
     | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along x and y |
     |                   |         |        | (0 sticks, ±1 slips that way), by contact node   |
 
-    Discrete state: the rows of `physics.contact` (contact, modes, stick points), one a node.
-    In stick the bristle deflection is the way from the stick point, so no integrator has to
-    be reset and the system has no continuous state. The modes are frozen within a step, which
-    keeps the forces smooth there, and updated at the end of each step; Initialize() sets
-    them from the pose.
+    Discrete state: `modes` of `physics.contact`; deflections follow from the stick points, so no
+    continuous state has to be reset. The modes are frozen within a step, which keeps the forces
+    smooth there, and updated at its end; Initialize() sets them from the pose.
 
-    With `witness`, a witness function also makes steps end where a mode is due to change,
-    to within Drake's isolation window: 0.01 s times the accuracy set in the Context
-    (Context.SetAccuracy).
+    With `witness`, steps also end where a mode is due to change, to within Drake's isolation
+    window: 0.01 s times the accuracy set by Context.SetAccuracy.
     """
 
     def __init__(
@@ -70,18 +67,11 @@ class GroundContact(LeafSystem):
         self.DeclareDiscreteState(MODE_COLUMNS * count)
         self.DeclareInitializationDiscreteUpdateEvent(self._start)
         self.DeclarePerStepDiscreteUpdateEvent(self._update)
-        self._witnesses: list[WitnessFunction] = []
-        if witness:
-            # It carries no event of its own: it ends the step, and the update follows there.
-            # (A bound method in its place would keep the system alive for ever.)
-            this = weakref.proxy(self)
-            self._witnesses.append(
-                self.MakeWitnessFunction(
-                    "mode margin",
-                    WitnessFunctionDirection.kPositiveThenNonPositive,
-                    lambda context: this._margin(context),
-                )
-            )
+        # It carries no event of its own: it ends the step, and the update follows there.
+        # (A bound method in its place would keep the system alive for ever.)
+        this, falls = weakref.proxy(self), WitnessFunctionDirection.kPositiveThenNonPositive
+        margin = self.MakeWitnessFunction("mode margin", falls, lambda c: this._margin(c))
+        self._witnesses = [margin] if witness else []
 
         sources = {self._state.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)

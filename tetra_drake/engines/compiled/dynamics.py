@@ -101,10 +101,9 @@ def implicit_matrix(robot: Model, modes: Array, forces: Forces, time: float) -> 
         node = robot.contacts[i]
         body = node // per_body
         if forces.contacts[i, 2] > 0.0:
-            depth = -nodes[node, P_WN + 2]
             speed_row(nodes, node, 0.0, 0.0, 1.0, row)
-            damping = time * (law.damping * depth + time * law.stiffness)
-            add_outer_product(damping, row, body, BLOCK, rows)
+            damping = law.damping * -nodes[node, P_WN + 2] + time * law.stiffness
+            add_outer_product(time * damping, row, body, BLOCK, rows)
         damping = time * law.stiction_damping
         if modes[i, MODE] == STICK:
             speed_row(nodes, node, 1.0, 0.0, 0.0, row)
