@@ -8,7 +8,6 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
-from helpers.meshcat_page import read_page
 from helpers.synthetic_run import tiny_scenario, with_reference, write_run
 
 from tetra_drake.cli import make_parser
@@ -111,14 +110,12 @@ def test_it_needs_no_network_and_links_relatively(run, source, page):
     assert len(source) < 3e6
 
 
-def test_names_are_escaped(run, source, page):
+def test_names_are_escaped(source, page):
     assert EVIL not in source
     assert "script" not in {tag for tag, _ in page.tags}
     for tag in ("h1", "title"):
         (text,) = page.texts[tag]
         assert text.startswith(EVIL)
-    assert "<script>alert" not in (run / "replay.html").read_text(encoding="utf-8")
-    assert "<script>alert" not in read_page(run / "replay.html")
 
 
 def test_each_trial_and_each_setting_that_differs_from_the_thesis_has_a_row(page):
