@@ -3,7 +3,6 @@
 import pytest
 from helpers.synthetic_run import write_run
 
-from tetra_drake.errors import InputError
 from tetra_drake.report.run_page import write_figures
 
 ONE_GAIT = "time_lapse relative_distances one_step signals_and_tensions ground_forces"
@@ -64,30 +63,22 @@ def test_an_unfinished_run_is_drawn_as_far_as_it_has_come(tmp_path, trials, miss
     assert not (run / "figures" / "two_best.csv").exists()
 
 
-@pytest.mark.parametrize("elsewhere", [False, True])
-@pytest.mark.parametrize("files", ["manifest.json", "trial_*/*"], ids=["damaged", "empty"])
-def test_a_damaged_or_empty_run_is_refused(run, tmp_path, files, elsewhere):
-    for path in run.glob(files):
-        path.write_text('{"schema": 1')
-        if files == "trial_*/*":
-            path.unlink()
-    before = contents(tmp_path)
-    with pytest.raises(InputError) as caught:
-        write_figures(run, tmp_path / "elsewhere" if elsewhere else None)
-    assert caught.value.source in (str(run), str(run / "manifest.json"))
-    assert contents(tmp_path) == before
-
-
-def test_other_sources_and_outs_are_refused_before_anything_is_simulated(
+def test_what_cannot_be_drawn_or_written_is_refused_before_anything_is_simulated(
     run, tmp_path, monkeypatch, refused
 ):
     monkeypatch.setattr("tetra_drake.figures.study.simulate", None)
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").touch()
-    for source in (tmp_path / "missing", tmp_path / "empty", tmp_path / "file"):
-        with refused(source, "", ""):
-            write_figures(source)
+    write_run(tmp_path / "no trial", [[]])
+    damaged = write_run(tmp_path / "damaged", [[[(1.0, 0)]]]) / "manifest.json"
+    damaged.write_text('{"schema": 1')
+    before = contents(tmp_path)
+    faults = {tmp_path / name: tmp_path / name for name in ("missing", "empty", "file", "no trial")}
+    for source, named in (faults | {damaged.parent: damaged}).items():
+        for out in (None, tmp_path / "elsewhere"):
+            with refused(named, "", ""):
+                write_figures(source, out)
     for out in (tmp_path / "file", tmp_path / "file" / "folder"):
         with refused(out, "", ""):
             write_figures(run, out)
-    assert not list((tmp_path / "empty").iterdir())
+    assert contents(tmp_path) == before

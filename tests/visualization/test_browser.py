@@ -17,7 +17,7 @@ import pytest
 from helpers.meshcat_page import unpack
 from matplotlib.colors import hex2color, rgb_to_hsv
 from matplotlib.image import imread
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
@@ -169,10 +169,7 @@ def test_a_page_is_filmed(browser, replay, tmp_path, monkeypatch):
         animation.save_gif(list(animation.film(page)), tmp_path / "walking.gif")
     with Image.open(tmp_path / "walking.gif") as gif:
         assert gif.size == (animation.WIDTH, animation.HEIGHT)
-        shots = []
-        for frame in range(gif.n_frames):
-            gif.seek(frame)
-            shots.append(np.asarray(gif.convert("RGB")) / 255)
+        shots = [np.asarray(shot.convert("RGB")) / 255 for shot in ImageSequence.Iterator(gif)]
     assert len(shots) == 3  # at 1, 2.5 and 4 s of 5
     assert len(pixels_of(shots[-1], "inner")) > 100
     assert (shots[0][:5] == 1.0).all()  # no sky, no texts
@@ -186,10 +183,8 @@ def test_a_simulation_can_be_watched_as_it_runs(browser, tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-m", "tetra_drake", "simulate", "--scenario=short.yaml", "--meshcat"],
         cwd=tmp_path,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
         text=True,
+        **dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE),
     )
     messages = []
     with process:
