@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 import pandas
 from analyse import ANALYSIS, DEFAULT, Analysis, load_analysis
+from engines import distances_on_both
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.robustness import summarize
 from tetra_drake.evolution.tables import Run, load_run
-from tetra_drake.figures.evolution import distances_on_both
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration, fixed, markdown_table, signed
 from tetra_drake.scenario.schema import Scenario

@@ -3,15 +3,12 @@
 import dataclasses
 
 import numpy as np
-import pandas
 import pytest
 from helpers.synthetic_run import PER_DISTANCE, with_reference, write_run
 from matplotlib.container import BarContainer, ErrorbarContainer
 
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.figures.evolution import (
-    both_engines,
-    distances_on_both,
     fitness_of_trials,
     initial_distances,
     initial_fitness,
@@ -144,23 +141,3 @@ def test_the_two_best_gaits_beside_the_reference(run_of):
     of_another_robot = ReferenceScenario("a paper", two_best_weights=[0.1] * 24)
     assert "reference" not in two_best(with_reference(run, of_another_robot), 0)
     assert two_best(run, 1) is None
-
-
-def test_both_engines_shows_every_gait_with_median_and_percentile():
-    compiled = np.linspace(-5.0, 8.0, 40)
-    both = pandas.DataFrame({"compiled_in": compiled, "drake_in": compiled + 0.02})
-    scatter, shares = both_engines(both).axes
-    (dots,) = [line for line in scatter.lines if line.get_linestyle() == "None"]
-    np.testing.assert_array_equal(dots.get_xydata(), both)
-    marks = [line.get_xydata()[0] for line in shares.lines[1:]]
-    np.testing.assert_allclose(marks, [(0.02, 50.0), (0.02, 95.0)])
-
-
-def test_distances_on_both_are_those_of_reevaluated_gaits(run_of):
-    run = run_of([[(2.0, 0), (1.0, 1), (None, 2)], [(3.0, 1), (1.0, None)]])
-    assert distances_on_both(run).empty
-    again = run.evaluations.head(4).drop(columns="placed")
-    found = distances_on_both(dataclasses.replace(run, reevaluations=again))
-    assert found["index"].tolist() == [0, 1, 2, 3]
-    np.testing.assert_allclose(found["compiled_in"], [1.0, 0.5, np.nan, 1.5])
-    np.testing.assert_array_equal(found["drake_in"], found["compiled_in"])

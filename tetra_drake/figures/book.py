@@ -47,9 +47,6 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
         pictures.append((evolution.initial_distances, run))
     if study.trial in trials:
         pictures.append((evolution.initial_fitness, run, study.trial))
-    both = evolution.distances_on_both(run).query("iteration == 0").dropna()
-    if len(both):
-        pictures.append((evolution.both_engines, both))
     walks = [(walk.label, walk.trajectory) for walk in (initial, best)]
     pictures.append((motion.before_and_after, walks, run.manifest.scenario.reference))
     return _save(folder, *pictures) | draw_trajectory(best.trajectory, folder)
