@@ -35,7 +35,7 @@ FILES = {
     "short.yaml": SHORT,
     "key.yaml": "base: thesis\nrobot: {tetrahedron: 4}\n",
     "broken.yaml": "robot: [\n",
-    "three.yaml": SHORT + "robot: {tetrahedra: 3}\n",
+    "three.yaml": SHORT + "robot: {tetrahedra: 3}\ncpg: {start_up: 0.1 s}\n",
     "six.yaml": SHORT + "robot: {tetrahedra: 6}\n",
     "poor.yaml": SHORT.replace("{", "{max_evaluations: 100, "),
 }
@@ -229,14 +229,14 @@ def test_replay_makes_the_page_of_simulate_from_its_recording_and_from_the_gait(
 
 def test_cpg_writes_the_signals_that_its_options_ask_for(work):
     tables = []
-    for options in ([], ["--raw"], ["--raw", "--unit", "N", "--rate", "100"]):
+    for options in ([], ["--raw"], ["--unit", "N", "--rate", "100"]):
         command = ["cpg", "--scenario", "three.yaml", "--signals", "recorded", "--out", "a.csv"]
         assert main([*command, *options]) == 0
         tables.append(np.loadtxt("a.csv", delimiter=",", comments=("#", "t"))[:, 1:])
-    fed, raw, newtons = tables
-    assert fed.shape == raw.shape == (601, 2)  # 0.3 s, two junctions
-    assert raw.any() and not fed.any()  # before the start-up time
-    np.testing.assert_allclose(newtons, 4.4482216152605 * raw[::20], atol=1e-6)
+    pounds, raw, newtons = tables
+    assert pounds.shape == raw.shape == (601, 2)  # 0.3 s, two junctions
+    assert raw[1:200].any() and not pounds[:200].any() and pounds[200:].any()  # starts at 0.1 s
+    np.testing.assert_allclose(newtons, 4.4482216152605 * pounds[::20], atol=1e-9)
 
 
 def test_diagram_writes_graphviz_source_that_names_the_subsystems(work):
