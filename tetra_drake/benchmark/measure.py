@@ -166,11 +166,12 @@ def step_cost(scenario: Scenario, tetrahedra: int) -> dict[str, Any]:
     row = Row(scenario.with_changes(changes))
     results = [row.simulate(seeded_gait(row.scenario, 0)) for _ in range(3)]
     times = [1e6 * r.wall_time / r.integrator.steps for r in results if r is not None]
+    per_step = statistics.median(times) if times else None
     return {
         "tetrahedra": tetrahedra,
         "steps": results[0].integrator.steps if results[0] else None,
-        "microseconds_per_step": statistics.median(times) if times else None,
-        "microseconds_per_tetrahedron": statistics.median(times) / tetrahedra if times else None,
+        "microseconds_per_step": per_step,
+        "microseconds_per_tetrahedron": per_step / tetrahedra if per_step else None,
     }
 
 

@@ -126,7 +126,8 @@ class _StepAimer:
             and settings.scheme in _IMPLICIT_SCHEMES
         )
         self._last_time = 0.0
-        self._last_velocities = self._acceleration = np.zeros(0)
+        size = simulator.get_context().get_continuous_state().num_v()
+        self._last_velocities = self._acceleration = np.zeros(size)
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
         """Limits the next step; call it after each step."""
@@ -135,8 +136,6 @@ class _StepAimer:
         step_taken = context.get_time() - self._last_time
         if step_taken > 0.0:
             self._acceleration = (velocities - self._last_velocities) / step_taken
-        elif not self._acceleration.size:
-            self._acceleration = np.zeros(velocities.size)
         self._last_time, self._last_velocities = context.get_time(), velocities
         horizon = self._settings.max_step
         predicted = self._ground.TimeToModeChange(

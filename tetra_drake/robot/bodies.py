@@ -30,9 +30,7 @@ def strut_inertia(structure: Structure, strut: tuple[int, int]) -> SpatialInerti
 
 def node_inertia(structure: Structure) -> SpatialInertia:
     """Spatial inertia of the sphere at a node, about its centre."""
-    return SpatialInertia.SolidSphereWithDensity(
-        density=structure.density, radius=structure.node_radius
-    )
+    return SpatialInertia.SolidSphereWithDensity(structure.density, structure.node_radius)
 
 
 def tetrahedron_inertia(structure: Structure) -> SpatialInertia:

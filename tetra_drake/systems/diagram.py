@@ -39,19 +39,12 @@ def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
     cpg = builder.AddNamedSystem("cpg", _make_cpg(scenario, gait))
-    start_up = builder.AddNamedSystem(
-        "start_up", StartUpGate(scenario.oscillators, start_up=scenario.cpg.start_up)
-    )
+    gate = StartUpGate(scenario.oscillators, start_up=scenario.cpg.start_up)
+    start_up = builder.AddNamedSystem("start_up", gate)
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
-    ground = builder.AddNamedSystem(
-        "ground",
-        GroundContact(
-            structure,
-            scenario.ground,
-            scenario.friction,
-            witness=scenario.simulation.mode_changes == "witness",
-        ),
-    )
+    witness = scenario.simulation.mode_changes == "witness"
+    contact = GroundContact(structure, scenario.ground, scenario.friction, witness=witness)
+    ground = builder.AddNamedSystem("ground", contact)
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
 
     state, signals = plant.get_state_output_port(), start_up.GetOutputPort("signals")

@@ -1,4 +1,1 @@
-"""The same robot simulated without Drake, compiled end to end, for speed.
-
-The laws are those of `physics`; here are the equations of motion and their integration.
-"""
+"""The same robot without Drake, compiled end to end: equations of motion, integration."""

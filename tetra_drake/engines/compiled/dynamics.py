@@ -104,13 +104,10 @@ def implicit_matrix(robot: Model, modes: Array, forces: Forces, time: float) -> 
             speed_row(nodes, node, 0.0, 0.0, 1.0, row)
             damping = law.damping * -nodes[node, P_WN + 2] + time * law.stiffness
             add_outer_product(time * damping, row, body, BLOCK, rows)
-        damping = time * law.stiction_damping
-        if modes[i, MODE] == STICK:
-            speed_row(nodes, node, 1.0, 0.0, 0.0, row)
-            add_outer_product(damping, row, body, BLOCK, rows)
-        if modes[i, MODE + 1] == STICK:
-            speed_row(nodes, node, 0.0, 1.0, 0.0, row)
-            add_outer_product(damping, row, body, BLOCK, rows)
+        for axis in range(2):
+            if modes[i, MODE + axis] == STICK:
+                speed_row(nodes, node, 1.0 - axis, 1.0 * axis, 0.0, row)
+                add_outer_product(time * law.stiction_damping, row, body, BLOCK, rows)
     return rows
 
 

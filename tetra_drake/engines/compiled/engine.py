@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import threading
 import time
 from collections.abc import Callable
@@ -72,19 +73,10 @@ def kernel_constants(
     scenario: Scenario, gait: Gait, structure: Structure
 ) -> tuple[Model, Settings, Actuation]:
     """The first arguments of the kernel `walk`."""
-    simulation, own = scenario.simulation, scenario.compiled
-    settings = Settings(
-        tolerance=own.tolerance,
-        max_step=own.max_step,
-        look_ahead=own.look_ahead,
-        max_speed=simulation.max_speed,
-        max_evaluations=simulation.max_evaluations,
-    )
-    actuation = Actuation(
-        samples=signal_samples(scenario, gait),
-        step=scenario.cpg.listing_step,
-        start_up=scenario.cpg.start_up,
-    )
+    cpg, simulation = scenario.cpg, scenario.simulation
+    limits = {name: getattr(simulation, name) for name in ("max_speed", "max_evaluations")}
+    settings = Settings(**dataclasses.asdict(scenario.compiled), **limits)
+    actuation = Actuation(signal_samples(scenario, gait), cpg.listing_step, cpg.start_up)
     return make_model(scenario, structure), settings, actuation
 
 

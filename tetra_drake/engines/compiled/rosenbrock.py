@@ -51,15 +51,13 @@ def take_step(
     moved = move_bodies(state, velocities, step)
     nodes = move_nodes(moved, robot.p_BN)
     change = compute_forces(robot, nodes, modes, signals).generalized
-    k1, stage_1 = np.empty(change.size), np.empty(change.size)
-    for i in range(change.size):
-        change[i] = GAMMA * (change[i] - forces.generalized[i])
-        k1[i] = forces.generalized[i] + change[i]
+    change -= forces.generalized
+    change *= GAMMA
     rows = implicit_matrix(robot, modes, forces, GAMMA * step)
     factorise(rows)
+    k1 = forces.generalized + change
     solve(rows, k1)
-    for i in range(change.size):
-        stage_1[i] = velocities[i] + GAMMA * step * k1[i]
+    stage_1 = velocities + GAMMA * step * k1
     end = move_bodies(state, stage_1, step)
     for i in range(change.size):
         end[first + i] = velocities[i] + step * k1[i]

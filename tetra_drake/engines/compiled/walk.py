@@ -81,12 +81,7 @@ def next_step(error: float, step: float, settings: Settings) -> float:
 
 @functools.partial(compiled, nogil=True)
 def walk(
-    robot: Model,
-    settings: Settings,
-    actuation: Actuation,
-    state: Array,
-    marks: Array,
-    times: Array,
+    robot: Model, settings: Settings, actuation: Actuation, state: Array, marks: Array, times: Array
 ) -> tuple[int, float, int, int, Samples]:
     """Simulates the robot from `state`, (13 bodies,), at time 0 to the last mark.
 
@@ -113,13 +108,7 @@ def walk(
             forces = compute_forces(robot, nodes, modes, signals_at(actuation, time, active))
             acceleration = forces.generalized / robot.inertia
             change = time_to_mode_change(
-                state,
-                acceleration,
-                nodes,
-                modes,
-                robot.contacts,
-                robot.ground,
-                settings.max_step,
+                state, acceleration, nodes, modes, robot.contacts, robot.ground, settings.max_step
             )
             step = min(step, AIM_FACTOR * change + settings.look_ahead)
             evaluations += 1
