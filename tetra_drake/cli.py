@@ -153,7 +153,7 @@ def _evolve(options: Options) -> None:
     continues it. The result depends on scenario and seed only. At the end it writes
     report.html, replay.html and figures/ into the run directory.
     """
-    from tetra_drake.evolution.progress import make_progress
+    from tetra_drake.evolution.progress import Display
     from tetra_drake.evolution.summary import summary, whole_experiment
     from tetra_drake.run import evolve
 
@@ -166,7 +166,7 @@ def _evolve(options: Options) -> None:
             seed=options.seed,
             workers=options.workers,
             resume=options.resume,
-            progress=make_progress(sys.stdout),
+            progress=Display(sys.stdout),
         )
     except KeyboardInterrupt:
         resume = f"tetra-drake evolve --out {options.out} --resume"
@@ -206,11 +206,11 @@ def _reevaluate(options: Options) -> None:
     which evolve itself does at its end, or all initial gaits. Gaits that have been evaluated so
     already are skipped.
     """
-    from tetra_drake.evolution.progress import make_progress
+    from tetra_drake.evolution.progress import Display
     from tetra_drake.evolution.reevaluation import reevaluate
     from tetra_drake.evolution.summary import summary
 
-    with make_progress(sys.stdout) as progress:
+    with Display(sys.stdout) as progress:
         run = reevaluate(
             options.run_directory,
             initial=options.initial,

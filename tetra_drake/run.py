@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from tetra_drake.engines.simulate import prepare
 from tetra_drake.errors import InputError, SimulationFailure
@@ -11,6 +12,7 @@ from tetra_drake.evolution.executors import (
     EvaluationImpossible,
     MakeExecutor,
     available_cores,
+    check_guard,
     check_sendable,
     process_executor,
     thread_executor,
@@ -59,6 +61,7 @@ def evolve(
 
     Raises InputError for what cannot be used, EvaluationImpossible if no evaluation can run.
     """
+    check_guard()
     out, progress, workers = Path(out), progress or Progress(), workers or available_cores()
     if isinstance(scenario, (str, Path)):
         scenario = load_scenario(scenario)
@@ -77,23 +80,12 @@ def evolve(
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
         prepare(own, say=progress.say)
-        run_trials(
-            record,
-            evaluate=evaluate,
-            workers=workers,
-            executor=where,
-            optimizer=optimizer,
-            progress=progress,
-        )
+        common: dict[str, Any] = {"workers": workers, "progress": progress}
+        run_trials(record, evaluate=evaluate, executor=where, optimizer=optimizer, **common)
         if reevaluate and own.simulation.engine != "drake":
+            where = executor or process_executor
             try:
-                reevaluate_gaits(
-                    out,
-                    workers=workers,
-                    executor=executor or process_executor,
-                    objective=objective,
-                    progress=progress,
-                )
+                reevaluate_gaits(out, executor=where, objective=objective, **common)
             except EvaluationImpossible as error:
                 progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
         if report:

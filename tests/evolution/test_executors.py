@@ -76,18 +76,25 @@ def test_a_function_that_workers_cannot_load_is_refused_with_the_cause(vectors, 
 PROGRAM = """
 import numpy as np
 from tetra_drake.evolution.executors import evaluate_all
-from helpers.analytic import Bowl
+from helpers.analytic import Bowl, small_scenario
 def own(vector):
     return Bowl()(vector)
-print(len(list(evaluate_all({evaluate}, [np.ones(26)], workers=1))))
 """
+EVALUATE = "print(len(list(evaluate_all({}, [np.ones(26)], workers=1))))"
+EVOLVE = "import tetra_drake\ntetra_drake.evolve(small_scenario(), 'run')"
 
 
 @pytest.mark.parametrize(
-    ("how", "evaluate"), [("stdin", "Bowl()"), ("stdin", "own"), ("file", "own")]
+    ("how", "call", "cause"),
+    [
+        ("stdin", EVALUATE.format("Bowl()"), "<stdin>"),
+        ("stdin", EVALUATE.format("own"), "<stdin>"),
+        ("file", EVALUATE.format("own"), "__main__"),
+        ("file", EVOLVE, "__main__"),
+    ],
 )
-def test_programs_that_workers_cannot_import_are_told_at_once(how, evaluate, tmp_path):
-    program = PROGRAM.format(evaluate=evaluate)
+def test_programs_that_workers_cannot_import_are_told_at_once(how, call, cause, tmp_path):
+    program = PROGRAM + call
     (tmp_path / "unguarded.py").write_text(program)
     ended = subprocess.run(
         [sys.executable, "-" if how == "stdin" else tmp_path / "unguarded.py"],
@@ -96,9 +103,10 @@ def test_programs_that_workers_cannot_import_are_told_at_once(how, evaluate, tmp
         capture_output=True,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
         timeout=60,
+        cwd=tmp_path,
     )
     # Read from standard input there is no file to import; in a file, a worker would start workers.
-    assert ended.stdout == ""
+    assert "1\n" not in ended.stdout
     error = ended.stderr.splitlines()[-1]
     assert "EvaluationImpossible" in error
-    assert ("<stdin>" if how == "stdin" else "__main__") in error
+    assert cause in error

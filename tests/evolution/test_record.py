@@ -101,7 +101,7 @@ def test_a_directory_with_other_things_in_it_is_refused(tmp_path, refused):
         RunRecord.create(tmp_path, scenario=small_scenario(), seed=5)
     with refused(tmp_path / "notes.txt", "", "is a file"):
         RunRecord.create(tmp_path / "notes.txt", scenario=small_scenario(), seed=5)
-    with refused(tmp_path / "notes.txt" / "run", "", "cannot be made"):
+    with refused(tmp_path / "notes.txt" / "run", "", "is a file"):
         RunRecord.create(tmp_path / "notes.txt" / "run", scenario=small_scenario(), seed=5)
 
 

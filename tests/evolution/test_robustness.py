@@ -89,10 +89,24 @@ def test_the_summary_is_of_the_changes_from_the_unchanged_distance():
     summary = summarize(table, by=["what", "percent"])
     at_2, at_5 = (summary.loc[("mass", percent)].to_dict() for percent in (2.0, 5.0))
     assert at_2 == pytest.approx(
-        {"median": 0.85, "least": -1.5, "greatest": 0.2, "kept": 0.5, "failed": 0}
+        {
+            "unchanged": 10.0,
+            "median": 0.85,
+            "least": -1.5,
+            "greatest": 0.2,
+            "kept": 0.5,
+            "failed": 0,
+        }
     )
     assert at_5 == pytest.approx(
-        {"median": 0.5, "least": -0.5, "greatest": -0.5, "kept": 0.5, "failed": 1}
+        {
+            "unchanged": 10.0,
+            "median": 0.5,
+            "least": -0.5,
+            "greatest": -0.5,
+            "kept": 0.5,
+            "failed": 1,
+        }
     )
 
 

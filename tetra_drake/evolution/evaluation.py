@@ -25,11 +25,8 @@ Objective = Callable[[SimulationResult], float]
 
 @dataclass(frozen=True)
 class GaitEvaluation:
-    """Evaluates vectors by simulating their gaits on a scenario.
-
-    The same vector gives the same numbers, bit for bit, in any process; only the time
-    budget depends on the machine, and is meant to be far beyond any simulation's time.
-    """
+    """Evaluates vectors by simulating their gaits: with the same numbers, bit for bit, in any
+    process, unless the time budget runs out."""
 
     scenario: Scenario
     objective: Objective | None = None
@@ -37,11 +34,9 @@ class GaitEvaluation:
 
     def __call__(self, vector: Vector) -> Evaluation:
         """Fitness and metrics of one vector, or the reason of a failure."""
-        started = time.perf_counter()
+        started, engine = time.perf_counter(), self.scenario.simulation.engine
         found = self._evaluate(ParameterSpace.of(self.scenario).gait(vector, name="candidate"))
-        wall_time = time.perf_counter() - started
-        engine = self.scenario.simulation.engine
-        return dataclasses.replace(found, wall_time=wall_time, engine=engine)
+        return dataclasses.replace(found, wall_time=time.perf_counter() - started, engine=engine)
 
     def _evaluate(self, gait: Gait) -> Evaluation:
         try:
@@ -56,10 +51,7 @@ class GaitEvaluation:
 
 
 class TimeBudgetExceeded(Exception):
-    """An evaluation took longer than allowed.
-
-    No RuntimeError: simulate() takes those for Drake's own and calls them divergence.
-    """
+    """An evaluation took too long. No RuntimeError, as simulate() takes those for divergence."""
 
 
 _KINDS: dict[type[Exception], str] = {
@@ -72,11 +64,8 @@ _KINDS: dict[type[Exception], str] = {
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """A block that ends with TimeBudgetExceeded after this wall time.
-
-    Works in a process's main thread, where worker processes run their tasks; elsewhere
-    there is no limit.
-    """
+    """A block that ends with TimeBudgetExceeded after this wall time, in a process's main thread;
+    in other threads there is no limit."""
     if threading.current_thread() is not threading.main_thread() or not math.isfinite(seconds):
         yield
         return

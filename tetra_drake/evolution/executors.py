@@ -32,8 +32,8 @@ MakeExecutor = Callable[[int], Executor]
 """Makes an executor with this many workers."""
 
 TASKS_PER_WORKER = 150
-"""A worker ends after this many evaluations and a fresh one takes its place: Drake before
-1.56 keeps about 2 MB of every diagram that holds Python systems."""
+"""After as many a fresh worker takes its place: Drake before 1.56 keeps about 2 MB of every
+diagram that holds Python systems."""
 
 
 class _Worker(SpawnProcess):
@@ -173,21 +173,17 @@ class EvaluationPool(Generic[JobT]):
         return finished
 
     def _fill(self) -> None:
-        while self._suspects or self._queue:
+        while waiting := self._suspects or self._queue:
             # A suspect runs alone: if a worker dies again the culprit is known.
-            if len(self._running) >= (1 if self._has_suspects() else self._workers):
+            alone = bool(self._suspects) or any(task.suspect for task in self._running.values())
+            if len(self._running) >= (1 if alone else self._workers):
                 return
-            task = self._suspects.popleft() if self._suspects else self._queue.popleft()
             try:
-                future = self._executor.submit(self._evaluate, task.task)
+                future = self._executor.submit(self._evaluate, waiting[0].task)
             except BrokenExecutor:
-                self._suspects.appendleft(task)
                 self._renew()
-                continue
-            self._running[future] = task
-
-    def _has_suspects(self) -> bool:
-        return bool(self._suspects) or any(task.suspect for task in self._running.values())
+            else:
+                self._running[future] = waiting.popleft()
 
     def _recover(self, broken: list[_Task]) -> None:
         """Starts new workers; what was under way with the old ones is suspect now."""
@@ -230,10 +226,18 @@ def evaluate_all(
 
 _SOURCE = "worker processes"
 _INSTEAD = "or use threads: executor=concurrent.futures.ThreadPoolExecutor"
+_UNGUARDED = 'the program lacks `if __name__ == "__main__":` around what it does'
+
+
+def check_guard() -> None:
+    """Raises EvaluationImpossible in a worker that is importing the program and so runs it."""
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise EvaluationImpossible(_SOURCE, "", _UNGUARDED)
 
 
 def check_sendable(evaluate: object, executor: MakeExecutor) -> None:
     """Raises EvaluationImpossible if worker processes are to get the function and cannot."""
+    check_guard()
     if executor is not process_executor:
         return
     try:
@@ -243,11 +247,12 @@ def check_sendable(evaluate: object, executor: MakeExecutor) -> None:
         raise EvaluationImpossible(_SOURCE, "", problem) from error
     program = sys.modules["__main__"]
     main = getattr(program, "__file__", None)
-    if main is not None and program.__spec__ is None and not os.path.exists(main):
-        problem = f"have to import the program, and '{main}' is no file: save it, {_INSTEAD}"
-        raise EvaluationImpossible(_SOURCE, "", problem)
+    problem = ""
     if main is None and b"__main__" in pickled:
         problem = f"cannot import what is defined interactively: use a module, {_INSTEAD}"
+    elif main is not None and program.__spec__ is None and not os.path.exists(main):
+        problem = f"have to import the program, and '{main}' is no file: save it, {_INSTEAD}"
+    if problem:
         raise EvaluationImpossible(_SOURCE, "", problem)
 
 
@@ -264,11 +269,9 @@ def _check_worker(evaluate: object) -> None:
             os.dup2(ours, 2)
             os.close(ours)
         messages.seek(0)
-        text = messages.read().strip()
+        *_, last = messages.read().strip().splitlines() or [f"exit status {worker.exitcode}"]
     if worker.exitcode:
-        cause = text.splitlines()[-1] if text else f"exit status {worker.exitcode}"
-        if "_check_not_importing_main" in text:
-            cause = 'the program lacks `if __name__ == "__main__":` around what it does'
+        cause = _UNGUARDED if _UNGUARDED in last else last
         raise EvaluationImpossible(_SOURCE, "", f"do not start: {cause}")
 
 

@@ -1,7 +1,5 @@
-"""Append-only files of JSON objects, one per line, that survive a kill at any moment.
-
-A file that is complete may be compressed by `xz`, which names it NAME.xz: it can still be read.
-"""
+"""Append-only files of JSON objects, one per line, that survive a kill at any moment. A complete
+one can be read after `xz` has compressed it to NAME.xz, too."""
 
 from __future__ import annotations
 
@@ -16,10 +14,7 @@ from tetra_drake.errors import InputError
 
 
 def append_lines(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
-    """Appends the entries, and hands them to the system before it returns.
-
-    After a kill in between only the last line there is can be torn.
-    """
+    """Appends the entries, handed to the system on return; a kill can tear only the last line."""
     if _compressed(path).exists():
         raise InputError(_compressed(path), "", "is compressed; to add to it, decompress it first")
     text = "".join(json.dumps(entry, allow_nan=False) + "\n" for entry in entries)
@@ -38,17 +33,13 @@ def repair_torn_line(path: Path) -> None:
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:
-    """The entries of all whole lines; none if there is no file.
-
-    Raises InputError, naming file and line, where a line is not a JSON object.
-    """
-    packed = _compressed(path).exists()
-    path = _compressed(path) if packed else path
-    if not path.exists():
-        return []
+    """The entries of all whole lines; none if there is no file. InputError, naming file and line,
+    where a line is not a JSON object."""
+    packed = _compressed(path)
+    path = packed if packed.exists() else path
     try:
-        content = path.read_bytes()
-        content = lzma.decompress(content) if packed else content
+        content = path.read_bytes() if path.exists() else b""
+        content = lzma.decompress(content) if path == packed else content
     except (OSError, lzma.LZMAError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     lines = content.split(b"\n")[:-1]

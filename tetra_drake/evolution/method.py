@@ -13,11 +13,9 @@ import inspect
 import json
 import sys
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
-
-import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
@@ -92,7 +90,8 @@ class Method:
             if ours == theirs:
                 continue
             now = f"another {name} of this name" if ours.name == theirs.name else theirs.name
-            problem = f"the run was made with {ours.name} {json.dumps(ours.settings)}, not {now}"
+            settings = f" {json.dumps(ours.settings)}" if ours.settings else ""
+            problem = f"the run was made with {ours.name}{settings}, not {now}"
             if ours.digest is not None:
                 call = f"tetra_drake.evolve(None, {str(source)!r}, resume=True, {name}=...)"
                 problem += f"; resume it from Python, with its own: {call}"
@@ -106,57 +105,61 @@ def _pieces(value: Any, seen: dict[int, Any]) -> Iterator[str]:
     elif id(value) not in seen:
         seen[id(value)] = value  # kept, so that no other object gets its id
         yield type(value).__qualname__
-        if isinstance(value, (type, types.FunctionType)):
-            yield f"{value.__module__}.{value.__qualname__}"
-            if _is_own(value.__module__):
-                inner = _class(value, seen) if isinstance(value, type) else _function(value, seen)
-                yield from inner
-        elif isinstance(value, types.CodeType):
-            yield f"{value.co_code.hex()} {value.co_names}"
-            yield from _pieces(value.co_consts, seen)
-        elif isinstance(value, (set, frozenset)):
-            yield repr(sorted(map(repr, value)))
-        elif isinstance(value, (np.ndarray, np.generic)):
-            yield f"{value.dtype} {value.shape} {value.tobytes().hex()}"
-        elif isinstance(value, (types.ModuleType, types.BuiltinFunctionType)):
-            yield value.__name__
-        else:
-            for key, item in _contents(value).items():
-                yield repr(key)
-                yield from _pieces(item, seen)
+        for part in _parts(value):
+            yield from _pieces(part, seen)
 
 
-def _contents(value: Any) -> Mapping[Any, Any]:
+_TRANSPARENT = (functools.partial, types.MethodType)
+"""Pickled as what they consist of."""
+
+
+def _parts(value: Any) -> Iterable[Any]:
     """What an object consists of."""
-    if isinstance(value, Mapping):
-        return value
     if isinstance(value, (list, tuple)):
-        return dict(enumerate(value))
-    if isinstance(value, functools.partial):
-        return {"function": value.func, "arguments": value.args, "keywords": value.keywords}
-    if isinstance(value, types.MethodType):
-        return {"function": value.__func__, "object": value.__self__}
-    return {"class": type(value), "values": getattr(value, "__dict__", {})}
+        return value
+    if isinstance(value, Mapping):
+        return value.items()
+    if isinstance(value, (set, frozenset)):
+        return sorted(map(repr, value))
+    if isinstance(value, (type, types.FunctionType)):
+        name = f"{value.__module__}.{value.__qualname__}"
+        if not _is_own(value.__module__):
+            return [name]
+        return [name, *(_class(value) if isinstance(value, type) else _function(value))]
+    opaque = not _is_own(type(value).__module__) and not isinstance(value, _TRANSPARENT)
+    if opaque and hasattr(value, "__wrapped__"):  # as made by staticmethod, functools.cache, numba
+        return [value.__wrapped__]
+    try:
+        reduced = value.__reduce_ex__(2)  # as for pickle: class and values, or a name
+    except Exception:
+        return [getattr(value, "__name__", "")]
+    return reduced if isinstance(reduced, tuple) else [reduced]
 
 
-def _function(function: types.FunctionType, seen: dict[int, Any]) -> Iterator[str]:
+def _function(function: types.FunctionType) -> list[Any]:
     """Its source, or else its bytecode, its defaults, and the values it finds outside."""
     try:
-        yield inspect.getsource(function)
+        code: Any = inspect.getsource(function)
     except (OSError, TypeError):  # typed into an interpreter, or read from standard input
-        yield from _pieces(function.__code__, seen)
+        code = _bytecode(function.__code__)
     outside = inspect.getclosurevars(function)
     defaults = [function.__defaults__, function.__kwdefaults__]
-    yield from _pieces([*defaults, dict(outside.nonlocals), dict(outside.globals)], seen)
+    return [code, *defaults, dict(outside.nonlocals), dict(outside.globals)]
 
 
-def _class(kind: type, seen: dict[int, Any]) -> Iterator[str]:
+def _bytecode(code: types.CodeType) -> list[Any]:
+    constants = [_bytecode(c) if isinstance(c, types.CodeType) else c for c in code.co_consts]
+    return [code.co_code, code.co_names, constants]
+
+
+def _class(kind: type) -> list[Any]:
     """Its bases and members, without what Python and decorators add."""
-    yield from _pieces(kind.__bases__, seen)
-    for name, member in sorted(vars(kind).items()):
-        if not name.startswith("__") or name in ("__init__", "__call__"):
-            inner = getattr(member, "fget", getattr(member, "__func__", member))
-            yield from _pieces([name, inner], seen)
+    members = {
+        name: getattr(member, "fget", member)
+        for name, member in sorted(vars(kind).items())
+        if not name.startswith("__") or name in ("__init__", "__call__")
+    }
+    return [kind.__bases__, members]
 
 
 def _is_own(module: str | None) -> bool:

@@ -17,6 +17,7 @@ fitnesses in place of simulations; every vector and every line must come out as 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import fcntl
 import hashlib
@@ -33,7 +34,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
 from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers.base import Evaluation
-from tetra_drake.files import write_whole
+from tetra_drake.files import check_folder, write_whole
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
@@ -48,12 +49,23 @@ EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS = "reevaluations.jsonl"
 
-_NONE = type(None)
-_ITERATION_KEYS: dict[str, Any] = {"iteration": int, "evaluations": int, "stop": (str, _NONE)}
-_ITERATION_KEYS |= {"best_fitness": (int, float, _NONE), "best_evaluation": (int, _NONE)}
-_EVALUATION_KEYS: dict[str, Any] = {"index": int, "iteration": int, "genome": list, "engine": str}
-_EVALUATION_KEYS |= {"metrics": dict, "failure": (str, _NONE), "fitness": (int, float, _NONE)}
-_EVALUATION_KEYS |= {"wall_time_s": (int, float)}
+_ITERATION_KEYS = {
+    "iteration": int,
+    "evaluations": int,
+    "best_fitness": float | int | None,
+    "best_evaluation": int | None,
+    "stop": str | None,
+}
+_EVALUATION_KEYS = {
+    "index": int,
+    "iteration": int,
+    "genome": list,
+    "metrics": dict,
+    "fitness": float | int | None,
+    "failure": str | None,
+    "wall_time_s": float | int,
+    "engine": str,
+}
 _FIRST_METRICS = {
     "distance_in": "distance",
     "steady_distance_in": "steady_distance",
@@ -97,8 +109,7 @@ def read_manifest(directory: Path) -> Manifest:
     scenario = load_scenario(scenario_file)
     text = scenario_file.read_text(encoding="utf-8")
     if schema == FIRST_SCHEMA:
-        unchanged = raw.get("scenario") == yaml.safe_load(text)
-        method = Method.of(scenario)
+        unchanged, method = raw.get("scenario") == yaml.safe_load(text), Method.of(scenario)
     else:
         unchanged = raw.get("scenario_sha256") == _sha256(text)
         method = Method.from_json(raw, path)
@@ -107,37 +118,31 @@ def read_manifest(directory: Path) -> Manifest:
     return Manifest(scenario, raw["seed"], raw["versions"], method)
 
 
+@dataclass(frozen=True)
 class RunRecord:
     """An open run directory, locked against other processes until closed."""
 
-    def __init__(self, directory: Path, manifest: Manifest, lock: BinaryIO) -> None:
-        self.directory = directory
-        self.manifest = manifest
-        self._lock = lock
+    directory: Path
+    manifest: Manifest
+    _lock: BinaryIO
 
     @classmethod
     def create(
         cls, directory: Path, *, scenario: Scenario, seed: int, method: Method | None = None
     ) -> RunRecord:
         """Begins a run in a directory that does not exist or is empty."""
-        if directory.exists() and not directory.is_dir():
-            raise InputError(directory, "", "is a file, expected a run directory")
+        now = versions(scenario.simulation.engine)
+        manifest = Manifest(scenario, seed, now, method or Method.of(scenario))
+        check_folder(directory)
         _refuse_a_used(directory)
-        try:
-            directory.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(directory, "", f"cannot be made: {error.strerror}") from error
-        lock = _lock(directory)
-        try:
+        directory.mkdir(parents=True, exist_ok=True)
+        with contextlib.ExitStack() as undo:
+            lock = undo.enter_context(_lock(directory))
             _refuse_a_used(directory)  # Another process may have been faster.
             for leftover in (*directory.glob(".manifest.*"), *directory.glob(".scenario.*")):
                 leftover.unlink()
-            now = versions(scenario.simulation.engine)
-            manifest = Manifest(scenario, seed, now, method or Method.of(scenario))
             _write_manifest(directory, manifest)
-        except BaseException:
-            lock.close()
-            raise
+            undo.pop_all()
         return cls(directory, manifest, lock)
 
     @classmethod
@@ -179,18 +184,16 @@ class TrialRecord:
         for name in (EVALUATIONS, ITERATIONS, IN_PROGRESS):
             repair_torn_line(folder / name)
         self._evaluations = read_entries(folder / EVALUATIONS)
-        for index, entry in enumerate(self._evaluations):
-            if entry["index"] != index:
-                self._refuse(EVALUATIONS, index, f"index is {entry['index']}, expected {index}")
+        for row, entry in enumerate(self._evaluations):
+            if entry["index"] != row:
+                self._refuse(EVALUATIONS, row, f"index is {entry['index']}, expected {row}")
         self._iterations = read_entries(folder / ITERATIONS)
         in_progress = read_entries(folder / IN_PROGRESS)
         self._in_progress = {entry["index"]: (i, entry) for i, entry in enumerate(in_progress)}
 
     def recall(self, index: int, vector: Vector) -> Evaluation | None:
-        """The recorded evaluation of this index, None if there is none.
-
-        Raises InputError if it is of another vector.
-        """
+        """The recorded evaluation of this index, None if there is none; InputError if it is of
+        another vector."""
         if index < len(self._evaluations):
             name, row, entry = EVALUATIONS, index, self._evaluations[index]
         elif index in self._in_progress:
@@ -199,14 +202,9 @@ class TrialRecord:
             return None
         if entry["genome"] != vector.tolist():
             self._refuse(name, row, "the genome is not the one that scenario and seed lead to")
-        fitness = entry["fitness"]
-        return Evaluation(
-            fitness=-math.inf if fitness is None else fitness,
-            metrics=entry["metrics"],
-            failure=entry["failure"],
-            wall_time=entry["wall_time_s"],
-            engine=entry["engine"],
-        )
+        fitness = -math.inf if entry["fitness"] is None else entry["fitness"]
+        rest = [entry[key] for key in ("metrics", "failure", "wall_time_s", "engine")]
+        return Evaluation(fitness, *rest)
 
     def keep(self, entry: dict[str, Any]) -> None:
         """Saves an evaluation whose iteration is not complete yet."""
@@ -231,13 +229,11 @@ class TrialRecord:
         (self._folder / IN_PROGRESS).unlink(missing_ok=True)
 
     def _write(self, name: str, recorded: _Lines, entries: _Lines, *, first: int) -> None:
-        for row, entry in enumerate(entries, start=first):
-            if row < len(recorded) and recorded[row] != entry:
-                keys = recorded[row] | entry
-                key = next(key for key in keys if recorded[row].get(key) != entry.get(key))
+        for row, (there, entry) in enumerate(zip(recorded[first:], entries, strict=False), first):
+            if there != entry:
+                key = next(key for key in there | entry if there.get(key) != entry.get(key))
                 self._refuse(name, row, f"{key} is not what scenario and seed lead to")
-        missing = entries[max(0, len(recorded) - first) :]
-        if missing:
+        if missing := entries[max(0, len(recorded) - first) :]:
             append_lines(self._folder / name, missing)
 
     def _refuse(self, name: str, row: int, problem: str) -> None:
@@ -261,15 +257,13 @@ def evaluation_entry(
 
 
 def read_entries(path: Path) -> list[dict[str, Any]]:
-    """The lines of a file of evaluations or iterations in today's form, whatever their schema.
-
-    Raises InputError, naming file and line, where a line is damaged.
-    """
+    """The lines of a file of evaluations or iterations in today's form, whatever their schema;
+    InputError, naming file and line, where one is damaged."""
     keys = _ITERATION_KEYS if path.name == ITERATIONS else _EVALUATION_KEYS
     entries = read_lines(path)
     for line, entry in enumerate(entries, start=1):
         for key, kind in keys.items():
-            if key not in entry or not isinstance(entry[key], kind):
+            if not isinstance(entry.get(key, NotImplemented), kind):
                 raise InputError(path, f"line {line}", f"is damaged: {key} is missing or invalid")
         entry.pop("best_distance_in", None)
         if "distance_in" in entry.get("metrics", {}):
@@ -315,15 +309,13 @@ def _refuse_a_used(directory: Path) -> None:
 
 def _lock(directory: Path) -> BinaryIO:
     """The run's locked file, which the system releases whenever this process ends."""
-    try:
-        lock = (directory / LOCK).open("ab")
-    except OSError as error:
-        raise InputError(directory, "", f"cannot be written to: {error.strerror}") from error
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        lock.close()
-        taken = isinstance(error, BlockingIOError)
-        problem = "another process is at work on this run" if taken else "cannot be locked"
-        raise InputError(directory, "", problem) from error
+    with contextlib.ExitStack() as undo:
+        try:
+            lock = undo.enter_context((directory / LOCK).open("ab"))
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError(directory, "", "another process is at work on this run") from error
+        except OSError as error:
+            raise InputError(directory, "", f"cannot be locked: {error.strerror}") from error
+        undo.pop_all()
     return lock

@@ -33,17 +33,15 @@ def reevaluate(
     progress: Progress | None = None,
 ) -> Run:
     """Evaluates a run's best gaits, or all initial ones, on the Drake diagram, adds them to its
-    record and returns it.
+    record and returns it. Gaits that have been evaluated so already are skipped.
 
-    Gaits that have been evaluated so already are skipped. `objective` must be the run's, if it
-    had one from Python. Raises InputError where it is not, or where there is no run.
+    Raises InputError where `objective` is not the run's, or where there is no run.
     """
     run = load_run(directory)
-    scenario = run.manifest.scenario.with_changes({"simulation.engine": "drake"})
-    given = dataclasses.replace(
-        run.manifest.method, objective=Method.of(scenario, objective=objective).objective
-    )
-    run.manifest.method.check_same(given, run.directory)
+    scenario, method = run.manifest.scenario, run.manifest.method
+    scenario = scenario.with_changes({"simulation.engine": "drake"})
+    given = Method.of(scenario, objective=objective).objective
+    method.check_same(dataclasses.replace(method, objective=given), run.directory)
     for trial in range(scenario.evolution.trials):
         repair_torn_line(trial_folder(run.directory, trial) / REEVALUATIONS)
     done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
@@ -65,8 +63,8 @@ def reevaluate(
 
 
 def best_distances(run: Run) -> list[tuple[int, float, float]]:
-    """For each trial, the distances (in) of its fittest gait: recorded, and on the diagram;
-    NaN for what there is not."""
+    """For each trial, the distances (in) of its fittest gait: recorded, and on the diagram; NaN
+    where there is none."""
     key = ["trial", "index"]
     again = run.reevaluations.set_index(key)["distance_in"].to_dict()
     best = run.best()[[*key, "distance_in"]].itertuples(index=False, name=None)

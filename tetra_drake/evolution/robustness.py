@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.executors import available_cores, evaluate_all, thread_executor
+from tetra_drake.evolution.executors import evaluate_all, thread_executor
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed, signed
@@ -51,10 +51,8 @@ KEPT = 0.9
 
 
 def gaits_of(source: Path, *, scenario: str | None = None) -> tuple[Scenario, dict[Any, Gait]]:
-    """The gait of a file, or the best gait of each trial of a run, and the scenario to use.
-
-    `scenario`, a name or file, replaces the run's, or the thesis's for a gait file.
-    """
+    """The gait of a file, or the best gait of each trial of a run, and the scenario to use: this
+    one, a name or file, instead of the run's, or the thesis's for a gait file."""
     if not source.is_dir():
         loaded = load_scenario(scenario or "thesis")
         gait = load_gait(source, loaded)
@@ -94,7 +92,7 @@ def robustness(
     for index, evaluation in evaluate_all(
         lambda task: GaitEvaluation(task[0])(task[1]),
         tasks,
-        workers=workers or available_cores(),
+        workers=workers,
         executor=thread_executor,
     ):
         rows[index]["distance"] = evaluation.metrics.get("distance", math.nan)
@@ -103,24 +101,27 @@ def robustness(
 
 
 def summarize(table: pandas.DataFrame, *, by: Sequence[str]) -> pandas.DataFrame:
-    """Changes of the distance in a table of robustness(), grouped by gait, what or percent.
+    """Changes of the distance in a table of robustness(), grouped by gait, what or percent, which
+    loses its sign.
 
-    Percents lose their signs. Columns, in the unit of the distance: median (of the absolute
+    Columns, in the unit of the distance: unchanged (mean distance), median (of the absolute
     change), least and greatest (change); kept (share of the simulations, 0 to 1, that walk at
     least KEPT of the unchanged distance), failed (count).
     """
-    unchanged = table[table["what"] == NOTHING].set_index("gait")["distance"]
-    changed = table[table["what"] != NOTHING]
-    before = changed["gait"].map(unchanged)
+    is_changed = table["what"] != NOTHING
+    changed = table[is_changed]
+    before = changed["gait"].map(table[~is_changed].set_index("gait")["distance"])
     change = changed["distance"] - before
     changed = changed.assign(
         percent=changed["percent"].abs(),
+        before=before,
         change=change,
         size=change.abs(),
         kept=change > (KEPT - 1.0) * before.abs(),
         failed=changed["failure"].notna(),
     )
     return changed.groupby(list(by), sort=False).agg(
+        unchanged=("before", "mean"),
         median=("size", "median"),
         least=("change", "min"),
         greatest=("change", "max"),
@@ -131,25 +132,23 @@ def summarize(table: pandas.DataFrame, *, by: Sequence[str]) -> pandas.DataFrame
 
 def describe(table: pandas.DataFrame) -> str:
     """Summaries of a table of robustness() for printing, in inches: by change, by gait."""
-    import pandas
-
     inches = table.assign(distance=table["distance"] / INCH)
-    unchanged = inches[inches["what"] == NOTHING].set_index("gait")["distance"]
+    shown: dict[Any, tuple[str, Callable[[Any], str]]] = {
+        "percent": ("by", "± {:g} %".format),
+        "unchanged": ("unchanged distance, in", fixed),
+        "median": ("median change", fixed),
+        "least": ("least", signed),
+        "greatest": ("greatest", signed),
+        "kept": (f"keeps {100.0 * KEPT:g} %", "{:.0%}".format),
+        "failed": ("failed", str),
+    }
+    headings = {"what": "changed"} | {key: heading for key, (heading, _) in shown.items()}
+    formats = dict(shown.values())
     texts = []
-    for key, heading in (("what", "changed"), ("gait", "gait")):
-        summary = summarize(inches, by=[key, "percent"]).reset_index()
-        columns = {
-            heading: summary[key],
-            "by": summary["percent"].map("± {:g} %".format),
-            "median change, in": summary["median"].map(fixed),
-            "least": summary["least"].map(signed),
-            "greatest": summary["greatest"].map(signed),
-            f"keeps {100.0 * KEPT:g} %": summary["kept"].map("{:.0%}".format),
-            "failed": summary["failed"],
-        }
-        if key == "gait":
-            columns["unchanged distance, in"] = summary[key].map(unchanged).map(fixed)
-        texts.append(pandas.DataFrame(columns).to_string(index=False))
+    for key in ("what", "gait"):
+        summary = summarize(inches, by=[key, "percent"]).reset_index()[[key, *shown]]
+        summary = summary.rename(columns=headings)
+        texts.append(summary.to_string(index=False, formatters=formats))
     return "\n\n".join(texts)
 
 

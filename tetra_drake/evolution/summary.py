@@ -12,6 +12,7 @@ from tetra_drake.evolution.executors import available_cores
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.tables import Run
+from tetra_drake.evolution.trial import TrialStatus
 from tetra_drake.formatting import duration, fixed
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
@@ -27,13 +28,7 @@ class Comparison(NamedTuple):
 
 def summary(run: Run) -> str:
     """The lines printed at the end of a run. Distances are those of the fittest gaits."""
-    lines = [
-        f"trial {status.number}: {status.stop or 'not ended'} after iteration {status.iteration}, "
-        f"{status.evaluations} evaluations, {status.failures} failed; mean fitness "
-        f"{fixed(status.initial_mean_fitness)} -> {fixed(status.mean_fitness)}, best distance "
-        f"{fixed(status.initial_best_distance_in)} -> {fixed(status.best_distance_in)} in"
-        for status in run.statuses
-    ]
+    lines = [_trial(status) for status in run.statuses]
     for trial, _, on_diagram in best_distances(run):
         if math.isfinite(on_diagram):
             lines[trial] += f" ({fixed(on_diagram)} in on the Drake diagram)"
@@ -47,16 +42,22 @@ def summary(run: Run) -> str:
     return "\n".join(lines)
 
 
-def whole_experiment(scenario: Scenario, *, seconds: float) -> str:
-    """What evolving on a whole scenario takes on this machine's cores, and its command.
+def _trial(status: TrialStatus) -> str:
+    text = f"trial {status.number}: {status.stop or 'not ended'} after iteration {status.iteration}"
+    text += f", {status.evaluations} evaluations, {status.failures} failed; "
+    if math.isfinite(status.mean_fitness):
+        initial, mean = status.initial_mean_fitness, status.mean_fitness
+        text += f"mean fitness {fixed(initial)} -> {fixed(mean)}, "
+    initial, best = status.initial_best_distance_in, status.best_distance_in
+    return text + f"best distance {fixed(initial)} -> {fixed(best)} in"
 
-    seconds: wall time per evaluation on the compiled engine.
-    """
-    settings = scenario.evolution
+
+def whole_experiment(scenario: Scenario, *, seconds: float) -> str:
+    """What evolving on a whole scenario takes on this machine's cores, and its command; seconds:
+    wall time per evaluation on the compiled engine."""
+    settings, cores, name = scenario.evolution, available_cores(), scenario.name
     evaluations = settings.trials * (settings.population + CHILDREN * settings.max_iterations)
-    cores = available_cores()
     time = duration(evaluations * seconds / cores)
-    name = scenario.name
     return (
         f"this is a first look; scenario {name}, {settings.trials} trials of at most "
         f"{settings.max_iterations} iterations, takes about {time} (h:mm:ss) on the {cores} cores "

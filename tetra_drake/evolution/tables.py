@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
 _EMPTY = ["trial", "index", "iteration", "fitness", "failure", "wall_time_s", "distance_in"]
 """Columns of an empty table."""
 _METRICS = [f.name for f in dataclasses.fields(Metrics)]
+_NUMBERS = [*_METRICS, "distance_in"]
 
 
 @dataclass(frozen=True)
@@ -80,26 +80,23 @@ class Run:
         return self.evaluations[self.evaluations["iteration"] == 0]
 
     def last_population(self, trial: int) -> pandas.DataFrame:
-        """The members of a trial's population after its last iteration: rows of `evaluations`.
-
-        Each row says in `placed` which place it took, so the last row of a place is its member.
-        """
+        """The population of a trial after its last iteration: rows of `evaluations`."""
         rows = self.evaluations[self.evaluations["trial"] == trial]
-        placed = rows[rows["placed"].notna()] if "placed" in rows else rows.iloc[:0]
-        if placed.empty:
-            return placed
-        return placed.drop_duplicates("placed", keep="last").sort_values("placed")
+        if "placed" not in rows:
+            return rows.iloc[:0]
+        # The last row of a place is its member.
+        rows = rows.dropna(subset="placed").drop_duplicates("placed", keep="last")
+        return rows.sort_values("placed")
 
     def vector(self, trial: int, index: int) -> Vector:
         """The parameters of an evaluation."""
-        rows = self.evaluations
-        row = rows[(rows["trial"] == trial) & (rows["index"] == index)]
-        return row[self._columns].to_numpy(dtype=np.float64)[0]
+        rows = self.evaluations.set_index(["trial", "index"])
+        return rows.loc[(trial, index), self._columns].to_numpy(dtype=np.float64)
 
     def gait(self, trial: int, index: int) -> Gait:
         """The gait of an evaluation."""
-        scenario, seed = self.manifest.scenario, self.manifest.seed
-        name = f"{scenario.name}, seed {seed}, trial {trial}, evaluation {index}"
+        scenario = self.manifest.scenario
+        name = f"{scenario.name}, seed {self.manifest.seed}, trial {trial}, evaluation {index}"
         return ParameterSpace.of(scenario).gait(self.vector(trial, index), name=name)
 
     @property
@@ -108,18 +105,13 @@ class Run:
         return [*weights, "tau_a_s", "tau_b_s"]
 
     def _status(self, trial: int) -> TrialStatus:
-        status = TrialStatus(trial)
         rows = self.evaluations[self.evaluations["trial"] == trial]
-        status.count(
-            evaluations=len(rows),
-            failures=int(rows["failure"].notna().sum()),
-            wall_time=float(rows["wall_time_s"].sum()),
-        )
-        status.recalled = status.evaluations
-        lines = self.iterations[self.iterations["trial"] == trial]
-        for line in (lines.iloc[0], lines.iloc[-1]) if len(lines) else ():
-            values = line.drop(["trial", "best_distance_in"]).to_dict()
-            status.complete(values, best_distance_in=float(line["best_distance_in"]))
+        status = TrialStatus(trial, recalled=len(rows))
+        failures, wall_time = rows["failure"].notna().sum(), rows["wall_time_s"].sum()
+        status.count(len(rows), failures=int(failures), wall_time=float(wall_time))
+        lines = self.iterations[self.iterations["trial"] == trial].drop(columns="trial")
+        for line in lines.iloc[[0, -1]].to_dict("records") if len(lines) else ():
+            status.complete(line, best_distance_in=line.pop("best_distance_in"))
         return status
 
 
@@ -133,38 +125,34 @@ def load_run(path: str | Path) -> Run:
     """
     directory = Path(path)
     manifest = read_manifest(directory)
-    evaluations = _table(directory, manifest, EVALUATIONS, _flat)
-    iterations = _table(directory, manifest, ITERATIONS, dict)
-    reevaluations = _table(directory, manifest, REEVALUATIONS, _flat)
+    files = (EVALUATIONS, ITERATIONS, REEVALUATIONS)
+    tables = [_table(directory, manifest.scenario.evolution.trials, name) for name in files]
+    evaluations, iterations, _ = tables
     if not iterations.empty:
         distances = evaluations.set_index(["trial", "index"])["distance_in"].to_dict()
         best = zip(iterations["trial"], iterations["best_evaluation"], strict=True)
         iterations["best_distance_in"] = [distances.get(each, math.nan) for each in best]
-    return Run(directory, manifest, evaluations, iterations, reevaluations)
+    return Run(directory, manifest, *tables)
 
 
-def _table(
-    directory: Path, manifest: Manifest, name: str, row: Callable[[dict[str, Any]], dict[str, Any]]
-) -> pandas.DataFrame:
+def _table(directory: Path, trials: int, name: str) -> pandas.DataFrame:
     import pandas
 
     rows = [
-        {"trial": trial, **row(entry)}
-        for trial in range(manifest.scenario.evolution.trials)
+        {"trial": trial, **(_flat(entry) if "genome" in entry else entry)}
+        for trial in range(trials)
         for entry in read_entries(trial_folder(directory, trial) / name)
     ]
     table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
-    whole = [column for column in ("placed", "best_evaluation") if column in table]
-    numbers = [
-        column for column in table if column in (*_METRICS, "distance_in") or "fitness" in column
-    ]
-    return table.astype({column: "Int64" for column in whole} | dict.fromkeys(numbers, float))
+    kinds = dict.fromkeys(("placed", "best_evaluation"), "Int64")
+    kinds |= {column: "float" for column in table if column in _NUMBERS or "fitness" in column}
+    return table.astype({column: kind for column, kind in kinds.items() if column in table})
 
 
 def _flat(entry: dict[str, Any]) -> dict[str, Any]:
-    *weights, tau_a, tau_b = entry["genome"]
-    plain = {key: value for key, value in entry.items() if key not in ("genome", "metrics")}
-    metrics = dict.fromkeys(_METRICS, math.nan) | entry["metrics"]
+    """A line of evaluations with a column for each number."""
+    *weights, tau_a, tau_b = entry.pop("genome")
+    metrics = dict.fromkeys(_METRICS, math.nan) | entry.pop("metrics")
     numbered = {f"weight_{i}": weight for i, weight in enumerate(weights, start=1)}
     inches = {"distance_in": metrics["distance"] / INCH}
-    return plain | metrics | inches | numbered | {"tau_a_s": tau_a, "tau_b_s": tau_b}
+    return entry | metrics | inches | numbered | {"tau_a_s": tau_a, "tau_b_s": tau_b}

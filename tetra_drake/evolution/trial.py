@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,8 @@ from tetra_drake.scenario.units import INCH
 
 @dataclass
 class TrialStatus:
-    """State of a trial, live or read back from its record. Distances in inches, those of the
-    fittest gait; NaN before there is any."""
+    """State of a trial, live or recorded. Distances are the fittest gait's; NaN before there is
+    any."""
 
     number: int
     evaluations_at_most: int = 0
@@ -56,7 +56,7 @@ class TrialStatus:
         initial = self.initial_best_distance_in
         return 100.0 * (self.best_distance_in / initial - 1.0) if initial > 0.0 else math.nan
 
-    def count(self, *, evaluations: int, failures: int, wall_time: float) -> None:
+    def count(self, evaluations: int, *, failures: int, wall_time: float) -> None:
         """Adds evaluations."""
         self.evaluations += evaluations
         self.failures += failures
@@ -79,99 +79,89 @@ LINE_KEYS = ("iteration", "evaluations", "best_fitness", "best_evaluation", "sto
 
 
 class Trial:
-    """Takes evaluations in any order and gives them to the optimiser in the order asked.
-
-    What the record holds already it goes through at once.
-    """
+    """Gives evaluations, taken in any order, to the optimiser in the order asked. What the record
+    holds already it goes through at once."""
 
     def __init__(
         self, number: int, name: str, *, space: ParameterSpace, optimizer: Optimizer, folder: Path
     ) -> None:
         self.status = TrialStatus(number, optimizer.evaluations_at_most)
+        self.unevaluated: dict[int, Vector] = {}
+        """What has to be evaluated before the optimiser can go on, by number; empty at the end."""
         self._name = name
         self._space = space
         self._optimizer = optimizer
         self._record = TrialRecord(folder)
-        self._batch: dict[int, Vector] = {}
-        """By the numbers of their evaluations, in the order asked."""
         self._results: dict[int, Evaluation] = {}
+        """Those of this iteration."""
         self._best: tuple[int, Vector, Evaluation] | None = None
         self._saved_best: int | None = None
-        self._ask(first=0)
-        self._catch_up()
-
-    @property
-    def finished(self) -> bool:
-        """Whether the optimiser has ended the trial."""
-        return self.status.stop is not None
-
-    def unevaluated(self) -> dict[int, Vector]:
-        """What has to be evaluated before the optimiser can go on, by number."""
-        return {i: vector for i, vector in self._batch.items() if i not in self._results}
+        self._course = self._iterate()
+        next(self._course, None)
 
     def take(self, index: int, evaluation: Evaluation) -> bool:
-        """Takes an evaluation; True if that was the last of its batch."""
+        """Takes an evaluation; True if that was the last of its iteration."""
+        vector = self.unevaluated.pop(index)
         self._add(index, evaluation)
-        if self.unevaluated():
-            iteration = self.status.iteration + 1
-            self._record.keep(evaluation_entry(index, iteration, self._batch[index], evaluation))
+        if self.unevaluated:
+            entry = evaluation_entry(index, self.status.iteration + 1, vector, evaluation)
+            self._record.keep(entry)
             return False
-        self._tell()
-        self._catch_up()
+        next(self._course, None)
         return True
 
-    def _ask(self, *, first: int) -> None:
-        self._batch = dict(enumerate(self._optimizer.ask(), start=first))
-        self._results = {}
-        for index, vector in self._batch.items():
-            evaluation = self._record.recall(index, vector)
-            if evaluation is not None:
-                self._add(index, evaluation)
-                self.status.recalled += 1
+    def _iterate(self) -> Iterator[None]:
+        """Goes from iteration to iteration; yields to wait for evaluations."""
+        while self.status.stop is None:
+            batch = dict(enumerate(self._optimizer.ask(), start=self.status.evaluations))
+            self._results = {}
+            for index, vector in batch.items():
+                recorded = self._record.recall(index, vector)
+                if recorded is None:
+                    self.unevaluated[index] = vector
+                else:
+                    self._add(index, recorded)
+                    self.status.recalled += 1
+            if self.unevaluated:
+                self._save_best()
+                yield
+            self._complete(batch)
+        self._record.finish(self.status.evaluations)
+        self._save_best()
 
     def _add(self, index: int, evaluation: Evaluation) -> None:
         self._results[index] = evaluation
         failed = evaluation.failure is not None
-        self.status.count(evaluations=1, failures=failed, wall_time=evaluation.wall_time)
+        self.status.count(1, failures=failed, wall_time=evaluation.wall_time)
 
-    def _catch_up(self) -> None:
-        """Goes on as far as evaluations are known, then saves the best gait if it is new."""
-        while not self.finished and not self.unevaluated():
-            self._tell()
+    def _save_best(self) -> None:
         if self._best is not None and self._best[0] != self._saved_best:
-            index, vector, _ = self._best
-            name = f"{self._name}, evaluation {index}"
+            self._saved_best, vector, _ = self._best
+            name = f"{self._name}, evaluation {self._saved_best}"
             self._record.save_best(self._space.gait(vector, name=name))
-            self._saved_best = index
 
-    def _tell(self) -> None:
-        iteration = self._optimizer.tell([self._results[index] for index in self._batch])
-        for index, vector in self._batch.items():
+    def _complete(self, batch: Mapping[int, Vector]) -> None:
+        """Tells the optimiser the results of an iteration, and records it."""
+        outcome = self._optimizer.tell([self._results[index] for index in batch])
+        number, entries = self.status.iteration + 1, []
+        for index, vector in batch.items():
             evaluation = self._results[index]
             if evaluation.fitness > (self._best[2].fitness if self._best else -math.inf):
                 self._best = index, vector, evaluation
+            entries.append(evaluation_entry(index, number, vector, evaluation))
+        for entry, place in zip(entries, outcome.placed or (), strict=outcome.placed is not None):
+            entry["placed"] = place
         line = {
-            "iteration": self.status.iteration + 1,
+            "iteration": number,
             "evaluations": self.status.evaluations,
             "best_fitness": self._best[2].fitness if self._best else None,
             "best_evaluation": self._best[0] if self._best else None,
-            "stop": iteration.stop,
-            **iteration.report,
+            "stop": outcome.stop,
+            **outcome.report,
         }
+        self._record.complete(entries, line)
         distance = self._best[2].metrics.get("distance", math.nan) if self._best else math.nan
         self.status.complete(line, best_distance_in=distance / INCH)
-        entries = [
-            evaluation_entry(index, self.status.iteration, vector, self._results[index])
-            for index, vector in self._batch.items()
-        ]
-        if iteration.placed is not None:
-            for entry, place in zip(entries, iteration.placed, strict=True):
-                entry["placed"] = place
-        self._record.complete(entries, line)
-        if self.finished:
-            self._record.finish(self.status.evaluations)
-        else:
-            self._ask(first=self.status.evaluations)
 
 
 def _number(value: Any) -> float:

@@ -29,34 +29,9 @@ def run_trials(
     The record depends on its scenario, method and seed only, not on the number of workers, the
     executor, or interruptions. Trials share nothing: one more trial changes no other.
     """
-    trials = _open_trials(record, optimizer)
-    statuses = [trial.status for trial in trials]
-    progress = progress or Progress()
-    progress.show(statuses)
-    if all(trial.finished for trial in trials):
-        return statuses
-    with EvaluationPool[tuple[int, int]](evaluate, workers=workers, executor=executor) as pool:
-
-        def submit(trial: Trial) -> None:
-            if not trial.finished:
-                for index, vector in trial.unevaluated().items():
-                    pool.submit((trial.status.number, index), vector)
-
-        for trial in trials:
-            submit(trial)
-        while pool.busy:
-            for (number, index), evaluation in pool.wait(_PROGRESS_PERIOD):
-                if trials[number].take(index, evaluation):
-                    submit(trials[number])
-            progress.show(statuses)
-    return statuses
-
-
-def _open_trials(record: RunRecord, optimizer: MakeOptimizer) -> list[Trial]:
     scenario, seed = record.manifest.scenario, record.manifest.seed
-    space = ParameterSpace.of(scenario)
-    seeds = np.random.SeedSequence(seed).spawn(scenario.evolution.trials)
-    return [
+    space, progress = ParameterSpace.of(scenario), progress or Progress()
+    trials = [
         Trial(
             number,
             f"{scenario.name}, seed {seed}, trial {number}",
@@ -64,5 +39,21 @@ def _open_trials(record: RunRecord, optimizer: MakeOptimizer) -> list[Trial]:
             optimizer=optimizer(space, scenario.evolution, np.random.default_rng(own_seed)),
             folder=trial_folder(record.directory, number),
         )
-        for number, own_seed in enumerate(seeds)
+        for number, own_seed in enumerate(
+            np.random.SeedSequence(seed).spawn(scenario.evolution.trials)
+        )
     ]
+    statuses = [trial.status for trial in trials]
+    progress.show(statuses)
+    waiting = [trial for trial in trials if trial.unevaluated]
+    if not waiting:
+        return statuses
+    with EvaluationPool[tuple[Trial, int]](evaluate, workers=workers, executor=executor) as pool:
+        while waiting or pool.busy:
+            for trial in waiting:
+                for index, vector in trial.unevaluated.items():
+                    pool.submit((trial, index), vector)
+            done = pool.wait(_PROGRESS_PERIOD)
+            waiting = [trial for (trial, index), found in done if trial.take(index, found)]
+            progress.show(statuses)
+    return statuses

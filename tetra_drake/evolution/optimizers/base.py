@@ -49,11 +49,8 @@ class Iteration:
 
 
 class Optimizer(Protocol):
-    """Asks for vectors to be evaluated, batch by batch, and is told their evaluations.
-
-    It may depend on its own random generator and on the evaluations only, so that a recorded
-    trial can be repeated from its record.
-    """
+    """Asks for vectors to be evaluated, batch by batch, and is told their evaluations; it depends
+    on these and its random generator only, so that a trial can be repeated from its record."""
 
     @property
     def evaluations_at_most(self) -> int:

@@ -26,9 +26,8 @@ CHILDREN = 2
 class SteadyState:
     """An Optimizer: first the random population, then two children per iteration.
 
-    Both children of an iteration come from the same two parents and the same mutation
-    numbers, before either is placed, so they can be evaluated at once. It reports mean_fitness,
-    the mean over the population's members that have not failed.
+    Both children come from the same two parents and the same mutation numbers, before either is
+    placed, so they can be evaluated at once. Reports mean_fitness, over members without failure.
     """
 
     def __init__(
@@ -59,45 +58,37 @@ class SteadyState:
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes the initial population, or places the children one after the other."""
         fitnesses = [evaluation.fitness for evaluation in evaluations]
-        placed: tuple[int | None, ...]
         if not self._population:
             self._population = self._asked
             self._fitnesses = np.array(fitnesses, dtype=float)
-            placed = tuple(range(len(fitnesses)))
+            placed: tuple[int | None, ...] = tuple(range(len(fitnesses)))
         else:
-            children = zip(self._asked, fitnesses, strict=True)
-            placed = tuple(self._place(vector, fitness) for vector, fitness in children)
+            placed = tuple(map(self._place, self._asked, fitnesses))
         mean = mean_fitness(self._fitnesses)
         self._means.append(mean)
         report = {"mean_fitness": mean if math.isfinite(mean) else None}
         return Iteration(report=report, placed=placed, stop=self._stop())
 
     def _breed(self) -> list[Vector]:
-        settings, generator = self._settings, self._generator
-        parents = [
-            self._population[
-                select_parent(self._fitnesses, tournament=settings.tournament, generator=generator)
-            ]
+        settings, generator, space = self._settings, self._generator, self._space
+        first, second = (
+            select_parent(self._fitnesses, tournament=settings.tournament, generator=generator)
             for _ in range(2)
-        ]
+        )
         crossed = cross_over(
-            *parents, probability=settings.crossover_probability, generator=generator
+            self._population[first],
+            self._population[second],
+            probability=settings.crossover_probability,
+            generator=generator,
         )
         mutation = draw_mutation(
-            self._space.steps, probability=settings.mutation_probability, generator=generator
+            space.steps, probability=settings.mutation_probability, generator=generator
         )
-        return [
-            self._space.repair(mutate(child, mutation=mutation, floors=self._space.floors))
-            for child in crossed
-        ]
+        return [space.repair(mutate(c, mutation=mutation, floors=space.floors)) for c in crossed]
 
     def _place(self, vector: Vector, fitness: float) -> int | None:
-        place = find_place(
-            self._fitnesses,
-            fitness,
-            tournament=self._settings.tournament,
-            generator=self._generator,
-        )
+        tournament, generator = self._settings.tournament, self._generator
+        place = find_place(self._fitnesses, fitness, tournament=tournament, generator=generator)
         if place is not None:
             self._population[place] = vector
             self._fitnesses[place] = fitness
@@ -107,11 +98,10 @@ class SteadyState:
         settings = self._settings
         if len(self._means) - 1 >= settings.max_iterations:
             return "all iterations done"
-        if has_levelled_off(
+        levelled_off = has_levelled_off(
             self._means,
             rise=settings.stop_rise,
             window=settings.stop_window,
             after=settings.stop_after,
-        ):
-            return "mean fitness levelled off"
-        return None
+        )
+        return "mean fitness levelled off" if levelled_off else None
