@@ -138,7 +138,7 @@ def _evolve_options(command: Command) -> None:
         "--iterations",
         "greatest number of iterations per trial, instead of the scenario's",
     )
-    command.add_argument("--seed", metavar="N", type=_seed, help="random seed (default: 0)")
+    command.add_argument("--seed", metavar="N", type=_integer(0), help="random seed (default: 0)")
     _add_workers(command)
     command.add_argument(
         "--resume", action="store_true", help="continue an interrupted run; needs only --out"
@@ -427,7 +427,7 @@ def _add_path(command: Command, name: str, metavar: str, what: str, **more: Any)
 
 
 def _add_count(command: Command, name: str, what: str, **more: Any) -> None:
-    command.add_argument(name, metavar="N", type=_count, help=what, **more)
+    command.add_argument(name, metavar="N", type=_integer(1), help=what, **more)
 
 
 def _add_workers(command: Command) -> None:
@@ -440,7 +440,7 @@ def _add_gait(command: Command) -> None:
     group.add_argument(
         "--seed",
         metavar="N",
-        type=_seed,
+        type=_integer(0),
         default=WALKING_SEED,
         help="instead, a random gait of this seed (default: %(default)s, which walks)",
     )
@@ -452,18 +452,14 @@ def _gait(options: Options, scenario: Scenario) -> Gait:
     return seeded_gait(scenario, options.seed)
 
 
-def _seed(text: str) -> int:
-    return _integer(text, least=0)
+def _integer(least: int) -> Callable[[str], int]:
+    def parse(text: str) -> int:
+        if text.isascii() and text.isdecimal() and int(text) >= least:
+            return int(text)
+        wanted = f"an integer, {least} or more"
+        raise argparse.ArgumentTypeError(f"found '{text}', expected {wanted}")
 
-
-def _count(text: str) -> int:
-    return _integer(text, least=1)
-
-
-def _integer(text: str, *, least: int) -> int:
-    if not (text.isascii() and text.isdecimal() and int(text) >= least):
-        raise argparse.ArgumentTypeError(f"found '{text}', expected an integer, {least} or more")
-    return int(text)
+    return parse
 
 
 def _positive(text: str) -> float:
