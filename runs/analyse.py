@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import pandas
+import xarray
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
@@ -26,11 +27,7 @@ from tetra_drake.evolution.executors import available_cores, evaluate_all, proce
 from tetra_drake.evolution.robustness import robustness
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.files import write_whole
-from tetra_drake.results.measures import (
-    dominant_frequency,
-    shares_off_ground,
-    signal_frequencies,
-)
+from tetra_drake.results.measures import dominant_frequency, lifted, share_of_time
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.robot.signals import signal_samples
@@ -184,6 +181,21 @@ def oscillator_frequency(scenario: Scenario) -> float:
 def _outcome(metrics: Mapping[str, Any], failure: str | None) -> dict[str, Any]:
     distance = metrics.get("distance", math.nan) / INCH
     return {"distance_in": _finite(distance), "failure": failure}
+
+
+def shares_off_ground(trajectory: xarray.Dataset, *, since: float) -> dict[str, float]:
+    """Share of the time, 0 to 1, in which each tetrahedron is lifted, from `since` (s) on."""
+    off = lifted(trajectory.sel(time=slice(since, None)))
+    return {str(name): share_of_time(off.sel(tetrahedron=name)) for name in off.tetrahedron.values}
+
+
+def signal_frequencies(trajectory: xarray.Dataset, *, since: float) -> dict[str, float]:
+    """Frequency (Hz) of each junction's signal, from `since` (s) on; see dominant_frequency."""
+    signals = trajectory.signal.sel(time=slice(since, None))
+    return {
+        str(name): dominant_frequency(signals.time.values, signals.sel(junction=name).values)
+        for name in signals.junction.values
+    }
 
 
 def _finite(value: float) -> float | None:

@@ -11,8 +11,7 @@ from tetra_drake.results.measures import (
     intervals,
     last_step,
     lifted,
-    shares_off_ground,
-    signal_frequencies,
+    share_of_time,
 )
 
 TIMES = np.linspace(0.0, 15.0, 1501)
@@ -48,11 +47,10 @@ def test_intervals(active, expected):
     assert intervals(np.array([0.0, 1.0, 2.0, 4.0, 8.0]), np.array(active, dtype=bool)) == expected
 
 
-def test_shares_off_the_ground_count_from_a_time_on(walk):
-    late = walk.copy(deep=True)
-    late.normal_force[{"time": walk.time.values >= 8.0}] = 0.1
-    assert shares_off_ground(late, since=8.0) == {f"T{i}": 0.0 for i in range(1, 6)}
-    assert shares_off_ground(late, since=7.0)["T2"] == pytest.approx(0.5, abs=0.01)
+def test_the_share_of_time_is_that_of_the_intervals(walk):
+    late = walk.sel(time=slice(8.0, None)).time
+    assert share_of_time(late < 0.0) == 0.0
+    assert share_of_time(late >= late.mean()) == pytest.approx(0.5, abs=0.01)
 
 
 @pytest.mark.parametrize("times", [TIMES, UNEVEN], ids=["even", "uneven"])
@@ -64,10 +62,7 @@ def test_the_frequency_is_that_of_the_strongest_sine(hertz, times):
     assert dominant_frequency(times, both) == pytest.approx(hertz, abs=0.01)
 
 
-def test_frequencies_of_the_signals(walk):
-    frequency = pytest.approx(1.0 / PERIOD, abs=0.01)
-    expected = dict.fromkeys(["T1-T2", "T2-T3", "T3-T4", "T4-T5"], frequency)
-    assert signal_frequencies(walk, since=1.0) == expected
+def test_a_constant_has_no_frequency():
     for constant in (0.0 * TIMES, 0.7 + 0.0 * TIMES, 1.0 + 1e-9 * np.sin(TIMES)):
         assert math.isnan(dominant_frequency(TIMES, constant))
 

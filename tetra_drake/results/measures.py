@@ -63,12 +63,6 @@ def share_of_time(active: xarray.DataArray) -> float:
     return length / float(times[-1] - times[0])
 
 
-def shares_off_ground(trajectory: xarray.Dataset, *, since: float) -> dict[str, float]:
-    """Share of the time, 0 to 1, in which each tetrahedron is lifted, from `since` (s) on."""
-    off = lifted(trajectory.sel(time=slice(since, None)))
-    return {str(name): share_of_time(off.sel(tetrahedron=name)) for name in off.tetrahedron.values}
-
-
 def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
     """Frequency in Hz of the highest peak in the spectrum of a signal (samples,).
 
@@ -83,15 +77,6 @@ def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
     spectrum = np.abs(np.fft.rfft(swing, _PADDING * len(even)))
     frequencies = np.fft.rfftfreq(_PADDING * len(even), even[1] - even[0])
     return float(frequencies[spectrum.argmax()])
-
-
-def signal_frequencies(trajectory: xarray.Dataset, *, since: float) -> dict[str, float]:
-    """Frequency (Hz) of each junction's signal, from `since` (s) on; see dominant_frequency."""
-    signals = trajectory.signal.sel(time=slice(since, None))
-    return {
-        str(name): dominant_frequency(signals.time.values, signals.sel(junction=name).values)
-        for name in signals.junction.values
-    }
 
 
 def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:
