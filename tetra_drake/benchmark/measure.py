@@ -112,11 +112,9 @@ def measure(
 
     Raises InputError if MuJoCo is asked for by its set and cannot simulate the scenario.
     """
-    settings = [changes for name in sets for changes in settings_of(name)]
     left_out = "mujoco" not in sets and (scenario.cables.slack or not installed())
-    if left_out:
-        settings = [changes for changes in settings if changes["simulation.engine"] != "mujoco"]
-    rows = list(_rows(scenario, settings))
+    settings = [changes for name in sets for changes in settings_of(name)]
+    rows = [row for row in _rows(scenario, settings) if not (left_out and row.engine == "mujoco")]
     engines = {row.engine for row in rows}
     say("converged runs of all gaits")
     exact_in, check_in = (_distances(scenario, changes, gaits) for changes in (CONVERGED, CHECK))

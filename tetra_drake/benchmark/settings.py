@@ -28,8 +28,7 @@ def settings_of(name: str) -> list[Changes]:
         }
         return [own("mujoco")] + [mujoco(scheme, ms) for scheme in steps for ms in steps[scheme]]
     others = [mujoco("implicitfast", 2), mujoco("Euler", 0.25), mujoco("discrete", 1)]
-    diagram = [own("drake"), drake("runge_kutta3", 1e-3, 2)]
-    return [*diagram, own("compiled"), own("mujoco"), *others]
+    return [own("drake"), drake("runge_kutta3", 1e-3, 2), own("compiled"), own("mujoco"), *others]
 
 
 def own(engine: str) -> Changes:

@@ -41,10 +41,8 @@ def simulate(
 
 
 def prepare(scenario: Scenario, *, say: Callable[[str], None] = lambda text: None) -> None:
-    """Makes the scenario's engine ready, so that no simulation has to wait for its compilation.
-
-    `say` is told if that takes longer than a moment.
-    """
+    """Compiles the scenario's engine, so that no simulation has to wait for that; `say` is told if
+    it takes longer than a moment."""
     if scenario.simulation.engine == "compiled":
         from tetra_drake.engines.compiled.engine import compile_engine
 

@@ -118,8 +118,7 @@ def interpolate_state(before: Array, after: Array, step: float, part: float) -> 
     for body in range(bodies):
         q, v = 7 * body, 7 * bodies + 6 * body
         q_rates = np.zeros((2, 7))
-        for end in range(2):
-            state = before if end == 0 else after
+        for end, state in enumerate((before, after)):
             w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
             w_x, w_y, w_z = 0.5 * state[v], 0.5 * state[v + 1], 0.5 * state[v + 2]
             q_rates[end, 0] = -w_x * x - w_y * y - w_z * z

@@ -76,9 +76,8 @@ def listing_output(network: Network, u: Array, v: Array, step: float, output: Ar
     u_rate, v_rate, feedback = np.empty_like(u), np.empty_like(v), np.zeros_like(u)
     for i in range(output.shape[0]):
         neuron_rates(network, u, v, feedback, u_rate, v_rate)
-        for k in range(u.size):
-            u[k] += u_rate[k] * step
-            v[k] += v_rate[k] * step
+        u += u_rate * step
+        v += v_rate * step
         oscillator_output(u, output[i])
 
 

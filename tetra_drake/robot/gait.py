@@ -171,11 +171,9 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     if key and isinstance(raw, dict):
         raw = raw.get(key)
     file: _GaitFile = Check(path, complete=True).value(_GaitFile, raw, key)
-    count, expected = len(file.weights), weight_count(scenario.oscillators)
-    if count != expected:
-        problem = (
-            f"found {count} numbers, expected {expected} for {scenario.oscillators} oscillators"
-        )
+    count, n = len(file.weights), scenario.oscillators
+    if count != weight_count(n):
+        problem = f"found {count} numbers, expected {weight_count(n)} for {n} oscillators"
         raise InputError(path, f"{key}.weights".strip("."), problem)
     return Gait(
         name=file.name or Path(path).stem,

@@ -26,8 +26,7 @@ class CableNetwork(LeafSystem):
 
     def __init__(self, structure: Structure, *, slack: bool) -> None:
         super().__init__()
-        self._p_BN = structure.p_BN
-        self._cables = structure.cables
+        self._p_BN, self._cables = structure.p_BN, structure.cables
         self._slack = slack
         bodies, count = len(structure.bodies), len(structure.cables)
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)

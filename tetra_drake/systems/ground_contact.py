@@ -59,8 +59,7 @@ class GroundContact(LeafSystem):
         witness: bool = False,
     ) -> None:
         super().__init__()
-        self._p_BN = structure.p_BN
-        self._contacts = structure.contacts
+        self._p_BN, self._contacts = structure.p_BN, structure.contacts
         self._law = ground_law(ground, friction)
         bodies, count = len(structure.bodies), len(structure.contacts)
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)

@@ -32,9 +32,8 @@ class MatsuokaCpg(LeafSystem):
         self._network = make_network(cpg, gait, oscillators=oscillators)
         self._no_feedback = np.zeros(neurons)
         self._feedback = self.DeclareVectorInputPort("feedback", neurons)
-        state = self.DeclareContinuousState(BasicVector(initial_state(cpg, oscillators)))
+        self.DeclareContinuousState(BasicVector(initial_state(cpg, oscillators)))
         tickets = {self.xc_ticket()}
-        assert state is not None
         self.DeclareVectorOutputPort("signals", oscillators, self._calc_signals, tickets)
         self.DeclareVectorOutputPort("neurons", neurons, self._calc_neurons, tickets)
 

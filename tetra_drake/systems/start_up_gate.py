@@ -36,7 +36,5 @@ class StartUpGate(LeafSystem):
         values.set_value([1.0])
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:
-        if context.get_discrete_state_vector().value()[0] != 0.0:
-            output.SetFromVector(self._ungated.Eval(context))
-        else:
-            output.SetFromVector(np.zeros(output.size()))
+        is_open = context.get_discrete_state_vector().value()[0] != 0.0
+        output.SetFromVector(self._ungated.Eval(context) if is_open else np.zeros(output.size()))

@@ -87,9 +87,9 @@ def compile_engine(scenario: Scenario, announce: Callable[[str], None] | None = 
         return
     message = "compiling the engine, which takes some seconds the first time ..."
     timer = threading.Timer(1.0, announce or (lambda _: None), [message])
+    structure = MakeStructure(scenario.robot, scenario.cables)
     timer.start()
     try:
-        structure = MakeStructure(scenario.robot, scenario.cables)
         constants = kernel_constants(scenario, seeded_gait(scenario), structure)
         walk(*constants, structure.initial_state, np.zeros(1), np.zeros(1))
     finally:
