@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from tetra_drake.engines.simulate import prepare
 from tetra_drake.errors import InputError, SimulationFailure
@@ -80,12 +79,23 @@ def evolve(
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
         prepare(own, say=progress.say)
-        common: dict[str, Any] = {"workers": workers, "progress": progress}
-        run_trials(record, evaluate=evaluate, executor=where, optimizer=optimizer, **common)
+        run_trials(
+            record,
+            evaluate=evaluate,
+            workers=workers,
+            executor=where,
+            optimizer=optimizer,
+            show=progress.show,
+        )
         if reevaluate and own.simulation.engine != "drake":
-            where = executor or process_executor
             try:
-                reevaluate_gaits(out, executor=where, objective=objective, **common)
+                reevaluate_gaits(
+                    out,
+                    workers=workers,
+                    executor=executor or process_executor,
+                    objective=objective,
+                    progress=progress,
+                )
             except EvaluationImpossible as error:
                 progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
         if report:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tetra_drake.evolution.optimizers.operators import (
+from tetra_drake.evolution.optimizers.steady_state import (
     cross_over,
     draw_mutation,
     find_place,

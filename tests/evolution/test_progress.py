@@ -4,7 +4,7 @@ import dataclasses
 import io
 
 from tetra_drake.evolution.progress import Display, overview
-from tetra_drake.evolution.trial import TrialStatus
+from tetra_drake.evolution.trials import TrialStatus
 
 STATUS = TrialStatus(
     number=0,

@@ -154,4 +154,3 @@ def test_another_optimiser_reports_its_own_numbers(tmp_path):
     farthest = run.evaluations.groupby("trial")["distance"].max()
     assert run.iterations.groupby("trial")["farthest"].last().tolist() == farthest.tolist()
     assert set(run.iterations["note"]) == {"wide"}
-    assert run.statuses[1].report["farthest"] == farthest[1]

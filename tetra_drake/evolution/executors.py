@@ -20,7 +20,6 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from dataclasses import dataclass
 from multiprocessing.connection import wait as wait_for_any
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Generic, TypeVar
@@ -101,14 +100,6 @@ class EvaluationImpossible(InputError):
     """No evaluation can run at all: workers that do not start, or a function they cannot load."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Task:
-    job: Any
-    task: Any
-    suspect: bool = False
-    """Whether it was under way when a worker died."""
-
-
 class EvaluationPool(Generic[JobT]):
     """Evaluates tasks (mostly vectors), at most `workers` at a time; `job` identifies each.
 
@@ -127,14 +118,15 @@ class EvaluationPool(Generic[JobT]):
         workers: int,
         executor: MakeExecutor = process_executor,
     ) -> None:
+        check_sendable(evaluate, executor)
         self._evaluate = evaluate
         self._workers = workers
         self._make_executor = executor
-        check_sendable(evaluate, executor)
         self._executor = executor(workers)
-        self._queue: deque[_Task] = deque()
-        self._suspects: deque[_Task] = deque()
-        self._running: dict[Future[Evaluation], _Task] = {}
+        self._queue: deque[tuple[JobT, Any]] = deque()
+        self._suspects: deque[tuple[JobT, Any]] = deque()
+        """What was under way when a worker died."""
+        self._running: dict[Future[Evaluation], tuple[JobT, Any]] = {}
         self._proven = False
         """Whether any task has succeeded."""
         self._held: list[tuple[JobT, Evaluation]] = []
@@ -154,46 +146,46 @@ class EvaluationPool(Generic[JobT]):
 
     def submit(self, job: JobT, task: object) -> None:
         """Puts a task in the queue."""
-        self._queue.append(_Task(job, task))
+        self._queue.append((job, task))
 
     def wait(self, timeout: float | None = None) -> list[tuple[JobT, Evaluation]]:
         """Whatever has been evaluated, as soon as there is something or time (s) is up."""
-        self._fill()
-        done, _ = wait(self._running, timeout=timeout, return_when=FIRST_COMPLETED)
-        tasks = [(self._running.pop(future), future) for future in done]
-        broken = [task for task, future in tasks if isinstance(future.exception(), BrokenExecutor)]
-        finished = [(task.job, future.result()) for task, future in tasks if task not in broken]
-        self._proven = self._proven or bool(finished)
-        if broken:
-            self._recover(broken)
+        found = self._try_suspect() if self._suspects else self._collect(timeout)
+        self._proven = self._proven or bool(found)
         if self._proven:
-            finished, self._held = self._held + finished, []
+            found, self._held = self._held + found, []
         elif self._held and (len(self._held) == _HOPELESS or not self.busy):
             raise EvaluationImpossible(_SOURCE, "", "every evaluation ends its worker process")
-        return finished
+        return found
 
-    def _fill(self) -> None:
-        while waiting := self._suspects or self._queue:
-            # A suspect runs alone: if a worker dies again the culprit is known.
-            alone = bool(self._suspects) or any(task.suspect for task in self._running.values())
-            if len(self._running) >= (1 if alone else self._workers):
-                return
+    def _collect(self, timeout: float | None) -> list[tuple[JobT, Evaluation]]:
+        """Keeps the workers busy; if one dies, new ones start."""
+        while self._queue and len(self._running) < self._workers:
             try:
-                future = self._executor.submit(self._evaluate, waiting[0].task)
+                future = self._executor.submit(self._evaluate, self._queue[0][1])
+                self._running[future] = self._queue.popleft()
             except BrokenExecutor:
                 self._renew()
-            else:
-                self._running[future] = waiting.popleft()
+        done, _ = wait(self._running, timeout=timeout, return_when=FIRST_COMPLETED)
+        broken = {future for future in done if isinstance(future.exception(), BrokenExecutor)}
+        found = [(self._running.pop(future)[0], future.result()) for future in done - broken]
+        if broken:
+            self._suspects.extend(self._running.values())
+            self._running.clear()
+            self._renew()
+        return found
 
-    def _recover(self, broken: list[_Task]) -> None:
-        """Starts new workers; what was under way with the old ones is suspect now."""
-        broken += self._running.values()
-        self._running.clear()
-        self._renew()
-        if len(broken) == 1 and broken[0].suspect:
-            self._held.append((broken[0].job, Evaluation.failed("its process died")))
-            return
-        self._suspects.extend(_Task(task.job, task.task, suspect=True) for task in broken)
+    def _try_suspect(self) -> list[tuple[JobT, Evaluation]]:
+        """Evaluates a suspect in a worker of its own: if that dies, the suspect is the cause."""
+        job, task = self._suspects.popleft()
+        alone = self._make_executor(1)
+        try:
+            return [(job, alone.submit(self._evaluate, task).result())]
+        except BrokenExecutor:
+            self._held.append((job, Evaluation.failed("its process died")))
+            return []
+        finally:
+            alone.shutdown(wait=False)
 
     def _renew(self) -> None:
         self._executor.shutdown(wait=False)

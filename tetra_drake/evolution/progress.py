@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, TextIO
 
-from tetra_drake.evolution.trial import TrialStatus
+from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.formatting import duration, fixed
 
 if TYPE_CHECKING:

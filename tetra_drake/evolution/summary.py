@@ -12,7 +12,7 @@ from tetra_drake.evolution.executors import available_cores
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.tables import Run
-from tetra_drake.evolution.trial import TrialStatus
+from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.formatting import duration, fixed
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH

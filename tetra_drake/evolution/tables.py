@@ -21,7 +21,7 @@ from tetra_drake.evolution.record import (
     read_manifest,
     trial_folder,
 )
-from tetra_drake.evolution.trial import TrialStatus
+from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.results.metrics import Metrics
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.units import INCH

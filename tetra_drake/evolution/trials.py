@@ -1,18 +1,159 @@
-"""The loop over all trials of a run: keeps the workers busy until every trial has ended."""
+"""The trials of a run: each an optimiser, its record and its state; and the loop over all."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tetra_drake.evolution.executors import EvaluationPool, MakeExecutor, process_executor
-from tetra_drake.evolution.optimizers.base import Evaluate, MakeOptimizer
+from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, MakeOptimizer, Optimizer
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
-from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.record import RunRecord, trial_folder
-from tetra_drake.evolution.trial import Trial, TrialStatus
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, trial_folder
+from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.scenario.units import INCH
 
-_PROGRESS_PERIOD = 1.0  # s
+_SHOW_PERIOD = 1.0  # s
+
+
+@dataclass
+class TrialStatus:
+    """State of a trial, live or recorded. Distances are the fittest gait's; NaN before there is
+    any."""
+
+    number: int
+    evaluations_at_most: int = 0
+    """0 where only the record is known."""
+    iteration: int = -1
+    """The last complete one; 0 is the initial population."""
+    evaluations: int = 0
+    recalled: int = 0
+    """Evaluations taken from the record instead of made."""
+    failures: int = 0
+    wall_time: float = 0.0
+    """Total of the evaluations, in s."""
+    best_fitness: float = -math.inf
+    best_distance_in: float = math.nan
+    mean_fitness: float = math.nan
+    """Of the population; NaN where the optimiser reports none."""
+    initial_best_distance_in: float = math.nan
+    initial_mean_fitness: float = math.nan
+    stop: str | None = None
+    """Why the trial ended; None while it goes on."""
+
+    @property
+    def improvement_percent(self) -> float:
+        """Rise of the best distance, in %; NaN where the best initial gait did not walk forward."""
+        initial = self.initial_best_distance_in
+        return 100.0 * (self.best_distance_in / initial - 1.0) if initial > 0.0 else math.nan
+
+    def count(self, evaluations: int, *, failures: int, wall_time: float) -> None:
+        """Adds evaluations."""
+        self.evaluations += evaluations
+        self.failures += failures
+        self.wall_time += wall_time
+
+    def complete(self, line: Mapping[str, Any], *, best_distance_in: float) -> None:
+        """Takes over a line of iterations.jsonl, and the distance of its best evaluation."""
+        self.iteration = int(line["iteration"])
+        best = _number(line["best_fitness"])
+        self.best_fitness = best if math.isfinite(best) else -math.inf
+        self.best_distance_in = best_distance_in
+        self.mean_fitness = _number(line.get("mean_fitness"))
+        self.stop = line["stop"] if isinstance(line["stop"], str) else None
+        if self.iteration == 0:
+            self.initial_mean_fitness = self.mean_fitness
+            self.initial_best_distance_in = best_distance_in
+
+
+class Trial:
+    """Gives evaluations, taken in any order, to the optimiser in the order asked. What the record
+    holds already it goes through at once."""
+
+    def __init__(
+        self, number: int, name: str, *, space: ParameterSpace, optimizer: Optimizer, folder: Path
+    ) -> None:
+        self.status = TrialStatus(number, optimizer.evaluations_at_most)
+        self.unevaluated: dict[int, Vector] = {}
+        """What has to be evaluated before the optimiser can go on, by number; empty at the end."""
+        self._name = name
+        self._space = space
+        self._optimizer = optimizer
+        self._record = TrialRecord(folder)
+        self._results: dict[int, Evaluation] = {}
+        """Those of this iteration."""
+        self._best: tuple[int, Vector, Evaluation] | None = None
+        self._saved_best: int | None = None
+        self._course = self._iterate()
+        next(self._course, None)
+
+    def take(self, index: int, evaluation: Evaluation) -> bool:
+        """Takes an evaluation; True if that was the last of its iteration."""
+        vector = self.unevaluated.pop(index)
+        self._add(index, evaluation)
+        if self.unevaluated:
+            entry = evaluation_entry(index, self.status.iteration + 1, vector, evaluation)
+            self._record.keep(entry)
+            return False
+        next(self._course, None)
+        return True
+
+    def _iterate(self) -> Iterator[None]:
+        """Goes from iteration to iteration; yields to wait for evaluations."""
+        while self.status.stop is None:
+            batch = dict(enumerate(self._optimizer.ask(), start=self.status.evaluations))
+            self._results = {}
+            for index, vector in batch.items():
+                recorded = self._record.recall(index, vector)
+                if recorded is None:
+                    self.unevaluated[index] = vector
+                else:
+                    self._add(index, recorded)
+                    self.status.recalled += 1
+            if self.unevaluated:
+                self._save_best()
+                yield
+            self._complete(batch)
+        self._record.finish(self.status.evaluations)
+        self._save_best()
+
+    def _add(self, index: int, evaluation: Evaluation) -> None:
+        self._results[index] = evaluation
+        failed = evaluation.failure is not None
+        self.status.count(1, failures=failed, wall_time=evaluation.wall_time)
+
+    def _save_best(self) -> None:
+        if self._best is not None and self._best[0] != self._saved_best:
+            self._saved_best, vector, _ = self._best
+            name = f"{self._name}, evaluation {self._saved_best}"
+            self._record.save_best(self._space.gait(vector, name=name))
+
+    def _complete(self, batch: Mapping[int, Vector]) -> None:
+        """Tells the optimiser the results of an iteration, and records it."""
+        outcome = self._optimizer.tell([self._results[index] for index in batch])
+        number, entries = self.status.iteration + 1, []
+        for index, vector in batch.items():
+            evaluation = self._results[index]
+            if evaluation.fitness > (self._best[2].fitness if self._best else -math.inf):
+                self._best = index, vector, evaluation
+            entries.append(evaluation_entry(index, number, vector, evaluation))
+        for entry, place in zip(entries, outcome.placed or (), strict=outcome.placed is not None):
+            entry["placed"] = place
+        line = {
+            "iteration": number,
+            "evaluations": self.status.evaluations,
+            "best_fitness": self._best[2].fitness if self._best else None,
+            "best_evaluation": self._best[0] if self._best else None,
+            "stop": outcome.stop,
+            **outcome.report,
+        }
+        self._record.complete(entries, line)
+        distance = self._best[2].metrics.get("distance", math.nan) if self._best else math.nan
+        self.status.complete(line, best_distance_in=distance / INCH)
 
 
 def run_trials(
@@ -22,7 +163,7 @@ def run_trials(
     workers: int,
     executor: MakeExecutor = process_executor,
     optimizer: MakeOptimizer = SteadyState,
-    progress: Progress | None = None,
+    show: Callable[[Sequence[TrialStatus]], None] = lambda statuses: None,
 ) -> list[TrialStatus]:
     """Runs all trials of a record to their ends, from wherever they are.
 
@@ -30,7 +171,7 @@ def run_trials(
     executor, or interruptions. Trials share nothing: one more trial changes no other.
     """
     scenario, seed = record.manifest.scenario, record.manifest.seed
-    space, progress = ParameterSpace.of(scenario), progress or Progress()
+    space = ParameterSpace.of(scenario)
     trials = [
         Trial(
             number,
@@ -44,7 +185,7 @@ def run_trials(
         )
     ]
     statuses = [trial.status for trial in trials]
-    progress.show(statuses)
+    show(statuses)
     waiting = [trial for trial in trials if trial.unevaluated]
     if not waiting:
         return statuses
@@ -53,7 +194,11 @@ def run_trials(
             for trial in waiting:
                 for index, vector in trial.unevaluated.items():
                     pool.submit((trial, index), vector)
-            done = pool.wait(_PROGRESS_PERIOD)
+            done = pool.wait(_SHOW_PERIOD)
             waiting = [trial for (trial, index), found in done if trial.take(index, found)]
-            progress.show(statuses)
+            show(statuses)
     return statuses
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None else float(value)

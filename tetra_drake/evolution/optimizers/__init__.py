@@ -1,1 +1,1 @@
-"""Optimisers behind ask/tell, and their operators."""
+"""Optimisers behind ask/tell."""
