@@ -1,7 +1,5 @@
 """The benchmark of engines and settings, on short gaits."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -45,7 +43,7 @@ def no_mujoco(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_the_settings_of_a_set_are_valid_and_belong_together(name: str, scenario: Scenario) -> None:
+def test_the_settings_of_a_set_are_valid_and_belong_together(name, scenario):
     scenarios = [scenario.with_changes(changes) for changes in settings_of(name)]
     engines = {changed.simulation.engine for changed in scenarios}
     assert len(engines) == (3 if name == "default" else 1)
@@ -53,22 +51,20 @@ def test_the_settings_of_a_set_are_valid_and_belong_together(name: str, scenario
     assert len(described) >= len(scenarios) - 1  # the scenario's own settings may be in the list
 
 
-def test_a_setting_is_described_by_its_values(scenario: Scenario) -> None:
+def test_a_setting_is_described_by_its_values(scenario):
     for changes in (drake("radau3", 5e-3, 8, witness=0.5), compiled(5e-3, 8, 0.5)):
         text = describe(scenario.with_changes(changes))
         assert all(value in text for value in ("0.005", "8 ms", "0.5 ms"))
 
 
-def test_errors_are_absolute_and_of_gaits_that_count_and_have_not_failed() -> None:
+def test_errors_are_absolute_and_of_gaits_that_count_and_have_not_failed():
     errors = np.array([-0.3, 0.1, np.nan, 5.0, 0.2])
     counted = np.array([True, True, True, False, True])
     assert error_statistics(errors, counted) == (0.2, 0.3)
     assert error_statistics(errors, np.zeros(5, dtype=bool)) == (None, None)
 
 
-def test_time_and_errors_are_those_of_gaits_that_do_not_fail(
-    short: Scenario, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_time_and_errors_are_those_of_gaits_that_do_not_fail(short, monkeypatch):
     row = Row(short.with_changes(own("compiled")))
     gaits = [seeded_gait(short, seed) for seed in range(3)]
     results = [row.simulate(gait) for gait in gaits]
@@ -84,7 +80,7 @@ def test_time_and_errors_are_those_of_gaits_that_do_not_fail(
     assert found["real_time_factor_per_core"] == pytest.approx(0.6 / row.wall_time)
 
 
-def test_every_setting_is_measured_on_every_gait(short: Scenario, no_mujoco: None) -> None:
+def test_every_setting_is_measured_on_every_gait(short, no_mujoco):
     gaits = [seeded_gait(short, seed) for seed in (0, 80)]
     stages: list[str] = []
     found = measure(short, gaits, sizes=[2], say=stages.append)
@@ -106,9 +102,7 @@ def test_every_setting_is_measured_on_every_gait(short: Scenario, no_mujoco: Non
     assert table[2].startswith(f"| {rows[0]['engine']} | {rows[0]['setting']} | ")
 
 
-def test_gaits_that_fail_leave_blanks_and_missing_mujoco_is_an_error_if_asked_for(
-    short: Scenario, no_mujoco: None
-) -> None:
+def test_gaits_that_fail_leave_blanks_and_missing_mujoco_is_an_error_if_asked_for(short, no_mujoco):
     short.simulation.max_evaluations = 10
     found = measure(short, [seeded_gait(short)], sizes=[3])
     assert [row["failed"] for row in found["rows"]] == [1] * 4
@@ -122,9 +116,7 @@ def test_gaits_that_fail_leave_blanks_and_missing_mujoco_is_an_error_if_asked_fo
 
 
 @pytest.mark.skipif(not mujoco_engine.installed(), reason=mujoco_engine.INSTALL)
-def test_mujoco_is_measured_against_its_own_converged_runs(
-    short: Scenario, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_mujoco_is_measured_against_its_own_converged_runs(short, monkeypatch):
     fine = [mujoco("implicitfast", 0.0625), mujoco("implicitfast", 0.125)]
     monkeypatch.setattr(benchmark, "settings_of", lambda name: fine)
     found = measure(short, [seeded_gait(short)], sets=["mujoco"], sizes=[])
@@ -134,9 +126,7 @@ def test_mujoco_is_measured_against_its_own_converged_runs(
     assert "mujoco" in found["versions"]
 
 
-def test_the_command_passes_its_options_on_and_writes_json(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_passes_its_options_on_and_writes_json(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     calls: list[tuple[list[str], dict[str, Any]]] = []
 
@@ -167,13 +157,7 @@ def test_the_command_passes_its_options_on_and_writes_json(
         (["--json", "three.json/x.json"], "three.json/x.json: "),
     ],
 )
-def test_bad_input_is_refused_before_anything_is_measured(
-    arguments: list[str],
-    found: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_bad_input_is_refused_before_measuring(arguments, found, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delattr(benchmark, "measure")
     four = load_scenario("thesis").with_changes({"robot.tetrahedra": 4})

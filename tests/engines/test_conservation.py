@@ -8,7 +8,6 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.model import make_model
 from tetra_drake.robot.structure import MakeStructure, Structure
-from tetra_drake.scenario.schema import Scenario
 
 G = 9.80665
 FALLING = {
@@ -27,7 +26,7 @@ FALLING = {
 
 
 @pytest.mark.parametrize("engine", ["drake", "compiled"])
-def test_a_falling_robot_keeps_momentum_and_energy(scenario: Scenario, engine: str) -> None:
+def test_a_falling_robot_keeps_momentum_and_energy(scenario, engine):
     falling = scenario.with_changes({**FALLING, "simulation.engine": engine})
     structure = MakeStructure(falling.robot, falling.cables)
     robot = make_model(falling, structure)

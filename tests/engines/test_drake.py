@@ -10,7 +10,7 @@ from pydrake.systems.analysis import Simulator
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import Gait, load_gait, weight_count
-from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, Structure, node_positions
+from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, node_positions
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -21,9 +21,7 @@ def gait(scenario: Scenario, data: Path) -> Gait:
     return load_gait(data / "gait_e.json", scenario)
 
 
-def test_settles_where_the_independent_simulation_does(
-    scenario: Scenario, structure: Structure, gait: Gait, data: Path
-) -> None:
+def test_settles_where_the_independent_simulation_does(scenario, structure, gait, data):
     still = scenario.with_changes({"cpg.start_up": 100.0, "simulation.max_step": 1e-3})
     diagram = MakeTensegrityDiagram(still, gait)
     simulator = MakeSimulator(diagram, still.simulation)
@@ -39,7 +37,7 @@ def test_settles_where_the_independent_simulation_does(
     np.testing.assert_allclose(normal, settled["normals"], atol=0.02 * normal.sum())
 
 
-def test_a_live_network_walks_as_its_recording_does(scenario: Scenario, gait: Gait) -> None:
+def test_a_live_network_walks_as_its_recording_does(scenario, gait):
     # A second of actuation at an accuracy of 1e-5: the live network's signals carry the
     # robot's error control, the recording's are exact, so they agree to about that accuracy.
     tight = {"scheme": "runge_kutta3", "accuracy": 1e-5, "max_step": 1e-4}
@@ -53,7 +51,7 @@ def test_a_live_network_walks_as_its_recording_does(scenario: Scenario, gait: Ga
     assert live.metrics.distance_in == pytest.approx(recorded.metrics.distance_in, abs=2e-3)
 
 
-def test_a_step_ends_at_the_start_up_jump(scenario: Scenario, gait: Gait) -> None:
+def test_a_step_ends_at_the_start_up_jump(scenario, gait):
     diagram = MakeTensegrityDiagram(scenario, gait)
     simulator = MakeSimulator(diagram, scenario.simulation)
     ends: list[float] = []
@@ -63,7 +61,7 @@ def test_a_step_ends_at_the_start_up_jump(scenario: Scenario, gait: Gait) -> Non
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 3, 8])
-def test_any_number_of_tetrahedra_walks(scenario: Scenario, tetrahedra: int) -> None:
+def test_any_number_of_tetrahedra_walks(scenario, tetrahedra):
     changes = {"simulation.duration": 4.0, "simulation.steady_from": 2.0}
     other = scenario.with_changes({"robot.tetrahedra": tetrahedra, **changes})
     weights = (0.0,) * weight_count(other.oscillators)  # so that every oscillator oscillates
@@ -77,7 +75,7 @@ def test_any_number_of_tetrahedra_walks(scenario: Scenario, tetrahedra: int) -> 
     assert np.ptp(walking.values) > 0.1 * INCH > 10.0 * np.ptp(settled.values)
 
 
-def test_plain_drake_simulates_the_diagram_too(scenario: Scenario, gait: Gait) -> None:
+def test_plain_drake_simulates_the_diagram_too(scenario, gait):
     # No hidden set-up: the diagram with its default context is all a Drake user needs.
     diagram = MakeTensegrityDiagram(scenario, gait)
     simulator = Simulator(diagram)

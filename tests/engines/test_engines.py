@@ -8,7 +8,7 @@ import pytest
 
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
@@ -25,7 +25,7 @@ def shortly(scenario: Scenario, engine: str, **settings: Any) -> Scenario:
 
 @pytest.mark.parametrize("engine", ["drake", "compiled", MUJOCO])
 @pytest.mark.parametrize("mode_changes", ["step_end", "witness"])
-def test_recording_changes_nothing(scenario: Scenario, engine: str, mode_changes: str) -> None:
+def test_recording_changes_nothing(scenario, engine, mode_changes):
     short = shortly(scenario, engine, mode_changes=mode_changes)
     gait = seeded_gait(short)
     plain = simulate(scenario=short, gait=gait)
@@ -39,7 +39,7 @@ def test_recording_changes_nothing(scenario: Scenario, engine: str, mode_changes
 
 
 @pytest.mark.parametrize("engine", ["compiled", MUJOCO])
-def test_a_gait_is_not_influenced_by_company_or_threads(scenario: Scenario, engine: str) -> None:
+def test_a_gait_is_not_influenced_by_company_or_threads(scenario, engine):
     short = shortly(scenario, engine)
 
     def distance(seed: int) -> float:
@@ -61,9 +61,7 @@ def test_a_gait_is_not_influenced_by_company_or_threads(scenario: Scenario, engi
         ("compiled", {"simulation.max_evaluations": 100}, StepBudgetExceeded),
     ],
 )
-def test_a_failed_simulation_says_when_and_why(
-    scenario: Scenario, engine: str, changes: dict[str, Any], kind: type[SimulationFailure]
-) -> None:
+def test_a_failed_simulation_says_when_and_why(scenario, engine, changes, kind):
     failing = shortly(scenario, engine).with_changes(changes)
     with pytest.raises(kind) as caught:
         simulate(scenario=failing, gait=seeded_gait(failing))
@@ -72,7 +70,7 @@ def test_a_failed_simulation_says_when_and_why(
 
 
 @pytest.mark.parametrize("kind", [Diverged, StepBudgetExceeded])
-def test_failures_cross_process_borders(kind: type[SimulationFailure]) -> None:
+def test_failures_cross_process_borders(kind):
     failure = pickle.loads(pickle.dumps(kind(time=1.5, reason="why")))
     assert type(failure) is kind
     assert (failure.time, failure.reason) == (1.5, "why")

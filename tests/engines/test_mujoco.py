@@ -1,7 +1,6 @@
 """The engine `mujoco`: the same robot as on the other engines, on ground of its own."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -35,9 +33,7 @@ def trajectory_of(scenario: Scenario) -> xarray.Dataset:
 
 @needs_mujoco
 @pytest.mark.parametrize("tetrahedra", [2, 5, 8])
-def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(
-    short: Scenario, tetrahedra: int
-) -> None:
+def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(short, tetrahedra):
     # Bodies, cables and motors are the same; only the ground differs. MuJoCo's error is of first
     # order in the step, so that two steps give the limit.
     floating = {"robot.tetrahedra": tetrahedra, "robot.gravity": 0.0}
@@ -60,9 +56,9 @@ def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(
 
 
 @needs_mujoco
-def test_at_rest_the_ground_bears_the_weight_and_the_pose_is_that_of_the_other_engines(
-    scenario: Scenario, structure: Structure, data: Path
-) -> None:
+def test_rests_with_its_weight_on_the_ground_in_the_pose_of_other_engines(
+    scenario, structure, data
+):
     times = {"simulation.duration": 1.2, "simulation.steady_from": 1.0}
     resting = scenario.with_changes({"simulation.engine": "mujoco", **times})
     end = trajectory_of(resting).isel(time=-1)
@@ -81,7 +77,7 @@ def test_at_rest_the_ground_bears_the_weight_and_the_pose_is_that_of_the_other_e
 
 
 @needs_mujoco
-def test_friction_opposes_motion_within_the_cone(short: Scenario, structure: Structure) -> None:
+def test_friction_opposes_motion_within_the_cone(short, structure):
     trajectory = trajectory_of(short.with_changes({"simulation.duration": 1.0}))
     friction = trajectory["friction_force"].values
     limit = short.mujoco.friction * trajectory["normal_force"].values
@@ -92,7 +88,7 @@ def test_friction_opposes_motion_within_the_cone(short: Scenario, structure: Str
 
 
 @needs_mujoco
-def test_steps_count_against_the_budget_of_evaluations(short: Scenario) -> None:
+def test_steps_count_against_the_budget_of_evaluations(short):
     gait, steps = seeded_gait(short), 3200
     short.simulation.max_evaluations = steps
     implicit = simulate(scenario=short, gait=gait)
@@ -104,7 +100,7 @@ def test_steps_count_against_the_budget_of_evaluations(short: Scenario) -> None:
 
 
 @needs_mujoco
-def test_the_integrators_of_mujoco_agree(short: Scenario) -> None:
+def test_the_integrators_of_mujoco_agree(short):
     gait = seeded_gait(short)
     implicit = simulate(scenario=short, gait=gait)
     for integrator in ("Euler", "discrete"):
@@ -115,9 +111,7 @@ def test_the_integrators_of_mujoco_agree(short: Scenario) -> None:
 
 @needs_mujoco
 @pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
-def test_too_long_a_step_diverges_without_a_log_file(
-    short: Scenario, integrator: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_too_long_a_step_diverges_without_a_log_file(short, integrator, tmp_path, monkeypatch):
     # With implicitfast the robot jumps for ever, but nothing overflows; Euler's state does.
     monkeypatch.chdir(tmp_path)
     steps = {"mujoco.integrator": integrator, "mujoco.step": 4e-3}
@@ -131,9 +125,7 @@ def test_too_long_a_step_diverges_without_a_log_file(
 @pytest.mark.parametrize(
     ("installed", "key"), [(True, "cables.slack"), (False, "simulation.engine")]
 )
-def test_what_mujoco_cannot_simulate_is_refused(
-    short: Scenario, installed: bool, key: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_mujoco_cannot_simulate_is_refused(short, installed, key, monkeypatch):
     monkeypatch.setattr(engine, "installed", lambda: installed)
     with pytest.raises(InputError) as caught:
         simulate(scenario=short.with_changes({"cables.slack": True}), gait=seeded_gait(short))
@@ -141,7 +133,7 @@ def test_what_mujoco_cannot_simulate_is_refused(
 
 
 @needs_mujoco
-def test_the_command_simulate_takes_the_engine(tmp_path: Path) -> None:
+def test_the_command_simulate_takes_the_engine(tmp_path):
     text = "{base: thesis, name: x, simulation: {duration: 0.3 s, steady_from: 0.1 s}}"
     (tmp_path / "x.yaml").write_text(text)
     out = tmp_path / "out"

@@ -1,7 +1,5 @@
 """The reference gaits on both engines: against the independent simulation, and digit by digit."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -35,7 +33,7 @@ def digits(data: Path) -> dict[str, Any]:
     return json.loads((data / "digits.json").read_text())
 
 
-def test_distances_are_those_of_the_independent_simulation(results: Results, data: Path) -> None:
+def test_distances_are_those_of_the_independent_simulation(results, data):
     # Its own error is about 0.03 in, that of the diagram's default settings 0.03 (median).
     expected = json.loads((data / "expected.json").read_text())["gaits"]
     errors = [
@@ -47,7 +45,7 @@ def test_distances_are_those_of_the_independent_simulation(results: Results, dat
     assert sorted(errors)[-2] < 0.25
 
 
-def test_distances_are_those_of_earlier_versions(results: Results, digits: dict[str, Any]) -> None:
+def test_distances_are_those_of_earlier_versions(results, digits):
     engine = results["gait_a"].engine
     differences = [
         abs(results[name].metrics.distance_in - digits["gaits"][name][engine]["distance_in"])
@@ -56,7 +54,7 @@ def test_distances_are_those_of_earlier_versions(results: Results, digits: dict[
     assert np.median(differences) < 0.05
 
 
-def test_the_same_versions_give_the_same_digits(results: Results, digits: dict[str, Any]) -> None:
+def test_the_same_versions_give_the_same_digits(results, digits):
     if versions() != digits["versions"]:
         pytest.skip("recorded with other versions; the distances themselves are tested above")
     found = {
@@ -72,7 +70,7 @@ def test_the_same_versions_give_the_same_digits(results: Results, digits: dict[s
     assert found == {name: entry[engine] for name, entry in digits["gaits"].items()}
 
 
-def test_the_robot_walks_straight_by_its_symmetry(results: Results) -> None:
+def test_the_robot_walks_straight_by_its_symmetry(results):
     for result in results.values():
         assert result.metrics.twist < 3e-5
         assert result.metrics.lateral_drift < 3e-5
@@ -92,9 +90,7 @@ def test_the_robot_walks_straight_by_its_symmetry(results: Results) -> None:
     ids=["explicit", "witness"],
 )
 @pytest.mark.parametrize("name", WELL_CONDITIONED)
-def test_other_settings_agree_with_the_independent_simulation(
-    data: Path, name: str, settings: dict[str, Any]
-) -> None:
+def test_other_settings_agree_with_the_independent_simulation(data, name, settings):
     scenario = load_scenario("thesis").with_changes(settings)
     expected = json.loads((data / "expected.json").read_text())["gaits"][name]["distance_in"]
     result = simulate(scenario=scenario, gait=load_gait(data / f"{name}.json", scenario))

@@ -27,13 +27,13 @@ def forces_of_cables(
     return gather_forces(nodes, 5), tensions
 
 
-def test_tension_is_equation_6() -> None:
+def test_tension_is_equation_6():
     cable = np.array([(0, 1, PASSIVE, 35.0, 8.0, 0.1)], dtype=CABLE)[0]
     # 35 N/m (0.3 m - 0.1 m) + 8 N s/m * -0.25 m/s + 1.5 N = 7 - 2 + 1.5
     assert cable_tension(0.3, -0.25, 1.5, cable, False) == pytest.approx(6.5, rel=1e-15)
 
 
-def test_cables_keep_momentum_and_angular_momentum(structure: Structure, state: np.ndarray) -> None:
+def test_cables_keep_momentum_and_angular_momentum(structure, state):
     wrench = forces_of_cables(structure, state, 1.0, -2.0, 0.5, 3.0)[0].reshape(5, 6)
     p_WB = state[:35].reshape(5, 7)[:, 4:]
     torque = wrench[:, :3] + np.cross(p_WB, wrench[:, 3:])
@@ -41,9 +41,7 @@ def test_cables_keep_momentum_and_angular_momentum(structure: Structure, state: 
     np.testing.assert_allclose(torque.sum(axis=0), 0.0, atol=1e-13)
 
 
-def test_power_of_the_cables_is_tension_times_shortening(
-    structure: Structure, state: np.ndarray
-) -> None:
+def test_power_of_the_cables_is_tension_times_shortening(structure, state):
     # Virtual power: generalized force . v = - sum of T dl/dt.
     force, tensions = forces_of_cables(structure, state, 1.0, 0.0, -1.0, 2.0)
     a, b = structure.cables["node_a"], structure.cables["node_b"]
@@ -53,9 +51,7 @@ def test_power_of_the_cables_is_tension_times_shortening(
     assert force @ state[35:] == pytest.approx(-tensions @ rates, rel=1e-12)
 
 
-def test_passive_cables_are_drakes_linear_spring_dampers(
-    structure: Structure, state: np.ndarray
-) -> None:
+def test_passive_cables_are_drakes_linear_spring_dampers(structure, state):
     def acceleration(*, springs: bool, force: np.ndarray) -> np.ndarray:
         plant = MultibodyPlant(time_step=0.0)
         bodies = AddTetrahedra(plant, structure)

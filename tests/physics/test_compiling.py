@@ -35,20 +35,18 @@ def run(package: Path, cache_home: Path, program: str = PROGRAM) -> str:
     return subprocess.check_output(command, env=environment, cwd=package, text=True)
 
 
-def test_a_read_only_installation_caches_in_the_users_folder(package: Path, tmp_path: Path) -> None:
+def test_a_read_only_installation_caches_in_the_users_folder(package, tmp_path):
     assert float(run(package, tmp_path / "cache")) == pytest.approx(2.0)
     assert list((tmp_path / "cache").rglob("contact.first_zero*.nbi"))
 
 
-def test_without_any_folder_for_a_cache_kernels_still_work(package: Path, tmp_path: Path) -> None:
+def test_without_any_folder_for_a_cache_kernels_still_work(package, tmp_path):
     (tmp_path / "file").write_text("")
     assert float(run(package, tmp_path / "file" / "cache")) == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("folder", ["physics", "elsewhere/deeper"])
-def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(
-    package: Path, tmp_path: Path, folder: str
-) -> None:
+def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(package, tmp_path, folder):
     # outer() calls inner(), which uses a constant of a third module; they may be in any folder.
     kernels = package / "tetra_drake" / folder
     kernels.mkdir(parents=True, exist_ok=True)

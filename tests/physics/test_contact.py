@@ -31,7 +31,7 @@ P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0
 LAW = np.array([(4000.0, 2e5, P0, SIGMA_1, A_C, SIGMA_0)], dtype=GROUND)[0]
 
 
-def test_normal_force_is_equation_1() -> None:
+def test_normal_force_is_equation_1():
     # k d + lambda d dd/dt = 4000*1e-3 + 2e5*1e-3*0.01 = 4 + 2; 4 - 6 < 0: it does not pull.
     assert normal_force(1e-3, 0.01, LAW) == pytest.approx(6.0, rel=1e-14)
     assert normal_force(1e-3, -0.03, LAW) == 0.0
@@ -39,7 +39,7 @@ def test_normal_force_is_equation_1() -> None:
 
 @pytest.mark.parametrize("velocity", [-0.02, 0.02])
 @pytest.mark.parametrize("mode", [-1.0, 1.0])
-def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity: float, mode: float) -> None:
+def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity, mode):
     # F = -s0 abs(v) x with x held at +-p0: it opposes a slip in the direction of `mode`.
     force = friction_force(velocity, 12.3, mode, LAW)
     assert force == pytest.approx(-mode * SIGMA_0 * 0.02 * P0, rel=1e-14)
@@ -47,7 +47,7 @@ def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity: float, m
 
 @pytest.mark.parametrize("velocity", [-0.02, 0.02])
 @pytest.mark.parametrize("x", [0.5 * P0, -0.9 * P0])
-def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity: float, x: float) -> None:
+def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
     expected = -(SIGMA_0 * 0.02 * (1.0 + A_C) * x + SIGMA_1 * velocity)
     assert friction_force(velocity, x, STICK, LAW) == pytest.approx(expected, rel=1e-14)
 
@@ -67,9 +67,9 @@ def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity: float
         (0.01, -5.0, -1.0, STICK),
     ],
 )
-def test_breaks_free_outward_at_the_range_and_sticks_when_the_velocity_changes_sign(
-    velocity: float, deflection: float, mode: float, after: float
-) -> None:
+def test_breaks_free_outward_at_the_range_and_sticks_at_a_reversal(
+    velocity, deflection, mode, after
+):
     assert next_friction_mode(velocity, deflection, mode, P0) == after
 
 
@@ -105,7 +105,7 @@ def ground(structure: Structure, scenario: Scenario) -> Ground:
     return Ground(structure, scenario)
 
 
-def test_a_node_that_lands_sticks_where_it_lands(ground: Ground) -> None:
+def test_a_node_that_lands_sticks_where_it_lands(ground):
     assert not ground.update(z=1e-3)[:, CONTACT].any()
     modes = ground.update(x=0.02, z=-1e-5, v_x=0.1)
     assert modes[:-1, CONTACT].all()
@@ -114,7 +114,7 @@ def test_a_node_that_lands_sticks_where_it_lands(ground: Ground) -> None:
     assert modes[0, STICK_POINT] == pytest.approx(0.02, abs=1e-15)
 
 
-def test_a_node_that_sticks_again_does_so_where_it_is(ground: Ground) -> None:
+def test_a_node_that_sticks_again_does_so_where_it_is(ground):
     for x, v_x, mode, stick_point in [
         (0.0, 0.1, STICK, 0.0),  # lands
         (1e-3, 0.1, 1.0, 0.0),  # has gone ten stiction ranges: broken free
@@ -127,7 +127,7 @@ def test_a_node_that_sticks_again_does_so_where_it_is(ground: Ground) -> None:
         assert modes[0, MODE + 1] == STICK, "the sideways axis is on its own"
 
 
-def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground: Ground) -> None:
+def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground):
     ground.modes[:, CONTACT] = ground.modes[:, MODE] = 1.0
     modes = ground.update(z=1e-3, v_x=0.1)
     assert not modes[:, : MODE + 2].any()
@@ -136,7 +136,7 @@ def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground: Ground) 
     assert not nodes[:, FORCE:].any()
 
 
-def test_the_margin_crosses_zero_at_a_mode_change(ground: Ground) -> None:
+def test_the_margin_crosses_zero_at_a_mode_change(ground):
     p0 = ground.law[0]["stiction_range"]
     modes = ground.update(z=-1e-4)
 
@@ -161,9 +161,7 @@ def test_the_margin_crosses_zero_at_a_mode_change(ground: Ground) -> None:
         (1.0, -0.01, 0.0, 9.0),  # beyond the horizon
     ],
 )
-def test_first_zero_of_a_quadratic(
-    value: float, rate: float, rate_rate: float, expected: float
-) -> None:
+def test_first_zero_of_a_quadratic(value, rate, rate_rate, expected):
     assert first_zero(value, rate, rate_rate, 9.0) == pytest.approx(expected, rel=1e-14)
 
 
@@ -174,9 +172,7 @@ def test_first_zero_of_a_quadratic(
         (0.0, 2.0, 0.01),  # 2 m/s^2 lift nodes 1e-4 m deep after sqrt(2 * 1e-4 / 2) s
     ],
 )
-def test_a_mode_change_is_foreseen_when_it_comes(
-    ground: Ground, v_x: float, upward: float, expected: float
-) -> None:
+def test_a_mode_change_is_foreseen_when_it_comes(ground, v_x, upward, expected):
     modes = ground.update(z=-1e-4)
     state, nodes = ground.state(z=-1e-4, v_x=v_x), ground.nodes(z=-1e-4, v_x=v_x)
     acceleration = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, upward], 5)
@@ -186,9 +182,7 @@ def test_a_mode_change_is_foreseen_when_it_comes(
 
 @pytest.mark.parametrize("depth", [-1e-4, 0.0, 1e-4, 5e-4])
 @pytest.mark.parametrize("rate", [-0.03, 0.0, 0.02])
-def test_normal_force_is_drakes_hunt_crossley_point_contact(
-    scenario: Scenario, depth: float, rate: float
-) -> None:
+def test_normal_force_is_drakes_hunt_crossley_point_contact(scenario, depth, rate):
     # Drake: f = k d (1 + dissipation dd/dt), never negative; two equal stiffnesses 2 k act in
     # series as k, and their dissipation, weighted by stiffness, stays what both have.
     ground, radius, mass = scenario.ground, 0.02, 0.05

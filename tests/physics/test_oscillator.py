@@ -3,8 +3,6 @@
 Its agreement with the thesis's listing is tested in tests/robot/test_signals.py.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -18,7 +16,7 @@ from tetra_drake.physics.oscillator import (
 )
 
 
-def test_weights_stand_in_the_listings_order() -> None:
+def test_weights_stand_in_the_listings_order():
     # B.2: sum(1) takes w(1) y(3), w(2) y(5), w(3) y(7) and the partner y(2); sum(2) takes
     # w(4) y(4) ...; sum(8) takes w(22) y(2), w(23) y(4), w(24) y(6).
     matrix = inhibition_matrix(np.arange(1.0, 25.0), oscillators=4, partner_weight=1.5)
@@ -27,7 +25,7 @@ def test_weights_stand_in_the_listings_order() -> None:
     assert matrix[7].tolist() == [0, 22, 0, 23, 0, 24, 1.5, 0]
 
 
-def test_rates_are_those_of_equation_7() -> None:
+def test_rates_are_those_of_equation_7():
     # One oscillator by hand: u = (0.4, -0.2), v = (0.1, 0.3), f = (0.05, 0), w_partner = 1.5,
     # beta = 2.5, u0 = 0.5, tau_A = 0.25 s, tau_B = 0.5 s; y = (0.4, 0).
     #   du_e = (-0.4 - 1.5*0   - 2.5*0.1 + 0.5 + 0.05)/0.25 = -0.4
@@ -41,7 +39,7 @@ def test_rates_are_those_of_equation_7() -> None:
     np.testing.assert_allclose(v_rate, [0.6, -0.6], rtol=1e-14)
 
 
-def test_the_network_rests_where_all_neurons_agree() -> None:
+def test_the_network_rests_where_all_neurons_agree():
     # With u = v = y = r for all neurons, Eq. 7 and its -u term give
     # r (1 + 1.5 + 3 w + beta) = u0 for four oscillators with equal weights w.
     weight, beta, u0 = 2.0, 2.5, 0.5
@@ -54,7 +52,7 @@ def test_the_network_rests_where_all_neurons_agree() -> None:
     np.testing.assert_allclose([u_rate, v_rate], 0.0, atol=1e-15)
 
 
-def test_output_counts_only_firing_neurons() -> None:
+def test_output_counts_only_firing_neurons():
     output = np.empty(2)
     oscillator_output(np.array([0.4, -0.3, -0.1, 0.2]), output)
     assert output.tolist() == [0.4, -0.2]
@@ -63,7 +61,7 @@ def test_output_counts_only_firing_neurons() -> None:
 @pytest.mark.parametrize(
     ("integrate", "first_row", "order"), [(listing_output, 1, 1), (network_output, 0, 4)]
 )
-def test_integrators_have_their_order(integrate, first_row: int, order: int) -> None:
+def test_integrators_have_their_order(integrate, first_row, order):
     # While both neurons of one oscillator fire, Eq. 7 is linear, without kinks. Halving the
     # step then divides the error by 2^order.
     network = Network(np.array([[0.0, 0.4], [0.4, 0.0]]), 0.3, 0.6, 2.5, 0.5)

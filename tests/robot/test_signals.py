@@ -1,7 +1,5 @@
 """The precomputed signals: the thesis's listing, the converged network, and the CSV file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +8,6 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.signals import raw_output, save_signals, signal_samples
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import MatsuokaCpg
 
 GAITS = ["gait_a", "gait_b", "single_oscillators"]
@@ -22,9 +19,7 @@ def reference_output(data: Path, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", GAITS)
-def test_stepped_as_the_listing_steps_it_gives_the_listings_output(
-    scenario: Scenario, data: Path, name: str
-) -> None:
+def test_stepped_as_the_listing_steps_it_gives_the_listings_output(scenario, data, name):
     rows, reference = reference_output(data, name)
     gait = load_gait(data / f"{name}.json", scenario)
     output = raw_output(scenario, gait)
@@ -33,9 +28,7 @@ def test_stepped_as_the_listing_steps_it_gives_the_listings_output(
 
 
 @pytest.mark.parametrize("name", GAITS)
-def test_the_converged_network_stays_within_the_listings_own_error(
-    scenario: Scenario, data: Path, name: str
-) -> None:
+def test_the_converged_network_stays_within_the_listings_own_error(scenario, data, name):
     # Euler's error reaches 1.4e-2 by 15 s on gait_a. The listing stamps a state one step early.
     rows, reference = reference_output(data, name)
     scenario.cpg.signals = "recorded"
@@ -46,7 +39,7 @@ def test_the_converged_network_stays_within_the_listings_own_error(
     assert error.max() < 2e-2
 
 
-def test_the_recorded_network_is_the_live_network(scenario: Scenario, data: Path) -> None:
+def test_the_recorded_network_is_the_live_network(scenario, data):
     # Drake's error-controlled integration of the same equations; RK4 in steps of 0.5 ms meets a
     # kink of max(0, u) between samples, which costs it up to 1e-5.
     scenario.cpg.signals = "recorded"
@@ -61,9 +54,7 @@ def test_the_recorded_network_is_the_live_network(scenario: Scenario, data: Path
         np.testing.assert_allclose(found, live, atol=1e-4)
 
 
-def test_without_weights_all_oscillators_give_the_same_signal(
-    scenario: Scenario, data: Path
-) -> None:
+def test_without_weights_all_oscillators_give_the_same_signal(scenario, data):
     scenario.cpg.signals = "recorded"
     samples = signal_samples(scenario, load_gait(data / "single_oscillators.json", scenario))
     np.testing.assert_allclose(samples, samples[:, :1] * np.ones(4), atol=1e-12)
@@ -79,9 +70,7 @@ def read_csv(path: Path) -> tuple[list[str], np.ndarray]:
     return header.split(","), table
 
 
-def test_the_csv_holds_what_the_cables_are_fed(
-    scenario: Scenario, data: Path, tmp_path: Path
-) -> None:
+def test_the_csv_holds_what_the_cables_are_fed(scenario, data, tmp_path):
     gait = load_gait(data / "gait_b.json", scenario)
     save_signals(tmp_path / "lbf.csv", scenario, gait)
     header, table = read_csv(tmp_path / "lbf.csv")
@@ -93,9 +82,7 @@ def test_the_csv_holds_what_the_cables_are_fed(
     np.testing.assert_allclose(table[started, 1:], fed[started], atol=1e-10)
 
 
-def test_the_csv_comes_in_other_units_and_rates(
-    scenario: Scenario, data: Path, tmp_path: Path
-) -> None:
+def test_the_csv_comes_in_other_units_and_rates(scenario, data, tmp_path):
     gait = load_gait(data / "gait_b.json", scenario)
     samples = signal_samples(scenario, gait)
     save_signals(tmp_path / "newton.csv", scenario, gait, unit="N", rate=100.0)

@@ -18,7 +18,7 @@ def evaluate(
     return cables.GetOutputPort(port).Eval(context)
 
 
-def test_ports_tell_the_tensions_and_lengths_of_equation_6(structure: Structure) -> None:
+def test_ports_tell_the_tensions_and_lengths_of_equation_6(structure):
     signals, table = [1.0, 2.0, 3.0, 4.0], structure.cables
     p_WN = node_positions(structure, structure.initial_state)
     expected = np.linalg.norm(p_WN[table["node_b"]] - p_WN[table["node_a"]], axis=1)
@@ -30,7 +30,7 @@ def test_ports_tell_the_tensions_and_lengths_of_equation_6(structure: Structure)
     np.testing.assert_allclose(tensions, passive + driven, rtol=1e-13)
 
 
-def test_the_start_is_axially_balanced(structure: Structure) -> None:
+def test_the_start_is_axially_balanced(structure):
     # 2.94 in is rounded by up to 0.005 in = 1.3e-4 m; three outer cables of 35 N/m and three
     # inner ones of 53 N/m make at most 263 N/m along x, so up to 0.033 N may be left.
     force = evaluate(structure, "generalized_force", signals=[0.0] * 4).reshape(-1, 6)
@@ -39,6 +39,6 @@ def test_the_start_is_axially_balanced(structure: Structure) -> None:
 
 
 @pytest.mark.parametrize(("slack", "least"), [(True, 0.0), (False, -97.4)])
-def test_slack_cables_do_not_push(structure: Structure, slack: bool, least: float) -> None:
+def test_slack_cables_do_not_push(structure, slack, least):
     tensions = evaluate(structure, "tensions", signals=[-100.0] * 4, slack=slack)
     assert tensions.min() == pytest.approx(least, abs=0.1)

@@ -24,14 +24,12 @@ def gait(scenario: Scenario, data: Path) -> Gait:
     return load_gait(data / "gait_b.json", scenario)
 
 
-def test_has_the_blocks_of_the_thesis_and_nothing_to_show_or_log(
-    scenario: Scenario, gait: Gait
-) -> None:
+def test_has_the_blocks_of_the_thesis_and_nothing_to_show_or_log(scenario, gait):
     names = {system.get_name() for system in MakeTensegrityDiagram(scenario, gait).GetSystems()}
     assert names == {"cpg", "start_up", "cables", "ground", "forces", "plant"}
 
 
-def test_exports_what_a_user_plots(scenario: Scenario, gait: Gait) -> None:
+def test_exports_what_a_user_plots(scenario, gait):
     diagram = MakeTensegrityDiagram(scenario, gait)
     context = diagram.CreateDefaultContext()
     ports = [diagram.get_output_port(i) for i in range(diagram.num_output_ports())]
@@ -40,7 +38,7 @@ def test_exports_what_a_user_plots(scenario: Scenario, gait: Gait) -> None:
     assert {port.get_name(): len(port.Eval(context)) for port in ports} == sizes
 
 
-def test_the_friction_brings_no_continuous_state(scenario: Scenario, gait: Gait) -> None:
+def test_the_friction_brings_no_continuous_state(scenario, gait):
     context = MakeTensegrityDiagram(scenario, gait).CreateDefaultContext()
     assert context.num_continuous_states() == 13 * 5
     scenario.cpg.signals = "live"
@@ -57,7 +55,7 @@ def resident_megabytes() -> float:
 @pytest.mark.slow
 @NEEDS_DRAKE_THAT_FREES
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads memory from /proc")
-def test_three_hundred_diagrams_do_not_fill_the_memory(scenario: Scenario, gait: Gait) -> None:
+def test_three_hundred_diagrams_do_not_fill_the_memory(scenario, gait):
     def build_and_run(count: int) -> float:
         for _ in range(count):
             simulator = MakeSimulator(MakeTensegrityDiagram(scenario, gait), scenario.simulation)

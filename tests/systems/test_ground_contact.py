@@ -56,9 +56,7 @@ def state_of(simulator: Simulator) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("height", "touches"), [(0.0, True), (-1e-5, True), (1e-5, False)])
-def test_initialize_takes_contact_and_stick_points_from_the_pose(
-    scenario: Scenario, height: float, touches: bool
-) -> None:
+def test_initialize_takes_contact_and_stick_points_from_the_pose(scenario, height, touches):
     simulator = make_simulator(scenario, height=height)
     ground = simulator.get_system().GetSubsystemByName("ground")
     context = ground.GetMyContextFromRoot(simulator.get_context())
@@ -70,7 +68,7 @@ def test_initialize_takes_contact_and_stick_points_from_the_pose(
         np.testing.assert_allclose(modes[:, 3:5], p_WN[:3, :2], atol=1e-15)
 
 
-def test_both_placements_agree_on_a_sliding_tetrahedron(scenario: Scenario) -> None:
+def test_both_placements_agree_on_a_sliding_tetrahedron(scenario):
     # A step end comes late, so the node sticks on beyond its range and slides less far: the
     # less the shorter the steps. Measured: 4.7 % at 0.1 ms, 1.0 % at 0.01 ms, 0.3 % at 1 us,
     # against a witness with a window of 10 ns, which takes fewer evaluations than any.

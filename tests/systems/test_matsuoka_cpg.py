@@ -1,7 +1,5 @@
 """The central pattern generator as a system."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,7 @@ def gait(scenario: Scenario, data: Path) -> Gait:
     return load_gait(data / "gait_b.json", scenario)
 
 
-def test_starts_at_the_values_of_table_4(scenario: Scenario, gait: Gait) -> None:
+def test_starts_at_the_values_of_table_4(scenario, gait):
     cpg = MatsuokaCpg(scenario.cpg, gait, oscillators=4)
     context = cpg.CreateDefaultContext()
     state = context.get_continuous_state_vector().CopyToVector()
@@ -30,7 +28,7 @@ def test_starts_at_the_values_of_table_4(scenario: Scenario, gait: Gait) -> None
     np.testing.assert_array_equal(cpg.GetOutputPort("signals").Eval(context), np.zeros(4))
 
 
-def test_unconnected_feedback_is_zero_feedback(scenario: Scenario, gait: Gait) -> None:
+def test_unconnected_feedback_is_zero_feedback(scenario, gait):
     cpg = MatsuokaCpg(scenario.cpg, gait, oscillators=4)
     free, fixed = cpg.CreateDefaultContext(), cpg.CreateDefaultContext()
     cpg.GetInputPort("feedback").FixValue(fixed, np.zeros(8))
@@ -39,7 +37,7 @@ def test_unconnected_feedback_is_zero_feedback(scenario: Scenario, gait: Gait) -
     )
 
 
-def test_feedback_adds_to_the_external_input(scenario: Scenario, gait: Gait) -> None:
+def test_feedback_adds_to_the_external_input(scenario, gait):
     # Eq. 7: tau_A du/dt = ... + f, so f changes du/dt by f / tau_A and dv/dt not at all.
     cpg = MatsuokaCpg(scenario.cpg, gait, oscillators=4)
     context = cpg.CreateDefaultContext()
@@ -51,7 +49,7 @@ def test_feedback_adds_to_the_external_input(scenario: Scenario, gait: Gait) -> 
     np.testing.assert_array_equal(change[8:], 0.0)
 
 
-def test_derivatives_are_the_laws(scenario: Scenario, gait: Gait) -> None:
+def test_derivatives_are_the_laws(scenario, gait):
     cpg = MatsuokaCpg(scenario.cpg, gait, oscillators=4)
     context = cpg.CreateDefaultContext()
     state = np.random.default_rng(5).normal(size=16)
@@ -62,7 +60,7 @@ def test_derivatives_are_the_laws(scenario: Scenario, gait: Gait) -> None:
     np.testing.assert_array_equal(cpg.EvalTimeDerivatives(context).CopyToVector(), expected)
 
 
-def test_signals_are_gain_times_extensor_less_flexor(scenario: Scenario, gait: Gait) -> None:
+def test_signals_are_gain_times_extensor_less_flexor(scenario, gait):
     cpg = MatsuokaCpg(scenario.cpg, gait, oscillators=4)
     context = cpg.CreateDefaultContext()
     u = np.array([0.4, -0.1, -0.2, 0.3, 0.2, 0.1, -0.3, -0.4])
@@ -76,7 +74,7 @@ def test_signals_are_gain_times_extensor_less_flexor(scenario: Scenario, gait: G
 
 
 @pytest.mark.parametrize("oscillators", [1, 2, 7])
-def test_takes_any_number_of_oscillators(scenario: Scenario, oscillators: int) -> None:
+def test_takes_any_number_of_oscillators(scenario, oscillators):
     weights = tuple(np.full(2 * oscillators * (oscillators - 1), 1.5))
     gait = Gait(name="equal", weights=weights, tau_a=0.3, tau_b=0.6)
     simulator = Simulator(MatsuokaCpg(scenario.cpg, gait, oscillators=oscillators))

@@ -11,9 +11,7 @@ from tetra_drake.systems import StartUpGate
     ("time", "start_up", "is_open"),
     [(0.0, 1.25, 0), (1.2499, 1.25, 0), (1.25, 1.25, 1), (15.0, 1.25, 1), (0.0, 0.0, 1)],
 )
-def test_passes_signals_from_the_start_up_time_on(
-    time: float, start_up: float, is_open: int
-) -> None:
+def test_passes_signals_from_the_start_up_time_on(time, start_up, is_open):
     signals = np.array([1.0, -2.0])
     gate = StartUpGate(2, start_up=start_up)
     simulator = Simulator(gate)

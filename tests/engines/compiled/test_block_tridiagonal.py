@@ -29,7 +29,7 @@ def random_system(bodies: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("bodies", [1, 2, 5, 8])
-def test_solves_what_it_was_made_of(bodies: int) -> None:
+def test_solves_what_it_was_made_of(bodies):
     rows, full = random_system(bodies)
     right_side = np.random.default_rng(1).normal(size=BLOCK * bodies)
     x = right_side.copy()

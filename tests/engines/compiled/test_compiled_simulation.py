@@ -1,7 +1,5 @@
 """The compiled engine against the Drake diagram."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray
@@ -9,7 +7,6 @@ import xarray
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import WALKING_SEED, load_gait, seeded_gait
 from tetra_drake.robot.model import make_model
-from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -46,9 +43,7 @@ after 0.5 s. Some such changes may add up.
     # In 0.5 s the robot settles and starts to walk: some nodes slip, leave the ground, land.
     [(5, 2, 0.5), (5, 3, 0.5), (2, 1, 0.3), (3, 1, 0.3), (8, 1, 0.3)],
 )
-def test_nodes_go_where_the_diagrams_nodes_go(
-    scenario: Scenario, tetrahedra: int, seed: int, duration: float
-) -> None:
+def test_nodes_go_where_the_diagrams_nodes_go(scenario, tetrahedra, seed, duration):
     times = {"simulation.duration": duration, "simulation.steady_from": 0.5 * duration}
     fine = scenario.with_changes({"robot.tetrahedra": tetrahedra, **times, **FINE})
     trajectories = trajectories_on_both(fine, seed)
@@ -69,9 +64,7 @@ def trajectories_on_both(scenario: Scenario, seed: int = WALKING_SEED) -> list[x
 
 
 @pytest.mark.slow
-def test_nine_of_ten_well_conditioned_random_gaits_end_where_the_diagrams_do(
-    compiled: Scenario,
-) -> None:
+def test_nine_of_ten_well_conditioned_random_gaits_end_where_the_diagrams_do(compiled):
     # The diagram's default settings are themselves off by 0.2 in and more in every fourth gait.
     fine = {"engine": "drake", "scheme": "runge_kutta3", "accuracy": 1e-5}
     fine |= {"max_step": 5e-5, "look_ahead": 0.0}
@@ -91,7 +84,7 @@ def distance(scenario: Scenario, seed: int) -> float:
     return simulate(scenario=scenario, gait=seeded_gait(scenario, seed)).metrics.distance_in
 
 
-def test_the_recording_has_the_forces_of_the_diagrams(scenario: Scenario) -> None:
+def test_the_recording_has_the_forces_of_the_diagrams(scenario):
     # Before the actuation both robots come to rest: the same tensions and normal forces.
     short = scenario.with_changes({"simulation.duration": 0.8, "simulation.steady_from": 0.2})
     ours, drakes = trajectories_on_both(short)
@@ -102,18 +95,14 @@ def test_the_recording_has_the_forces_of_the_diagrams(scenario: Scenario) -> Non
 
 
 @pytest.mark.parametrize("signals", ["recorded", "live"])
-def test_signals_integrated_with_error_control_are_those_of_the_diagram(
-    compiled: Scenario, data: Path, signals: str
-) -> None:
+def test_signals_integrated_with_error_control_are_those_of_the_diagram(compiled, data, signals):
     # Gait c goes 0.4 in farther than on the listing's signals.
     compiled.cpg.signals = signals
     result = simulate(scenario=compiled, gait=load_gait(data / "gait_c.json", compiled))
     assert result.metrics.distance_in == pytest.approx(2.22, abs=0.05)
 
 
-def test_structures_the_engine_cannot_simulate_are_refused(
-    scenario: Scenario, structure: Structure
-) -> None:
+def test_structures_the_engine_cannot_simulate_are_refused(scenario, structure):
     structure.cables[0]["node_b"] += 4  # from T1 to T3
     with pytest.raises(ValueError):
         make_model(scenario, structure)

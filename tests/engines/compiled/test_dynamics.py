@@ -33,9 +33,7 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
 
 @pytest.mark.parametrize("tetrahedra", [2, 5, 8])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_accelerations_are_those_of_the_diagram(
-    scenario: Scenario, tetrahedra: int, seed: int
-) -> None:
+def test_accelerations_are_those_of_the_diagram(scenario, tetrahedra, seed):
     scenario.robot.tetrahedra = tetrahedra
     robot, state, modes = disturbed_robot(scenario, seed)
     nodes = move_nodes(state, robot.p_BN)
@@ -52,7 +50,7 @@ def test_accelerations_are_those_of_the_diagram(
     np.testing.assert_allclose(acceleration, expected, rtol=1e-7, atol=1e-7)
 
 
-def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario: Scenario) -> None:
+def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario):
     # With stiffness left out (it enters squared in time) and the small dependence of bristles
     # on speed switched off, d force / d velocity is minus the damping matrix.
     scenario.friction.proportional_stiction = 0.0
@@ -78,7 +76,7 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario: Scenario)
     np.testing.assert_allclose(damping, -jacobian, atol=2e-4 * np.abs(jacobian).max())
 
 
-def test_bodies_turn_as_drakes_quaternions_do() -> None:
+def test_bodies_turn_as_drakes_quaternions_do():
     # A turn by angle w t about z: quaternion (cos(w t / 2), 0, 0, sin(w t / 2)).
     state = np.append(1.0, np.zeros(12))
     moved = move_bodies(state, np.array([0.0, 0.0, 3.0, 0.1, 0.2, 0.3]), 0.01)
