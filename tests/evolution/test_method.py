@@ -24,17 +24,19 @@ def other_body(result):
 
 
 def by_closure(factor):
-    def objective(result):
-        return factor * result.fitness
-
-    return objective
+    return lambda result: factor * result.fitness
 
 
 def by_default(factor):
-    def objective(result, factor=factor):
-        return factor * result.fitness
+    return lambda result, factor=factor: factor * result.fitness
 
-    return objective
+
+def by_cached_helper(factor):
+    @functools.cache
+    def helper(fitness):
+        return factor * fitness
+
+    return lambda result: helper(result.fitness)
 
 
 @dataclass(frozen=True)
@@ -49,14 +51,16 @@ class Table:
     def __init__(self, values):
         self.values = np.array(values)
 
-    def __call__(self, result):
+    def total(self, result):
         return float(self.values @ self.values)
+
+    __call__ = total
 
 
 def by_source(factor):
     """Functions without a source file, as typed into an interpreter."""
     names = {}
-    exec(f"def objective(result):\n    return {factor} * result.fitness", names)
+    exec(f"def objective(result):\n    return [{factor} * r for r in result]", names)
     return names["objective"]
 
 
@@ -67,9 +71,11 @@ def power(exponent, result):
 MADE = [
     by_closure,
     by_default,
+    by_cached_helper,
     by_source,
     Weighted,
     lambda values: Table([values, 1.0]),
+    lambda values: Table([values, 1.0]).total,
     lambda exponent: functools.partial(power, exponent),
 ]
 
@@ -88,40 +94,33 @@ def test_the_digest_covers_globals_and_the_body(monkeypatch):
     assert Part.of(scaled).digest != before.digest
 
 
-def test_fields_of_a_dataclass_are_settings():
-    assert Part.of(Weighted(2.5)).settings == {"factor": 2.5}
-
-
-def test_what_the_package_brings_needs_no_digest():
-    assert Part.of(SteadyState) == Method.of(small_scenario()).optimizer
-    built_in = Method.of(small_scenario())
-    assert built_in.given_from_python == []
-    assert built_in.evaluator.name == "drake"
-
-
-def test_a_method_survives_its_file():
-    method = Method.of(small_scenario(), objective=Weighted(2.0), optimizer=by_closure(1.0))
+def test_a_method_survives_its_file_and_what_the_package_brings_needs_no_digest():
+    method = Method.of(small_scenario(), objective=Weighted(2.5), optimizer=by_closure(1.0))
     assert method.given_from_python == ["objective", "optimizer"]
+    assert method.objective.settings == {"factor": 2.5}
     assert Method.from_json(json.loads(json.dumps(asdict(method))), "run") == method
     with pytest.raises(InputError):
         Method.from_json({"objective": {}}, "run")
+    built_in = Method.of(small_scenario())
+    assert built_in.given_from_python == []
+    assert (built_in.optimizer, built_in.evaluator.name) == (Part.of(SteadyState), "drake")
 
 
 @pytest.mark.parametrize(
-    ("now", "key"),
+    ("now", "key", "settings"),
     [
-        ({}, "objective"),
-        ({"objective": Weighted(3.0), "optimizer": RuntimeError}, "objective"),
-        ({"objective": scaled, "optimizer": RuntimeError}, "objective"),
-        ({"objective": Weighted(2.0)}, "optimizer"),
+        ({}, "objective", '{"factor": 2.0}'),
+        ({"objective": Weighted(3.0), "optimizer": RuntimeError}, "objective", '{"factor": 2.0}'),
+        ({"objective": scaled, "optimizer": RuntimeError}, "objective", '{"factor": 2.0}'),
+        ({"objective": Weighted(2.0)}, "optimizer", "RuntimeError, not"),
     ],
 )
-def test_another_method_is_refused_and_the_part_named(now, key):
+def test_another_method_is_refused_and_the_part_named(now, key, settings):
     scenario = small_scenario()
-    method = Method.of(scenario, objective=Weighted(2.0), optimizer=RuntimeError)
-    method.check_same(
-        Method.of(scenario, objective=Weighted(2.0), optimizer=RuntimeError), "runs/mine"
-    )
+    given = {"objective": Weighted(2.0), "optimizer": RuntimeError}
+    method = Method.of(scenario, **given)
+    method.check_same(Method.of(scenario, **given), "runs/mine")
     with pytest.raises(InputError) as caught:
         method.check_same(Method.of(scenario, **now), "runs/mine")
     assert (caught.value.source, caught.value.key) == ("runs/mine", key)
+    assert settings in caught.value.problem

@@ -27,7 +27,6 @@ def test_a_run_loads_as_tables(run_small):
     run = load_run(run_small(seed=11))
     assert run.manifest.seed == 11
     assert len(run.evaluations) == 2 * 42
-    assert len(run.iterations) == 2 * 16
     row = run.evaluations.iloc[20]
     assert row["weight_3"] == run.vector(0, 20)[2]
     expected = Bowl()(run.vector(0, 20))
@@ -51,9 +50,8 @@ def test_a_run_in_progress_loads_and_is_left_alone(run_small):
     torn = path.read_bytes()
     assert len(load_run(run).evaluations) == 2 * 42 - 1
     assert path.read_bytes() == torn
-    for trial in ("trial_00", "trial_01"):
-        for file in (run / trial).iterdir():
-            file.unlink()
+    for file in run.glob("trial_*/*"):
+        file.unlink()
     empty = load_run(run)
     assert empty.evaluations.empty
     assert [status.evaluations for status in empty.statuses] == [0, 0]
@@ -94,30 +92,19 @@ def test_a_line_that_is_no_entry_is_reported(run_small, refused, name, entry, ke
         load_run(run)
 
 
-# Best gaits and populations
+# Best gaits, populations, states of trials
 
 
 def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(tmp_path):
-    run = load_run(
-        write_run(tmp_path / "run", [[[(5.0, 0), (5.0, 1), (None, 2), (7.0, 3)]], [[(6.0, 0)]]])
-    )
-    best = run.best(3)
-    assert best[["trial", "index"]].to_numpy().tolist() == [[0, 3], [0, 0], [1, 0]]
+    trials = [[[(5.0, 0), (5.0, 1), (None, 2), (7.0, 3)]], [[(6.0, 0)]]]
+    run = load_run(write_run(tmp_path / "run", trials))
+    assert run.best(3)[["trial", "index"]].to_numpy().tolist() == [[0, 3], [0, 0], [1, 0]]
     assert run.best()["fitness"].tolist() == [7.0, 6.0]
     assert run.fittest() == (0, 3)
     assert run.gait(0, 3).name == "tiny, seed 7, trial 0, evaluation 3"
 
 
-def test_the_gait_of_an_evaluation_is_that_of_its_file(run_small, scenario):
-    directory = run_small()
-    run = load_run(directory)
-    trial, index = run.fittest()
-    assert load_gait(directory / f"trial_0{trial}" / "best_gait.json", scenario) == run.gait(
-        trial, index
-    )
-
-
-def test_the_last_population_is_that_kept_by_hand(run_small):
+def test_best_gait_and_last_population_are_those_kept_by_hand(run_small, scenario):
     directory = run_small()
     run = load_run(directory)
     for trial in (0, 1):
@@ -130,9 +117,9 @@ def test_the_last_population_is_that_kept_by_hand(run_small):
         assert population["placed"].tolist() == list(range(12))
         assert population["index"].tolist() == [kept[place] for place in range(12)]
         assert population["fitness"].mean() == pytest.approx(run.statuses[trial].mean_fitness)
-
-
-# State of trials
+        best = int(run.best()["index"].iloc[trial])
+        saved = load_gait(directory / f"trial_0{trial}" / "best_gait.json", scenario)
+        assert saved == run.gait(trial, best)
 
 
 def test_the_record_says_what_the_run_said_at_its_end(tmp_path):
@@ -148,13 +135,8 @@ def test_the_record_says_what_the_run_said_at_its_end(tmp_path):
 
 
 def test_an_unfinished_run_says_how_far_it_has_come(tmp_path):
-    run = load_run(
-        write_run(
-            tmp_path / "run",
-            [[[(1.0, 0), (None, 1)], [(4.0, 1)]], [[(None, 0)]], []],
-            unfinished=(0, 1, 2),
-        )
-    )
+    trials = [[[(1.0, 0), (None, 1)], [(4.0, 1)]], [[(None, 0)]], []]
+    run = load_run(write_run(tmp_path / "run", trials, unfinished=(0, 1, 2)))
     first, second, third = run.statuses
     assert (first.iteration, first.evaluations, first.failures, first.stop) == (1, 3, 1, None)
     assert (first.initial_mean_fitness, first.mean_fitness) == (1.0, 2.5)
@@ -168,9 +150,8 @@ def test_an_unfinished_run_says_how_far_it_has_come(tmp_path):
 def test_the_reference_stands_beside_our_numbers_where_there_is_one(tmp_path):
     scenario = load_scenario("thesis")
     with_reference = load_run(write_run(tmp_path / "a", [[[(5.0, 0)]]], scenario=scenario))
-    assert [row.reference for row in comparisons(with_reference)] == [
-        "6.6 in", "14.34 in", "32 %", "51 %", "22 s",
-    ]  # fmt: skip
+    numbers = [row.reference for row in comparisons(with_reference)]
+    assert numbers == ["6.6 in", "14.34 in", "32 %", "51 %", "22 s"]
     assert "14.34 in" in summary(with_reference)
     scenario.reference = None
     without = load_run(write_run(tmp_path / "b", [[[(5.0, 0)]]], scenario=scenario))
@@ -182,43 +163,38 @@ def test_the_reference_stands_beside_our_numbers_where_there_is_one(tmp_path):
 RECORDED = Path(__file__).parents[2] / "runs" / "thesis"
 
 
-def first_lines(tmp_path, count):
-    """A copy of the recorded run's first trial, ended after this many evaluations."""
+@pytest.fixture
+def first_lines(tmp_path):
+    """The recorded run's first trial, ended after 56 evaluations, and all lines there are."""
     run = tmp_path / "run"
     (run / "trial_00").mkdir(parents=True)
     for name in ("manifest.json", "scenario.yaml"):
         (run / name).write_bytes((RECORDED / name).read_bytes())
     content = lzma.decompress((RECORDED / "trial_00" / "evaluations.jsonl.xz").read_bytes())
-    (run / "trial_00" / "evaluations.jsonl").write_bytes(
-        b"".join(content.splitlines(keepends=True)[:count])
-    )
-    return run
+    lines = content.splitlines(keepends=True)
+    (run / "trial_00" / "evaluations.jsonl").write_bytes(b"".join(lines[:56]))
+    return run, [json.loads(line) for line in lines]
 
 
-def test_a_recorded_run_of_schema_1_loads_with_its_inches_to_the_last_digit(tmp_path):
-    run = load_run(first_lines(tmp_path, 100))
+def test_a_recorded_run_of_schema_1_loads_with_its_inches_to_the_last_digit(first_lines):
+    path, entries = first_lines
+    run = load_run(path)
     assert run.manifest.method.evaluator.name == "compiled"
-    lines = (tmp_path / "run" / "trial_00" / "evaluations.jsonl").read_text().splitlines()
-    inches = [json.loads(line)["metrics"]["distance_in"] for line in lines]
+    inches = [entry["metrics"]["distance_in"] for entry in entries[:56]]
     assert run.evaluations["distance_in"].tolist() == inches
     assert run.evaluations["twist"].notna().all()
 
 
-class Interrupted(Exception):
-    pass
-
-
-def test_a_recorded_run_of_schema_1_is_resumed_where_it_ended(tmp_path):
+def test_a_recorded_run_of_schema_1_is_resumed_where_it_ended(first_lines):
     """The optimiser must ask for what the record holds: 50 gaits and 2 per iteration."""
-    path = first_lines(tmp_path, 56)
+    path, entries = first_lines
     asked = []
 
     def evaluate(vector):
         asked.append(vector.tolist())
-        raise Interrupted
+        raise InterruptedError
 
-    with RunRecord.resume(path) as record, pytest.raises(Interrupted):
+    with RunRecord.resume(path) as record, pytest.raises(InterruptedError):
         run_trials(record, evaluate=evaluate, workers=1, executor=ThreadPoolExecutor)
-    recorded = lzma.decompress((RECORDED / "trial_00" / "evaluations.jsonl.xz").read_bytes())
-    assert asked[0] == json.loads(recorded.splitlines()[56])["genome"]
+    assert asked[0] == entries[56]["genome"]
     assert len(load_run(path).iterations) == 4

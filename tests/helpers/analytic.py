@@ -10,7 +10,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.evolution.optimizers.base import Evaluation, Iteration
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -75,3 +75,20 @@ def read_record(directory: Path) -> dict[str, object]:
                 del entry["wall_time_s"]
             record[name] = [json.dumps(entry) for entry in entries]
     return record
+
+
+class RandomSearch:
+    """An optimiser: two batches of four without a population."""
+
+    evaluations_at_most = 8
+
+    def __init__(self, space, settings, generator):
+        self.space, self.generator, self.told = space, generator, []
+
+    def ask(self):
+        return [self.space.random(self.generator) for _ in range(4)]
+
+    def tell(self, evaluations):
+        self.told += [evaluation.metrics.get("distance", 0.0) for evaluation in evaluations]
+        report = {"farthest": max(self.told), "note": "wide"}
+        return Iteration(report=report, stop="done" if len(self.told) == 8 else None)
