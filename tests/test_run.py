@@ -4,12 +4,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import pytest
-from helpers.analytic import Bowl, read_record, small_scenario
+from helpers.analytic import Bowl, RandomSearch, read_record, small_scenario
 
 import tetra_drake
 from tetra_drake import cli
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.optimizers.base import Iteration
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import read_manifest
@@ -47,32 +46,20 @@ class Heaviest:
         return self.factor * (1.0 + result.metrics.distance)
 
 
-class Halves:
-    """Another optimiser: batches of two random gaits, three times."""
+@pytest.fixture
+def interrupting():
+    """An executor that ends a run by Ctrl-C after five evaluations."""
 
-    evaluations_at_most = 6
+    class Interrupting(ThreadPoolExecutor):
+        left = 5
 
-    def __init__(self, space, settings, generator):
-        self.space, self.generator, self.told = space, generator, 0
+        def submit(self, *arguments):
+            Interrupting.left -= 1
+            if Interrupting.left < 0:
+                raise KeyboardInterrupt
+            return super().submit(*arguments)
 
-    def ask(self):
-        return [self.space.random(self.generator) for _ in range(2)]
-
-    def tell(self, evaluations):
-        self.told += 1
-        return Iteration(report={"told": self.told}, stop="done" if self.told == 3 else None)
-
-
-class Interrupting(ThreadPoolExecutor):
-    """Ends a run by Ctrl-C after some evaluations."""
-
-    left = 5
-
-    def submit(self, *arguments):
-        Interrupting.left -= 1
-        if Interrupting.left < 0:
-            raise KeyboardInterrupt
-        return super().submit(*arguments)
+    return Interrupting
 
 
 class Told(Progress):
@@ -87,7 +74,7 @@ class Told(Progress):
     def show(self, statuses):
         self.shown.append(sum(status.evaluations for status in statuses))
 
-    def stage(self, title, done, total):
+    def stage(self, title, done, total, text=""):
         self.stages.append((done, total))
 
 
@@ -95,43 +82,42 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     progress = Told()
     run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=2, progress=progress)
     assert run.manifest.seed == 3
-    assert len(run.evaluations) == 8
-    assert run.evaluations["engine"].unique().tolist() == ["compiled"]
-    assert len(run.reevaluations) == 5
-    assert run.reevaluations["engine"].unique().tolist() == ["drake"]
+    assert run.evaluations["engine"].tolist() == ["compiled"] * 8
+    assert run.reevaluations["engine"].tolist() == ["drake"] * 5
     assert reports == [tmp_path / "run"]
     assert progress.shown[0] == 0 and progress.shown[-1] == 8
     assert progress.stages == [(done, 5) for done in range(6)]
     assert progress.warnings == []
 
 
-def test_re_evaluation_and_report_can_be_left_out(tiny, tmp_path, reports):
-    run = tetra_drake.evolve(tiny, tmp_path / "run", reevaluate=False, report=False)
-    assert run.reevaluations.empty
-    assert reports == []
-
-
-def test_a_name_will_do_for_a_scenario_and_nothing_will_not(tmp_path):
-    with pytest.raises(InputError):
-        tetra_drake.evolve("quack", tmp_path / "run")
-    with pytest.raises(InputError):
-        tetra_drake.evolve(None, tmp_path / "run")
+def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
+    on_diagram = tiny.with_changes({"simulation.engine": "drake"})
+    for scenario, objective, problem in (
+        ("quack", None, "quack"),
+        (None, None, "is needed"),
+        (on_diagram, lambda result: 1.0, "lambda"),
+    ):
+        with pytest.raises(InputError, match=problem):
+            tetra_drake.evolve(scenario, tmp_path / "run", objective=objective)
     assert not (tmp_path / "run").exists()
 
 
-def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(tiny, tmp_path, refused, capsys):
-    own = {"objective": Heaviest(2.0), "optimizer": Halves, "reevaluate": False, "report": False}
+def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
+    tiny, tmp_path, refused, capsys, interrupting, reports
+):
+    own = {"objective": Heaviest(2.0), "optimizer": RandomSearch}
+    own |= {"reevaluate": False, "report": False}
     whole = tetra_drake.evolve(tiny, tmp_path / "whole", **own)
     assert whole.evaluations["fitness"].tolist() == pytest.approx(
         (2.0 + 2.0 * whole.evaluations["distance"]).tolist()
     )
-    assert whole.iterations["told"].tolist() == [1, 2, 3]
+    assert whole.reevaluations.empty and reports == []
+    assert whole.iterations["note"].tolist() == ["wide", "wide"]
     assert whole.manifest.method.objective.settings == {"factor": 2.0}
 
     run = tmp_path / "run"
-    Interrupting.left = 5
     with pytest.raises(KeyboardInterrupt):
-        tetra_drake.evolve(tiny, run, executor=Interrupting, **own)
+        tetra_drake.evolve(tiny, run, executor=interrupting, **own)
     begun = read_record(run)
     for changed, key in (
         ({"objective": None}, "objective"),
@@ -150,27 +136,15 @@ def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(tiny, tmp_path, refused
     assert read_record(run) == read_record(tmp_path / "whole")
 
 
-def test_an_objective_that_workers_cannot_load_begins_no_run(tiny, tmp_path):
-    on_diagram = tiny.with_changes({"simulation.engine": "drake"})
-    with pytest.raises(InputError, match="lambda"):
-        tetra_drake.evolve(on_diagram, tmp_path / "run", objective=lambda result: 1.0)
-    assert not (tmp_path / "run").exists()
-
-
-def test_a_report_that_fails_is_no_failed_run(tiny, tmp_path, monkeypatch):
-    def fail(directory):
-        raise KeyError("x1")
-
-    monkeypatch.setattr("tetra_drake.report.run_page.write_report", fail)
+def test_a_report_that_fails_is_no_failed_run_and_other_versions_are_told(
+    tiny, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda path: {}["x1"])
     with pytest.warns(RuntimeWarning, match="x1"):
         run = tetra_drake.evolve(tiny, tmp_path / "run", reevaluate=False)
     assert run.statuses[0].stop is not None
-
-
-def test_other_versions_than_the_runs_are_told(tiny, tmp_path):
-    tetra_drake.evolve(tiny, tmp_path / "run", reevaluate=False, report=False)
     manifest = tmp_path / "run" / "manifest.json"
-    current = read_manifest(tmp_path / "run").versions["numpy"]
+    current = run.manifest.versions["numpy"]
     manifest.write_text(manifest.read_text().replace(f'"{current}"', '"0.9"'))
     with pytest.warns(RuntimeWarning, match=r"numpy 0\.9"):
         tetra_drake.evolve(None, tmp_path / "run", resume=True, reevaluate=False, report=False)
@@ -194,8 +168,8 @@ def test_the_command_runs_the_scenario_with_its_options(evolve, tmp_path, capsys
     out = tmp_path / "runs" / "demo"
     assert evolve(*SMALL, "--out", out, "--seed", 4) == 0
     manifest = read_manifest(out)
-    quick = load_scenario("quick")
     assert manifest.seed == 4
+    quick = load_scenario("quick")
     assert manifest.scenario == quick.with_changes({"evolution.max_iterations": 3})
     assert load_scenario(out / "scenario.yaml") == manifest.scenario
     assert reports == [out]
@@ -210,33 +184,25 @@ def test_without_a_scenario_the_first_look_is_run(evolve, tmp_path, capsys):
     assert "--scenario thesis" in capsys.readouterr().out
 
 
-def test_resuming_needs_the_directory_only(evolve, tmp_path, capsys):
+def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, tmp_path, capsys):
     out = tmp_path / "run"
     evolve(*SMALL, "--out", out)
     whole = read_record(out)
     evaluations = out / "trial_00" / "evaluations.jsonl"
     evaluations.write_bytes(evaluations.read_bytes()[:-100])
-    assert evolve("--out", out, "--resume") == 0
-    assert read_record(out) == whole
-    assert evolve("--out", out, "--resume", *SMALL) == 0
-    assert read_record(out) == whole
+    for options in ((), SMALL):
+        assert evolve("--out", out, "--resume", *options) == 0
+        assert read_record(out) == whole
     assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize(
-    ("options", "key"),
-    [
-        (("--trials", 2), "evolution.trials"),
-        (("--iterations", 4), "evolution.max_iterations"),
-        (("--engine", "compiled"), "simulation.engine"),
-        (("--scenario", "thesis"), "evolution.population"),
-        (("--seed", 1), "seed"),
-    ],
-)
-def test_a_run_is_resumed_as_what_it_is(evolve, tmp_path, options, key, capsys):
-    evolve(*SMALL, "--out", tmp_path / "run")
-    assert evolve("--out", tmp_path / "run", "--resume", *options) == 2
-    assert capsys.readouterr().err.startswith(f"tetra-drake: {tmp_path / 'run'}: {key}: ")
+    for option, value, key in (
+        ("--trials", 2, "evolution.trials"),
+        ("--iterations", 4, "evolution.max_iterations"),
+        ("--engine", "compiled", "simulation.engine"),
+        ("--scenario", "thesis", "evolution.population"),
+        ("--seed", 1, "seed"),
+    ):
+        assert evolve("--out", out, "--resume", option, value) == 2
+        assert capsys.readouterr().err.startswith(f"tetra-drake: {out}: {key}: ")
 
 
 @pytest.mark.parametrize("option", ["--trials", "--iterations", "--workers"])
@@ -248,8 +214,9 @@ def test_counts_are_counts(evolve, tmp_path, option, value, capsys):
     assert option in capsys.readouterr().err
 
 
-def test_an_interrupted_run_says_how_to_continue(evolve, tmp_path, capsys, monkeypatch):
-    Interrupting.left = 5
-    monkeypatch.setattr("tetra_drake.run.process_executor", Interrupting)
+def test_an_interrupted_run_says_how_to_continue(
+    evolve, tmp_path, capsys, monkeypatch, interrupting
+):
+    monkeypatch.setattr("tetra_drake.run.process_executor", interrupting)
     assert evolve(*SMALL, "--out", tmp_path / "run") == 130
     assert f"tetra-drake evolve --out {tmp_path / 'run'} --resume" in capsys.readouterr().err

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers.analytic import Bowl, Deadly, is_deadly
 
-from tetra_drake.evolution.executors import EvaluationImpossible, evaluate_all
+from tetra_drake.evolution.executors import EvaluationImpossible, evaluate_all, process_executor
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.robot.gait import ParameterSpace
 
@@ -21,15 +21,14 @@ def vectors(scenario):
     return [space.random(generator) for _ in range(20)]
 
 
-def test_every_task_is_evaluated_once(vectors):
-    found = dict(evaluate_all(Bowl(), vectors, workers=3, executor=ThreadPoolExecutor))
-    assert found == {i: Bowl()(vector) for i, vector in enumerate(vectors)}
-    assert list(evaluate_all(Bowl(), [], workers=2)) == []
-
-
-def test_workers_are_recycled_without_losing_any(vectors, monkeypatch):
+@pytest.mark.parametrize("executor", [process_executor, ThreadPoolExecutor])
+def test_every_task_is_evaluated_once_also_when_workers_are_recycled(
+    vectors, monkeypatch, executor
+):
     monkeypatch.setattr("tetra_drake.evolution.executors.TASKS_PER_WORKER", 4)
-    assert len(dict(evaluate_all(Bowl(), vectors, workers=2))) == 20
+    found = dict(evaluate_all(Bowl(), vectors, workers=2, executor=executor))
+    assert found == {i: Bowl()(vector) for i, vector in enumerate(vectors)}
+    assert list(evaluate_all(Bowl(), [], executor=executor)) == []
 
 
 def test_only_what_ends_its_process_fails(vectors):
@@ -40,33 +39,23 @@ def test_only_what_ends_its_process_fails(vectors):
     assert any(died)
 
 
-def end_the_process(task):
-    os._exit(3)
-
-
-def succeed_once(task):
-    if task > 0:
+def succeed_at_0(task):
+    if task != 0:
         os._exit(3)
     return Evaluation(1.0)
 
 
 def test_deaths_count_once_anything_has_succeeded():
-    found = dict(evaluate_all(succeed_once, [1, 0, 2, 3, 4], workers=1))
+    found = dict(evaluate_all(succeed_at_0, [1, 0, 2, 3, 4], workers=1))
     assert [found[i].failure is None for i in range(5)] == [False, True, False, False, False]
+    for tasks in ([1], [1, 2, 3, 4, 5, 6]):
+        with pytest.raises(EvaluationImpossible):
+            list(evaluate_all(succeed_at_0, tasks, workers=2))
 
 
-@pytest.mark.parametrize("tasks", [1, 10])
-def test_if_every_task_ends_its_process_none_can_run(tasks):
-    with pytest.raises(EvaluationImpossible):
-        list(evaluate_all(end_the_process, range(tasks), workers=2))
-
-
-def test_a_function_that_cannot_be_sent_is_refused_with_the_cause(vectors):
+def test_a_function_that_workers_cannot_get_is_refused_with_the_cause(vectors, monkeypatch):
     with pytest.raises(EvaluationImpossible, match="lambda"):
         list(evaluate_all(lambda vector: Evaluation(1.0), vectors, workers=2))
-
-
-def test_a_function_that_workers_cannot_load_is_refused_with_the_cause(vectors, monkeypatch):
     monkeypatch.delenv("TETRA_DRAKE_LOADED_IN", raising=False)
     evaluate = importlib.import_module("helpers.unloadable").evaluate
     with pytest.raises(EvaluationImpossible, match="only one process can load this"):
