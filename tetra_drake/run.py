@@ -104,15 +104,14 @@ def evolve(
 
 
 def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
-    scenario, settings = manifest.scenario, manifest.scenario.evolution
-    trials = f"{settings.trials} trial{'s' if settings.trials > 1 else ''}"
+    """What begins: scenario, size, method, and where the results will be."""
+    scenario, settings, method = manifest.scenario, manifest.scenario.evolution, manifest.method
+    own = [f", {part} {getattr(method, part).name}" for part in method.given_from_python]
     text = (
-        f"{directory}: scenario {scenario.name}, seed {manifest.seed}, {trials} of at most "
-        f"{settings.max_iterations} iterations, population {settings.population}, engine "
-        f"{scenario.simulation.engine}, {workers} worker{'s' if workers > 1 else ''}"
+        f"{directory}: scenario {scenario.name}, seed {manifest.seed}, trials {settings.trials}, "
+        f"each of at most {settings.max_iterations} iterations, population {settings.population}, "
+        f"engine {scenario.simulation.engine}, workers {workers}{''.join(own)}"
     )
-    for part in manifest.method.given_from_python:
-        text += f", {part} {getattr(manifest.method, part).name}"
     if report:
         text += (
             f"\nat the end: {directory / 'replay.html'}, the best gait walking, and "

@@ -71,13 +71,13 @@ def kill_again_and_again(directory, executor, *, kills, longest, delay=0.006):
     return hits
 
 
-def test_a_run_killed_a_few_times_ends_like_one_that_was_not(tmp_path, uninterrupted):
-    kill_again_and_again(tmp_path / "run", "threads", kills=4, longest=0.3)
-    assert read_record(tmp_path / "run") == uninterrupted
-
-
-def test_with_worker_processes_too_and_none_is_left_behind(tmp_path, uninterrupted):
-    kill_again_and_again(tmp_path / "run", "processes", kills=1, longest=1.5)
+@pytest.mark.parametrize(
+    ("executor", "kills", "longest"), [("threads", 4, 0.3), ("processes", 1, 1.5)]
+)
+def test_a_run_killed_ends_like_one_that_was_not_and_leaves_no_process(
+    tmp_path, uninterrupted, executor, kills, longest
+):
+    kill_again_and_again(tmp_path / "run", executor, kills=kills, longest=longest)
     assert read_record(tmp_path / "run") == uninterrupted
 
 

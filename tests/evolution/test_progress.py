@@ -11,13 +11,12 @@ STATUS = TrialStatus(
     evaluations_at_most=140,
     iteration=10,
     evaluations=40,
-    recalled=20,
     failures=1,
     best_fitness=4.25,
     best_distance_in=5.0,
 )
 ENDED = dataclasses.replace(
-    STATUS, number=1, evaluations=100, recalled=0, best_fitness=6.0, stop="levelled off"
+    STATUS, number=1, evaluations=100, best_fitness=6.0, stop="levelled off"
 )
 FRESH = TrialStatus(number=2, evaluations_at_most=140)
 

@@ -16,7 +16,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
+from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.schema import Scenario
 
 Objective = Callable[[SimulationResult], float]
@@ -34,20 +34,20 @@ class GaitEvaluation:
 
     def __call__(self, vector: Vector) -> Evaluation:
         """Fitness and metrics of one vector, or the reason of a failure."""
-        started, engine = time.perf_counter(), self.scenario.simulation.engine
-        found = self._evaluate(ParameterSpace.of(self.scenario).gait(vector, name="candidate"))
-        return dataclasses.replace(found, wall_time=time.perf_counter() - started, engine=engine)
-
-    def _evaluate(self, gait: Gait) -> Evaluation:
+        started, scenario = time.perf_counter(), self.scenario
+        gait = ParameterSpace.of(scenario).gait(vector, name="candidate")
         try:
-            with time_limit(self.scenario.evolution.time_budget):
-                result = simulate(scenario=self.scenario, gait=gait)
+            with time_limit(scenario.evolution.time_budget):
+                result = simulate(scenario=scenario, gait=gait)
         except (SimulationFailure, TimeBudgetExceeded) as error:
-            return Evaluation.failed(f"{_KINDS[type(error)]}: {error}")
-        fitness = result.fitness if self.objective is None else float(self.objective(result))
-        if not math.isfinite(fitness):
-            return Evaluation.failed("diverged: the fitness is not finite")
-        return Evaluation(fitness, dataclasses.asdict(result.metrics))
+            found = Evaluation.failed(f"{_KINDS[type(error)]}: {error}")
+        else:
+            fitness = result.fitness if self.objective is None else float(self.objective(result))
+            found = Evaluation(fitness, dataclasses.asdict(result.metrics))
+            if not math.isfinite(fitness):
+                found = Evaluation.failed("diverged: the fitness is not finite")
+        wall_time, engine = time.perf_counter() - started, scenario.simulation.engine
+        return dataclasses.replace(found, wall_time=wall_time, engine=engine)
 
 
 class TimeBudgetExceeded(Exception):

@@ -97,7 +97,7 @@ _HOPELESS = 3
 
 
 class EvaluationImpossible(InputError):
-    """No evaluation can run at all: workers that do not start, or a function they cannot load."""
+    """No evaluation can run: workers do not start, or cannot load the function."""
 
 
 class EvaluationPool(Generic[JobT]):

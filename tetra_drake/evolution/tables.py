@@ -106,7 +106,7 @@ class Run:
 
     def _status(self, trial: int) -> TrialStatus:
         rows = self.evaluations[self.evaluations["trial"] == trial]
-        status = TrialStatus(trial, recalled=len(rows))
+        status = TrialStatus(trial)
         failures, wall_time = rows["failure"].notna().sum(), rows["wall_time_s"].sum()
         status.count(len(rows), failures=int(failures), wall_time=float(wall_time))
         lines = self.iterations[self.iterations["trial"] == trial].drop(columns="trial")

@@ -31,8 +31,6 @@ class TrialStatus:
     iteration: int = -1
     """The last complete one; 0 is the initial population."""
     evaluations: int = 0
-    recalled: int = 0
-    """Evaluations taken from the record instead of made."""
     failures: int = 0
     wall_time: float = 0.0
     """Total of the evaluations, in s."""
@@ -113,7 +111,6 @@ class Trial:
                     self.unevaluated[index] = vector
                 else:
                     self._add(index, recorded)
-                    self.status.recalled += 1
             if self.unevaluated:
                 self._save_best()
                 yield

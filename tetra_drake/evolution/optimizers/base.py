@@ -55,15 +55,12 @@ class Optimizer(Protocol):
     @property
     def evaluations_at_most(self) -> int:
         """Number of evaluations of a trial that is not stopped early."""
-        ...
 
     def ask(self) -> list[Vector]:
         """The vectors of the next iteration, to be evaluated in any order."""
-        ...
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes the evaluations in the order in which the vectors were asked for."""
-        ...
 
 
 MakeOptimizer = Callable[[ParameterSpace, EvolutionScenario, np.random.Generator], Optimizer]
