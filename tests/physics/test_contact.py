@@ -67,9 +67,7 @@ def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
         (0.01, -5.0, -1.0, STICK),
     ],
 )
-def test_breaks_free_outward_at_the_range_and_sticks_at_a_reversal(
-    velocity, deflection, mode, after
-):
+def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection, mode, after):
     assert next_friction_mode(velocity, deflection, mode, P0) == after
 
 

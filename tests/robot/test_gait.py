@@ -90,9 +90,8 @@ BAD_VALUES = {
     ("key", "value"), [(key, value) for key, values in BAD_VALUES.items() for value in values]
 )
 def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, refused, scenario):
-    weights = [*WEIGHTS[:7], value, *WEIGHTS[8:]]
-    bad = gait_file(weights=weights) if key == "weights[7]" else gait_file(**{key: value})
-    file = write(tmp_path, bad)
+    weights = {"weights": [*WEIGHTS[:7], value, *WEIGHTS[8:]]}
+    file = write(tmp_path, gait_file(**(weights if key == "weights[7]" else {key: value})))
     shown = {None: "nothing", True: "true"}.get(value) if value is None or value is True else ""
     with refused(file, key, shown or ("a list" if isinstance(value, list) else str(value))):
         load_gait(file, scenario)
@@ -105,9 +104,7 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
         (gait_file(weights=[*WEIGHTS, 1]), "weights", "25"),
         (gait_file(weights=1.5), "weights", "1.5"),
         (gait_file(weights={"w1": 1}), "weights", "mapping"),
-        (without("schema"), "schema", ""),
-        (without("weights"), "weights", ""),
-        (without("tau_a_s"), "tau_a_s", ""),
+        *[(without(key), key, "") for key in ("schema", "weights", "tau_a_s")],
         (gait_file(tau_c_s=1), "tau_c_s", "tau_"),
         (gait_file(tau_a=0.3), "tau_a", "tau_a_s"),
         (gait_file(tau_a_s=10**400), "tau_a_s", "1000"),
@@ -122,9 +119,7 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
     ],
     ids=itertools.count(),
 )
-def test_a_bad_gait_file_is_refused_with_file_and_key(
-    tmp_path, content, key, found, refused, scenario
-):
+def test_a_bad_file_is_refused_with_file_and_key(tmp_path, content, key, found, refused, scenario):
     file = write(tmp_path, content)
     with refused(file, key, found):
         load_gait(file, scenario)
@@ -158,13 +153,8 @@ def test_a_vector_is_a_gait_in_the_order_of_the_names(scenario, oscillators):
 def test_names_follow_the_listing(scenario):
     names = ParameterSpace.of(scenario).names
     # w1 to w3 act on neuron 1 from neurons 3, 5, 7; w4 on neuron 2 from neuron 4; w7 on 3 from 1.
-    assert names[:4] == (
-        "weight 2->1 extensor",
-        "weight 3->1 extensor",
-        "weight 4->1 extensor",
-        "weight 2->1 flexor",
-    )
-    assert names[6] == "weight 1->2 extensor"
+    assert names[:3] == tuple(f"weight {other}->1 extensor" for other in (2, 3, 4))
+    assert (names[3], names[6]) == ("weight 2->1 flexor", "weight 1->2 extensor")
     assert names[-2:] == ("tau_A", "tau_B")
 
 

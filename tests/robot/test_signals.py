@@ -6,44 +6,44 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.signals import raw_output, save_signals, signal_samples
 from tetra_drake.systems import MatsuokaCpg
 
-GAITS = ["gait_a", "gait_b", "single_oscillators"]
+
+@pytest.fixture(params=["gait_a", "gait_b", "single_oscillators"])
+def listing(request, scenario, data) -> tuple[Gait, np.ndarray, np.ndarray]:
+    """A gait, and of its output by the listing the numbers of some steps and their rows."""
+    table = np.loadtxt(data / f"cpg_{request.param}.csv", delimiter=",", skiprows=1)
+    steps = np.round(table[:, 0] / 0.5e-3).astype(int)
+    return load_gait(data / f"{request.param}.json", scenario), steps, table[:, 1:]
 
 
-def reference_output(data: Path, name: str) -> tuple[np.ndarray, np.ndarray]:
-    table = np.loadtxt(data / f"cpg_{name}.csv", delimiter=",", skiprows=1)
-    return np.round(table[:, 0] / 0.5e-3).astype(int), table[:, 1:]
+@pytest.fixture
+def gait(scenario, data) -> Gait:
+    return load_gait(data / "gait_b.json", scenario)
 
 
-@pytest.mark.parametrize("name", GAITS)
-def test_stepped_as_the_listing_steps_it_gives_the_listings_output(scenario, data, name):
-    rows, reference = reference_output(data, name)
-    gait = load_gait(data / f"{name}.json", scenario)
+def test_stepped_as_the_listing_steps_it_gives_the_listings_output(scenario, listing):
+    gait, steps, reference = listing
     output = raw_output(scenario, gait)
     assert output.shape == (30_000, 4)
-    np.testing.assert_allclose(output[rows], reference, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(output[steps], reference, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", GAITS)
-def test_the_converged_network_stays_within_the_listings_own_error(scenario, data, name):
+def test_the_converged_network_stays_within_the_listings_own_error(scenario, listing):
     # Euler's error reaches 1.4e-2 by 15 s on gait_a. The listing stamps a state one step early.
-    rows, reference = reference_output(data, name)
+    gait, steps, reference = listing
     scenario.cpg.signals = "recorded"
-    gait = load_gait(data / f"{name}.json", scenario)
-    output = raw_output(scenario, gait)
-    error = np.abs(output[rows + 1] - reference).max(axis=1)
-    assert error[rows * 0.5e-3 <= 3.0].max() < 2e-3
+    error = np.abs(raw_output(scenario, gait)[steps + 1] - reference).max(axis=1)
+    assert error[steps * 0.5e-3 <= 3.0].max() < 2e-3
     assert error.max() < 2e-2
 
 
-def test_the_recorded_network_is_the_live_network(scenario, data):
+def test_the_recorded_network_is_the_live_network(scenario, gait):
     # Drake's error-controlled integration of the same equations; RK4 in steps of 0.5 ms meets a
     # kink of max(0, u) between samples, which costs it up to 1e-5.
     scenario.cpg.signals = "recorded"
-    gait = load_gait(data / "gait_b.json", scenario)
     simulator = Simulator(MatsuokaCpg(scenario.cpg, gait, oscillators=4))
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.01).set_target_accuracy(1e-9)
     samples = signal_samples(scenario, gait)
@@ -70,8 +70,7 @@ def read_csv(path: Path) -> tuple[list[str], np.ndarray]:
     return header.split(","), table
 
 
-def test_the_csv_holds_what_the_cables_are_fed(scenario, data, tmp_path):
-    gait = load_gait(data / "gait_b.json", scenario)
+def test_the_csv_holds_what_the_cables_are_fed(scenario, gait, tmp_path):
     save_signals(tmp_path / "lbf.csv", scenario, gait)
     header, table = read_csv(tmp_path / "lbf.csv")
     assert header == ["time_s", "signal_1", "signal_2", "signal_3", "signal_4"]
@@ -82,8 +81,7 @@ def test_the_csv_holds_what_the_cables_are_fed(scenario, data, tmp_path):
     np.testing.assert_allclose(table[started, 1:], fed[started], atol=1e-10)
 
 
-def test_the_csv_comes_in_other_units_and_rates(scenario, data, tmp_path):
-    gait = load_gait(data / "gait_b.json", scenario)
+def test_the_csv_comes_in_other_units_and_rates(scenario, gait, tmp_path):
     samples = signal_samples(scenario, gait)
     save_signals(tmp_path / "newton.csv", scenario, gait, unit="N", rate=100.0)
     _, newtons = read_csv(tmp_path / "newton.csv")

@@ -91,10 +91,8 @@ def test_mass_and_inertia_are_those_of_six_cylinders_and_four_spheres(structure)
 def test_ten_bodies_welded_together_have_the_inertia_of_the_tetrahedron(structure):
     # As the thesis built it (appendix C.2): every part is welded to the first strut.
     parts = [(f"strut{s}", strut_inertia(structure, s), strut_pose(structure, s)) for s in STRUTS]
-    parts += [
-        (f"node{i}", node_inertia(structure), RigidTransform(p_BNi))
-        for i, p_BNi in enumerate(structure.p_BN)
-    ]
+    nodes = zip(NODES, structure.p_BN, strict=True)
+    parts += [(name, node_inertia(structure), RigidTransform(p_BNi)) for name, p_BNi in nodes]
     plant = MultibodyPlant(time_step=0.0)
     bodies = [plant.AddRigidBody(name, inertia) for name, inertia, _ in parts]
     X_BF = parts[0][2]
@@ -108,9 +106,8 @@ def test_ten_bodies_welded_together_have_the_inertia_of_the_tetrahedron(structur
         plant.CreateDefaultContext(), frame_B, [body.index() for body in bodies]
     )
     one = tetrahedron_inertia(structure)
-    I_welded, I_one = (
-        inertia.CalcRotationalInertia().CopyToFullMatrix3() for inertia in (welded, one)
-    )
+    I_welded = welded.CalcRotationalInertia().CopyToFullMatrix3()
+    I_one = one.CalcRotationalInertia().CopyToFullMatrix3()
     assert one.get_mass() == pytest.approx(welded.get_mass(), rel=1e-12)
     assert welded.get_com() == pytest.approx(one.get_com(), abs=1e-12 * 6 * IN)
     assert I_one == pytest.approx(I_welded, rel=1e-12, abs=1e-12 * I_welded[0, 0])
@@ -153,11 +150,8 @@ def test_each_junction_has_three_outer_and_three_inner_cables_named_by_their_end
 
 
 def test_signal_i_drives_the_two_bottom_outer_cables_of_junction_i(row):
-    driven = {
-        name: int(cable["signal"])
-        for name, cable in zip(row.cable_names, row.cables, strict=True)
-        if cable["signal"] != PASSIVE
-    }
+    signals = zip(row.cable_names, row.cables["signal"].tolist(), strict=True)
+    driven = {name: signal for name, signal in signals if signal != PASSIVE}
     assert row.signals == len(row.bodies) - 1
     assert driven == {
         f"T{i + 1}-T{i + 2} outer {node}": i
