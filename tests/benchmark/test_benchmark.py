@@ -10,15 +10,7 @@ import pytest
 from tetra_drake.benchmark import measure as benchmark
 from tetra_drake.benchmark import tables
 from tetra_drake.benchmark.measure import CLOSE_IN, Row, error_statistics, measure
-from tetra_drake.benchmark.settings import (
-    SETS,
-    compiled,
-    describe,
-    drake,
-    mujoco,
-    own,
-    settings_of,
-)
+from tetra_drake.benchmark.settings import SETS, compiled, describe, drake, mujoco, own, settings_of
 from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as mujoco_engine
 from tetra_drake.errors import InputError

@@ -39,13 +39,10 @@ def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(short, tetra
     floating = {"robot.tetrahedra": tetrahedra, "robot.gravity": 0.0}
     floating |= {"robot.offsets": [[0.0, 0.0, 1.0]] * tetrahedra}
     fine = {"compiled.tolerance": 1e-6, "compiled.max_step": 0.5e-3, "compiled.look_ahead": 1e-6}
+    fine |= {"simulation.engine": "compiled"}
     ours, coarse, halved = (
         trajectory_of(short.with_changes(floating | changes))
-        for changes in (
-            {"simulation.engine": "compiled", **fine},
-            {"mujoco.step": 4e-5},
-            {"mujoco.step": 2e-5},
-        )
+        for changes in (fine, {"mujoco.step": 4e-5}, {"mujoco.step": 2e-5})
     )
     limit = 2.0 * halved - coarse
     assert np.ptp(ours["q_WB"].sel(quaternion="y").values) > 0.01
@@ -56,9 +53,7 @@ def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(short, tetra
 
 
 @needs_mujoco
-def test_rests_with_its_weight_on_the_ground_in_the_pose_of_other_engines(
-    scenario, structure, data
-):
+def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, structure, data):
     times = {"simulation.duration": 1.2, "simulation.steady_from": 1.0}
     resting = scenario.with_changes({"simulation.engine": "mujoco", **times})
     end = trajectory_of(resting).isel(time=-1)
