@@ -55,12 +55,9 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, tetrahedra, seed, durati
 
 def trajectories_on_both(scenario: Scenario, seed: int = WALKING_SEED) -> list[xarray.Dataset]:
     """Of a seeded gait on the compiled engine and on the diagram."""
-    gait = seeded_gait(scenario, seed)
-    found = []
-    for engine in ("compiled", "drake"):
-        on_engine = scenario.with_changes({"simulation.engine": engine})
-        found.append(simulate(scenario=on_engine, gait=gait, record=True).trajectory)
-    return found
+    gait, engines = seeded_gait(scenario, seed), ("compiled", "drake")
+    both = [scenario.with_changes({"simulation.engine": engine}) for engine in engines]
+    return [simulate(scenario=each, gait=gait, record=True).trajectory for each in both]
 
 
 @pytest.mark.slow
