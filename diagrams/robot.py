@@ -31,7 +31,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import Adder, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from tetra_drake.engines.recorder import Recorder
+from tetra_drake.engines.recorder import Recorder, make_dataset
 from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.bodies import AddTetrahedra
@@ -112,11 +112,11 @@ def main() -> None:
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.001)
     structure = MakeStructure(scenario.robot, scenario.cables)
-    recorder = Recorder(diagram, structure, sample_times(options.duration, 0.01))
+    recorder = Recorder(structure, sample_times(options.duration, 0.01))
     simulator.set_monitor(recorder.after_step)
     simulator.AdvanceTo(options.duration)
 
-    trajectory = recorder.dataset()
+    trajectory = make_dataset(diagram, structure, recorder.samples)
     title = replay_title(gait.name, trajectory)
     save_replay(options.out / "robot.html", scenario=scenario, trajectory=trajectory, title=title)
     print(title)

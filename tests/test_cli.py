@@ -15,7 +15,7 @@ import xarray
 import tetra_drake
 from tetra_drake.cli import main
 from tetra_drake.formatting import fixed
-from tetra_drake.robot.gait import Gait, load_gait, random_gait, save_gait
+from tetra_drake.robot.gait import Gait, load_gait, save_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario
 
 SHORT = """\
@@ -174,7 +174,7 @@ def result(simulated) -> dict:
 
 @pytest.fixture(scope="module")
 def gait_3() -> Gait:
-    return random_gait(load_scenario(), np.random.default_rng(3), name="random gait 3")
+    return seeded_gait(load_scenario(), 3)
 
 
 def test_simulate_writes_its_files_and_prints_the_distance_and_the_page(simulated, result):

@@ -14,8 +14,8 @@ from tetra_drake.robot.gait import (
     Gait,
     ParameterSpace,
     load_gait,
-    random_gait,
     save_gait,
+    seeded_gait,
     weight_count,
 )
 
@@ -145,8 +145,8 @@ def test_a_vector_is_a_gait_in_the_order_of_the_names(scenario, oscillators):
     assert len(space.names) == len(set(space.names)) == len(vector)
     for limits in (space.low, space.high, space.steps, space.floors):
         assert limits.shape == vector.shape
-    gait = space.gait(vector, name="mine")
-    assert gait == random_gait(scenario, np.random.default_rng(7), name="mine")
+    gait = space.gait(vector, name="random gait 7")
+    assert gait == seeded_gait(scenario, 7)
     np.testing.assert_array_equal(space.vector(gait), vector)
 
 

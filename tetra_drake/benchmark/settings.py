@@ -41,18 +41,14 @@ def drake(
 ) -> Changes:
     """The Drake diagram, times in ms. Mode changes are at step ends, or located by a witness
     function to within the time `witness`."""
-    window = {"simulation.witness_window": f"{witness} ms"} if witness else {}
-    return (
-        own("drake")
-        | window
-        | {
-            "simulation.scheme": scheme,
-            "simulation.accuracy": accuracy,
-            "simulation.max_step": f"{max_step} ms",
-            "simulation.look_ahead": f"{look_ahead} ms",
-            "simulation.mode_changes": "witness" if witness else "step_end",
-        }
-    )
+    changes = own("drake") | {
+        "simulation.scheme": scheme,
+        "simulation.accuracy": accuracy,
+        "simulation.max_step": f"{max_step} ms",
+        "simulation.look_ahead": f"{look_ahead} ms",
+        "simulation.mode_changes": "witness" if witness else "step_end",
+    }
+    return changes | ({"simulation.witness_window": f"{witness} ms"} if witness else {})
 
 
 def compiled(tolerance: float, max_step: float, look_ahead: float) -> Changes:

@@ -36,7 +36,7 @@ def simulate_drake(
     integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
     aimer = _StepAimer(diagram, simulator, settings)
     times = sample_times(settings.duration, settings.sample_period)
-    recorder = Recorder(diagram, structure, times)
+    recorder = Recorder(structure, times)
 
     def after_step(context: Context) -> None:
         # What is done here must not depend on whether somebody records or watches.
@@ -76,7 +76,7 @@ def simulate_drake(
             derivative_evaluations=integrator.get_num_derivative_evaluations(),
             jacobian_evaluations=int(dict(integrator.GetStatisticsSummary()).get(for_jacobian, 0)),
         ),
-        trajectory=recorder.dataset() if record else None,
+        trajectory=make_dataset(diagram, structure, recorder.samples) if record else None,
     )
 
 

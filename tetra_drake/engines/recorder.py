@@ -41,23 +41,19 @@ class Recorder:
     forces and lengths for later, so recording cannot change the simulation.
     """
 
-    def __init__(self, diagram: Diagram, structure: Structure, times: np.ndarray) -> None:
-        self._diagram, self._structure, self._times = diagram, structure, times
-        self._samples: list[Sample] = []
+    def __init__(self, structure: Structure, times: np.ndarray) -> None:
+        self._structure, self._times = structure, times
+        self.samples: list[Sample] = []
         self._latest: Sample | None = None
 
     def after_step(self, context: Context) -> None:
         """Takes the samples that are due in the step that ends here."""
         after = Sample.of(context)
         before, self._latest = self._latest or after, after
-        for time in self._times[len(self._samples) :]:
+        for time in self._times[len(self.samples) :]:
             if time > after.time:
                 return
-            self._samples.append(self._between(before, after, float(time)))
-
-    def dataset(self) -> xarray.Dataset:
-        """The samples with all that the diagram's output ports say of them."""
-        return make_dataset(self._diagram, self._structure, self._samples)
+            self.samples.append(self._between(before, after, float(time)))
 
     def _between(self, before: Sample, after: Sample, time: float) -> Sample:
         """The sample at a time (s) of a step, with the discrete state of its end."""

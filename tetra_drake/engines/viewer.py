@@ -15,4 +15,4 @@ class Viewer(Protocol):
         """Whether to be shown the state at this time (s)."""
 
     def show(self, frame: xarray.Dataset) -> None:
-        """Takes one sample of a trajectory (see trajectory.make_dataset)."""
+        """Takes one sample of a trajectory (see results.trajectory.assemble_dataset)."""

@@ -169,6 +169,7 @@ def run_trials(
     """
     scenario, seed = record.manifest.scenario, record.manifest.seed
     space = ParameterSpace.of(scenario)
+    seeds = np.random.SeedSequence(seed).spawn(scenario.evolution.trials)
     trials = [
         Trial(
             number,
@@ -177,9 +178,7 @@ def run_trials(
             optimizer=optimizer(space, scenario.evolution, np.random.default_rng(own_seed)),
             folder=trial_folder(record.directory, number),
         )
-        for number, own_seed in enumerate(
-            np.random.SeedSequence(seed).spawn(scenario.evolution.trials)
-        )
+        for number, own_seed in enumerate(seeds)
     ]
     statuses = [trial.status for trial in trials]
     show(statuses)

@@ -167,7 +167,7 @@ def time_to_mode_change(
 ) -> float:
     """Time (s) to the next mode change, at most `horizon`, at constant node accelerations.
 
-    `acceleration` is dv/dt, 6 numbers a body, and `nodes` that of `state`; the other arguments
+    `acceleration` is dv/dt, 6 numbers per body, and `nodes` that of `state`; the other arguments
     are those of `add_ground_forces`.
     """
     time = horizon

@@ -18,8 +18,8 @@ run body by body."""
 def move_nodes(state: Array, p_BN: Array) -> Array:
     """The `nodes`, fixed to the bodies, without forces.
 
-    `state` is [q; v] of the bodies, 13 numbers a body; `p_BN`, (nodes a body, 3) in m, is the same
-    for every body.
+    `state` is [q; v] of the bodies, 13 numbers per body; `p_BN`, (nodes per body, 3) in m, is
+    the same for every body.
     """
     bodies = state.size // 13
     per_body = p_BN.shape[0]
@@ -55,7 +55,7 @@ def move_nodes(state: Array, p_BN: Array) -> Array:
 def node_acceleration(
     state: Array, acceleration: Array, nodes: Array, node: int
 ) -> tuple[float, float, float]:
-    """Acceleration (m/s²) of a node in World from dv/dt of the bodies, 6 numbers a body."""
+    """Acceleration (m/s²) of a node in World from dv/dt of the bodies, 6 numbers per body."""
     bodies = state.size // 13
     body = node // (nodes.shape[0] // bodies)
     v = 7 * bodies + 6 * body

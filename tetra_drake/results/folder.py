@@ -39,7 +39,7 @@ class Recording:
     scenario: Scenario
     gait: Gait
     trajectory: xarray.Dataset
-    """See trajectory.assemble_dataset."""
+    """See results.trajectory.assemble_dataset."""
 
 
 def check_result_folder(folder: Path) -> None:
@@ -90,18 +90,13 @@ def load_result_folder(folder: Path) -> Recording:
 
 
 def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
+    """The trajectory in a file; InputError unless it holds the motion of this robot."""
     import xarray
 
     try:
         trajectory = xarray.load_dataset(path, engine="h5netcdf")
     except Exception as error:  # what HDF5 raises for damaged files has no common ancestor
         raise InputError(path, "", f"cannot be read as netCDF: {error}") from error
-    _check_trajectory(path, trajectory, structure)
-    return trajectory
-
-
-def _check_trajectory(path: Path, trajectory: xarray.Dataset, structure: Structure) -> None:
-    """Raises InputError unless the file holds the motion of this robot."""
     contacts = [structure.node_names[node] for node in structure.contacts]
     labels = {"tetrahedron": structure.bodies, "cable": structure.cable_names, "contact": contacts}
     for name, expected in labels.items():
@@ -115,3 +110,4 @@ def _check_trajectory(path: Path, trajectory: xarray.Dataset, structure: Structu
             raise InputError(path, name, "is empty, or holds numbers that are not finite")
     if not (np.diff(trajectory["time"].values) > 0.0).all():
         raise InputError(path, "time", "does not ascend")
+    return trajectory

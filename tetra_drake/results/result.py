@@ -54,7 +54,7 @@ class SimulationResult:
     engine: str
     """That of the scenario."""
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
-    """See trajectory.make_dataset; None unless asked for."""
+    """See results.trajectory.assemble_dataset; None unless asked for."""
 
 
 def make_result(

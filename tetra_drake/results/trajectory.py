@@ -43,12 +43,15 @@ def assemble_dataset(
     import xarray
 
     bodies, contacts = len(structure.bodies), len(structure.contacts)
-    modes = modes.reshape(-1, contacts, 3)
+    modes = modes.reshape(-1, contacts, 3).astype(np.int8)
     friction = friction_forces.reshape(-1, contacts, 2)
     positions = np.array([node_positions(structure, state) for state in states])
     velocities = np.array([node_velocities(structure, state) for state in states])
     q = states[:, : 7 * bodies].reshape(-1, bodies, 7)
     junctions = [f"{a}-{b}" for a, b in itertools.pairwise(structure.bodies)]
+    driving = ["" if i == PASSIVE else junctions[i] for i in structure.cables["signal"]]
+    slip = "0 sticks, +1 or -1 slips in that direction"
+    horizontal = ("time", "contact", "horizontal")
     node_dims = ("time", "tetrahedron", "node", "axis")
     node_shape = (-1, bodies, len(NODES), 3)
     variables = {
@@ -60,14 +63,9 @@ def assemble_dataset(
         "length": (("time", "cable"), lengths, "m", "cable length"),
         "signal": (("time", "junction"), signals, "N", "actuation signal"),
         "normal_force": (("time", "contact"), normal_forces, "N", "upward force"),
-        "friction_force": (("time", "contact", "horizontal"), friction, "N", "friction force"),
-        "in_contact": (("time", "contact"), modes[..., 0].astype(np.int8), "1", "1 on the ground"),
-        "friction_mode": (
-            ("time", "contact", "horizontal"),
-            modes[..., 1:].astype(np.int8),
-            "1",
-            "0 sticks, +1 or -1 slips in that direction",
-        ),
+        "friction_force": (horizontal, friction, "N", "friction force"),
+        "in_contact": (("time", "contact"), modes[..., 0], "1", "1 on the ground"),
+        "friction_mode": (horizontal, modes[..., 1:], "1", slip),
     }
     names = np.array(structure.node_names)
     return xarray.Dataset(
@@ -83,10 +81,7 @@ def assemble_dataset(
             "contact": names[structure.contacts].tolist(),
             "cable_junction": ("cable", [name.split()[0] for name in structure.cable_names]),
             "cable_role": ("cable", [name.split()[1] for name in structure.cable_names]),
-            "cable_signal": (
-                "cable",
-                ["" if i == PASSIVE else junctions[i] for i in structure.cables["signal"]],
-            ),
+            "cable_signal": ("cable", driving),
             "junction": junctions,
             "axis": ["x", "y", "z"],
             "horizontal": ["x", "y"],

@@ -42,15 +42,10 @@ class Gait:
 
     def to_json(self) -> dict[str, Any]:
         """The content of a gait file."""
-        gait: dict[str, Any] = {
-            "schema": SCHEMA,
-            "name": self.name,
-            "weights": list(self.weights),
-            "tau_a_s": self.tau_a,
-        }
-        if self.tau_b != TAU_B_PER_TAU_A * self.tau_a:
-            gait["tau_b_s"] = self.tau_b
-        return gait
+        taus = {"tau_a_s": self.tau_a, "tau_b_s": self.tau_b}
+        if self.tau_b == TAU_B_PER_TAU_A * self.tau_a:
+            del taus["tau_b_s"]
+        return {"schema": SCHEMA, "name": self.name, "weights": list(self.weights), **taus}
 
 
 @dataclass(frozen=True)
@@ -127,19 +122,14 @@ def _weight_names(oscillators: int) -> list[str]:
     ]
 
 
-def random_gait(scenario: Scenario, generator: np.random.Generator, *, name: str) -> Gait:
-    """A gait drawn uniformly from the scenario's bounds (Table 5)."""
-    space = ParameterSpace.of(scenario)
-    return space.gait(space.random(generator), name=name)
-
-
 WALKING_SEED = 80
 """Seed of a random gait that walks forward on the thesis's scenario: the default gait."""
 
 
 def seeded_gait(scenario: Scenario, seed: int = WALKING_SEED) -> Gait:
-    """The random gait of a seed."""
-    return random_gait(scenario, np.random.default_rng(seed), name=f"random gait {seed}")
+    """The random gait of a seed, drawn uniformly from the scenario's bounds (Table 5)."""
+    space = ParameterSpace.of(scenario)
+    return space.gait(space.random(np.random.default_rng(seed)), name=f"random gait {seed}")
 
 
 def save_gait(gait: Gait, path: str | Path) -> None:

@@ -20,7 +20,7 @@ class Model(NamedTuple):
     """A structure and the constants of its laws; SI units."""
 
     p_BN: Array
-    """(nodes a body, 3)."""
+    """(nodes per body, 3)."""
     cables: Array
     """(cables,) of dtype CABLE, each from a body to the next."""
     contacts: Array
@@ -71,10 +71,9 @@ def ground_law(ground: GroundScenario, friction: FrictionScenario) -> np.ndarray
 
 def make_network(cpg: CpgScenario, gait: Gait, *, oscillators: int) -> Network:
     """The network of a gait."""
+    weights, partner = np.array(gait.weights), cpg.partner_weight
     return Network(
-        inhibition=inhibition_matrix(
-            np.array(gait.weights), oscillators=oscillators, partner_weight=cpg.partner_weight
-        ),
+        inhibition=inhibition_matrix(weights, oscillators=oscillators, partner_weight=partner),
         tau_a=gait.tau_a,
         tau_b=gait.tau_b,
         self_inhibition_weight=cpg.self_inhibition_weight,

@@ -44,7 +44,7 @@ class Structure:
 
     @property
     def signals(self) -> int:
-        """Actuation signals: one a junction."""
+        """Actuation signals: one per junction."""
         return len(self.bodies) - 1
 
     @property
@@ -71,14 +71,9 @@ def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
     edge = robot.strut_length
     circumradius = edge / math.sqrt(3.0)
     height = edge * math.sqrt(2.0 / 3.0)
-    p_BN = np.array(
-        [
-            [-height / 4, edge / 2, -circumradius / 2],
-            [-height / 4, -edge / 2, -circumradius / 2],
-            [-height / 4, 0.0, circumradius],
-            [3 * height / 4, 0.0, 0.0],
-        ]
-    )
+    x, z = -height / 4, -circumradius / 2
+    base = [[x, edge / 2, z], [x, -edge / 2, z], [x, 0.0, circumradius]]
+    p_BN = np.array([*base, [3 * height / 4, 0.0, 0.0]])
     bodies = tuple(f"T{i + 1}" for i in range(n))
     p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
     if robot.offsets:

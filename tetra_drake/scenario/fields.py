@@ -174,9 +174,8 @@ def tree_of(node: Any, show: Show | None = None, *, sparse: bool = False) -> Tre
 def _tree(kind: Any, value: Any, unit: str | None, show: Show | None, sparse: bool) -> Any:
     kind, *others = _kinds(kind)
     if dataclasses.is_dataclass(value):
-        return ({TAG: f"!{type(value).__name__}"} if others else {}) | tree_of(
-            value, show, sparse=sparse
-        )
+        tag = {TAG: f"!{type(value).__name__}"} if others else {}
+        return tag | tree_of(value, show, sparse=sparse)
     if isinstance(value, list):
         return [_tree(typing.get_args(kind)[0], v, unit, show, sparse) for v in value]
     if isinstance(value, dict):

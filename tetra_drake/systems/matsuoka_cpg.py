@@ -12,7 +12,7 @@ from tetra_drake.scenario.schema import CpgScenario
 
 
 class MatsuokaCpg(LeafSystem):
-    """A network of n Matsuoka oscillators (thesis Eq. 7-9), one a gait.
+    """The network of n Matsuoka oscillators (thesis Eq. 7-9) of one gait.
 
     | port     | shape | unit | meaning                                                      |
     |----------|-------|------|--------------------------------------------------------------|

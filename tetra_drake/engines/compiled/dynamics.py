@@ -1,6 +1,6 @@
 """The equations of nodes: free rigid bodies under the forces of cables, ground and gravity.
 
-Vectors over bodies hold 6 numbers a body, rotation before translation, in World.
+Vectors over bodies hold 6 numbers per body, rotation before translation, in World.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def move_bodies(state: Array, velocities: Array, time: float) -> Array:
     moved = state.copy()
     for body in range(state.size // 13):
         q, v = 7 * body, BLOCK * body
-        # The rotation's quaternion, to fourth order in its angle (some thousandths a step).
+        # The rotation's quaternion, to fourth order in its angle (some thousandths per step).
         half = 0.5 * time
         x, y, z = half * velocities[v], half * velocities[v + 1], half * velocities[v + 2]
         square = x * x + y * y + z * z

@@ -35,8 +35,6 @@ from tetra_drake.scenario.schema import Scenario
 if TYPE_CHECKING:
     import xarray
 
-SCHEME = "ros2"
-
 
 def simulate_compiled(*, scenario: Scenario, gait: Gait, record: bool) -> SimulationResult:
     """Simulates a gait as simulate() does, without Drake. Other threads run meanwhile."""
@@ -64,7 +62,7 @@ def simulate_compiled(*, scenario: Scenario, gait: Gait, record: bool) -> Simula
         structure,
         states=samples.states[np.searchsorted(instants, ends)],
         wall_time=wall_time,
-        integrator=IntegratorWork(SCHEME, scenario.compiled.tolerance, steps, evaluations),
+        integrator=IntegratorWork("ros2", scenario.compiled.tolerance, steps, evaluations),
         trajectory=trajectory,
     )
 

@@ -68,16 +68,12 @@ class SteadyState:
 
     def _breed(self) -> list[Vector]:
         settings, generator, space = self._settings, self._generator, self._space
-        first, second = (
+        chosen = (
             select_parent(self._fitnesses, tournament=settings.tournament, generator=generator)
             for _ in range(2)
         )
-        crossed = cross_over(
-            self._population[first],
-            self._population[second],
-            probability=settings.crossover_probability,
-            generator=generator,
-        )
+        parents, probability = [self._population[i] for i in chosen], settings.crossover_probability
+        crossed = cross_over(*parents, probability=probability, generator=generator)
         mutation = draw_mutation(
             space.steps, probability=settings.mutation_probability, generator=generator
         )
@@ -95,12 +91,8 @@ class SteadyState:
         settings = self._settings
         if len(self._means) - 1 >= settings.max_iterations:
             return "all iterations done"
-        levelled_off = has_levelled_off(
-            self._means,
-            rise=settings.stop_rise,
-            window=settings.stop_window,
-            after=settings.stop_after,
-        )
+        rise, window, after = settings.stop_rise, settings.stop_window, settings.stop_after
+        levelled_off = has_levelled_off(self._means, rise=rise, window=window, after=after)
         return "mean fitness levelled off" if levelled_off else None
 
 
