@@ -90,7 +90,8 @@ def test_twenty_kills_leave_no_trace(tmp_path, uninterrupted, executor, longest)
 
 
 def test_a_ctrl_c_ends_the_run_at_once_and_it_can_be_resumed(tmp_path, uninterrupted):
-    status, session = run_and_kill(tmp_path / "run", "processes", after=0.8, sign=signal.SIGINT)
+    interrupted = {"after": 0.8, "sign": signal.SIGINT, "delay": 0.04}
+    status, session = run_and_kill(tmp_path / "run", "processes", **interrupted)
     assert status != 0
     wait_until_gone(session)
     assert run_and_kill(tmp_path / "run", "threads")[0] == 0

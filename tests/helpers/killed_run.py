@@ -1,5 +1,6 @@
 """A small run to be killed, on a cheap fitness: killed_run.py DIRECTORY processes|threads DELAY."""
 
+import signal
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -10,6 +11,7 @@ from tetra_drake.evolution.record import MANIFEST, RunRecord
 from tetra_drake.evolution.trials import run_trials
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in jobs of a script
     directory = Path(sys.argv[1])
     if (directory / MANIFEST).exists():
         opened = RunRecord.resume(directory)
