@@ -1,0 +1,455 @@
+"""Lanes: several simulations side by side in the registers of one core.
+
+A processor's SIMD registers hold several doubles, and one instruction adds, multiplies or compares
+all of them: four with AVX2, eight with AVX-512. The compiler fills them by itself only where it
+finds simple loops, which a robot's equations are not. Here they are filled by hand: what a kernel
+takes for a number is `Lanes(W)`, W doubles that belong to W simulations. An addition of two such
+numbers is one instruction, and W robots move in little more than the time of one.
+
+How numba is taught the type
+    Numba translates a kernel to LLVM, the compiler's own language, where `<8 x double>` is a type
+    like `double`. To numba a type is a Python class (Lanes, Mask, Field) and a model that names its
+    LLVM type. An operator needs two entries: which types it takes and gives (a template), and the
+    instruction to emit (a lowering). LLVM's instructions fadd, fmul, fcmp ... take vectors and
+    doubles alike, so a lowering is one line. If the processor's registers are narrower than W, LLVM
+    splits an instruction in two or more; the numbers are the same. (What changes the last digit is
+    whether a processor can multiply and add in one rounding, for single numbers as for lanes.)
+
+What a kernel must not do
+    Comparing lanes gives a `Mask(W)`, W truth values, and `if` cannot go two ways at once: numba
+    refuses `if mask`, and `and`, `or`, `not`, `a < b < c` of lanes. So laws are written without
+    branches, with & | ~ and parentheses: `select(mask, x, y)` computes both and picks lane by lane,
+    and `minimum` and `maximum` are made of it. An `if any_lane(mask)` may skip work that no lane
+    needs. A lane that is not picked may compute nonsense (a division by zero, say): no other lane
+    sees it. Lanes may stand in variables, tuples and fields, not in lists.
+
+The same kernel for one simulation
+    `select`, `any_lane` and the others take plain floats and booleans as well, and arrays are
+    indexed alike: so the kernels that a LeafSystem calls with NumPy arrays are those that run in
+    lanes. In the type hints, Real is a float or Lanes, Truth a bool or Mask, and Table an
+    array or Field. A field of one lane holds float64, LLVM's double: there is no Lanes(1).
+
+Arrays of lanes
+    A `Field` is to a kernel what an array is: `field[i, j]` is a number, here Lanes(W). Made in
+    Python by `lane_table`, it lies in memory as (..., W), the lanes of a number side by side. All
+    lengths but the first are part of its type, so that the compiler knows the strides, and there
+    is no reference count to maintain. Indices are not checked: -1 is the memory before the field.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.imputils import lower_builtin, lower_cast
+from numba.core.typeconv import Conversion
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import (
+    NativeValue,
+    intrinsic,
+    models,
+    overload,
+    overload_attribute,
+    register_model,
+    typeof_impl,
+    unbox,
+)
+
+Real: TypeAlias = float
+Truth: TypeAlias = bool
+Table: TypeAlias = Any
+
+_intrinsic: Callable[..., Any] = intrinsic
+
+_DOUBLE, _BIT, _INT, _INT32 = ir.DoubleType(), ir.IntType(1), ir.IntType(64), ir.IntType(32)
+_ALIGNMENT = 64  # bytes of the widest register
+
+
+# The types and their LLVM types.
+
+
+class Lanes(types.Type):
+    """`width` doubles."""
+
+    element: Any = _DOUBLE
+    scalar: Any = types.float64
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"{type(self).__name__}({width})")
+
+    def accepts(self, other: types.Type) -> bool:
+        """Whether a scalar of this type stands for the same value in every lane."""
+        return isinstance(other, (types.Float, types.Integer))
+
+    def can_convert_from(self, context: Any, other: types.Type) -> Conversion | None:
+        """Lets numba cast scalars; a variable that is a scalar here and lanes there is lanes."""
+        return Conversion.safe if self.accepts(other) else None
+
+
+class Mask(Lanes):
+    """`width` truth values."""
+
+    element: Any = _BIT
+    scalar: Any = types.boolean
+
+    def accepts(self, other: types.Type) -> bool:
+        """Whether a scalar of this type stands for the same value in every lane."""
+        return isinstance(other, types.Boolean)
+
+
+@register_model(Lanes)
+@register_model(Mask)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Lanes) -> None:
+        super().__init__(manager, kind, ir.VectorType(kind.element, kind.width))
+
+
+@lower_cast(types.Number, Lanes)
+@lower_cast(types.Boolean, Mask)
+def _to_all_lanes(context: Any, builder: Any, of: Any, to: Lanes, value: Any) -> Any:
+    value = context.cast(builder, value, of, to.scalar)
+    vector = ir.VectorType(to.element, to.width)
+    # Puts the scalar in lane 0 of a vector, then copies lane 0 to all.
+    undefined, first = ir.Constant(vector, ir.Undefined), ir.Constant(_INT32, 0)
+    every = ir.Constant(ir.VectorType(_INT32, to.width), [0] * to.width)
+    return builder.shuffle_vector(builder.insert_element(undefined, value, first), undefined, every)
+
+
+# Operators: `emit` gives the LLVM instruction for operands of vector type.
+
+
+def _operator(
+    names: Sequence[str], emit: Callable[..., Any], *, over: type = Lanes, to: type = Lanes
+) -> None:
+    for name in names:
+        _register(getattr(operator, name), emit, over, to)
+
+
+def _register(function: Any, emit: Callable[..., Any], over: type, to: type) -> None:
+    def generic(self: Any, args: tuple[Any, ...], kws: Any) -> Any:
+        own: Any = next((a for a in args if type(a) is over), None)
+        if own is None or not all(a == own or own.accepts(a) for a in args):
+            return None
+        return signature(to(own.width), *[own] * len(args))
+
+    template = type(f"_{function.__name__}", (AbstractTemplate,), {"generic": generic})
+    infer_global(function)(template)
+    count = 1 if function in (operator.neg, operator.invert) else 2
+    lower_builtin(function, *[over] * count)(lambda c, builder, s, args: emit(builder, *args))
+
+
+# Numba types x += y by the in-place name, and then adds.
+_operator(["add", "iadd"], lambda b, x, y: b.fadd(x, y))
+_operator(["sub", "isub"], lambda b, x, y: b.fsub(x, y))
+_operator(["mul", "imul"], lambda b, x, y: b.fmul(x, y))
+_operator(["truediv", "itruediv"], lambda b, x, y: b.fdiv(x, y))
+_operator(["neg"], lambda b, x: b.fneg(x))
+# Ordered comparisons are false where either is NaN; != is true there.
+_operator(["lt"], lambda b, x, y: b.fcmp_ordered("<", x, y), to=Mask)
+_operator(["le"], lambda b, x, y: b.fcmp_ordered("<=", x, y), to=Mask)
+_operator(["gt"], lambda b, x, y: b.fcmp_ordered(">", x, y), to=Mask)
+_operator(["ge"], lambda b, x, y: b.fcmp_ordered(">=", x, y), to=Mask)
+_operator(["eq"], lambda b, x, y: b.fcmp_ordered("==", x, y), to=Mask)
+_operator(["ne"], lambda b, x, y: b.fcmp_unordered("!=", x, y), to=Mask)
+_operator(["and_", "iand"], lambda b, x, y: b.and_(x, y), over=Mask, to=Mask)
+_operator(["or_", "ior"], lambda b, x, y: b.or_(x, y), over=Mask, to=Mask)
+_operator(["xor", "ixor"], lambda b, x, y: b.xor(x, y), over=Mask, to=Mask)
+_operator(["invert"], lambda b, x: b.not_(x), over=Mask, to=Mask)
+
+
+# Functions. Each is Python for floats; numba compiles the overload.
+
+
+def _call(builder: Any, name: str, x: Any) -> Any:
+    """A call of an LLVM function of one number or vector, such as llvm.sqrt.v8f64."""
+    vector = isinstance(x.type, ir.VectorType)
+    bits = 32 if (x.type.element if vector else x.type) == ir.FloatType() else 64
+    suffix = f"v{x.type.count}f{bits}" if vector else f"f{bits}"
+    kind = ir.FunctionType(x.type, [x.type])
+    return builder.call(
+        cgutils.get_or_insert_function(builder.module, kind, f"{name}.{suffix}"), [x]
+    )
+
+
+@_intrinsic
+def _sqrt(context: Any, x: types.Type) -> Any:
+    return signature(x, x), lambda c, builder, s, args: _call(builder, "llvm.sqrt", *args)
+
+
+@_intrinsic
+def _abs(context: Any, x: types.Type) -> Any:
+    return signature(x, x), lambda c, builder, s, args: _call(builder, "llvm.fabs", *args)
+
+
+overload(math.sqrt)(lambda x: (lambda x: _sqrt(x)) if isinstance(x, Lanes) else None)
+
+
+overload(abs)(lambda x: (lambda x: _abs(x)) if isinstance(x, Lanes) else None)
+
+
+def select(mask: Truth, x: Real, y: Real) -> Real:
+    """x where the mask is true, y elsewhere."""
+    return x if mask else y
+
+
+@_intrinsic
+def _select(context: Any, mask: types.Type, x: types.Type, y: types.Type) -> Any:
+    if not isinstance(mask, (Mask, types.Boolean)):
+        return None
+    kind = Lanes(mask.width) if isinstance(mask, Mask) else types.float64
+    return signature(kind, mask, kind, kind), lambda c, builder, s, args: builder.select(*args)
+
+
+overload(select)(lambda mask, x, y: lambda mask, x, y: _select(mask, x, y))
+
+
+def minimum(x: Real, y: Real) -> Real:
+    """The smaller; y where they are equal or either is NaN."""
+    return x if x < y else y
+
+
+overload(minimum)(lambda x, y: lambda x, y: select(x < y, x, y))
+
+
+def maximum(x: Real, y: Real) -> Real:
+    """The larger; y where they are equal or either is NaN."""
+    return x if x > y else y
+
+
+overload(maximum)(lambda x, y: lambda x, y: select(x > y, x, y))
+
+
+def inverse_sqrt(x: Real) -> Real:
+    """1 / sqrt(x) to within 2 units in the last place, for x from 1e-37 to 1e38; 0 above 3.4e38,
+    NaN for 0, negatives and infinity.
+
+    Division and square root of doubles are slow. This is those of singles, made exact by two steps
+    of Newton's method, in a third of the time.
+    """
+    return 1.0 / math.sqrt(x)
+
+
+@_intrinsic
+def _inverse_sqrt_in_single(context: Any, x: types.Type) -> Any:
+    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
+        single: Any = ir.FloatType()
+        one: Any = 1.0
+        if isinstance(x, Lanes):
+            single, one = ir.VectorType(single, x.width), [1.0] * x.width
+        root = _call(builder, "llvm.sqrt", builder.fptrunc(args[0], single))
+        return builder.fpext(builder.fdiv(ir.Constant(single, one), root), args[0].type)
+
+    return signature(x, x), emit
+
+
+@overload(inverse_sqrt)
+def _overload_inverse_sqrt(x):  # type: ignore[no-untyped-def]
+    def newton(x):  # type: ignore[no-untyped-def]
+        y = _inverse_sqrt_in_single(x)
+        half = 0.5 * x
+        y += y * (0.5 - half * y * y)
+        y += y * (0.5 - half * y * y)
+        return y
+
+    return newton
+
+
+def any_lane(mask: Truth) -> bool:
+    """Whether the mask is true in any lane."""
+    return mask
+
+
+@_intrinsic
+def _any(context: Any, mask: Mask) -> Any:
+    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
+        bits = builder.bitcast(args[0], ir.IntType(mask.width))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+    return signature(types.boolean, mask), emit
+
+
+overload(any_lane)(
+    lambda mask: (lambda mask: _any(mask)) if isinstance(mask, Mask) else (lambda mask: mask)
+)
+
+
+# Fields: a pointer and the lengths of all dimensions, of which the type may know some.
+
+
+class Field(types.Type):
+    """An array of numbers of the numba type `number`.
+
+    `lengths` are those of its dimensions; None where the type does not know it.
+    """
+
+    def __init__(self, number: types.Type, lengths: tuple[int | None, ...]) -> None:
+        self.number, self.lengths = number, lengths
+        super().__init__(name=f"Field({number}, {lengths})")
+
+
+class FieldArray:
+    """A contiguous array that kernels see as a Field, the last axis the `width` lanes, if given.
+
+    Its numbers are float64, or int64 without lanes. The type knows all lengths but the first, or,
+    with `any_size`, none. Raises ValueError for an array that is not like this.
+    """
+
+    def __init__(
+        self, array: np.ndarray, width: int | None = None, *, any_size: bool = False
+    ) -> None:
+        proper = array.dtype == np.float64 or (width is None and array.dtype == np.int64)
+        if not (proper and array.flags.c_contiguous and width in (None, array.shape[-1])):
+            raise ValueError(f"no field: {array.dtype}, {array.shape}, {array.strides}, {width=}")
+        self.array, self.address = array, array.ctypes.data
+        self.shape = array.shape if width is None else array.shape[:-1]
+        number = _number(array, width)
+        known = [None] * len(self.shape) if any_size else [None, *self.shape[1:]]
+        self.kind = Field(number, tuple(known))
+
+
+def _number(array: np.ndarray, width: int | None) -> types.Type:
+    if width is None:
+        return types.int64 if array.dtype == np.int64 else types.float64
+    return types.float64 if width == 1 else Lanes(width)
+
+
+def lane_table(shape: tuple[int, ...], width: int, *, any_size: bool = False) -> FieldArray:
+    """A table of zeros in lanes; its `array` is (*shape, width)."""
+    size = math.prod(shape) * width
+    buffer = np.zeros(size + _ALIGNMENT // 8)
+    first = -buffer.ctypes.data % _ALIGNMENT // 8
+    array = buffer[first : first + size].reshape(*shape, width)
+    return FieldArray(array, width, any_size=any_size)
+
+
+@register_model(Field)
+class _FieldModel(models.StructModel):
+    def __init__(self, manager: Any, kind: Field) -> None:
+        lengths = types.UniTuple(types.intp, len(kind.lengths))
+        members = [("data", types.CPointer(kind.number)), ("lengths", lengths)]
+        super().__init__(manager, kind, members)
+
+
+@typeof_impl.register(FieldArray)
+def _typeof(value: FieldArray, context: Any) -> Field:
+    return value.kind
+
+
+@unbox(Field)
+def _unbox(kind: Field, value: Any, c: Any) -> NativeValue:
+    field = cgutils.create_struct_proxy(kind)(c.context, c.builder)
+    address = c.pyapi.object_getattr_string(value, "address")
+    field.data = c.builder.inttoptr(c.pyapi.long_as_longlong(address), field.data.type)
+    shape = c.pyapi.object_getattr_string(value, "shape")
+    field.lengths = c.pyapi.to_native_value(
+        types.UniTuple(types.intp, len(kind.lengths)), shape
+    ).value
+    c.pyapi.decref(address)
+    c.pyapi.decref(shape)
+    return NativeValue(field._getvalue())
+
+
+def _lengths(context: Any, builder: Any, kind: Field, value: Any) -> list[Any]:
+    field = cgutils.create_struct_proxy(kind)(context, builder, value)
+    found = cgutils.unpack_tuple(builder, field.lengths)
+    known = [n if n is None else ir.Constant(_INT, n) for n in kind.lengths]
+    return [a if b is None else b for a, b in zip(found, known, strict=True)]
+
+
+def _place(context: Any, builder: Any, kind: Field, value: Any, index: Any) -> Any:
+    """The pointer to a number of a field; nsw promises that the arithmetic does not overflow."""
+    indices = [index] if len(kind.lengths) == 1 else cgutils.unpack_tuple(builder, index)
+    lengths = _lengths(context, builder, kind, value)
+    offset = indices[0]
+    for length, i in zip(lengths[1:], indices[1:], strict=True):
+        offset = builder.add(builder.mul(offset, length, flags=("nsw",)), i, flags=("nsw",))
+    field = cgutils.create_struct_proxy(kind)(context, builder, value)
+    return builder.gep(field.data, [offset], inbounds=True)
+
+
+def _index_kind(kind: types.Type, index: Any) -> types.Type | None:
+    """What the index is cast to; None if it is not one for a number of a field."""
+    if not isinstance(kind, Field):
+        return None
+    count, is_tuple = len(kind.lengths), isinstance(index, types.BaseTuple)
+    indices = index.types if is_tuple else [index]
+    if len(indices) != count or is_tuple != (count > 1):
+        return None
+    if not all(isinstance(i, types.Integer) for i in indices):
+        return None
+    return types.UniTuple(types.intp, count) if is_tuple else types.intp
+
+
+@infer_global(operator.getitem)
+class _GetItem(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        index = _index_kind(args[0], args[1])
+        return index and signature(args[0].number, args[0], index)
+
+
+@infer_global(operator.setitem)
+class _SetItem(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        index = _index_kind(args[0], args[1])
+        return index and signature(types.none, args[0], index, args[0].number)
+
+
+# Without align, LLVM takes a vector to lie at a multiple of its size, and crashes elsewhere.
+
+
+@lower_builtin(operator.getitem, Field, types.Any)
+def _lower_getitem(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
+    return builder.load(_place(context, builder, kinds.args[0], *args), align=8)
+
+
+@lower_builtin(operator.setitem, Field, types.Any, types.Any)
+def _lower_setitem(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
+    field, index, number = args
+    builder.store(number, _place(context, builder, kinds.args[0], field, index), align=8)
+    return context.get_dummy_value()
+
+
+@_intrinsic
+def by_lane(context: Any, field: Field) -> Any:
+    """The memory of a field of lanes as a field of floats, (..., W)."""
+    width = field.number.width if isinstance(field.number, Lanes) else 1
+    floats = Field(types.float64, (*field.lengths, width))
+
+    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
+        of = cgutils.create_struct_proxy(field)(c, builder, args[0])
+        to = cgutils.create_struct_proxy(floats)(c, builder)
+        to.data = builder.bitcast(of.data, to.data.type)
+        lengths = [*_lengths(c, builder, field, args[0]), ir.Constant(_INT, width)]
+        to.lengths = c.make_tuple(builder, types.UniTuple(types.intp, len(lengths)), lengths)
+        return to._getvalue()
+
+    return signature(floats, field), emit
+
+
+@_intrinsic
+def _shape(context: Any, field: Field) -> Any:
+    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
+        return c.make_tuple(builder, s.return_type, _lengths(c, builder, field, args[0]))
+
+    return signature(types.UniTuple(types.intp, len(field.lengths)), field), emit
+
+
+overload_attribute(Field, "shape")(lambda field: lambda field: _shape(field))
+
+
+@overload_attribute(Field, "size")
+def _overload_size(field):  # type: ignore[no-untyped-def]
+    def size(field):  # type: ignore[no-untyped-def]
+        count = 1
+        for length in _shape(field):
+            count *= length
+        return count
+
+    return size
