@@ -6,10 +6,10 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.physics.cable import CABLE, PASSIVE, add_cable_forces, cable_tension
-from tetra_drake.physics.kinematics import gather_forces, move_nodes
+from tetra_drake.physics.cable import PULL_COLUMNS, TENSION, add_cable_forces, cable_tension
+from tetra_drake.physics.kinematics import gather_forces
 from tetra_drake.robot.bodies import AddTetrahedra
-from tetra_drake.robot.structure import Structure, node_positions, node_velocities
+from tetra_drake.robot.structure import Structure, moved_nodes, node_positions, node_velocities
 
 
 @pytest.fixture
@@ -22,15 +22,16 @@ def forces_of_cables(
     structure: Structure, state: np.ndarray, *signals: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The generalized force and the tensions."""
-    nodes = move_nodes(state, structure.p_BN)
-    tensions, _ = add_cable_forces(nodes, np.array(signals), structure.cables, False)
-    return gather_forces(nodes, 5), tensions
+    nodes, pulls = moved_nodes(structure, state), np.empty((24, PULL_COLUMNS))
+    force = np.empty(30)
+    add_cable_forces(nodes, np.array(signals), structure.cables, False, True, pulls)
+    gather_forces(nodes, force)
+    return force, pulls[:, TENSION]
 
 
 def test_tension_is_equation_6():
-    cable = np.array([(0, 1, PASSIVE, 35.0, 8.0, 0.1)], dtype=CABLE)[0]
     # 35 N/m (0.3 m - 0.1 m) + 8 N s/m * -0.25 m/s + 1.5 N = 7 - 2 + 1.5
-    assert cable_tension(0.3, -0.25, 1.5, cable, False) == pytest.approx(6.5, rel=1e-15)
+    assert cable_tension(0.3, -0.25, 1.5, 35.0, 8.0, 0.1) == pytest.approx(6.5, rel=1e-15)
 
 
 def test_cables_keep_momentum_and_angular_momentum(structure, state):

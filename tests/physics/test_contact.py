@@ -10,10 +10,10 @@ from pydrake.systems.framework import DiagramBuilder
 
 from tetra_drake.physics.contact import (
     CONTACT,
-    GROUND,
     MODE,
     MODE_COLUMNS,
     STICK_POINT,
+    Ground,
     add_ground_forces,
     first_zero,
     mode_margin,
@@ -22,13 +22,13 @@ from tetra_drake.physics.contact import (
     update_modes,
 )
 from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
-from tetra_drake.physics.kinematics import FORCE, move_nodes
+from tetra_drake.physics.kinematics import FORCE
 from tetra_drake.robot.model import ground_law
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.schema import Scenario
 
 P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0
-LAW = np.array([(4000.0, 2e5, P0, SIGMA_1, A_C, SIGMA_0)], dtype=GROUND)[0]
+LAW = Ground(4000.0, 2e5, P0, SIGMA_1, A_C, SIGMA_0)
 
 
 def test_normal_force_is_equation_1():
@@ -71,7 +71,7 @@ def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection,
     assert next_friction_mode(velocity, deflection, mode, P0) == after
 
 
-class Ground:
+class RobotOnGround:
     """The robot over the ground, and the modes of its contact nodes, at first in the air."""
 
     def __init__(self, structure: Structure, scenario: Scenario) -> None:
@@ -90,7 +90,7 @@ class Ground:
 
     def nodes(self, **change: float) -> np.ndarray:
         """The nodes in that state."""
-        return move_nodes(self.state(**change), self.structure.p_BN)
+        return moved_nodes(self.structure, self.state(**change))
 
     def update(self, **change: float) -> np.ndarray:
         """The modes updated in that state."""
@@ -99,8 +99,8 @@ class Ground:
 
 
 @pytest.fixture
-def ground(structure: Structure, scenario: Scenario) -> Ground:
-    return Ground(structure, scenario)
+def ground(structure: Structure, scenario: Scenario) -> RobotOnGround:
+    return RobotOnGround(structure, scenario)
 
 
 def test_a_node_that_lands_sticks_where_it_lands(ground):
@@ -129,8 +129,9 @@ def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground):
     ground.modes[:, CONTACT] = ground.modes[:, MODE] = 1.0
     modes = ground.update(z=1e-3, v_x=0.1)
     assert not modes[:, : MODE + 2].any()
-    nodes = ground.nodes(z=1e-3, v_x=0.1)
-    assert not add_ground_forces(nodes, modes, *ground.args).any()
+    nodes, pushes = ground.nodes(z=1e-3, v_x=0.1), np.full((len(modes), 3), np.nan)
+    add_ground_forces(nodes, modes, *ground.args, True, pushes)
+    assert not pushes.any()
     assert not nodes[:, FORCE:].any()
 
 
@@ -204,5 +205,6 @@ def test_normal_force_is_drakes_hunt_crossley_point_contact(scenario, depth, rat
     state = np.array([1.0, 0, 0, 0, 0, 0, radius - depth, 0, 0, 0, 0, 0, -rate])
     plant.GetMyMutableContextFromRoot(context).SetContinuousState(state)
     force = mass * diagram.EvalTimeDerivatives(context).CopyToVector()[12]
-    expected = normal_force(depth, rate, ground_law(ground, scenario.friction)[0])
+    law = Ground(*ground_law(ground, scenario.friction)[0].item())
+    expected = normal_force(depth, rate, law)
     assert force == pytest.approx(expected, rel=1e-9, abs=1e-12)

@@ -7,13 +7,24 @@ import numpy as np
 import pytest
 
 from tetra_drake.physics.oscillator import (
+    NEURON_COLUMNS,
+    U_RATE,
+    V_RATE,
     Network,
+    U,
+    V,
     inhibition_matrix,
-    listing_output,
     network_output,
     neuron_rates,
     oscillator_output,
 )
+
+
+def neurons_at(u: list[float] | np.ndarray, v: list[float] | np.ndarray) -> np.ndarray:
+    """The neurons with these states."""
+    neurons = np.zeros((len(u), NEURON_COLUMNS))
+    neurons[:, U], neurons[:, V] = u, v
+    return neurons
 
 
 def test_weights_stand_in_the_listings_order():
@@ -31,12 +42,11 @@ def test_rates_are_those_of_equation_7():
     #   du_e = (-0.4 - 1.5*0   - 2.5*0.1 + 0.5 + 0.05)/0.25 = -0.4
     #   du_f = ( 0.2 - 1.5*0.4 - 2.5*0.3 + 0.5       )/0.25 = -2.6
     #   dv_e = (0.4 - 0.1)/0.5 = 0.6,  dv_f = (0 - 0.3)/0.5 = -0.6
-    u_rate, v_rate = np.empty(2), np.empty(2)
     network = Network(np.array([[0.0, 1.5], [1.5, 0.0]]), 0.25, 0.5, 2.5, 0.5)
-    u, v, feedback = np.array([0.4, -0.2]), np.array([0.1, 0.3]), np.array([0.05, 0.0])
-    neuron_rates(network, u, v, feedback, u_rate, v_rate)
-    np.testing.assert_allclose(u_rate, [-0.4, -2.6], rtol=1e-14)
-    np.testing.assert_allclose(v_rate, [0.6, -0.6], rtol=1e-14)
+    neurons = neurons_at([0.4, -0.2], [0.1, 0.3])
+    neuron_rates(network, np.array([0.05, 0.0]), neurons)
+    np.testing.assert_allclose(neurons[:, U_RATE], [-0.4, -2.6], rtol=1e-14)
+    np.testing.assert_allclose(neurons[:, V_RATE], [0.6, -0.6], rtol=1e-14)
 
 
 def test_the_network_rests_where_all_neurons_agree():
@@ -45,31 +55,28 @@ def test_the_network_rests_where_all_neurons_agree():
     weight, beta, u0 = 2.0, 2.5, 0.5
     r = u0 / (1.0 + 1.5 + 3.0 * weight + beta)
     inhibition = inhibition_matrix(np.full(24, weight), oscillators=4, partner_weight=1.5)
-    u_rate, v_rate = np.empty(8), np.empty(8)
-    u = np.full(8, r)
-    network = Network(inhibition, 0.3, 0.6, beta, u0)
-    neuron_rates(network, u, u, np.zeros(8), u_rate, v_rate)
-    np.testing.assert_allclose([u_rate, v_rate], 0.0, atol=1e-15)
+    neurons = neurons_at(np.full(8, r), np.full(8, r))
+    neuron_rates(Network(inhibition, 0.3, 0.6, beta, u0), np.zeros(8), neurons)
+    np.testing.assert_allclose(neurons[:, [U_RATE, V_RATE]], 0.0, atol=2e-15)
 
 
 def test_output_counts_only_firing_neurons():
     output = np.empty(2)
-    oscillator_output(np.array([0.4, -0.3, -0.1, 0.2]), output)
+    oscillator_output(neurons_at([0.4, -0.3, -0.1, 0.2], np.zeros(4)), output)
     assert output.tolist() == [0.4, -0.2]
 
 
 @pytest.mark.parametrize(
-    ("integrate", "first_row", "order"), [(listing_output, 1, 1), (network_output, 0, 4)]
+    ("listing", "first_row", "order"), [(True, 1, 1), (False, 0, 4)], ids=["listing", "recorded"]
 )
-def test_integrators_have_their_order(integrate, first_row, order):
+def test_integrators_have_their_order(listing, first_row, order):
     # While both neurons of one oscillator fire, Eq. 7 is linear, without kinks. Halving the
     # step then divides the error by 2^order.
     network = Network(np.array([[0.0, 0.4], [0.4, 0.0]]), 0.3, 0.6, 2.5, 0.5)
 
     def output_at_the_end(steps: int) -> float:
-        u, v = np.array([0.3, 0.25]), np.array([0.1, 0.12])
-        output = np.empty((steps + 1 - first_row, 1))
-        integrate(network, u, v, 0.2 / steps, output)
+        neurons, output = neurons_at([0.3, 0.25], [0.1, 0.12]), np.empty((steps + 1 - first_row, 1))
+        network_output(network, np.zeros(2), 0.2 / steps, listing, neurons, output)
         return float(output[-1, 0])
 
     exact = output_at_the_end(4096)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from tetra_drake.physics.oscillator import neuron_rates
+from tetra_drake.physics.oscillator import NEURON_COLUMNS, U_RATE, V_RATE, U, V, neuron_rates
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.model import make_network
 from tetra_drake.scenario.schema import Scenario
@@ -37,13 +37,15 @@ def test_derivatives_are_the_laws_without_feedback_where_none_is_connected(
     scenario, gait, cpg, feedback
 ):
     context = cpg.CreateDefaultContext()
-    state, expected = np.random.default_rng(5).normal(size=16), np.empty(16)
+    state, neurons = np.random.default_rng(5).normal(size=16), np.zeros((8, NEURON_COLUMNS))
     context.SetContinuousState(state)
     if feedback is not None:
         cpg.GetInputPort("feedback").FixValue(context, feedback)
     added = np.zeros(8) if feedback is None else feedback
     network = make_network(scenario.cpg, gait, oscillators=4)
-    neuron_rates(network, state[:8], state[8:], added, expected[:8], expected[8:])
+    neurons[:, U], neurons[:, V] = state[:8], state[8:]
+    neuron_rates(network, added, neurons)
+    expected = np.concatenate([neurons[:, U_RATE], neurons[:, V_RATE]])
     np.testing.assert_array_equal(cpg.EvalTimeDerivatives(context).CopyToVector(), expected)
 
 

@@ -2,63 +2,80 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.kinematics import FORCE, P_WN, V_WN, gather_forces, move_nodes
-
-Array = np.ndarray
+from tetra_drake.physics.lanes import Real, Table, inverse_sqrt, maximum
 
 PASSIVE = -1
 """The `signal` of a cable that no signal drives."""
 
-CABLE = np.dtype(
-    [(name, np.int64) for name in ("node_a", "node_b", "signal")]
-    + [(name, np.float64) for name in ("stiffness", "damping", "free_length")]
-)
-"""One cable: the two nodes it joins, its law in SI, and the signal that drives it."""
+
+class Cables(NamedTuple):
+    """The two nodes each cable joins, the signal that drives it, and its law in SI: (cables,)."""
+
+    node_a: Table
+    node_b: Table
+    signal: Table
+    stiffness: Table
+    damping: Table
+    free_length: Table
+
+
+CABLE = np.dtype([(name, np.int64 if i < 3 else float) for i, name in enumerate(Cables._fields)])
+"""One cable. Kernels take an array of these or Cables, alike."""
+
+DIRECTION, LENGTH, TENSION, PULL_COLUMNS = 0, 3, 4, 5
+"""Columns of `pulls`, (cables, 5): direction from node a to node b in World, length (m), tension
+(N); and their number."""
 
 
 @compiled
-def cable_tension(length: float, rate: float, signal: float, cable: Any, slack: bool) -> float:
+def cable_tension(
+    length: Real, rate: Real, signal: Real, stiffness: Real, damping: Real, free_length: Real
+) -> Real:
     """Tension (N) of a cable of `length` (m) that lengthens at `rate` (m/s).
 
-    Eq. 6, with the actuation `signal` (N) superimposed. With `slack`, never negative.
+    Eq. 6, with the actuation `signal` (N) superimposed.
     """
-    tension = cable.stiffness * (length - cable.free_length) + cable.damping * rate + signal
-    if slack and tension < 0.0:
-        return 0.0
-    return tension
+    return stiffness * (length - free_length) + damping * rate + signal
 
 
 @compiled
-def add_cable_forces(nodes: Array, signals: Array, cables: Array, slack: bool) -> Array:
+def add_cable_forces(
+    nodes: Table, signals: Table, cables: Table, slack: bool, keep: bool, pulls: Table
+) -> None:
     """Adds the forces of all cables to those on the `nodes` of `kinematics`.
 
-    `signals`, (signals,), are in N; `cables` is of dtype CABLE. Returns (2, cables): tensions (N)
-    and lengths (m).
+    `signals`, (signals,), are in N. With `slack`, tensions are never negative. With `keep`, writes
+    `pulls`.
     """
-    found = np.empty((2, cables.size))
-    for i in range(cables.size):
-        cable = cables[i]
-        a = cable.node_a
-        b = cable.node_b
+    for i in range(pulls.shape[0]):
+        a, b, driver = cables.node_a[i], cables.node_b[i], cables.signal[i]
         d_x = nodes[b, P_WN] - nodes[a, P_WN]
         d_y = nodes[b, P_WN + 1] - nodes[a, P_WN + 1]
         d_z = nodes[b, P_WN + 2] - nodes[a, P_WN + 2]
-        length = np.sqrt(d_x * d_x + d_y * d_y + d_z * d_z)
-        d_x /= length
-        d_y /= length
-        d_z /= length
+        square = d_x * d_x + d_y * d_y + d_z * d_z
+        per_length = inverse_sqrt(square)
+        length = square * per_length
+        d_x *= per_length
+        d_y *= per_length
+        d_z *= per_length
         rate = (
             (nodes[b, V_WN] - nodes[a, V_WN]) * d_x
             + (nodes[b, V_WN + 1] - nodes[a, V_WN + 1]) * d_y
             + (nodes[b, V_WN + 2] - nodes[a, V_WN + 2]) * d_z
         )
-        signal = signals[cable.signal] if cable.signal >= 0 else 0.0
-        tension = cable_tension(length, rate, signal, cable, slack)
+        signal = 0.0
+        if driver != PASSIVE:
+            signal = signals[driver]
+        law = cables.stiffness[i], cables.damping[i], cables.free_length[i]
+        tension = cable_tension(length, rate, signal, *law)
+        if slack:
+            tension = maximum(tension, 0.0)
         f_x, f_y, f_z = tension * d_x, tension * d_y, tension * d_z
         nodes[a, FORCE] += f_x
         nodes[a, FORCE + 1] += f_y
@@ -66,15 +83,24 @@ def add_cable_forces(nodes: Array, signals: Array, cables: Array, slack: bool) -
         nodes[b, FORCE] -= f_x
         nodes[b, FORCE + 1] -= f_y
         nodes[b, FORCE + 2] -= f_z
-        found[0, i], found[1, i] = tension, length
-    return found
+        if keep:
+            pulls[i, DIRECTION], pulls[i, DIRECTION + 1], pulls[i, DIRECTION + 2] = d_x, d_y, d_z
+            pulls[i, LENGTH], pulls[i, TENSION] = length, tension
 
 
 @compiled
 def cable_forces(
-    state: Array, signals: Array, p_BN: Array, cables: Array, slack: bool, generalized_force: Array
+    state: Table,
+    signals: Table,
+    p_BN: Table,
+    cables: Table,
+    slack: bool,
+    nodes: Table,
+    pulls: Table,
+    generalized_force: Table,
 ) -> None:
-    """Writes [t_W; f_W] of all cables at each Bo, (6 bodies,), for a state of the bodies."""
-    nodes = move_nodes(state, p_BN)
-    add_cable_forces(nodes, signals, cables, slack)
-    generalized_force[:] = gather_forces(nodes, state.size // 13)
+    """Writes [t_W; f_W] of all cables at each Bo, (6 bodies,), for a state of the bodies; also
+    `nodes` and `pulls`."""
+    move_nodes(state, p_BN, nodes)
+    add_cable_forces(nodes, signals, cables, slack, True, pulls)
+    gather_forces(nodes, generalized_force)

@@ -18,14 +18,20 @@ F = TypeVar("F", bound=Callable[..., object])
 def compiled(function: F, *, nogil: bool = False) -> F:
     """Compiles a kernel, keeping the machine code beside the source or in the user's cache.
 
-    Division follows NumPy (no check for zero). With `nogil`, other threads run meanwhile.
+    Division follows NumPy (no check for zero); a product may be rounded together with the sum it
+    goes into. With `nogil`, other threads run meanwhile; other kernels become part of their
+    callers, since calls with many tables are slow.
+
     Where no folder can hold the cache (say, a read-only installation without a home), the
     kernel is compiled anew each time.
     """
+    compile_ = functools.partial(
+        njit, error_model="numpy", fastmath={"contract"}, nogil=nogil, forceinline=not nogil
+    )
     try:
-        kernel: Any = njit(cache=True, error_model="numpy", nogil=nogil)(function)
+        kernel: Any = compile_(cache=True)(function)
     except RuntimeError:
-        return cast(F, njit(error_model="numpy", nogil=nogil)(function))
+        return cast(F, compile_()(function))
     if not hasattr(kernel, "_cache"):  # compilation is switched off (NUMBA_DISABLE_JIT)
         return cast(F, kernel)
     # Numba looks for changes in the kernel's own file only; what it calls is compiled into it.

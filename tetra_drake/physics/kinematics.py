@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.lanes import Real, Table
 
 Array = np.ndarray
 
@@ -15,51 +16,47 @@ run body by body."""
 
 
 @compiled
-def move_nodes(state: Array, p_BN: Array) -> Array:
-    """The `nodes`, fixed to the bodies, without forces.
+def move_nodes(state: Table, p_BN: Table, nodes: Table) -> None:
+    """Writes the `nodes`, fixed to the bodies, without forces.
 
     `state` is [q; v] of the bodies, 13 numbers per body; `p_BN`, (nodes per body, 3) in m, is
     the same for every body.
     """
-    bodies = state.size // 13
-    per_body = p_BN.shape[0]
-    nodes = np.zeros((per_body * bodies, NODE_COLUMNS))
+    bodies, per_body = state.size // 13, p_BN.shape[0]
     for body in range(bodies):
-        q = 7 * body
-        v = 7 * bodies + 6 * body
+        q, v = 7 * body, 7 * bodies + 6 * body
         w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
         s = 2.0 / (w * w + x * x + y * y + z * z)
         r_00, r_01, r_02 = 1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
         r_10, r_11, r_12 = s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)
         r_20, r_21, r_22 = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
+        o_x, o_y, o_z = state[q + 4], state[q + 5], state[q + 6]
         w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
+        v_x, v_y, v_z = state[v + 3], state[v + 4], state[v + 5]
         for k in range(per_body):
             a, b, c = p_BN[k, 0], p_BN[k, 1], p_BN[k, 2]
             p_x = r_00 * a + r_01 * b + r_02 * c
             p_y = r_10 * a + r_11 * b + r_12 * c
             p_z = r_20 * a + r_21 * b + r_22 * c
             node = per_body * body + k
-            nodes[node, P_BN_W] = p_x
-            nodes[node, P_BN_W + 1] = p_y
-            nodes[node, P_BN_W + 2] = p_z
-            nodes[node, P_WN] = state[q + 4] + p_x
-            nodes[node, P_WN + 1] = state[q + 5] + p_y
-            nodes[node, P_WN + 2] = state[q + 6] + p_z
-            nodes[node, V_WN] = state[v + 3] + w_y * p_z - w_z * p_y
-            nodes[node, V_WN + 1] = state[v + 4] + w_z * p_x - w_x * p_z
-            nodes[node, V_WN + 2] = state[v + 5] + w_x * p_y - w_y * p_x
-    return nodes
+            nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2] = p_x, p_y, p_z
+            nodes[node, P_WN] = o_x + p_x
+            nodes[node, P_WN + 1] = o_y + p_y
+            nodes[node, P_WN + 2] = o_z + p_z
+            nodes[node, V_WN] = v_x + w_y * p_z - w_z * p_y
+            nodes[node, V_WN + 1] = v_y + w_z * p_x - w_x * p_z
+            nodes[node, V_WN + 2] = v_z + w_x * p_y - w_y * p_x
+            nodes[node, FORCE], nodes[node, FORCE + 1], nodes[node, FORCE + 2] = 0.0, 0.0, 0.0
 
 
 @compiled
 def node_acceleration(
-    state: Array, acceleration: Array, nodes: Array, node: int
-) -> tuple[float, float, float]:
+    state: Table, acceleration: Table, nodes: Table, node: int
+) -> tuple[Real, Real, Real]:
     """Acceleration (m/s²) of a node in World from dv/dt of the bodies, 6 numbers per body."""
     bodies = state.size // 13
     body = node // (nodes.shape[0] // bodies)
-    v = 7 * bodies + 6 * body
-    a = 6 * body
+    v, a = 7 * bodies + 6 * body, 6 * body
     w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     u_x = w_y * p_z - w_z * p_y
@@ -74,11 +71,11 @@ def node_acceleration(
 
 
 @compiled
-def gather_forces(nodes: Array, bodies: int) -> Array:
-    """The forces on the nodes as [t_W; f_W] at each Bo, (6 bodies,): Drake's
+def gather_forces(nodes: Table, generalized_force: Table) -> None:
+    """Writes the forces on the nodes as [t_W; f_W] at each Bo, (6 bodies,): Drake's
     applied_generalized_force."""
+    bodies = generalized_force.size // 6
     per_body = nodes.shape[0] // bodies
-    generalized_force = np.empty(6 * bodies)
     for body in range(bodies):
         t_x = t_y = t_z = f_x = f_y = f_z = 0.0
         for node in range(per_body * body, per_body * (body + 1)):
@@ -97,7 +94,6 @@ def gather_forces(nodes: Array, bodies: int) -> Array:
         generalized_force[g + 3] = f_x
         generalized_force[g + 4] = f_y
         generalized_force[g + 5] = f_z
-    return generalized_force
 
 
 @compiled

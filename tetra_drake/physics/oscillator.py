@@ -8,20 +8,25 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.lanes import Real, Table, maximum
 
 Array = np.ndarray
+
+U, V, U_RATE, V_RATE, Y, U_START, V_START, U_SUM, V_SUM, NEURON_COLUMNS = range(10)
+"""Columns of `neurons`, (2n, 9): inner state u, self-inhibition v, their rates in 1/s, and what the
+kernels note besides; and their number."""
 
 
 class Network(NamedTuple):
     """The constants of a network of n oscillators."""
 
-    inhibition: Array
+    inhibition: Table
     """(2n, 2n): see inhibition_matrix."""
-    tau_a: float
-    tau_b: float
+    tau_a: Real
+    tau_b: Real
     """In s."""
-    self_inhibition_weight: float
-    external_input: float
+    self_inhibition_weight: Real
+    external_input: Real
 
 
 def inhibition_matrix(weights: Array, *, oscillators: int, partner_weight: float) -> Array:
@@ -43,59 +48,80 @@ def inhibition_matrix(weights: Array, *, oscillators: int, partner_weight: float
 
 
 @compiled
-def neuron_rates(
-    network: Network, u: Array, v: Array, feedback: Array, u_rate: Array, v_rate: Array
-) -> None:
-    """Rates of the inner states u and the self-inhibitions v (Eq. 7; -u as in listing B.2).
-
-    All arrays (2n,); `u_rate` and `v_rate` are written, in 1/s.
-    """
-    neurons = u.size
-    for i in range(neurons):
-        total = network.external_input + feedback[i] - u[i] - network.self_inhibition_weight * v[i]
-        for j in range(neurons):
-            total -= network.inhibition[i, j] * max(0.0, u[j])
-        u_rate[i] = total / network.tau_a
-        v_rate[i] = (max(0.0, u[i]) - v[i]) / network.tau_b
+def neuron_rates(network: Network, feedback: Table, neurons: Table) -> None:
+    """Writes the rates of u and v (Eq. 7; -u as in listing B.2); `feedback` is (2n,)."""
+    count = neurons.shape[0]
+    per_tau_a, per_tau_b = 1.0 / network.tau_a, 1.0 / network.tau_b
+    for i in range(count):
+        neurons[i, Y] = maximum(neurons[i, U], 0.0)
+    for i in range(count):
+        u, v, y = neurons[i, U], neurons[i, V], neurons[i, Y]
+        total = network.external_input + feedback[i] - u - network.self_inhibition_weight * v
+        for j in range(count):
+            total -= network.inhibition[i, j] * neurons[j, Y]
+        neurons[i, U_RATE] = total * per_tau_a
+        neurons[i, V_RATE] = (y - v) * per_tau_b
 
 
 @compiled
-def oscillator_output(u: Array, output: Array) -> None:
+def oscillator_output(neurons: Table, output: Table) -> None:
     """y_extensor - y_flexor (n,) of each oscillator, y = max(0, u) (Eq. 8 and 9)."""
     for k in range(output.size):
-        output[k] = max(0.0, u[2 * k]) - max(0.0, u[2 * k + 1])
+        extensor, flexor = neurons[2 * k, U], neurons[2 * k + 1, U]
+        output[k] = maximum(extensor, 0.0) - maximum(flexor, 0.0)
 
 
 @compiled
-def listing_output(network: Network, u: Array, v: Array, step: float, output: Array) -> None:
-    """Writes `output`, (steps, n), as listing B.1 does: forward Euler from u and v (2n,).
+def euler_step(network: Network, feedback: Table, step: Real, neurons: Table) -> None:
+    """A step (s) of the forward Euler method, as in listing B.1."""
+    neuron_rates(network, feedback, neurons)
+    for i in range(neurons.shape[0]):
+        neurons[i, U] += step * neurons[i, U_RATE]
+        neurons[i, V] += step * neurons[i, V_RATE]
 
-    Row i is the state after i + 1 steps (s); the listing stamps it with i steps. `u` and `v` end
-    as the last state.
+
+@compiled
+def runge_kutta_step(network: Network, feedback: Table, step: Real, neurons: Table) -> None:
+    """A step (s) of the classical Runge-Kutta method of order 4."""
+    for i in range(neurons.shape[0]):
+        neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
+        neurons[i, U_SUM], neurons[i, V_SUM] = 0.0, 0.0
+    for stage in range(4):
+        weight = (1.0 if stage == 0 or stage == 3 else 2.0) / 6.0
+        reach = 1.0 if stage == 2 else 0.5  # where the next stage begins
+        neuron_rates(network, feedback, neurons)
+        for i in range(neurons.shape[0]):
+            neurons[i, U_SUM] += weight * neurons[i, U_RATE]
+            neurons[i, V_SUM] += weight * neurons[i, V_RATE]
+            neurons[i, U] = neurons[i, U_START] + reach * step * neurons[i, U_RATE]
+            neurons[i, V] = neurons[i, V_START] + reach * step * neurons[i, V_RATE]
+    for i in range(neurons.shape[0]):
+        neurons[i, U] = neurons[i, U_START] + step * neurons[i, U_SUM]
+        neurons[i, V] = neurons[i, V_START] + step * neurons[i, V_SUM]
+
+
+@compiled
+def next_output(
+    network: Network, feedback: Table, step: Real, listing: bool, neurons: Table, output: Table
+) -> None:
+    """The next sample of the outputs (n,), a step (s) after the last.
+
+    With `listing`, by forward Euler and after the step: listing B.1 stamps the state after i + 1
+    steps with the time of i. Otherwise by Runge-Kutta and before the step. A step of 0 changes
+    nothing.
     """
-    u_rate, v_rate, feedback = np.empty_like(u), np.empty_like(v), np.zeros_like(u)
-    for i in range(output.shape[0]):
-        neuron_rates(network, u, v, feedback, u_rate, v_rate)
-        u += u_rate * step
-        v += v_rate * step
-        oscillator_output(u, output[i])
+    if listing:
+        euler_step(network, feedback, step, neurons)
+        oscillator_output(neurons, output)
+    else:
+        oscillator_output(neurons, output)
+        runge_kutta_step(network, feedback, step, neurons)
 
 
 @compiled
-def network_output(network: Network, u: Array, v: Array, step: float, output: Array) -> None:
-    """As `listing_output` by the classical Runge-Kutta method of order 4; row i after i steps."""
-    neurons = u.size
-    weights = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
-    reaches = (0.0, 0.5, 0.5, 1.0)
-    feedback = np.zeros(neurons)
-    u_rate, v_rate = np.zeros(neurons), np.zeros(neurons)
+def network_output(
+    network: Network, feedback: Array, step: float, listing: bool, neurons: Array, output: Array
+) -> None:
+    """Writes `output`, (samples, n), the first samples of `next_output` without lanes."""
     for i in range(output.shape[0]):
-        oscillator_output(u, output[i])
-        u_sum, v_sum = np.zeros(neurons), np.zeros(neurons)
-        for stage in range(4):
-            reach = reaches[stage] * step
-            neuron_rates(network, u + reach * u_rate, v + reach * v_rate, feedback, u_rate, v_rate)
-            u_sum += weights[stage] * u_rate
-            v_sum += weights[stage] * v_rate
-        u += step * u_sum
-        v += step * v_sum
+        next_output(network, feedback, step, listing, neurons, output[i])

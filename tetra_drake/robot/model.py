@@ -6,72 +6,82 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.physics.contact import FRICTION, GROUND, NORMAL
+from tetra_drake.errors import InputError
+from tetra_drake.physics.contact import GROUND, Ground
+from tetra_drake.physics.lanes import Table
 from tetra_drake.physics.oscillator import Network, inhibition_matrix
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import CpgScenario, FrictionScenario, GroundScenario, Scenario
 
-Array = np.ndarray
+JUNCTION_CABLES = 6
+"""The cables between two neighbouring bodies."""
+
+
+class Body(NamedTuple):
+    """What all bodies have in common; SI units. Each a table of one."""
+
+    mass: Table
+    moment: Table
+    """Of inertia, about any axis through the centre of mass."""
+    radius: Table
+    """Distance of the nodes from the centre of mass."""
+    gravity: Table
 
 
 class Model(NamedTuple):
     """A structure and the constants of its laws; SI units."""
 
-    p_BN: Array
+    p_BN: Table
     """(nodes per body, 3)."""
-    cables: Array
-    """(cables,) of dtype CABLE, each from a body to the next."""
-    contacts: Array
+    cables: Table
+    """(cables,) of dtype CABLE or Cables; JUNCTION_CABLES from each body to the next, in order."""
+    contacts: Table
     """(contacts,), the indices of the nodes that may touch the ground."""
-    ground: Array
-    """(1,) of dtype GROUND."""
+    ground: Table
+    """(1,) of dtype GROUND, or Ground of tables of one."""
+    body: Body
     slack: bool
-    mass: float
-    moment: float
-    """Mass of a body, and its moment of inertia about any axis through its centre of mass."""
-    radius: float
-    """Distance of the nodes from the centre of mass."""
-    inertia: Array
-    """(6 bodies,): the diagonal of the mass matrix."""
-    gravity: float
 
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:
-    """The structure and its laws as the kernels take them."""
-    nodes = len(structure.p_BN)
-    cables = structure.cables
-    if not (cables["node_b"] // nodes == cables["node_a"] // nodes + 1).all():
+    """The structure and its laws as the kernels take them; cables and ground are records."""
+    nodes, cables = len(structure.p_BN), structure.cables
+    junction = np.arange(len(cables)) // JUNCTION_CABLES
+    ends = cables["node_a"] // nodes, cables["node_b"] // nodes
+    if not ((ends[0] == junction).all() and (ends[1] == junction + 1).all()):
         raise ValueError("a cable does not join a body to the next one")
     inertia = tetrahedron_inertia(structure)
     mass = inertia.get_mass()
     moments = mass * inertia.get_unit_inertia().get_moments()
     if np.ptp(moments) > 1e-12 * moments[0]:
         raise ValueError("the bodies' inertia is not isotropic")
+    radius = np.linalg.norm(structure.p_BN, axis=1).max()
+    body = mass, moments[0], radius, scenario.robot.gravity
     return Model(
         p_BN=structure.p_BN,
         cables=cables,
         contacts=structure.contacts,
         ground=ground_law(scenario.ground, scenario.friction),
+        body=Body(*(np.array([number]) for number in body)),
         slack=scenario.cables.slack,
-        mass=mass,
-        moment=float(moments[0]),
-        inertia=np.tile(3 * [moments[0]] + 3 * [mass], len(structure.bodies)),
-        radius=float(np.linalg.norm(structure.p_BN, axis=1).max()),
-        gravity=scenario.robot.gravity,
     )
 
 
 def ground_law(ground: GroundScenario, friction: FrictionScenario) -> np.ndarray:
     """The constants of the ground's laws as `physics.contact` takes them: (1,) of dtype GROUND."""
-    normal = [getattr(ground, name) for name in NORMAL]
-    return np.array([(*normal, *(getattr(friction, name) for name in FRICTION))], dtype=GROUND)
+    normal = ground.stiffness, ground.damping
+    return np.array([(*normal, *(getattr(friction, n) for n in Ground._fields[2:]))], dtype=GROUND)
 
 
 def make_network(cpg: CpgScenario, gait: Gait, *, oscillators: int) -> Network:
-    """The network of a gait."""
+    """The network of a gait; raises InputError where that is for another number of oscillators."""
     weights, partner = np.array(gait.weights), cpg.partner_weight
+    expected = 2 * oscillators * (oscillators - 1)
+    if weights.size != expected:
+        problem = f"found {weights.size}, expected {expected} for {oscillators + 1} tetrahedra"
+        raise InputError(f"gait {gait.name}", "weights", problem)
     return Network(
         inhibition=inhibition_matrix(weights, oscillators=oscillators, partner_weight=partner),
         tau_a=gait.tau_a,

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tetra_drake.files import whole_file
-from tetra_drake.physics.oscillator import listing_output, network_output
+from tetra_drake.physics.oscillator import NEURON_COLUMNS, U, V, network_output
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import initial_state, make_network
 from tetra_drake.scenario.schema import Scenario
@@ -31,12 +31,17 @@ def raw_output(scenario: Scenario, gait: Gait) -> np.ndarray:
     """
     cpg, oscillators = scenario.cpg, scenario.oscillators
     network = make_network(cpg, gait, oscillators=oscillators)
-    u, v = np.split(initial_state(cpg, oscillators), 2)
-    steps = scenario.simulation.duration / cpg.listing_step
-    listing = cpg.signals == "listing"
-    output = np.empty((round(steps) if listing else math.ceil(steps) + 1, oscillators))
-    (listing_output if listing else network_output)(network, u, v, cpg.listing_step, output)
+    neurons = np.zeros((2 * oscillators, NEURON_COLUMNS))
+    neurons[:, U], neurons[:, V] = np.split(initial_state(cpg, oscillators), 2)
+    output, listing = np.empty((sample_count(scenario), oscillators)), cpg.signals == "listing"
+    network_output(network, np.zeros(len(neurons)), cpg.listing_step, listing, neurons, output)
     return output
+
+
+def sample_count(scenario: Scenario) -> int:
+    """The number of samples of raw_output(); the signals keep the last value."""
+    steps = scenario.simulation.duration / scenario.cpg.listing_step
+    return round(steps) if scenario.cpg.signals == "listing" else math.ceil(steps) + 1
 
 
 def signal_samples(scenario: Scenario, gait: Gait) -> np.ndarray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetra_drake.physics.cable import CABLE, PASSIVE
-from tetra_drake.physics.kinematics import P_WN, V_WN, move_nodes
+from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN, move_nodes
 from tetra_drake.scenario.schema import CableScenario, RobotScenario
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
@@ -106,9 +106,16 @@ def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
     """p_WN (nodes, 3) in m from the state (13 n,) of the bodies."""
-    return move_nodes(state, structure.p_BN)[:, P_WN : P_WN + 3]
+    return moved_nodes(structure, state)[:, P_WN : P_WN + 3]
 
 
 def node_velocities(structure: Structure, state: np.ndarray) -> np.ndarray:
     """v_WN (nodes, 3) in m/s from the state (13 n,) of the bodies."""
-    return move_nodes(state, structure.p_BN)[:, V_WN : V_WN + 3]
+    return moved_nodes(structure, state)[:, V_WN : V_WN + 3]
+
+
+def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
+    """The `nodes` of physics.kinematics, without forces, for a state (13 n,) of the bodies."""
+    nodes = np.empty((len(NODES) * len(structure.bodies), NODE_COLUMNS))
+    move_nodes(state, structure.p_BN, nodes)
+    return nodes

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.physics.cable import add_cable_forces, cable_forces
-from tetra_drake.physics.kinematics import move_nodes
+from tetra_drake.physics.cable import LENGTH, PULL_COLUMNS, TENSION, cable_forces
+from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.robot.structure import Structure
 
 
@@ -29,6 +29,8 @@ class CableNetwork(LeafSystem):
         self._p_BN, self._cables = structure.p_BN, structure.cables
         self._slack = slack
         bodies, count = len(structure.bodies), len(structure.cables)
+        self._size, self._pulls = 6 * bodies, (count, PULL_COLUMNS)
+        self._nodes = len(structure.node_names), NODE_COLUMNS
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self._signals = self.DeclareVectorInputPort("signals", structure.signals)
         inputs = {self._state.ticket(), self._signals.ticket()}
@@ -37,17 +39,18 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        state, signals = self._state.Eval(context), self._signals.Eval(context)
-        force = output.get_mutable_value()
-        cable_forces(state, signals, self._p_BN, self._cables, self._slack, force)
+        self._pull(context, output.get_mutable_value())
 
-    def _pull(self, context: Context) -> np.ndarray:
-        """Tensions and lengths."""
-        nodes = move_nodes(self._state.Eval(context), self._p_BN)
-        return add_cable_forces(nodes, self._signals.Eval(context), self._cables, self._slack)
+    def _pull(self, context: Context, force: np.ndarray) -> np.ndarray:
+        """Writes the generalized force; returns the cables' `pulls`."""
+        state, signals = self._state.Eval(context), self._signals.Eval(context)
+        nodes, pulls = np.empty(self._nodes), np.empty(self._pulls)
+        law = self._p_BN, self._cables, self._slack
+        cable_forces(state, signals, *law, nodes, pulls, force)
+        return pulls
 
     def _calc_tensions(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._pull(context)[0])
+        output.SetFromVector(self._pull(context, np.empty(self._size))[:, TENSION])
 
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._pull(context)[1])
+        output.SetFromVector(self._pull(context, np.empty(self._size))[:, LENGTH])

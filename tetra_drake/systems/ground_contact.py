@@ -18,15 +18,14 @@ from pydrake.systems.framework import (
 from tetra_drake.physics.contact import (
     MODE_COLUMNS,
     STICK_POINT,
-    add_ground_forces,
     ground_forces,
     mode_margin,
     time_to_mode_change,
     update_modes,
 )
-from tetra_drake.physics.kinematics import move_nodes
+from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.robot.model import ground_law
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.schema import FrictionScenario, GroundScenario
 
 
@@ -59,9 +58,10 @@ class GroundContact(LeafSystem):
         witness: bool = False,
     ) -> None:
         super().__init__()
-        self._p_BN, self._contacts = structure.p_BN, structure.contacts
+        self._structure, self._contacts = structure, structure.contacts
         self._law = ground_law(ground, friction)
         bodies, count = len(structure.bodies), len(structure.contacts)
+        self._size, self._shape = 6 * bodies, (len(structure.node_names), NODE_COLUMNS)
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self.DeclareDiscreteState(MODE_COLUMNS * count)
         self.DeclareInitializationDiscreteUpdateEvent(self._start)
@@ -91,6 +91,11 @@ class GroundContact(LeafSystem):
         state, ground = self._state.Eval(context), (self._contacts, self._law)
         return time_to_mode_change(state, acceleration, nodes, rows, *ground, horizon)
 
+    def ModeChangeIsDue(self, context: Context) -> bool:
+        """Whether a mode will change if a step ends here."""
+        rows = self._rows(context).copy()
+        return update_modes(self._nodes(context), self._contacts, self._law, rows)
+
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """The one witness, if asked for."""
         return self._witnesses
@@ -99,7 +104,7 @@ class GroundContact(LeafSystem):
         return context.get_discrete_state_vector().value().reshape(-1, MODE_COLUMNS)
 
     def _nodes(self, context: Context) -> np.ndarray:
-        return move_nodes(self._state.Eval(context), self._p_BN)
+        return moved_nodes(self._structure, self._state.Eval(context))
 
     def _start(self, context: Context, values: DiscreteValues) -> EventStatus:
         # From "nowhere in contact", an update makes every node at or below 0 stick where it is.
@@ -118,20 +123,21 @@ class GroundContact(LeafSystem):
         return mode_margin(self._nodes(context), rows, self._contacts, self._law)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        state, rows = self._state.Eval(context), self._rows(context)
-        force = output.get_mutable_value()
-        ground_forces(state, rows, self._p_BN, self._contacts, self._law, force)
+        self._push(context, output.get_mutable_value())
 
-    def _push(self, context: Context) -> np.ndarray:
-        """(m, 3): friction along x and y, normal force."""
-        nodes, rows = self._nodes(context), self._rows(context)
-        return add_ground_forces(nodes, rows, self._contacts, self._law)
+    def _push(self, context: Context, force: np.ndarray) -> np.ndarray:
+        """Writes the generalized force; returns (m, 3): friction along x and y, normal force."""
+        state, rows = self._state.Eval(context), self._rows(context)
+        nodes, pushes = np.empty(self._shape), np.empty((len(self._contacts), 3))
+        law = self._structure.p_BN, self._contacts, self._law
+        ground_forces(state, rows, *law, nodes, pushes, force)
+        return pushes
 
     def _calc_normal(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._push(context)[:, 2])
+        output.SetFromVector(self._push(context, np.empty(self._size))[:, 2])
 
     def _calc_friction(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._push(context)[:, :2].ravel())
+        output.SetFromVector(self._push(context, np.empty(self._size))[:, :2].ravel())
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._rows(context)[:, :STICK_POINT].ravel())

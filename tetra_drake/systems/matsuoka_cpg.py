@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
-from tetra_drake.physics.oscillator import neuron_rates, oscillator_output
+from tetra_drake.physics.oscillator import (
+    NEURON_COLUMNS,
+    U_RATE,
+    V_RATE,
+    U,
+    V,
+    neuron_rates,
+    oscillator_output,
+)
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import initial_state, make_network
 from tetra_drake.scenario.schema import CpgScenario
@@ -39,22 +47,22 @@ class MatsuokaCpg(LeafSystem):
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Eq. 7."""
-        u, v = self._split(context)
-        feedback = self._no_feedback
+        neurons, feedback = self._neurons(context), self._no_feedback
         if self._feedback.HasValue(context):
             feedback = self._feedback.Eval(context)
-        rates = np.empty(2 * u.size)
-        neuron_rates(self._network, u, v, feedback, rates[: u.size], rates[u.size :])
-        derivatives.SetFromVector(rates)
+        neuron_rates(self._network, feedback, neurons)
+        derivatives.SetFromVector(neurons[:, U_RATE : V_RATE + 1].T.ravel())
 
-    def _split(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
-        state = context.get_continuous_state_vector().CopyToVector()
-        return state[: state.size // 2], state[state.size // 2 :]
+    def _neurons(self, context: Context) -> np.ndarray:
+        """The `neurons` of physics.oscillator."""
+        neurons = np.zeros((self._no_feedback.size, NEURON_COLUMNS))
+        neurons[:, U : V + 1] = context.get_continuous_state_vector().value().reshape(2, -1).T
+        return neurons
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:
         signals = output.get_mutable_value()
-        oscillator_output(self._split(context)[0], signals)
+        oscillator_output(self._neurons(context), signals)
         signals *= self._gain
 
     def _calc_neurons(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(np.maximum(0.0, self._split(context)[0]))
+        output.SetFromVector(np.maximum(0.0, self._neurons(context)[:, U]))
