@@ -1,4 +1,5 @@
-"""The two ways things end that are not results: bad input, and a simulation that fails."""
+"""The ways things end that are not results: bad input, and a simulation that fails or takes too
+long."""
 
 from __future__ import annotations
 
@@ -23,6 +24,9 @@ class InputError(ValueError):
 class SimulationFailure(RuntimeError):
     """A simulation ended before its duration: `time` (s) says when, `reason` why."""
 
+    wall_time = 0.0
+    """What the simulation cost, in s, where the engine says it."""
+
     def __init__(self, *, time: float, reason: str) -> None:
         self.time = time
         self.reason = reason
@@ -39,3 +43,11 @@ class Diverged(SimulationFailure):
 
 class StepBudgetExceeded(SimulationFailure):
     """The integrator used up its allowance of derivative evaluations."""
+
+
+class TimeBudgetExceeded(Exception):
+    """A simulation took too long by the clock. No RuntimeError, as engines take those for
+    divergence."""
+
+    wall_time = 0.0
+    """As of SimulationFailure."""

@@ -3,28 +3,24 @@
 import numpy as np
 import pytest
 
-from tetra_drake.engines.compiled.block_tridiagonal import (
-    BLOCK,
-    ROW,
-    add_outer_product,
-    factorise,
-    solve,
-)
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW, factorise, solve
 
 
 def random_system(bodies: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of a random positive definite system and the same written out in full."""
+    """Rows of a random positive definite system, NaN below the diagonal, and the system in full."""
     generator = np.random.default_rng(bodies)
     rows, full = np.zeros((bodies, BLOCK, ROW)), 0.1 * np.eye(BLOCK * bodies)
-    rows[:, range(BLOCK), range(BLOCK)] = 0.1
     for _ in range(20 * bodies):
         body = int(generator.integers(bodies))
         size = ROW if body + 1 < bodies and generator.random() < 0.7 else BLOCK
         vector = np.append(generator.normal(size=size), np.zeros(ROW - size))
-        factor = generator.uniform(0.1, 2.0)
-        add_outer_product(factor, vector, body, size, rows)
         place = slice(BLOCK * body, BLOCK * body + size)
-        full[place, place] += factor * np.outer(vector[:size], vector[:size])
+        full[place, place] += generator.uniform(0.1, 2.0) * np.outer(vector[:size], vector[:size])
+    wide = np.hstack([full, np.zeros((len(full), BLOCK))])
+    for body in range(bodies):
+        first = BLOCK * body
+        block = wide[first : first + BLOCK, first : first + ROW]
+        rows[body] = np.where(np.arange(ROW) >= np.arange(BLOCK)[:, None], block, np.nan)
     return rows, full
 
 

@@ -11,13 +11,31 @@ from tetra_drake.engines.compiled.dynamics import (
     implicit_matrix,
     move_bodies,
 )
+from tetra_drake.physics.cable import PULL_COLUMNS
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
-from tetra_drake.physics.kinematics import move_nodes
+from tetra_drake.physics.kinematics import NODE_COLUMNS, move_nodes
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.model import Model, make_model
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.model import JUNCTION_CABLES, Model, make_model
+from tetra_drake.robot.structure import MakeStructure, moved_nodes
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+
+def forces_at(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Forces, np.ndarray]:
+    """All forces without actuation, and as forces on the bodies."""
+    bodies = len(state) // 13
+    nodes = np.empty((4 * bodies, NODE_COLUMNS))
+    pulls = np.empty((len(robot.cables), PULL_COLUMNS))
+    forces = Forces(nodes, pulls, np.empty((len(robot.contacts), 3)))
+    generalized = np.empty(6 * bodies)
+    move_nodes(state, robot.p_BN, nodes)
+    compute_forces(robot, modes, np.zeros(bodies - 1), True, forces, generalized)
+    return forces, generalized
+
+
+def inertia_of(robot: Model, bodies: int) -> np.ndarray:
+    """The diagonal of the mass matrix."""
+    return np.tile([*3 * [robot.body.moment[0]], *3 * [robot.body.mass[0]]], bodies)
 
 
 def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, np.ndarray]:
@@ -26,7 +44,7 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
     robot = make_model(scenario, structure)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
-    update_modes(move_nodes(state, structure.p_BN), robot.contacts, robot.ground, modes)
+    update_modes(moved_nodes(structure, state), robot.contacts, robot.ground, modes)
     assert np.count_nonzero(modes[:, 0]) > 0, "some nodes touch the ground"
     return robot, state, modes
 
@@ -36,9 +54,7 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
 def test_accelerations_are_those_of_the_diagram(scenario, tetrahedra, seed):
     scenario.robot.tetrahedra = tetrahedra
     robot, state, modes = disturbed_robot(scenario, seed)
-    nodes = move_nodes(state, robot.p_BN)
-    forces = compute_forces(robot, nodes, modes, np.zeros(tetrahedra - 1))
-    acceleration = forces.generalized / robot.inertia
+    acceleration = forces_at(robot, state, modes)[1] / inertia_of(robot, tetrahedra)
 
     diagram = MakeTensegrityDiagram(scenario, seeded_gait(scenario))
     context = diagram.CreateDefaultContext()
@@ -56,29 +72,63 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario):
     scenario.friction.proportional_stiction = 0.0
     robot, state, modes = disturbed_robot(scenario, 0)
 
-    def forces_at(velocity: np.ndarray) -> Forces:
-        nodes = move_nodes(np.append(state[:35], velocity), robot.p_BN)
-        return compute_forces(robot, nodes, modes, np.zeros(4))
+    def with_velocity(velocity: np.ndarray) -> np.ndarray:
+        return np.append(state[:35], velocity)
 
     columns = [
-        forces_at(change).generalized - forces_at(-change).generalized
+        forces_at(robot, with_velocity(change), modes)[1]
+        - forces_at(robot, with_velocity(-change), modes)[1]
         for change in 1e-4 * np.eye(30)
     ]
     jacobian = np.array(columns).T / 2e-4
     time = 1e-9  # s, so short that time² stiffness counts for nothing
-    rows = implicit_matrix(robot, modes, forces_at(np.zeros(30)), time)
+    forces, _ = forces_at(robot, with_velocity(np.zeros(30)), modes)
+    rows, lines = np.zeros((5, BLOCK, ROW)), np.empty((JUNCTION_CABLES, 9))
+    implicit_matrix(robot, modes, forces, time, lines, rows)
     full = np.zeros((30, 30 + BLOCK))
     for body in range(5):
         full[BLOCK * body : BLOCK * body + 6, BLOCK * body : BLOCK * body + ROW] = rows[body]
     upper = np.triu(full[:, :30], 1)
-    damping = (upper + upper.T + np.diag(full.diagonal() - robot.inertia)) / time
+    damping = (upper + upper.T + np.diag(full.diagonal() - inertia_of(robot, 5))) / time
     # Differencing M + 1e-9 D costs 7 of 16 digits.
     np.testing.assert_allclose(damping, -jacobian, atol=2e-4 * np.abs(jacobian).max())
+
+
+def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
+    # At rest and without other stiffness, forces change with positions by the normal forces only.
+    for key in ("outer_stiffness", "inner_stiffness"):
+        setattr(scenario.cables, key, 1e-12)
+    robot, state, modes = disturbed_robot(scenario, 0)
+    state[35:] = 0.0
+
+    def forces_moved(motion: np.ndarray) -> np.ndarray:
+        moved = state.copy()
+        move_bodies(state, motion, 1.0, moved)
+        return forces_at(robot, moved, modes)[1]
+
+    columns = [forces_moved(m) - forces_moved(-m) for m in 1e-7 * np.eye(30)]
+    jacobian = np.array(columns).T / 2e-7
+
+    def matrix(time: float) -> np.ndarray:
+        rows, lines = np.zeros((5, BLOCK, ROW)), np.empty((JUNCTION_CABLES, 9))
+        implicit_matrix(robot, modes, forces_at(robot, state, modes)[0], time, lines, rows)
+        return np.array([row[:, :BLOCK] for row in rows])
+
+    # M + t D + t^2 K, at t = 0, 1, 2 s: the second difference is 2 K.
+    stiffness = (matrix(2.0) - 2.0 * matrix(1.0) + matrix(0.0)) / 2.0
+    k = scenario.ground.stiffness
+    assert stiffness[:, 5, 5].max() == pytest.approx(2.0 * k, rel=1e-6), "both feet of a body press"
+    for body in range(5):
+        place = slice(BLOCK * body, BLOCK * body + BLOCK)
+        expected = np.triu(-jacobian[place, place])
+        # Turned levers change torques, too: by the force, k times 1 mm, that is 0.001 k.
+        np.testing.assert_allclose(np.triu(stiffness[body]), expected, atol=0.003 * k)
 
 
 def test_bodies_turn_as_drakes_quaternions_do():
     # A turn by angle w t about z: quaternion (cos(w t / 2), 0, 0, sin(w t / 2)).
     state = np.append(1.0, np.zeros(12))
-    moved = move_bodies(state, np.array([0.0, 0.0, 3.0, 0.1, 0.2, 0.3]), 0.01)
+    moved = np.empty(13)
+    move_bodies(state, np.array([0.0, 0.0, 3.0, 0.1, 0.2, 0.3]), 0.01, moved)
     np.testing.assert_allclose(moved[:4], [np.cos(0.015), 0, 0, np.sin(0.015)], atol=1e-11)
     np.testing.assert_allclose(moved[4:7], [1e-3, 2e-3, 3e-3], atol=1e-18)

@@ -1,4 +1,4 @@
-"""The equations of nodes: free rigid bodies under the forces of cables, ground and gravity.
+"""The equations of motion: free rigid bodies under the forces of cables, ground and gravity.
 
 Vectors over bodies hold 6 numbers per body, rotation before translation, in World.
 """
@@ -7,63 +7,68 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW, add_outer_product
-from tetra_drake.physics.cable import add_cable_forces
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
+from tetra_drake.physics.cable import DIRECTION, add_cable_forces
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.contact import CONTACT, MODE, add_ground_forces
+from tetra_drake.physics.contact import CONTACT, MODE, add_ground_forces, ground_law
 from tetra_drake.physics.friction import STICK
 from tetra_drake.physics.kinematics import P_BN_W, P_WN, gather_forces
-from tetra_drake.robot.model import Model
-
-Array = np.ndarray
+from tetra_drake.physics.lanes import Real, Table, any_lane, inverse_sqrt, select
+from tetra_drake.robot.model import JUNCTION_CABLES, Model
 
 
 class Forces(NamedTuple):
-    """The forces at a state; as in `physics`."""
+    """The forces at a state, as in `physics`, which kernels write."""
 
-    nodes: Array
-    generalized: Array
-    """(6 bodies,)."""
-    cables: Array
-    """(2, cables): tensions and lengths."""
-    contacts: Array
-    """(contacts, 3): on the contact nodes."""
-
-
-@compiled
-def compute_forces(robot: Model, nodes: Array, modes: Array, signals: Array) -> Forces:
-    """All forces on nodes that have just been moved, and gravity; arguments as in `physics`."""
-    cables = add_cable_forces(nodes, signals, robot.cables, robot.slack)
-    contacts = add_ground_forces(nodes, modes, robot.contacts, robot.ground)
-    generalized = gather_forces(nodes, robot.inertia.size // BLOCK)
-    for i in range(5, generalized.size, BLOCK):
-        generalized[i] -= robot.mass * robot.gravity
-    return Forces(nodes, generalized, cables, contacts)
+    nodes: Table
+    """(nodes, NODE_COLUMNS)."""
+    pulls: Table
+    """(cables, PULL_COLUMNS): of the cables."""
+    pushes: Table
+    """(contacts, 3): of the ground."""
 
 
 @compiled
-def move_bodies(state: Array, velocities: Array, time: float) -> Array:
-    """The state (13 bodies,) with its bodies moved for a time (s) at velocities (6 bodies,).
+def compute_forces(
+    robot: Model, modes: Table, signals: Table, keep: bool, forces: Forces, generalized: Table
+) -> None:
+    """Writes all forces on nodes that have just been moved, with gravity, as (6 bodies,).
 
-    Its own velocities stay as they are; quaternions get the length 1.
+    With `keep`, those of the cables and the ground by themselves, too.
     """
-    moved = state.copy()
-    for body in range(state.size // 13):
+    add_cable_forces(forces.nodes, signals, robot.cables, robot.slack, keep, forces.pulls)
+    add_ground_forces(forces.nodes, modes, robot.contacts, robot.ground, keep, forces.pushes)
+    gather_forces(forces.nodes, generalized)
+    weight = robot.body.mass[0] * robot.body.gravity[0]
+    for body in range(generalized.size // BLOCK):
+        generalized[BLOCK * body + 5] -= weight
+
+
+@compiled
+def inertia(robot: Model, j: int) -> Real:
+    """The diagonal of a body's mass matrix: of rotation for j = 0, 1, 2, else of translation."""
+    return robot.body.moment[0] if j < 3 else robot.body.mass[0]
+
+
+@compiled
+def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> None:
+    """Writes the positions of a state (13 bodies,) whose bodies have `moved` for a time (s) at
+    velocities (6 bodies,); quaternions get the length 1."""
+    half = 0.5 * time
+    for body in range(velocities.size // BLOCK):
         q, v = 7 * body, BLOCK * body
         # The rotation's quaternion, to fourth order in its angle (some thousandths per step).
-        half = 0.5 * time
         x, y, z = half * velocities[v], half * velocities[v + 1], half * velocities[v + 2]
         square = x * x + y * y + z * z
-        sine = 1.0 - square / 6.0
-        w, x, y, z = 1.0 - 0.5 * square * (1.0 - square / 12.0), sine * x, sine * y, sine * z
+        sine = 1.0 - square * (1.0 / 6.0)
+        w = 1.0 - 0.5 * square * (1.0 - square * (1.0 / 12.0))
+        x, y, z = sine * x, sine * y, sine * z
         q_w, q_x, q_y, q_z = state[q], state[q + 1], state[q + 2], state[q + 3]
         n_w = w * q_w - x * q_x - y * q_y - z * q_z
         n_x = w * q_x + x * q_w + y * q_z - z * q_y
         n_y = w * q_y + y * q_w + z * q_x - x * q_z
         n_z = w * q_z + z * q_w + x * q_y - y * q_x
-        scale = 1.0 / np.sqrt(n_w * n_w + n_x * n_x + n_y * n_y + n_z * n_z)
+        scale = inverse_sqrt(n_w * n_w + n_x * n_x + n_y * n_y + n_z * n_z)
         moved[q] = scale * n_w
         moved[q + 1] = scale * n_x
         moved[q + 2] = scale * n_y
@@ -71,53 +76,144 @@ def move_bodies(state: Array, velocities: Array, time: float) -> Array:
         moved[q + 4] = state[q + 4] + time * velocities[v + 3]
         moved[q + 5] = state[q + 5] + time * velocities[v + 4]
         moved[q + 6] = state[q + 6] + time * velocities[v + 5]
-    return moved
 
 
 @compiled
-def implicit_matrix(robot: Model, modes: Array, forces: Forces, time: float) -> Array:
-    """Mass matrix + time * damping matrix + time² * contact stiffness, as rows of
+def implicit_matrix(
+    robot: Model, modes: Table, forces: Forces, time: Real, lines: Table, rows: Table
+) -> None:
+    """Writes mass matrix + time * damping matrix + time² * contact stiffness, as rows of
     block_tridiagonal; time in s.
 
     Damping is what makes the equations stiff: that of cables, normal forces and stiction.
+    `lines`, (JUNCTION_CABLES, 9), is room for what is computed on the way.
     """
-    per_body, nodes, law = robot.p_BN.shape[0], forces.nodes, robot.ground[0]
-    rows, row = np.zeros((robot.inertia.size // BLOCK, BLOCK, ROW)), np.zeros(ROW)
-    for k in range(robot.inertia.size):
-        rows[k // BLOCK, k % BLOCK, k % BLOCK] = robot.inertia[k]
-    for i in range(robot.cables.size):
-        cable = robot.cables[i]
-        a, b = cable.node_a, cable.node_b
-        scale = 1.0 / forces.cables[1, i]
-        d_x = (nodes[b, P_WN] - nodes[a, P_WN]) * scale
-        d_y = (nodes[b, P_WN + 1] - nodes[a, P_WN + 1]) * scale
-        d_z = (nodes[b, P_WN + 2] - nodes[a, P_WN + 2]) * scale
-        speed_row(nodes, a, -d_x, -d_y, -d_z, row[:BLOCK])
-        speed_row(nodes, b, d_x, d_y, d_z, row[BLOCK:])
-        add_outer_product(time * cable.damping, row, a // per_body, ROW, rows)
+    for r in range(BLOCK):
+        for c in range(r, BLOCK):
+            rows[0, r, c] = 0.0
+    for junction in range(rows.shape[0] - 1):
+        add_junction(robot, forces, time, junction, lines, rows)
+    for body in range(rows.shape[0]):
+        for r in range(BLOCK):
+            rows[body, r, r] += inertia(robot, r)
+    law, per_body = ground_law(robot.ground), robot.p_BN.shape[0]
     for i in range(robot.contacts.size):
-        if modes[i, CONTACT] == 0.0:
+        touches = modes[i, CONTACT] != 0.0
+        if not any_lane(touches):
             continue
         node = robot.contacts[i]
-        body = node // per_body
-        if forces.contacts[i, 2] > 0.0:
-            speed_row(nodes, node, 0.0, 0.0, 1.0, row)
-            damping = law.damping * -nodes[node, P_WN + 2] + time * law.stiffness
-            add_outer_product(time * damping, row, body, BLOCK, rows)
-        for axis in range(2):
-            if modes[i, MODE + axis] == STICK:
-                speed_row(nodes, node, 1.0 - axis, 1.0 * axis, 0.0, row)
-                add_outer_product(time * law.stiction_damping, row, body, BLOCK, rows)
-    return rows
+        depth = -forces.nodes[node, P_WN + 2]
+        presses, stiction = touches & (forces.pushes[i, 2] > 0.0), time * law.stiction_damping
+        k_x = select(touches & (modes[i, MODE] == STICK), stiction, 0.0)
+        k_y = select(touches & (modes[i, MODE + 1] == STICK), stiction, 0.0)
+        k_z = select(presses, time * (law.damping * depth + time * law.stiffness), 0.0)
+        add_contact(forces.nodes, node, node // per_body, k_x, k_y, k_z, rows)
 
 
 @compiled
-def speed_row(nodes: Array, node: int, d_x: float, d_y: float, d_z: float, row: Array) -> None:
-    """The row (BLOCK,) whose product with its body's velocity is the node's speed along d."""
+def add_junction(
+    robot: Model, forces: Forces, time: Real, junction: int, lines: Table, rows: Table
+) -> None:
+    """Adds time * damping * l lᵀ for each cable from body `junction` to the next, the first to
+    contribute to that one's rows.
+
+    l, (ROW,), times the velocities of both bodies is the rate of the cable's length: the ends at
+    p_a and p_b move apart along d, so l = (u, -d, w, d) with u = d x p_a and w = p_b x d. All
+    cables of the junction are summed at once, a product of two columns of `lines`: u, w, d.
+    """
+    for j in range(JUNCTION_CABLES):
+        i = JUNCTION_CABLES * junction + j
+        d_x, d_y = forces.pulls[i, DIRECTION], forces.pulls[i, DIRECTION + 1]
+        d_z = forces.pulls[i, DIRECTION + 2]
+        a, b = robot.cables.node_a[i], robot.cables.node_b[i]
+        p_x, p_y = forces.nodes[a, P_BN_W], forces.nodes[a, P_BN_W + 1]
+        p_z = forces.nodes[a, P_BN_W + 2]
+        lines[j, 0] = d_y * p_z - d_z * p_y
+        lines[j, 1] = d_z * p_x - d_x * p_z
+        lines[j, 2] = d_x * p_y - d_y * p_x
+        p_x, p_y = forces.nodes[b, P_BN_W], forces.nodes[b, P_BN_W + 1]
+        p_z = forces.nodes[b, P_BN_W + 2]
+        lines[j, 3] = p_y * d_z - p_z * d_y
+        lines[j, 4] = p_z * d_x - p_x * d_z
+        lines[j, 5] = p_x * d_y - p_y * d_x
+        lines[j, 6], lines[j, 7], lines[j, 8] = d_x, d_y, d_z
+    first, damping = JUNCTION_CABLES * junction, robot.cables.damping
+    weights = (
+        time * damping[first],
+        time * damping[first + 1],
+        time * damping[first + 2],
+        time * damping[first + 3],
+        time * damping[first + 4],
+        time * damping[first + 5],
+    )
+    after = junction + 1
+    for r in range(3):
+        u = weighted(lines, r, weights)
+        w = weighted(lines, 3 + r, weights)
+        d = weighted(lines, 6 + r, weights)
+        for c in range(r, 3):
+            rows[junction, r, c] += product(u, lines, c)
+            rows[after, r, c] = product(w, lines, 3 + c)
+            dd = product(d, lines, 6 + c)
+            rows[junction, 3 + r, 3 + c] += dd
+            rows[after, 3 + r, 3 + c] = dd
+            rows[junction, 3 + r, 9 + c] = -dd
+            rows[junction, 3 + c, 9 + r] = -dd
+        for c in range(3):
+            rows[junction, r, 6 + c] = product(u, lines, 3 + c)
+            ud = product(u, lines, 6 + c)
+            rows[junction, r, 3 + c] -= ud
+            rows[junction, r, 9 + c] = ud
+            wd = product(w, lines, 6 + c)
+            rows[after, r, 3 + c] = wd
+            rows[junction, 3 + c, 6 + r] = -wd
+
+
+@compiled
+def weighted(lines: Table, c: int, weights: tuple[Real, ...]) -> tuple[Real, ...]:
+    """Column c of `lines`, times weights."""
+    return (
+        weights[0] * lines[0, c],
+        weights[1] * lines[1, c],
+        weights[2] * lines[2, c],
+        weights[3] * lines[3, c],
+        weights[4] * lines[4, c],
+        weights[5] * lines[5, c],
+    )
+
+
+@compiled
+def product(column: tuple[Real, ...], lines: Table, c: int) -> Real:
+    """The product of a column and column c of `lines`."""
+    return (
+        column[0] * lines[0, c]
+        + column[1] * lines[1, c]
+        + column[2] * lines[2, c]
+        + column[3] * lines[3, c]
+        + column[4] * lines[4, c]
+        + column[5] * lines[5, c]
+    )
+
+
+@compiled
+def add_contact(
+    nodes: Table, node: int, body: int, k_x: Real, k_y: Real, k_z: Real, rows: Table
+) -> None:
+    """Adds Jᵀ diag(k_x, k_y, k_z) J of a node at p from its body's origin, where J = [-[p]x 1]
+    times the velocity of the body is the node's."""
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
-    row[0] = p_y * d_z - p_z * d_y
-    row[1] = p_z * d_x - p_x * d_z
-    row[2] = p_x * d_y - p_y * d_x
-    row[3] = d_x
-    row[4] = d_y
-    row[5] = d_z
+    rows[body, 0, 0] += p_y * p_y * k_z + p_z * p_z * k_y
+    rows[body, 1, 1] += p_z * p_z * k_x + p_x * p_x * k_z
+    rows[body, 2, 2] += p_x * p_x * k_y + p_y * p_y * k_x
+    rows[body, 0, 1] -= p_x * p_y * k_z
+    rows[body, 0, 2] -= p_x * p_z * k_y
+    rows[body, 1, 2] -= p_y * p_z * k_x
+    rows[body, 0, 4] -= p_z * k_y
+    rows[body, 0, 5] += p_y * k_z
+    rows[body, 1, 3] += p_z * k_x
+    rows[body, 1, 5] -= p_x * k_z
+    rows[body, 2, 3] -= p_y * k_x
+    rows[body, 2, 4] += p_x * k_y
+    rows[body, 3, 3] += k_x
+    rows[body, 4, 4] += k_y
+    rows[body, 5, 5] += k_z

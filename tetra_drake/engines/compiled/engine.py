@@ -2,127 +2,116 @@
 
 from __future__ import annotations
 
-import dataclasses
 import threading
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import compute_forces
+from tetra_drake.engines.compiled.dynamics import Forces, compute_forces
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk
 from tetra_drake.engines.compiled.walk import (
     DONE,
     STEP_TOO_SMALL,
     TOO_FAST,
     TOO_MANY_EVALUATIONS,
-    Actuation,
-    Samples,
-    Settings,
-    walk,
 )
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.physics.cable import LENGTH, PULL_COLUMNS, TENSION
 from tetra_drake.physics.contact import STICK_POINT
-from tetra_drake.physics.kinematics import move_nodes
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
-from tetra_drake.robot.gait import Gait, seeded_gait
-from tetra_drake.robot.model import Model, make_model
-from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.structure import moved_nodes
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
     import xarray
 
+_ITERATIONS = 20_000
+"""Iterations, some 70 ms, after which signals of the operating system are heard."""
+
 
 def simulate_compiled(*, scenario: Scenario, gait: Gait, record: bool) -> SimulationResult:
     """Simulates a gait as simulate() does, without Drake. Other threads run meanwhile."""
-    compile_engine(scenario)
-    simulation = scenario.simulation
-    structure = MakeStructure(scenario.robot, scenario.cables)
-    constants, start = kernel_constants(scenario, gait, structure), structure.initial_state
-    ends = (0.0, simulation.steady_from, simulation.duration)
-    times = sample_times(simulation.duration, simulation.sample_period)
-    instants = np.unique([*ends, *(times if record else ())])
-    marks = np.unique([t for t in (scenario.cpg.start_up, *ends) if t <= simulation.duration])
-    started = time.perf_counter()
-    status, ended, steps, evaluations, samples = walk(*constants, start, marks, instants)
-    wall_time = time.perf_counter() - started
-    if status != DONE:
-        raise _failure(status, ended, scenario)
+    walk = Walk.of(scenario, gait, record=record)
+    engine = LaneEngine(walk, width=1)
+    engine.load(0, walk)
+    while not (ended := engine.advance(_ITERATIONS)):
+        pass
+    _, walk, course = ended[0]
+    return make_outcome(walk, course)
 
+
+def ready_engine(
+    walk: Walk, width: int, *, say: Callable[[str], None] = lambda text: None
+) -> LaneEngine:
+    """An engine for walks like this one, compiled or loaded from numba's cache; `say` is told if
+    that takes longer than a moment."""
+    message = "compiling the engine, which takes some seconds the first time ..."
+    timer = threading.Timer(1.0, say, [message])
+    timer.start()
+    try:
+        engine = LaneEngine(walk, width=width)
+        engine.advance(0)
+    finally:
+        timer.cancel()
+    return engine
+
+
+def make_outcome(walk: Walk, course: Course) -> SimulationResult:
+    """The result of a walk; raises Diverged or StepBudgetExceeded if it failed."""
+    scenario, structure = walk.scenario, walk.structure
+    if course.status != DONE:
+        raise _failure(course, scenario)
     trajectory = None
-    if record:
-        chosen = np.searchsorted(instants, times)
-        kept = Samples(*(column[chosen] for column in samples))
-        trajectory = _dataset(structure, constants[0], times, kept)
+    if walk.record:
+        simulation = scenario.simulation
+        times = sample_times(simulation.duration, simulation.sample_period)
+        trajectory = _dataset(walk, course, times)
+    steps, evaluations = course.steps, course.evaluations
     return make_result(
         scenario,
         structure,
-        states=samples.states[np.searchsorted(instants, ends)],
-        wall_time=wall_time,
+        states=course.states[np.searchsorted(course.times, walk.ends)],
+        wall_time=course.wall_time,
         integrator=IntegratorWork("ros2", scenario.compiled.tolerance, steps, evaluations),
         trajectory=trajectory,
     )
 
 
-def kernel_constants(
-    scenario: Scenario, gait: Gait, structure: Structure
-) -> tuple[Model, Settings, Actuation]:
-    """The first arguments of the kernel `walk`."""
-    cpg, simulation = scenario.cpg, scenario.simulation
-    limits = {name: getattr(simulation, name) for name in ("max_speed", "max_evaluations")}
-    settings = Settings(**dataclasses.asdict(scenario.compiled), **limits)
-    actuation = Actuation(signal_samples(scenario, gait), cpg.listing_step, cpg.start_up)
-    return make_model(scenario, structure), settings, actuation
-
-
-def compile_engine(scenario: Scenario, announce: Callable[[str], None] | None = None) -> None:
-    """Compiles the engine, or loads it from numba's cache, unless that is done already;
-    `announce` is told if it takes longer than a moment."""
-    if walk.signatures:  # type: ignore[attr-defined]
-        return
-    message = "compiling the engine, which takes some seconds the first time ..."
-    timer = threading.Timer(1.0, announce or (lambda _: None), [message])
-    structure = MakeStructure(scenario.robot, scenario.cables)
-    timer.start()
-    try:
-        constants = kernel_constants(scenario, seeded_gait(scenario), structure)
-        walk(*constants, structure.initial_state, np.zeros(1), np.zeros(1))
-    finally:
-        timer.cancel()
-
-
-def _failure(status: int, time: float, scenario: Scenario) -> SimulationFailure:
+def _failure(course: Course, scenario: Scenario) -> SimulationFailure:
     settings = scenario.simulation
     reasons = {
         TOO_FAST: f"a body's velocity exceeds the limit of {settings.max_speed:g} m/s",
         STEP_TOO_SMALL: "no step is small enough for the tolerance",
         TOO_MANY_EVALUATIONS: f"force evaluations exceed the budget of {settings.max_evaluations}",
     }
-    kind = StepBudgetExceeded if status == TOO_MANY_EVALUATIONS else Diverged
-    return kind(time=time, reason=reasons[status])
+    kind = StepBudgetExceeded if course.status == TOO_MANY_EVALUATIONS else Diverged
+    failure = kind(time=course.time, reason=reasons[course.status])
+    failure.wall_time = course.wall_time
+    return failure
 
 
-def _dataset(
-    structure: Structure, robot: Model, times: np.ndarray, samples: Samples
-) -> xarray.Dataset:
-    """The recording with the forces that the kernels find at its states."""
-    forces = [
-        compute_forces(robot, move_nodes(state, robot.p_BN), modes, signals)
-        for state, modes, signals in zip(*samples, strict=True)
-    ]
-    cables = np.array([found.cables for found in forces])
-    contacts = np.array([found.contacts for found in forces])
+def _dataset(walk: Walk, course: Course, times: np.ndarray) -> xarray.Dataset:
+    """The recording at `times`, with the forces that the kernels find at its states."""
+    chosen = np.searchsorted(course.times, times)
+    states, modes, signals = course.states[chosen], course.modes[chosen], course.signals[chosen]
+    count, model = len(times), walk.model
+    pulls = np.empty((count, len(model.cables), PULL_COLUMNS))
+    pushes = np.empty((count, len(model.contacts), 3))
+    generalized = np.empty(6 * len(walk.structure.bodies))
+    for i, state in enumerate(states):
+        forces = Forces(moved_nodes(walk.structure, state), pulls[i], pushes[i])
+        compute_forces(model, modes[i], signals[i], True, forces, generalized)
     return assemble_dataset(
-        structure,
+        walk.structure,
         times=times,
-        states=samples.states,
-        signals=samples.signals,
-        tensions=cables[:, 0],
-        lengths=cables[:, 1],
-        normal_forces=contacts[:, :, 2],
-        friction_forces=contacts[:, :, :2],
-        modes=samples.modes[:, :, :STICK_POINT],
+        states=states,
+        signals=signals,
+        tensions=pulls[:, :, TENSION],
+        lengths=pulls[:, :, LENGTH],
+        normal_forces=pushes[:, :, 2],
+        friction_forces=pushes[:, :, :2],
+        modes=modes[:, :, :STICK_POINT],
     )

@@ -18,67 +18,99 @@ It enters by its product with the velocities, a difference of forces along the m
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from typing import NamedTuple
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, factorise, solve
 from tetra_drake.engines.compiled.dynamics import (
     Forces,
     compute_forces,
     implicit_matrix,
+    inertia,
     move_bodies,
 )
 from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.kinematics import move_nodes
+from tetra_drake.physics.lanes import Real, Table, select
 from tetra_drake.robot.model import Model
-
-Array = np.ndarray
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
+class Step(NamedTuple):
+    """A step from `state` to `end`, (13 bodies,), and what is computed on the way."""
+
+    state: Table
+    end: Table
+    force: Table
+    """(6 bodies,), at the state; so are the following."""
+    end_force: Table
+    change: Table
+    stage: Table
+    k1: Table
+    k2: Table
+    rows: Table
+    """(bodies, 6, 12)."""
+    lines: Table
+    """(JUNCTION_CABLES, 9)."""
+
+
 @compiled
 def take_step(
-    robot: Model, state: Array, modes: Array, forces: Forces, signals: Array, step: float
-) -> tuple[Array, float]:
-    """The state after a step (s) from `state`, where `forces` are; `signals` are the end's.
+    robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, step: Real
+) -> Real:
+    """Writes the end of a step (s); `signals` are the end's. What is given of the state: `forces`,
+    whose nodes are overwritten, and work.force.
 
-    Also returns the difference to the first-order solution within: the largest of any body's
-    velocity (m/s), of rotation that of its nodes.
+    Returns the difference to the first-order solution within: the largest of any body's
+    velocity (m/s), of rotation that of its nodes; NaN if one is.
     """
-    first = state.size // 13 * 7
-    velocities = state[first:]
-    moved = move_bodies(state, velocities, step)
-    nodes = move_nodes(moved, robot.p_BN)
-    change = compute_forces(robot, nodes, modes, signals).generalized
-    change -= forces.generalized
-    change *= GAMMA
-    rows = implicit_matrix(robot, modes, forces, GAMMA * step)
-    factorise(rows)
-    k1 = forces.generalized + change
-    solve(rows, k1)
-    stage_1 = velocities + GAMMA * step * k1
-    end = move_bodies(state, stage_1, step)
-    for i in range(change.size):
-        end[first + i] = velocities[i] + step * k1[i]
+    state, end, k1, k2, stage = work.state, work.end, work.k1, work.k2, work.stage
+    size, scaled = work.force.size, GAMMA * step
+    bodies = size // BLOCK
+    first = state.size - size
+    implicit_matrix(robot, modes, forces, scaled, work.lines, work.rows)
+    factorise(work.rows)
 
-    nodes = move_nodes(end, robot.p_BN)
-    k2 = compute_forces(robot, nodes, modes, signals).generalized
-    for i in range(change.size):
-        k2[i] = k2[i] - 2.0 * (robot.inertia[i] * k1[i]) - change[i]
-    solve(rows, k2)
+    for i in range(size):
+        stage[i] = end[first + i] = state[first + i]
+    move_bodies(state, stage, step, end)
+    move_nodes(end, robot.p_BN, forces.nodes)
+    compute_forces(robot, modes, signals, False, forces, work.end_force)
+    for i in range(size):
+        work.change[i] = GAMMA * (work.end_force[i] - work.force[i])
+        k1[i] = work.force[i] + work.change[i]
+    solve(work.rows, k1)
 
-    error = 0.0
-    for i in range(change.size):
-        # The position's second stage is stage 2's velocity - 2 (stage 1's rate) + γ h k2.
-        stage_2 = end[first + i] - 2.0 * stage_1[i] + GAMMA * step * k2[i]
-        stage_1[i] = 1.5 * stage_1[i] + 0.5 * stage_2
-        difference = 0.5 * step * abs(k1[i] + k2[i])
-        if i % BLOCK < 3:
-            difference *= robot.radius
-        if difference > error or math.isnan(difference):
-            error = difference
-    end = move_bodies(state, stage_1, step)
-    for i in range(change.size):
-        end[first + i] = velocities[i] + step * (1.5 * k1[i] + 0.5 * k2[i])
-    return end, error
+    for i in range(size):
+        stage[i] = state[first + i] + scaled * k1[i]
+        end[first + i] = state[first + i] + step * k1[i]
+    move_bodies(state, stage, step, end)
+    move_nodes(end, robot.p_BN, forces.nodes)
+    compute_forces(robot, modes, signals, False, forces, work.end_force)
+    for body in range(bodies):
+        for j in range(BLOCK):
+            i = BLOCK * body + j
+            k2[i] = work.end_force[i] - 2.0 * (inertia(robot, j) * k1[i]) - work.change[i]
+    solve(work.rows, k2)
+
+    turn, shift = 0.0, 0.0
+    for body in range(bodies):
+        for j in range(BLOCK):
+            i = BLOCK * body + j
+            velocity, difference = state[first + i], abs(k1[i] + k2[i])
+            # The position's second stage is stage 2's velocity - 2 (stage 1's rate) + γ h k2.
+            stage_2 = velocity + step * k1[i] - 2.0 * stage[i] + scaled * k2[i]
+            stage[i] = 1.5 * stage[i] + 0.5 * stage_2
+            end[first + i] = velocity + step * (1.5 * k1[i] + 0.5 * k2[i])
+            if j < 3:
+                turn = larger(turn, difference)
+            else:
+                shift = larger(shift, difference)
+    move_bodies(state, stage, step, end)
+    return 0.5 * step * larger(robot.body.radius[0] * turn, shift)
+
+
+@compiled
+def larger(x: Real, y: Real) -> Real:
+    """The larger; NaN if either is."""
+    return select((y > x) | (y != y), y, x)

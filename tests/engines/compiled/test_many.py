@@ -1,0 +1,180 @@
+"""Many gaits at a time on the compiled engine: each as if it were alone."""
+
+import dataclasses
+import threading
+import time
+from concurrent.futures import CancelledError
+
+import numpy as np
+import pytest
+import xarray
+
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk
+from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.compiled.walk import DONE, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
+from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.errors import (
+    Diverged,
+    InputError,
+    SimulationFailure,
+    StepBudgetExceeded,
+    TimeBudgetExceeded,
+)
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.signals import signals_at
+from tetra_drake.scenario.perturb import displaced, scaled
+from tetra_drake.scenario.schema import Scenario
+
+FAR_TOO_STRONG = {"cpg.gain": 4e9}
+"""A pull that throws the robot about at the first step."""
+
+TOO_STRONG = {"cpg.gain": 300.0, "simulation.max_evaluations": 20_000}
+"""One that winds it up until steps are tiny."""
+
+
+@pytest.fixture
+def short(scenario: Scenario) -> Scenario:
+    """One second on the compiled engine, driven from 0.2 s on."""
+    times = {"simulation.duration": 1.0, "simulation.steady_from": 0.5, "cpg.start_up": 0.2}
+    return scenario.with_changes({"simulation.engine": "compiled", **times})
+
+
+def courses(walks: list[Walk], width: int) -> list[Course]:
+    """How walks go in an engine whose lanes take the next walk when one has ended."""
+    engine = LaneEngine(walks[0], width=width)
+    waiting, found = list(enumerate(walks)), dict[int, Course]()
+    in_lane = dict[int, int]()
+    while waiting or in_lane:
+        for lane in engine.idle[: len(waiting)]:
+            in_lane[lane], walk = waiting.pop(0)
+            engine.load(lane, walk)
+        for lane, _, course in engine.advance(1000):
+            found[in_lane.pop(lane)] = course
+    return [found[i] for i in range(len(walks))]
+
+
+def same(a: Course, b: Course) -> bool:
+    """Whether two courses agree to the last bit, cost aside."""
+    pairs = zip(a[:-1], b[:-1], strict=True)
+    return all(np.array_equal(x, y, equal_nan=True) for x, y in pairs)
+
+
+def test_a_gait_walks_alike_in_any_number_of_lanes_in_any_order_beside_any_neighbours(short):
+    kinds = [short, short.with_changes(FAR_TOO_STRONG), short, short.with_changes(TOO_STRONG)]
+    scenarios = [kinds[i % 4] for i in range(11)]
+    walks = [Walk.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(scenarios)]
+    alone = [courses([walk], 1)[0] for walk in walks]
+    statuses = [course.status for course in alone[:4]]
+    assert statuses == [DONE, STEP_TOO_SMALL, DONE, TOO_MANY_EVALUATIONS]
+    for width in (4, 8):
+        for order in (range(11), range(10, -1, -1)):
+            found = courses([walks[i] for i in order], width)
+            assert all(same(course, alone[i]) for i, course in zip(order, found, strict=True))
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_many_gaits_have_the_results_of_single_ones(short, workers):
+    gaits = [seeded_gait(short, seed) for seed in range(12)]
+    found = simulate_many(scenario=short, gaits=gaits, workers=workers)
+    for gait, result in zip(gaits, found, strict=True):
+        alone = simulate(scenario=short, gait=gait)
+        assert without_cost(result) == without_cost(alone)
+
+
+def without_cost(result: SimulationResult | SimulationFailure) -> SimulationResult:
+    assert isinstance(result, SimulationResult)
+    return dataclasses.replace(result, wall_time=0.0)
+
+
+def test_every_gait_may_have_a_scenario_of_its_own(short):
+    scenarios = [
+        short,
+        scaled(short, ["cables.outer_stiffness"], 1.05),
+        displaced(short, percent=5.0, seed=1),
+        short.with_changes({"simulation.duration": 0.8, "compiled.tolerance": 5e-5}),
+        short.with_changes({"robot.tetrahedra": 3}),
+        short.with_changes({"cpg.signals": "recorded", "cpg.gain": "1 lbf"}),
+        short.with_changes({"cables.slack": True, "cpg.listing_step": "0.1 ms"}),
+        short.with_changes({"robot.gravity": 1.6, "ground.stiffness": "20 lbf/in"}),
+    ]
+    gaits = [seeded_gait(each, 3) for each in scenarios]
+    found = simulate_many(scenario=scenarios, gaits=gaits, workers=1)
+    alone = [simulate(scenario=s, gait=g) for s, g in zip(scenarios, gaits, strict=True)]
+    assert [without_cost(each) for each in found] == [without_cost(each) for each in alone]
+    assert len({each.metrics.distance for each in alone}) == len(alone), "all of them differ"
+
+
+def test_failures_stand_in_the_place_of_results(short):
+    failing = {
+        "a body's velocity": {"simulation.max_speed": 1e-3},
+        "no step": {"compiled.tolerance": 1e-300},
+        "force evaluations": {"simulation.max_evaluations": 100},
+        "": {},
+    }
+    scenarios = [short.with_changes(changes) for changes in failing.values()]
+    gait = seeded_gait(short)
+    found = simulate_many(scenario=scenarios, gaits=[gait] * 4, workers=1)
+    kinds = [Diverged, Diverged, StepBudgetExceeded, SimulationResult]
+    assert [type(each) for each in found] == kinds
+    for each, scenario, reason in zip(found[:3], scenarios, failing, strict=False):
+        with pytest.raises(type(each)) as alone:
+            simulate(scenario=scenario, gait=gait)
+        assert each.reason.startswith(reason)
+        assert (each.time, each.reason) == (alone.value.time, alone.value.reason)
+    assert found[2].time > 0.0 and found[3].metrics == simulate(scenario=short, gait=gait).metrics
+
+
+def test_recordings_are_those_of_single_gaits(short):
+    gaits = [seeded_gait(short, seed) for seed in range(5)]
+    for gait, found in zip(
+        gaits, simulate_many(scenario=short, gaits=gaits, record=True, workers=1), strict=True
+    ):
+        alone = simulate(scenario=short, gait=gait, record=True)
+        xarray.testing.assert_identical(found.trajectory, alone.trajectory)
+
+
+@pytest.mark.parametrize("signals", ["listing", "recorded"])
+def test_cables_are_fed_the_signals_of_the_network(short, signals):
+    # The engine computes them as it goes; here they are computed at once.
+    own = short.with_changes({"cpg.signals": signals})
+    gait = seeded_gait(own)
+    trajectory = simulate(scenario=own, gait=gait, record=True).trajectory
+    times = trajectory.time.values
+    times = times[np.abs(times - own.cpg.start_up) > 1e-9]  # there the signals jump
+    expected = signals_at(own, gait, times)
+    assert np.abs(expected).max() > 1.0, "N"
+    np.testing.assert_allclose(trajectory.signal.sel(time=times), expected, atol=1e-12)
+
+
+def test_scenarios_and_gaits_have_to_fit(short):
+    gait = seeded_gait(short)
+    with pytest.raises(InputError):
+        simulate_many(scenario=[short, short], gaits=[gait] * 3)
+    with pytest.raises(InputError) as caught:
+        simulate_many(scenario=short.with_changes({"robot.tetrahedra": 3}), gaits=[gait])
+    assert caught.value.key == "weights"
+    with LanePool(1) as pool:  # a gait that is refused leaves the lanes as they are
+        fit, misfit = (short, gait), (short, dataclasses.replace(gait, weights=(1.0,) * 4))
+        futures = pool.submit([fit, misfit, fit, misfit, misfit, fit])
+        assert [future.exception() is None for future in futures] == [1, 0, 1, 0, 0, 1]
+    assert simulate_many(scenario=short, gaits=[]) == []
+
+
+def test_a_gait_that_takes_too_long_leaves_its_lane_to_others(short):
+    gait, endless = seeded_gait(short), short.with_changes({"simulation.duration": "1 h"})
+    with LanePool(1) as pool:
+        with pytest.raises(TimeBudgetExceeded):
+            pool.simulate(scenario=endless, gait=gait, time_budget=0.05)
+        found = pool.simulate(scenario=short, gait=gait)
+    assert found.metrics == simulate(scenario=short, gait=gait).metrics
+
+
+def test_the_end_of_a_pool_cancels_what_is_under_way(short):
+    endless = short.with_changes({"simulation.duration": "1 h"})
+    before = threading.active_count()
+    with LanePool(2) as pool:
+        futures = pool.submit([(endless, seeded_gait(endless))] * 40)
+        time.sleep(0.1)  # some are under way, some wait
+    assert threading.active_count() == before
+    assert all(isinstance(future.exception(), CancelledError) for future in futures)

@@ -1,0 +1,106 @@
+"""One step of the compiled engine: its order, and its estimate of the error."""
+
+import numpy as np
+import pytest
+
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
+from tetra_drake.engines.compiled.dynamics import Forces, compute_forces
+from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
+from tetra_drake.physics.cable import PULL_COLUMNS
+from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
+from tetra_drake.physics.kinematics import NODE_COLUMNS, move_nodes
+from tetra_drake.robot.model import JUNCTION_CABLES, make_model
+from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
+from tetra_drake.scenario.schema import Scenario
+
+PULL = np.array([1.0, -2.0, 3.0, 0.5])
+"""Rise of the signals per second, in 100 N."""
+
+
+class Stepper:
+    """The robot on the ground, its nodes sticking or slipping, with frozen modes and rising
+    signals: nothing jumps, so a method shows its order."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.structure: Structure = MakeStructure(scenario.robot, scenario.cables)
+        self.robot = make_model(scenario, self.structure)
+        bodies, contacts = len(self.structure.bodies), self.structure.contacts
+        self.modes = np.zeros((len(contacts), MODE_COLUMNS))
+        self.modes[:-1, CONTACT] = 1.0
+        self.modes[:4, MODE] = [1.0, 0.0, -1.0, 1.0]
+        self.modes[3:6, MODE + 1] = [-1.0, 1.0, 0.0]
+        places = node_positions(self.structure, self.structure.initial_state)[contacts, :2]
+        self.modes[:, STICK_POINT : STICK_POINT + 2] = places
+        size = BLOCK * bodies
+        self.work = Step(
+            state=np.empty(13 * bodies),
+            end=np.empty(13 * bodies),
+            **{n: np.empty(size) for n in ("force", "end_force", "change", "stage", "k1", "k2")},
+            rows=np.empty((bodies, BLOCK, ROW)),
+            lines=np.empty((JUNCTION_CABLES, 9)),
+        )
+        self.forces = Forces(
+            np.empty((4 * bodies, NODE_COLUMNS)),
+            np.empty((len(self.robot.cables), PULL_COLUMNS)),
+            np.empty((len(contacts), 3)),
+        )
+
+    def start(self) -> np.ndarray:
+        """A state half a millimetre in the ground, all bodies sliding to one side and turning."""
+        state, generator = self.structure.initial_state, np.random.default_rng(3)
+        state[6:35:7] -= 5e-4
+        state[35:] = np.tile([0.0, 0.0, 0.0, 0.06, 0.04, 0.0], 5)
+        state[35:] += generator.normal(scale=0.005, size=30)
+        return state
+
+    def walk(self, duration: float, steps: int) -> tuple[np.ndarray, float]:
+        """The state after so many equal steps, and the estimated error of the first."""
+        h, work = duration / steps, self.work
+        work.state[:] = self.start()
+        estimates = []
+        for i in range(steps):
+            move_nodes(work.state, self.robot.p_BN, self.forces.nodes)
+            signals = 1e2 * PULL * i * h
+            compute_forces(self.robot, self.modes, signals, True, self.forces, work.force)
+            signals = 1e2 * PULL * (i + 1) * h
+            estimates.append(take_step(self.robot, work, self.modes, self.forces, signals, h))
+            work.state[:] = work.end
+        return work.state.copy(), estimates[0]
+
+
+@pytest.fixture
+def stepper(scenario: Scenario) -> Stepper:
+    # With a fortieth of the damping of cables and ground: the stiffer an equation, the shorter the
+    # steps from which on a method shows its order.
+    soft = {"cables.damping": 0.2, "friction.stiction_damping": 2.0, "ground.damping": 5e3}
+    soft["ground.stiffness"] = 200.0  # so that the weight keeps the nodes in the ground
+    return Stepper(scenario.with_changes(soft))
+
+
+def test_half_the_step_has_a_quarter_of_the_error(stepper):
+    duration = 4e-3
+    exact, _ = stepper.walk(duration, 4096)
+    errors = [np.abs(stepper.walk(duration, steps)[0] - exact) for steps in (32, 64)]
+    # Positions, turns, velocities and spins each converge, at order 2.
+    for part in (slice(0, 35), slice(35, 65)):
+        assert errors[0][part].max() / errors[1][part].max() == pytest.approx(4.0, rel=0.12)
+
+
+def test_the_estimate_is_the_error_of_a_solution_of_first_order(stepper):
+    # Half the step has a quarter of it, and it bounds the true error of small steps.
+    estimates, true = [], []
+    for h in (1e-4, 5e-5):
+        exact, _ = stepper.walk(h, 64)
+        end, estimate = stepper.walk(h, 1)
+        estimates.append(estimate)
+        speeds = (end - exact)[35:].reshape(5, 6)
+        speeds[:, :3] *= stepper.robot.body.radius[0]
+        true.append(np.abs(speeds).max())
+    assert estimates[0] / estimates[1] == pytest.approx(4.0, rel=0.1)
+    assert 0.0 < true[0] < estimates[0] and 0.0 < true[1] < estimates[1]
+    assert true[0] / true[1] == pytest.approx(8.0, rel=0.2), "of a step of order 2"
+
+
+def test_an_error_that_is_not_a_number_is_not_lost():
+    assert larger(1.0, 2.0) == larger(2.0, 1.0) == 2.0
+    assert np.isnan(larger(1.0, np.nan)) and np.isnan(larger(np.nan, 1.0))

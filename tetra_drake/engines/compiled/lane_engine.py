@@ -1,0 +1,306 @@
+"""The tables of W walks in lanes, and how a walk gets into a lane and its result out of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import typeof
+from numba.core import registry
+
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
+from tetra_drake.engines.compiled.dynamics import Forces
+from tetra_drake.engines.compiled.rosenbrock import Step
+from tetra_drake.engines.compiled.walk import (
+    CLOCK_ROWS,
+    DUE,
+    EVALUATIONS,
+    IDLE,
+    MARK,
+    STATUS,
+    STEP,
+    TAKEN,
+    TIME,
+    TRIED,
+    WALKING,
+    Log,
+    Walks,
+    advance,
+)
+from tetra_drake.physics.cable import PULL_COLUMNS, Cables
+from tetra_drake.physics.contact import MODE_COLUMNS, Ground, update_modes
+from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.lanes import FieldArray, lane_table
+from tetra_drake.physics.oscillator import NEURON_COLUMNS, U, V
+from tetra_drake.results.trajectory import sample_times
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.model import (
+    JUNCTION_CABLES,
+    Body,
+    Model,
+    initial_state,
+    make_model,
+    make_network,
+)
+from tetra_drake.robot.signals import sample_count
+from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
+from tetra_drake.scenario.schema import Scenario
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A gait on a scenario, prepared for a lane."""
+
+    scenario: Scenario
+    gait: Gait
+    record: bool
+    structure: Structure
+    model: Model
+    ends: tuple[float, float, float]
+    """The times (s) that metrics compare."""
+    times: np.ndarray
+    """The times (s) of the samples to keep, the ends among them."""
+    marks: np.ndarray
+    """The times (s) at which steps end."""
+
+    @classmethod
+    def of(cls, scenario: Scenario, gait: Gait, *, record: bool) -> Walk:
+        """Prepares a gait."""
+        simulation, start_up = scenario.simulation, scenario.cpg.start_up
+        structure = MakeStructure(scenario.robot, scenario.cables)
+        ends = 0.0, simulation.steady_from, simulation.duration
+        times = sample_times(simulation.duration, simulation.sample_period) if record else ()
+        return cls(
+            scenario,
+            gait,
+            record,
+            structure,
+            make_model(scenario, structure),
+            ends,
+            times=np.unique([*ends, *times]),
+            marks=np.unique([*ends, *([start_up] if start_up <= simulation.duration else [])]),
+        )
+
+    def with_gait(self, gait: Gait) -> Walk:
+        """Another gait on the same scenario."""
+        return dataclasses.replace(self, gait=gait)
+
+    @property
+    def kind(self) -> tuple[int, bool, bool]:
+        """What walks that share an engine must have in common."""
+        scenario = self.scenario
+        return scenario.robot.tetrahedra, scenario.cables.slack, scenario.cpg.signals == "listing"
+
+    @property
+    def recent_signals(self) -> int:
+        """How many samples of the signals an engine has to hold: those within a step, and as many
+        for lanes that run ahead; a power of two."""
+        within = self.scenario.compiled.max_step / self.scenario.cpg.listing_step
+        return 1 << math.ceil(math.log2(2.0 * within + 32.0))
+
+
+class Course(NamedTuple):
+    """How a walk went."""
+
+    status: int
+    time: float
+    """When it ended, in s."""
+    steps: int
+    evaluations: int
+    times: np.ndarray
+    states: np.ndarray
+    modes: np.ndarray
+    signals: np.ndarray
+    wall_time: float
+    """What it cost, in s: shared with the other walks on the same core."""
+
+
+class LaneEngine:
+    """Simulates walks of one kind in `width` lanes."""
+
+    def __init__(self, first: Walk, *, width: int) -> None:
+        """For walks like the first; see `accepts`."""
+        self._kind = first.kind
+        self._robot, self._robot_tables = _lane_model(first.model, width)
+        self._walks = _tables(first, self._robot, width)
+        structure = first.structure
+        shape, signals = (width, len(first.times)), structure.signals
+        self._log = Log(
+            marks=np.full((width, 5), math.inf),
+            passed=np.zeros(width, dtype=np.int64),
+            times=np.full((width, len(first.times) + 1), math.inf),
+            kept=np.zeros(width, dtype=np.int64),
+            states=np.zeros((*shape, structure.initial_state.size)),
+            modes=np.zeros((*shape, len(structure.contacts), MODE_COLUMNS)),
+            signals=np.zeros((*shape, signals)),
+            recent=np.zeros((width, first.recent_signals, signals)),
+        )
+        log = Log(*(FieldArray(array, any_size=True) for array in self._log))
+        self._arguments = self._walks, log, first.scenario.cpg.signals == "listing"
+        # Called without looking for the types of all these tables each time.
+        kinds = tuple(typeof(each) for each in (*self._arguments, 0))
+        self._advance = advance.compile(kinds)  # type: ignore[attr-defined]
+        self._in_lane: list[Walk | None] = [None] * width
+        self._wall_times = [0.0] * width
+        for lane in range(width):  # so that idle lanes compute with proper numbers
+            self.load(lane, first)
+            self.stop(lane)
+
+    def accepts(self, each: Walk) -> bool:
+        """Whether a walk can be simulated: one like the first in structure and kind of signals,
+        and with no more to keep."""
+        room = self._log.times.shape[1] - 1, self._log.recent.shape[1]
+        needs = len(each.times), each.recent_signals
+        return each.kind == self._kind and needs[0] <= room[0] and needs[1] <= room[1]
+
+    @property
+    def idle(self) -> list[int]:
+        """The lanes without a walk."""
+        return [lane for lane, each in enumerate(self._in_lane) if each is None]
+
+    def load(self, lane: int, each: Walk) -> None:
+        """Starts a walk in a lane; raises InputError if its gait does not fit its scenario."""
+        scenario, model, start = each.scenario, each.model, each.structure.initial_state
+        nodes, modes = moved_nodes(each.structure, start), np.zeros(self._log.modes.shape[2:])
+        update_modes(nodes, model.contacts, model.ground, modes)
+        cpg, simulation, compiled = scenario.cpg, scenario.simulation, scenario.compiled
+        numbers = make_network(cpg, each.gait, oscillators=scenario.oscillators)._asdict()
+        numbers |= dataclasses.asdict(compiled)
+        numbers |= {name: getattr(simulation, name) for name in ("max_speed", "max_evaluations")}
+        numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
+        numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
+        for name, values in numbers.items():
+            getattr(self._walks, name).array[..., lane] = values
+        for table, values in zip(self._robot_tables, _numbers(model), strict=True):
+            table.array[..., lane] = values
+        self._walks.step.state.array[:, lane] = start
+        u_and_v = initial_state(cpg, scenario.oscillators).reshape(2, -1)
+        self._walks.neurons.array[:, U, lane], self._walks.neurons.array[:, V, lane] = u_and_v
+
+        log, clock = self._log, self._walks.clock.array
+        log.times[lane] = log.marks[lane] = math.inf
+        log.times[lane, : len(each.times)] = each.times
+        log.marks[lane, : len(each.marks)] = each.marks
+        log.states[lane, 0], log.modes[lane, 0], log.signals[lane, 0] = start, modes, 0.0
+        log.kept[lane], log.passed[lane] = 1, 0
+        clock[:, lane] = 0.0
+        clock[STATUS, lane], clock[STEP, lane] = WALKING, compiled.look_ahead
+        clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
+        self._in_lane[lane], self._wall_times[lane] = each, 0.0
+
+    def stop(self, lane: int) -> float:
+        """Takes the walk out of a lane, wherever it is; returns what it cost, in s."""
+        self._in_lane[lane] = None
+        self._walks.clock.array[STATUS, lane] = IDLE
+        return self._wall_times[lane]
+
+    def advance(self, iterations: int) -> list[tuple[int, Walk, Course]]:
+        """Lets the lanes walk until one of them ends, or for a number of iterations; returns lanes
+        and walks that have ended, which are idle then. Other threads run meanwhile."""
+        started = time.perf_counter()
+        self._advance(*self._arguments, iterations)
+        walks = [(lane, each) for lane, each in enumerate(self._in_lane) if each is not None]
+        share = (time.perf_counter() - started) / max(len(walks), 1)
+        ended = []
+        for lane, each in walks:
+            self._wall_times[lane] += share
+            if self._walks.clock.array[STATUS, lane] != WALKING:
+                ended.append((lane, each, self._course(lane)))
+                self.stop(lane)
+        return ended
+
+    def _course(self, lane: int) -> Course:
+        clock, log = self._walks.clock.array[:, lane], self._log
+        kept = slice(log.kept[lane])
+        return Course(
+            status=int(clock[STATUS]),
+            time=float(clock[TIME]),
+            steps=int(clock[TAKEN]),
+            evaluations=EVALUATIONS * int(clock[TRIED]),
+            times=log.times[lane, kept].copy(),
+            states=log.states[lane, kept].copy(),
+            modes=log.modes[lane, kept].copy(),
+            signals=log.signals[lane, kept].copy(),
+            wall_time=self._wall_times[lane],
+        )
+
+
+def lanes_for(walks: float) -> int:
+    """The number of lanes in which so many walks are simulated fastest on a core of this machine;
+    their numbers are the same with any.
+
+    Eight doubles fill a register of AVX-512. With narrower registers, eight lanes need more of
+    them than there are, and four are faster.
+    """
+    if walks <= 1:
+        return 1
+    return 8 if walks > 4 and "+avx512f" in processor_features() else 4
+
+
+def processor_features() -> str:
+    """The instructions that numba compiles for, such as +avx2: its settings', or the machine's."""
+    return registry.cpu_target.target_context.codegen().magic_tuple()[2]
+
+
+def _numbers(model: Model) -> list[np.ndarray]:
+    """The arrays of a model that differ between scenarios, in the order of its lane tables."""
+    cables = [model.cables[name] for name in Cables._fields[3:]]
+    ground = [model.ground[name] for name in Ground._fields]
+    return [model.p_BN, *cables, *ground, *model.body]
+
+
+def _lane_model(model: Model, width: int) -> tuple[Model, list[FieldArray]]:
+    """The model in lanes, and those of its tables that differ between scenarios."""
+    tables = [lane_table(values.shape, width) for values in _numbers(model)]
+    rest = iter(tables)
+    p_BN = next(rest)
+    indices = [FieldArray(model.cables[name].copy()) for name in Cables._fields[:3]]
+    lanes = Model(
+        p_BN=p_BN,
+        cables=Cables(*indices, *(next(rest) for _ in Cables._fields[3:])),
+        contacts=FieldArray(model.contacts.copy()),
+        ground=Ground(*(next(rest) for _ in Ground._fields)),  # type: ignore[arg-type]
+        body=Body(*(next(rest) for _ in Body._fields)),
+        slack=model.slack,
+    )
+    return lanes, tables
+
+
+def _tables(first: Walk, robot: Model, width: int) -> Walks:
+    """The tables of walks like the first, zeros."""
+    structure = first.structure
+    bodies, signals = len(structure.bodies), structure.signals
+    contacts, size, neurons = len(structure.contacts), BLOCK * bodies, 2 * signals
+
+    def table(*shape: int) -> FieldArray:
+        return lane_table(shape, width)
+
+    vectors = {name: table(size) for name in ("force", "end_force", "change", "stage", "k1", "k2")}
+    tables: dict[str, Any] = {name: table(1) for name in Walks._fields}
+    tables |= {name: table(signals) for name in ("output", "signals", "end_signals")}
+    tables |= {
+        "robot": robot,
+        "inhibition": lane_table((neurons, neurons), width, any_size=True),
+        "neurons": table(neurons, NEURON_COLUMNS),
+        "feedback": table(neurons),
+        "clock": table(CLOCK_ROWS),
+        "modes": table(contacts, MODE_COLUMNS),
+        "acceleration": table(size),
+        "step": Step(
+            state=table(13 * bodies),
+            end=table(13 * bodies),
+            rows=table(bodies, BLOCK, ROW),
+            lines=table(JUNCTION_CABLES, 9),
+            **vectors,
+        ),
+        "forces": Forces(
+            nodes=table(len(structure.node_names), NODE_COLUMNS),
+            pulls=table(len(structure.cables), PULL_COLUMNS),
+            pushes=table(contacts, 3),
+        ),
+    }
+    return Walks(**tables)

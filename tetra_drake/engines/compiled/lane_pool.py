@@ -1,0 +1,200 @@
+"""Threads that simulate many gaits at a time, each thread several in lanes."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import CancelledError, Future
+from dataclasses import dataclass, field
+
+from tetra_drake.engines.compiled.engine import Course, Walk, make_outcome, ready_engine
+from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
+from tetra_drake.errors import SimulationFailure, TimeBudgetExceeded
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.schema import Scenario
+
+_GATHERING = 1e-3
+"""Time (s) that a thread without work waits for more than one walk to come."""
+
+_ITERATIONS = 5000
+"""Iterations, some 30 ms, after which a thread looks for time budgets and the pool's end."""
+
+
+@dataclass(eq=False)
+class _Job:
+    scenario: Scenario
+    gait: Gait
+    record: bool
+    time_budget: float
+    future: Future[tuple[Walk, Course]] = field(default_factory=Future)
+    deadline: float = math.inf
+
+
+class LanePool:
+    """Simulates gaits on the compiled engine, in so many threads and as many lanes in each as the
+    waiting gaits fill. At the end of its `with` block, what is under way is cancelled."""
+
+    def __init__(self, threads: int, *, say: Callable[[str], None] = lambda text: None) -> None:
+        """`say` is told when the engine has to be compiled."""
+        self._say = say
+        self._waiting: deque[_Job] = deque()
+        self._changed = threading.Condition()
+        self._closing = False
+        self._threads = [threading.Thread(target=self._work, daemon=True) for _ in range(threads)]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def capacity(self) -> int:
+        """The number of gaits that are simulated at a time."""
+        return len(self._threads) * lanes_for(math.inf)
+
+    def __enter__(self) -> LanePool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        for thread in self._threads:
+            thread.join()
+        for job in self._waiting:
+            job.future.set_exception(CancelledError())
+
+    def simulate(
+        self, *, scenario: Scenario, gait: Gait, record: bool = False, time_budget: float = math.inf
+    ) -> SimulationResult:
+        """As simulate(), while other threads ask for other gaits; the numbers are the same.
+
+        Also raises TimeBudgetExceeded if a simulation is not done after `time_budget` (s).
+        """
+        (future,) = self.submit([(scenario, gait)], record=record, time_budget=time_budget)
+        return make_outcome(*future.result())
+
+    def submit(
+        self,
+        walks: Sequence[tuple[Scenario, Gait]],
+        *,
+        record: bool = False,
+        time_budget: float = math.inf,
+    ) -> list[Future[tuple[Walk, Course]]]:
+        """Puts gaits, each with its scenario, in the queue; make_outcome() makes their results."""
+        jobs = [_Job(*walk, record, time_budget) for walk in walks]
+        with self._changed:
+            self._waiting.extend(jobs)
+            self._changed.notify_all()
+        return [job.future for job in jobs]
+
+    def _work(self) -> None:
+        """What each thread does: fills idle lanes, lets them walk, hands over what has ended."""
+        crew = _Crew(self._say)
+        while (jobs := self._take(crew)) is not None:
+            for job in jobs:
+                if not crew.load(job):
+                    with self._changed:
+                        self._waiting.appendleft(job)
+            crew.advance()
+        for job in crew.jobs.values():
+            job.future.set_exception(CancelledError())
+
+    def _take(self, crew: _Crew) -> list[_Job] | None:
+        """Jobs for the idle lanes of a thread; None at the pool's end."""
+        with self._changed:
+            while not (self._closing or self._waiting or crew.jobs):
+                self._changed.wait()
+            if not crew.jobs and len(self._waiting) == 1:
+                self._changed.wait(_GATHERING)
+            if self._closing:
+                return None
+            room = crew.room
+            if not crew.jobs:
+                share = math.ceil(len(self._waiting) / len(self._threads))
+                room = min(share, lanes_for(share))
+                crew.planned = room
+            return [self._waiting.popleft() for _ in range(min(room, len(self._waiting)))]
+
+
+class _Crew:
+    """The lanes of one thread and the jobs in them."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self.jobs: dict[int, _Job] = {}
+        """By lane."""
+        self.planned = 1
+        """How many jobs come next, if there are none."""
+        self._say = say
+        self._engine: LaneEngine | None = None
+        self._engines: dict[int, LaneEngine] = {}
+        """By width."""
+        self._latest: Walk | None = None
+
+    @property
+    def room(self) -> int:
+        """The number of idle lanes."""
+        return len(self._engine.idle) if self._engine else 0
+
+    def load(self, job: _Job) -> bool:
+        """Puts a job in an idle lane; False if it has to wait until all lanes are idle."""
+        try:
+            walk = self._prepare(job)
+            engine = self._engine if self.jobs else self._engine_for(walk)
+            if engine is None or not engine.accepts(walk):
+                return False
+            self._engine, lane = engine, engine.idle[0]
+            engine.load(lane, walk)
+        except Exception as error:  # such as a gait that does not fit the scenario
+            job.future.set_exception(error)
+            return True
+        job.deadline = time.perf_counter() + job.time_budget
+        self.jobs[lane] = job
+        return True
+
+    def advance(self) -> None:
+        """Lets all lanes walk for a while; jobs that have ended leave."""
+        engine = self._engine
+        if engine is None or not self.jobs:
+            return
+        for lane, walk, course in engine.advance(_ITERATIONS):
+            self.jobs.pop(lane).future.set_result((walk, course))
+        now = time.perf_counter()
+        for lane in [lane for lane, job in self.jobs.items() if now > job.deadline]:
+            job = self.jobs.pop(lane)
+            error = TimeBudgetExceeded(f"not done after {job.time_budget:g} s")
+            error.wall_time = engine.stop(lane)
+            job.future.set_exception(error)
+
+    def _prepare(self, job: _Job) -> Walk:
+        latest = self._latest
+        if latest and latest.scenario is job.scenario and latest.record == job.record:
+            return latest.with_gait(job.gait)
+        self._latest = Walk.of(job.scenario, job.gait, record=job.record)
+        return self._latest
+
+    def _engine_for(self, walk: Walk) -> LaneEngine:
+        width = lanes_for(self.planned)
+        engine = self._engines.get(width)
+        if engine is None or not engine.accepts(walk):
+            engine = self._engines[width] = ready_engine(walk, width, say=self._say)
+        return engine
+
+
+def simulate_in_lanes(
+    walks: Sequence[tuple[Scenario, Gait]],
+    *,
+    record: bool,
+    threads: int,
+    say: Callable[[str], None] = lambda text: None,
+) -> list[SimulationResult | SimulationFailure]:
+    """The results of many gaits, each with its scenario, or their failures."""
+    found: list[SimulationResult | SimulationFailure] = []
+    with LanePool(threads, say=say) as pool:
+        for future in pool.submit(walks, record=record):
+            try:
+                found.append(make_outcome(*future.result()))
+            except SimulationFailure as failure:
+                found.append(failure)
+    return found
