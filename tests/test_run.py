@@ -3,6 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+import pandas
 import pytest
 from helpers.analytic import Bowl, RandomSearch, read_record, small_scenario
 
@@ -88,6 +89,23 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     assert progress.shown[0] == 0 and progress.shown[-1] == 8
     assert progress.stages == [(done, 5) for done in range(6)]
     assert progress.warnings == []
+
+
+def test_candidates_side_by_side_have_the_records_of_candidates_one_by_one(tiny, tmp_path, reports):
+    several = tiny.with_changes({"evolution.trials": 3})
+    ways = {"lanes": {"workers": 1}, "threads": {"workers": 3}, "own": {"executor": OneByOne}}
+    records = {}
+    for name, way in ways.items():
+        evolved = tetra_drake.evolve(several, tmp_path / name, seed=4, reevaluate=False, **way)
+        records[name] = evolved.evaluations.drop(columns="wall_time_s")
+    assert len(records["lanes"]) == 24
+    for name in ("threads", "own"):
+        pandas.testing.assert_frame_equal(records[name], records["lanes"], check_exact=True)
+
+
+def OneByOne(workers):
+    """An executor with one thread."""
+    return ThreadPoolExecutor(1)
 
 
 def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):

@@ -282,13 +282,12 @@ def _robustness(options: Options) -> None:
     starting pose, friction, cables and ground changed by a few percent, one at a time, and
     prints how much that changes the distance.
     """
-    from tetra_drake.engines.simulate import prepare
     from tetra_drake.evolution.robustness import describe, gaits_of, robustness, save_table
 
     scenario, gaits = gaits_of(options.source, scenario=options.scenario)
-    prepare(scenario.with_changes({"simulation.engine": "compiled"}), say=_say)
     _say(f"gaits: {len(gaits)}; simulating each under every change")
-    table = robustness(scenario, gaits, percents=options.percent, workers=options.workers)
+    percents, workers = options.percent, options.workers
+    table = robustness(scenario, gaits, percents=percents, workers=workers, say=_say)
     print(describe(table))
     if options.out:
         save_table(table, options.out)
@@ -321,9 +320,10 @@ def _benchmark(options: Options) -> None:
     """Measure speed and accuracy of the engines and their settings.
 
     Simulates gaits on the engines with different settings and prints how many times faster than
-    real time each is, the errors of its distances against converged ones, and the compiled
-    engine's cost per step by number of tetrahedra. Takes some minutes; the set integrators
-    takes longer. Times are meaningful on an idle machine only.
+    real time each is, the errors of its distances against converged ones, the speed of batches
+    of gaits on one core and on all, and the compiled engine's cost per step by number of
+    tetrahedra. Takes some five minutes; the set integrators takes longer. Times are meaningful
+    on an idle machine only.
     """
     scenario = load_scenario(options.scenario)
     if options.gaits and options.number is not None:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
-from tetra_drake.engines.simulate import prepare
+from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.simulate import available_cores
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import (
     EvaluationImpossible,
     MakeExecutor,
-    available_cores,
     check_guard,
     check_sendable,
     process_executor,
@@ -53,7 +54,8 @@ def evolve(
         (see optimizers.base); by default the thesis's steady-state algorithm.
     objective: objective(result) -> float, to be maximised; by default the scenario's fitness.
     executor: executor(workers) makes a concurrent.futures.Executor; by default worker processes,
-        for which an objective must be defined in a module (for the compiled engine, threads).
+        for which an objective must be defined in a module. On the compiled engine, by default,
+        threads simulate the candidates of all trials side by side; see simulate_many.
     progress: shown none by default; see evolution.progress.
     reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another.
     report: in the end, writes report.html, replay.html and figures/.
@@ -68,8 +70,9 @@ def evolve(
     if own is None:
         raise InputError("scenario", "", "is needed to begin a run")
     method = Method.of(own, objective=objective, optimizer=optimizer)
-    evaluate, compiled = GaitEvaluation(own, objective), own.simulation.engine == "compiled"
-    where = executor or (thread_executor if compiled else process_executor)
+    evaluate = GaitEvaluation(own, objective)
+    in_lanes = executor is None and own.simulation.engine == "compiled"
+    where = thread_executor if in_lanes else executor or process_executor
     if resume:
         record = RunRecord.resume(out, scenario=scenario, seed=seed, method=method)
     else:
@@ -78,15 +81,19 @@ def evolve(
     with record, progress:
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
-        prepare(own, say=progress.say)
-        run_trials(
-            record,
-            evaluate=evaluate,
-            workers=workers,
-            executor=where,
-            optimizer=optimizer,
-            show=progress.show,
-        )
+        with contextlib.ExitStack() as stack:
+            at_a_time = workers
+            if in_lanes:
+                lanes = stack.enter_context(LanePool(workers, say=progress.say))
+                evaluate, at_a_time = GaitEvaluation(own, objective, lanes), lanes.capacity
+            run_trials(
+                record,
+                evaluate=evaluate,
+                workers=at_a_time,
+                executor=where,
+                optimizer=optimizer,
+                show=progress.show,
+            )
         if reevaluate and own.simulation.engine != "drake":
             try:
                 reevaluate_gaits(

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from helpers.analytic import small_scenario
 
+from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import Diverged
+from tetra_drake.errors import Diverged, TimeBudgetExceeded
 from tetra_drake.evolution import evaluation
-from tetra_drake.evolution.evaluation import GaitEvaluation, TimeBudgetExceeded, time_limit
+from tetra_drake.evolution.evaluation import GaitEvaluation, time_limit
 from tetra_drake.evolution.executors import evaluate_all
 from tetra_drake.robot.gait import ParameterSpace
 
@@ -61,6 +62,27 @@ def test_failures_say_why_and_have_the_worst_fitness(tiny, vectors, changes, obj
     assert failed.failure.startswith(kind)
     assert (failed.fitness, failed.metrics) == (-math.inf, {})
     assert time.monotonic() - started < 5.0  # 15 s would take longer
+
+
+def test_evaluations_in_lanes_are_those_of_single_gaits_and_keep_their_budgets(tiny, vectors):
+    compiled = tiny.with_changes({"simulation.engine": "compiled"})
+    endless = {"simulation.duration": "1 h", "evolution.time_budget": 0.05}
+    with LanePool(1) as lanes:
+        for vector in vectors:
+            alone, found = (
+                GaitEvaluation(compiled)(vector),
+                GaitEvaluation(compiled, None, lanes)(vector),
+            )
+            assert (found.fitness, found.metrics) == (alone.fitness, alone.metrics)
+            assert 0.0 < found.wall_time < alone.wall_time + 1.0
+        for changes, kind in (
+            ({"simulation.max_evaluations": 50}, "step budget: "),
+            ({"simulation.max_speed": 1e-6}, "diverged: "),
+            (endless, "time budget: "),
+        ):
+            failed = GaitEvaluation(compiled.with_changes(changes), None, lanes)(vectors[0])
+            assert failed.failure.startswith(kind)
+            assert failed.wall_time > 0.0
 
 
 def test_the_reason_of_a_failed_simulation_is_kept(tiny, vectors, monkeypatch):

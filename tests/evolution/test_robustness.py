@@ -125,5 +125,5 @@ def test_the_command_takes_the_best_gait_of_each_trial_of_a_run(tmp_path, capsys
 
 
 def test_a_gait_of_another_robot_is_refused(scenario, refused):
-    with refused("scenario tiny", "robot.tetrahedra", "expected 4"):
+    with refused("gait random gait 1", "weights", "expected 4"):
         robustness(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)})

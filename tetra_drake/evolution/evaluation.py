@@ -11,13 +11,22 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.errors import (
+    Diverged,
+    SimulationFailure,
+    StepBudgetExceeded,
+    TimeBudgetExceeded,
+)
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    from tetra_drake.engines.compiled.lane_pool import LanePool
 
 Objective = Callable[[SimulationResult], float]
 """What evolution maximises; the result has no trajectory. -inf or NaN counts as a failure."""
@@ -31,27 +40,31 @@ class GaitEvaluation:
     scenario: Scenario
     objective: Objective | None = None
     """None for the scenario's fitness."""
+    lanes: LanePool | None = None
+    """Where many threads that evaluate have their gaits simulated side by side."""
 
     def __call__(self, vector: Vector) -> Evaluation:
         """Fitness and metrics of one vector, or the reason of a failure."""
         started, scenario = time.perf_counter(), self.scenario
         gait = ParameterSpace.of(scenario).gait(vector, name="candidate")
         try:
-            with time_limit(scenario.evolution.time_budget):
-                result = simulate(scenario=scenario, gait=gait)
+            result = self._simulate(gait)
         except (SimulationFailure, TimeBudgetExceeded) as error:
-            found = Evaluation.failed(f"{_KINDS[type(error)]}: {error}")
+            found, cost = Evaluation.failed(f"{_KINDS[type(error)]}: {error}"), error.wall_time
         else:
             fitness = result.fitness if self.objective is None else float(self.objective(result))
-            found = Evaluation(fitness, dataclasses.asdict(result.metrics))
+            found, cost = Evaluation(fitness, dataclasses.asdict(result.metrics)), result.wall_time
             if not math.isfinite(fitness):
                 found = Evaluation.failed("diverged: the fitness is not finite")
-        wall_time, engine = time.perf_counter() - started, scenario.simulation.engine
-        return dataclasses.replace(found, wall_time=wall_time, engine=engine)
+        wall_time = time.perf_counter() - started if self.lanes is None else cost
+        return dataclasses.replace(found, wall_time=wall_time, engine=scenario.simulation.engine)
 
-
-class TimeBudgetExceeded(Exception):
-    """An evaluation took too long. No RuntimeError, as simulate() takes those for divergence."""
+    def _simulate(self, gait: Gait) -> SimulationResult:
+        budget = self.scenario.evolution.time_budget
+        if self.lanes is not None:
+            return self.lanes.simulate(scenario=self.scenario, gait=gait, time_budget=budget)
+        with time_limit(budget):
+            return simulate(scenario=self.scenario, gait=gait)
 
 
 _KINDS: dict[type[Exception], str] = {

@@ -24,6 +24,7 @@ from multiprocessing.connection import wait as wait_for_any
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Generic, TypeVar
 
+from tetra_drake.engines.simulate import available_cores
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.optimizers.base import Evaluation
 
@@ -68,11 +69,6 @@ def process_executor(workers: int) -> ProcessPoolExecutor:
 
 thread_executor: MakeExecutor = ThreadPoolExecutor
 """Threads, for evaluations that let other threads run meanwhile, as the compiled engine."""
-
-
-def available_cores() -> int:
-    """The cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _do_nothing(*_: object) -> None:

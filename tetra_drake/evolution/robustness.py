@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import functools
 import math
-import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tetra_drake.errors import InputError
-from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.executors import evaluate_all, thread_executor
+from tetra_drake.engines.simulate import simulate_many
+from tetra_drake.errors import SimulationFailure
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed, signed
-from tetra_drake.robot.gait import Gait, ParameterSpace, load_gait
+from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.perturb import displaced, scaled
 from tetra_drake.scenario.schema import Scenario
@@ -72,29 +69,30 @@ def robustness(
     *,
     percents: Sequence[float] = PERCENTS,
     workers: int | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> pandas.DataFrame:
     """Distances of gaits under every change, simulated on the compiled engine.
 
     Columns: gait (its key), what (NOTHING first), percent, distance (m; NaN where the simulation
-    failed), failure. Raises InputError where a gait is for another number of tetrahedra.
+    failed), failure. `workers` and `say` are those of simulate_many().
+
+    Raises InputError where a gait is for another number of tetrahedra.
     """
     import pandas
 
     scenario = scenario.with_changes({"simulation.engine": "compiled"})
-    space = ParameterSpace.of(scenario)
-    for key, gait in gaits.items():
-        if space.vector(gait).size != len(space.names):
-            problem = f"{key} has {len(gait.weights)} weights, expected {len(space.names) - 2}"
-            raise InputError(f"scenario {scenario.name}", "robot.tetrahedra", problem)
-    rows, tasks = [], []
+    rows: list[dict[str, Any]] = []
+    scenarios: list[Scenario] = []
     for what, percent, changed in _changes(scenario, percents):
-        for key, gait in gaits.items():
-            rows.append({"gait": key, "what": what, "percent": percent})
-            tasks.append(functools.partial(GaitEvaluation(changed), space.vector(gait)))
-    results = evaluate_all(operator.call, tasks, workers=workers, executor=thread_executor)
-    for index, evaluation in results:
-        rows[index]["distance"] = evaluation.metrics.get("distance", math.nan)
-        rows[index]["failure"] = evaluation.failure
+        rows += [{"gait": key, "what": what, "percent": percent} for key in gaits]
+        scenarios += [changed] * len(gaits)
+    every = [gaits[row["gait"]] for row in rows]
+    results = simulate_many(scenario=scenarios, gaits=every, workers=workers, say=say)
+    for row, found in zip(rows, results, strict=True):
+        if isinstance(found, SimulationFailure):
+            row["distance"], row["failure"] = math.nan, str(found)
+        else:
+            row["distance"], row["failure"] = found.metrics.distance, None
     return pandas.DataFrame(rows)
 
 

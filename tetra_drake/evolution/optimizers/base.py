@@ -22,7 +22,7 @@ class Evaluation:
     """As the fields of results.metrics.Metrics, SI."""
     failure: str | None = None
     wall_time: float = 0.0
-    """Time from vector to fitness, in s."""
+    """What it cost, in s; of simulations side by side on a core, its share of that core's time."""
     engine: str = ""
 
     @classmethod
