@@ -9,7 +9,7 @@ import pytest
 
 from tetra_drake.benchmark import measure as benchmark
 from tetra_drake.benchmark import tables
-from tetra_drake.benchmark.measure import CLOSE_IN, Row, error_statistics, measure
+from tetra_drake.benchmark.measure import CLOSE_IN, LANES, Batch, Row, error_statistics, measure
 from tetra_drake.benchmark.settings import SETS, compiled, describe, drake, mujoco, own, settings_of
 from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as mujoco_engine
@@ -28,10 +28,17 @@ def short(scenario: Scenario) -> Scenario:
 
 @pytest.fixture
 def no_mujoco(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine without MuJoCo; only few gaits in a batch."""
+    """A machine without MuJoCo."""
     for module in (mujoco_engine, benchmark):
         monkeypatch.setattr(module, "installed", lambda: False)
-    monkeypatch.setattr(benchmark, "BATCH", 2)
+
+
+@pytest.fixture(autouse=True)
+def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two cores; few gaits at a time, measured once."""
+    monkeypatch.setattr(benchmark, "available_cores", lambda: 2)
+    for name, value in {"BATCHES": (1, 5), "MUJOCO_BATCH": 1, "ROUNDS": 1}.items():
+        monkeypatch.setattr(benchmark, name, value)
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -63,7 +70,7 @@ def test_time_and_errors_are_those_of_gaits_that_do_not_fail(short, monkeypatch)
     results[1] = None
     monkeypatch.setattr(Row, "simulate", lambda self, gait: results[gaits.index(gait)])
     for gait in gaits:
-        row.time([gait])
+        row.time(gait)
     exact_in = np.array([result.metrics.distance_in if result else 0.0 for result in results])
     found = row.to_json(exact_in + 0.5, np.ones(3, dtype=bool))
     assert found["failed"] == 1 and found["distances_in"][1] is None
@@ -77,27 +84,29 @@ def test_every_setting_is_measured_on_every_gait(short, no_mujoco):
     stages: list[str] = []
     found = measure(short, gaits, sizes=[2], say=stages.append)
     rows = found["rows"]
-    assert [row["engine"] for row in rows] == ["drake", "drake", "compiled", "compiled"]
-    assert [row["batch"] for row in rows] == [False, False, False, True]
+    assert [row["engine"] for row in rows] == ["drake", "drake", "compiled"]
     for row in rows:
         assert row["real_time_factor_per_core"] > 0.0 and row["evaluations"] > 0
         assert row["failed"] == 0 and len(row["distances_in"]) == 2
         assert row["worst_error_in"] < CLOSE_IN
-    assert rows[2]["distances_in"] == rows[3]["distances_in"]
     assert [gait["well_conditioned"] for gait in found["gaits"]] == [True, True]
     assert found["mujoco"]["left_out"]
     (cost,) = found["step_costs"]
-    assert cost["tetrahedra"] == 2 and cost["steps"] > 0 and cost["microseconds_per_step"] > 0.0
+    assert cost["tetrahedra"] == 2 and cost["steps"] > 0
+    for of in ("", "_in_lanes"):
+        per_step = cost[f"microseconds_per_step{of}"]
+        assert 0.0 < per_step == 2.0 * cost[f"microseconds_per_tetrahedron{of}"]
     assert len(stages) >= 2 + len(gaits)
     table = [line for line in tables.to_markdown(found).splitlines() if line.startswith("|")]
-    assert len(table) == 2 + len(rows) + 2 + 1
+    assert len(table) == 2 + len(rows) + 2 + len(found["batches"]) + 2 + 1
     assert table[2].startswith(f"| {rows[0]['engine']} | {rows[0]['setting']} | ")
 
 
 def test_gaits_that_fail_leave_blanks_and_missing_mujoco_is_an_error_if_asked_for(short, no_mujoco):
     short.simulation.max_evaluations = 10
     found = measure(short, [seeded_gait(short)], sizes=[3])
-    assert [row["failed"] for row in found["rows"]] == [1] * 4
+    assert [row["failed"] for row in found["rows"]] == [1] * 3
+    assert [batch["failed"] for batch in found["batches"]] == [1, 5, 5]
     assert not any(row["median_error_in"] or row["evaluations"] for row in found["rows"])
     assert found["step_costs"][0]["microseconds_per_step"] is None
     assert not found["gaits"][0]["well_conditioned"]
@@ -105,6 +114,33 @@ def test_gaits_that_fail_leave_blanks_and_missing_mujoco_is_an_error_if_asked_fo
     with pytest.raises(InputError):
         measure(short, [seeded_gait(short)], sets=["mujoco"])  # which is not left out
     assert "| - | - | - | - | 1 |" in tables.to_markdown(found)
+
+
+def test_batches_are_of_different_gaits_on_one_core_and_on_all_they_fill(short, no_mujoco):
+    found = measure(short, [seeded_gait(short)], sets=["compiled"], sizes=[])["batches"]
+    assert [(row["gaits"], row["cores"]) for row in found] == [(1, 1), (5, 1), (5, 2)]
+    for row in found:
+        assert row["setting"] == describe(short.with_changes(own("compiled")))
+        assert row["real_time_factor"] == row["cores"] * row["real_time_factor_per_core"] > 0.0
+        assert row["failed"] == 0
+
+
+def test_batches_and_sizes_take_turns_and_their_medians_count(short, no_mujoco, monkeypatch):
+    timed: list[tuple[int, int]] = []
+
+    def time(batch: Batch) -> None:
+        timed.append((batch.size, batch.cores))
+        batch.factors.append(float(len(timed)))
+        batch.step_costs.append(float(len(timed)))
+
+    monkeypatch.setattr(Batch, "time", time)
+    monkeypatch.setattr(benchmark, "ROUNDS", 3)
+    monkeypatch.setattr(benchmark, "settings_of", lambda name: [own("compiled")])
+    found = measure(short, [seeded_gait(short)], sets=["compiled"], sizes=[2])
+    assert timed == 3 * [(1, 1), (5, 1), (5, 2), (1, 1), (LANES, 1)]
+    assert [row["real_time_factor"] for row in found["batches"]] == [6.0, 7.0, 8.0]
+    (cost,) = found["step_costs"]
+    assert (cost["microseconds_per_step"], cost["microseconds_per_step_in_lanes"]) == (9.0, 10.0)
 
 
 @pytest.mark.skipif(not mujoco_engine.installed(), reason=mujoco_engine.INSTALL)
@@ -116,6 +152,10 @@ def test_mujoco_is_measured_against_its_own_converged_runs(short, monkeypatch):
     assert found["rows"][1]["evaluations"] == 2400
     assert found["mujoco"]["median_distance_from_ours_in"] > 0.0
     assert "mujoco" in found["versions"]
+    batches = [(batch["setting"], batch["gaits"], batch["cores"]) for batch in found["batches"]]
+    chosen = own("mujoco"), mujoco("implicitfast", 2)
+    settings = [describe(short.with_changes(each)) for each in chosen]
+    assert batches == [(setting, cores, cores) for setting in settings for cores in (1, 2)]
 
 
 def test_the_command_passes_its_options_on_and_writes_json(tmp_path, monkeypatch, capsys):

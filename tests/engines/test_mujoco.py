@@ -8,8 +8,9 @@ import xarray
 
 from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as engine
-from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
@@ -117,6 +118,14 @@ def test_too_long_a_step_diverges_without_a_log_file(short, integrator, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+@needs_mujoco
+def test_where_mujoco_starts_again_the_simulation_has_failed_when_it_did(short):
+    thrown = short.with_changes({"cpg.gain": 4e9})
+    with pytest.raises(Diverged, match="warns of instability") as caught:
+        simulate(scenario=thrown, gait=seeded_gait(thrown))
+    assert caught.value.time == pytest.approx(short.cpg.start_up, abs=2.5 * short.mujoco.step)
+
+
 @pytest.mark.parametrize(
     ("installed", "key"), [(True, "cables.slack"), (False, "simulation.engine")]
 )
@@ -125,6 +134,37 @@ def test_what_mujoco_cannot_simulate_is_refused(short, installed, key, monkeypat
     with pytest.raises(InputError) as caught:
         simulate(scenario=short.with_changes({"cables.slack": True}), gait=seeded_gait(short))
     assert caught.value.key == key
+
+
+@needs_mujoco
+@pytest.mark.parametrize("workers", [1, 2])
+def test_many_gaits_walk_as_each_alone(short, workers, monkeypatch):
+    monkeypatch.setattr(engine, "_STRETCH", 1000)
+    monkeypatch.setattr(engine, "_GAITS", 2)
+    gaits = [seeded_gait(short, seed) for seed in range(5)]
+    found = simulate_many(scenario=short, gaits=gaits, record=True, workers=workers)
+    for gait, result in zip(gaits, found, strict=True):
+        alone = simulate(scenario=short, gait=gait, record=True)
+        assert isinstance(result, SimulationResult)
+        assert (result.metrics, result.integrator) == (alone.metrics, alone.integrator)
+        xarray.testing.assert_identical(result.trajectory, alone.trajectory)
+    assert simulate_many(scenario=short, gaits=[]) == []
+
+
+@needs_mujoco
+def test_gaits_that_fail_leave_the_others_alone(short, monkeypatch):
+    monkeypatch.setattr(engine, "_STRETCH", 1000)
+    gaits = [seeded_gait(short, seed) for seed in range(5)]
+    short.simulation.max_speed = 0.07  # m/s, which two of them exceed
+    found = simulate_many(scenario=short, gaits=gaits, workers=2)
+    assert {type(outcome) for outcome in found} == {Diverged, SimulationResult}
+    for gait, outcome in zip(gaits, found, strict=True):
+        if isinstance(outcome, Diverged):
+            with pytest.raises(Diverged) as alone:
+                simulate(scenario=short, gait=gait)
+            assert (outcome.time, outcome.reason) == (alone.value.time, alone.value.reason)
+        else:
+            assert outcome.metrics == simulate(scenario=short, gait=gait).metrics
 
 
 @needs_mujoco

@@ -6,7 +6,7 @@ import itertools
 import math
 import statistics
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,10 +14,8 @@ import numpy as np
 
 from tetra_drake.benchmark.settings import Changes, compiled, describe, mujoco, own, settings_of
 from tetra_drake.engines.mujoco import installed
-from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.simulate import available_cores, simulate, simulate_many
 from tetra_drake.errors import SimulationFailure
-from tetra_drake.evolution.executors import available_cores, thread_executor
-from tetra_drake.formatting import listed
 from tetra_drake.results.result import SimulationResult, versions
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.scenario.schema import Scenario
@@ -31,7 +29,13 @@ walks elsewhere with it is ill-conditioned."""
 MUJOCO_CONVERGED = mujoco("implicitfast", 0.0625)
 
 SIZES = (5, 10, 20, 40)  # numbers of tetrahedra
-BATCH = 20  # simulations per core in a batch on all cores
+BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time on the compiled engine
+MUJOCO_BATCH = 4  # gaits at a time in MuJoCo, for each core
+LANES = 8  # gaits at a time for the cost per step
+ROUNDS = 3  # measurements of batches and costs, of which the medians count
+
+SHORT = {"simulation.duration": 0.02, "simulation.steady_from": 0.01}
+"""For simulations that only load or compile what is timed later."""
 
 Array = np.ndarray
 
@@ -41,8 +45,6 @@ class Row:
     """One row of the table: one setting, and what has been measured with it so far."""
 
     scenario: Scenario
-    batch: bool = False
-    """Whether many gaits are simulated at a time, on all cores."""
     distances_in: list[float] = field(default_factory=list)
     """By gait, NaN where the simulation failed."""
     evaluations: list[int] = field(default_factory=list)
@@ -53,22 +55,17 @@ class Row:
 
     def __post_init__(self) -> None:
         self.engine = self.scenario.simulation.engine
-        self.cores = available_cores() if self.batch else 1
 
-    def time(self, gaits: Sequence[Gait]) -> None:
-        """Simulates the first gait, or a batch that begins with it."""
-        number = BATCH * self.cores if self.batch else 1
-        with thread_executor(self.cores) as executor:
-            run = executor.map if self.batch else map
-            started = time.perf_counter()
-            results = list(run(self.simulate, itertools.islice(itertools.cycle(gaits), number)))
-            taken = time.perf_counter() - started
-        first = results[0]
-        self.distances_in.append(math.nan if first is None else first.metrics.distance_in)
-        if first is not None:
-            self.evaluations.append(first.integrator.derivative_evaluations)
+    def time(self, gait: Gait) -> None:
+        """Simulates a gait."""
+        started = time.perf_counter()
+        result = self.simulate(gait)
+        taken = time.perf_counter() - started
+        self.distances_in.append(math.nan if result is None else result.metrics.distance_in)
+        if result is not None:
+            self.evaluations.append(result.integrator.derivative_evaluations)
             self.wall_time += taken
-            self.simulated += sum(result.duration for result in results if result is not None)
+            self.simulated += result.duration
 
     def simulate(self, gait: Gait) -> SimulationResult | None:
         """The result of a gait; None if its simulation fails."""
@@ -81,18 +78,59 @@ class Row:
         """The row; errors are those of the gaits that are `counted` and did not fail."""
         distances = np.array(self.distances_in)
         median, worst = error_statistics(distances - exact_in, counted)
-        work = self.wall_time * self.cores
+        factor = self.simulated / self.wall_time if self.wall_time else None
         return {
             "engine": self.engine,
-            "setting": describe(self.scenario) + (", many gaits at a time" if self.batch else ""),
-            "batch": self.batch,
-            "real_time_factor_per_core": self.simulated / work if work else None,
+            "setting": describe(self.scenario),
+            "real_time_factor_per_core": factor,
             "median_error_in": median,
             "worst_error_in": worst,
             "evaluations": round(statistics.mean(self.evaluations)) if self.evaluations else None,
             "failed": int(np.isnan(distances).sum()),
             "distances_in": _finite(self.distances_in),
             "exact_in": _finite(exact_in.tolist()),
+        }
+
+
+@dataclass
+class Batch:
+    """One row of the table of batches: random gaits, of seeds 0, 1 ..., at a time."""
+
+    scenario: Scenario
+    size: int
+    """The number of gaits."""
+    cores: int = 1
+    factors: list[float] = field(default_factory=list)
+    """By round: simulated time over wall time from gaits to results."""
+    step_costs: list[float] = field(default_factory=list)
+    """By round: the time (μs) that a step of one gait takes on one core, without preparation."""
+    steps: int = 0
+    failed: int = 0
+
+    def time(self) -> None:
+        """Simulates the gaits."""
+        gaits = [seeded_gait(self.scenario, seed) for seed in range(self.size)]
+        started = time.perf_counter()
+        outcomes = simulate_many(scenario=self.scenario, gaits=gaits, workers=self.cores)
+        taken = time.perf_counter() - started
+        results = [outcome for outcome in outcomes if isinstance(outcome, SimulationResult)]
+        self.failed = self.size - len(results)
+        self.factors.append(sum(result.duration for result in results) / taken)
+        self.steps = sum(result.integrator.steps for result in results)
+        if results:
+            self.step_costs.append(1e6 * sum(result.wall_time for result in results) / self.steps)
+
+    def to_json(self) -> dict[str, Any]:
+        """The row."""
+        factor = statistics.median(self.factors)
+        return {
+            "engine": self.scenario.simulation.engine,
+            "setting": describe(self.scenario),
+            "gaits": self.size,
+            "cores": self.cores,
+            "real_time_factor_per_core": factor / self.cores,
+            "real_time_factor": factor,
+            "failed": self.failed,
         }
 
 
@@ -104,11 +142,13 @@ def measure(
     sizes: Sequence[int] = SIZES,
     say: Callable[[str], None] = lambda stage: None,
 ) -> dict[str, Any]:
-    """Measures sets of settings (of SETS) on gaits, and the cost per step by robot size.
+    """Measures sets of settings (of SETS) on gaits, batches on the engines that simulate many gaits
+    at a time, and the compiled engine's cost per step by number of tetrahedra.
 
-    All settings simulate the first gait, then the second, and so on, so that whatever else runs on
-    the machine affects all alike. Returns what tables.to_markdown() prints and JSON can hold:
-    lengths in inches, times in s, None for what failed. `say` is told which stage begins.
+    All settings simulate the first gait, then the second, and so on, and batches take turns, so
+    that whatever else runs on the machine affects all alike. Returns what tables.to_markdown()
+    prints and JSON can hold: lengths in inches, times in s, None for what failed. `say` is told
+    which stage begins.
 
     Raises InputError if MuJoCo is asked for by its set and cannot simulate the scenario.
     """
@@ -122,17 +162,26 @@ def measure(
     converged = dict.fromkeys(engines, exact_in)
     if "mujoco" in engines:
         converged["mujoco"] = _distances(scenario, MUJOCO_CONVERGED, gaits)
-    if "drake" in engines:  # loads what the diagram calls
-        short = {"simulation.duration": 0.02, "simulation.steady_from": 0.01}
-        Row(scenario.with_changes(own("drake") | short)).simulate(gaits[0])
+    batches = list(_batches(scenario, engines))
+    sized = [{"robot.tetrahedra": size} | own("compiled") for size in sizes]
+    costs = [[Batch(scenario.with_changes(each), n) for n in (1, LANES)] for each in sized]
+    in_turn = list(itertools.chain(batches, *costs))
+    if "drake" in engines:
+        Row(scenario.with_changes(own("drake") | SHORT)).simulate(gaits[0])
+    for batch in in_turn:
+        brief = batch.scenario.with_changes(SHORT)
+        simulate_many(scenario=brief, gaits=[seeded_gait(brief)] * batch.size, workers=1, say=say)
     for i in range(len(gaits)):
         say(f"gait {i + 1} of {len(gaits)} with all settings")
         for row in rows:
-            row.time([*gaits[i:], *gaits[:i]])
-    say(f"cost per step for these numbers of tetrahedra: {listed(sizes)}")
+            row.time(gaits[i])
+    for i in range(ROUNDS if in_turn else 0):
+        say(f"batches and sizes of the robot, round {i + 1} of {ROUNDS}")
+        for batch in in_turn:
+            batch.time()
     apart, _ = error_statistics(converged.get("mujoco", exact_in) - exact_in, counted)
     return {
-        "schema": 2,
+        "schema": 3,
         "scenario": scenario.name,
         "duration_s": scenario.simulation.duration,
         "versions": versions("mujoco" if "mujoco" in engines else ""),
@@ -148,7 +197,8 @@ def measure(
             "converged": describe(scenario.with_changes(MUJOCO_CONVERGED)),
             "median_distance_from_ours_in": apart if "mujoco" in engines else None,
         },
-        "step_costs": [step_cost(scenario, size) for size in sizes],
+        "batches": [batch.to_json() for batch in batches],
+        "step_costs": [step_cost(*pair) for pair in costs],
     }
 
 
@@ -158,40 +208,44 @@ def error_statistics(errors: Array, counted: Array) -> tuple[float | None, float
     return (float(np.median(errors)), float(errors.max())) if errors.size else (None, None)
 
 
-def step_cost(scenario: Scenario, tetrahedra: int) -> dict[str, Any]:
-    """The cost per step of the compiled engine with so many tetrahedra and a random gait."""
-    changes = {"simulation.engine": "compiled", "robot.tetrahedra": tetrahedra}
-    row = Row(scenario.with_changes(changes))
-    results = [row.simulate(seeded_gait(row.scenario, 0)) for _ in range(3)]
-    times = [1e6 * r.wall_time / r.integrator.steps for r in results if r is not None]
-    per_step = statistics.median(times) if times else None
-    return {
-        "tetrahedra": tetrahedra,
-        "steps": results[0].integrator.steps if results[0] else None,
-        "microseconds_per_step": per_step,
-        "microseconds_per_tetrahedron": per_step / tetrahedra if per_step else None,
-    }
+def step_cost(alone: Batch, in_lanes: Batch) -> dict[str, Any]:
+    """The cost per step of one gait, alone and beside others, on one robot."""
+    tetrahedra = alone.scenario.robot.tetrahedra
+    found: dict[str, Any] = {"tetrahedra": tetrahedra, "steps": alone.steps or None}
+    for batch, which in ((alone, ""), (in_lanes, "_in_lanes")):
+        cost = statistics.median(batch.step_costs) if batch.step_costs else None
+        found[f"microseconds_per_step{which}"] = cost
+        found[f"microseconds_per_tetrahedron{which}"] = cost and cost / tetrahedra
+    return found
 
 
 def _rows(scenario: Scenario, settings: Sequence[Changes]) -> Iterator[Row]:
-    """A row for each setting that differs from those before it; after the compiled engine's own
-    settings, one for a batch on all cores."""
+    """A row for each setting that differs from those before it."""
     seen = set()
     for changes in settings:
         row = Row(scenario.with_changes(changes))
         if (row.engine, describe(row.scenario)) not in seen:
             seen.add((row.engine, describe(row.scenario)))
             yield row
-            if changes == own("compiled"):
-                yield Row(row.scenario, batch=True)
+
+
+def _batches(scenario: Scenario, engines: Container[str]) -> Iterator[Batch]:
+    """Batches on one core, and on all that they fill."""
+    cores = sorted({1, available_cores()})
+    if "compiled" in engines:
+        changed = scenario.with_changes(own("compiled"))
+        sizes = [(size, n) for n in cores for size in BATCHES if n == 1 or size > 1]
+        yield from (Batch(changed, size, min(size, n)) for size, n in sizes)
+    if "mujoco" in engines:
+        for row in _rows(scenario, [own("mujoco"), mujoco("implicitfast", 2)]):
+            yield from (Batch(row.scenario, MUJOCO_BATCH * n, n) for n in cores)
 
 
 def _distances(scenario: Scenario, changes: Changes, gaits: Sequence[Gait]) -> Array:
-    """(gaits,): how far (in) gaits walk with a setting; simulated on all cores."""
-    row = Row(scenario.with_changes(changes))
-    with thread_executor(available_cores()) as executor:
-        results = executor.map(row.simulate, gaits)
-        return np.array([math.nan if r is None else r.metrics.distance_in for r in results])
+    """(gaits,): how far (in) gaits walk with a setting, NaN where the simulation failed."""
+    outcomes = simulate_many(scenario=scenario.with_changes(changes), gaits=gaits)
+    walked = (o.metrics.distance_in if isinstance(o, SimulationResult) else None for o in outcomes)
+    return np.array([*walked], dtype=float)
 
 
 def _finite(values: list[float]) -> list[float | None]:

@@ -84,7 +84,7 @@ def describe(scenario: Scenario) -> str:
 
 
 def _drake_settings() -> list[Changes]:
-    step_end, look_ahead, witness = (0.0, 0.0), (0.25, 0.0), (0.0, 0.02)
+    step_end, look_ahead, witness = (0.0, 0.0), (0.02, 0.0), (0.0, 0.02)
     explicit = itertools.product((1e-2, 1e-3, 1e-4), (step_end, witness))
     implicit = itertools.product((2, 4, 8), (5e-3, 1e-3), (step_end, look_ahead, witness))
     first_order = ("implicit_euler", "velocity_implicit_euler", "radau1")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tetra_drake.benchmark.measure import CLOSE_IN
+from tetra_drake.benchmark.measure import CLOSE_IN, LANES, ROUNDS
 from tetra_drake.engines.mujoco import INSTALL
 from tetra_drake.formatting import fixed, listed, markdown_table
 
@@ -17,11 +17,22 @@ SETTINGS = {
     "evaluations": ("evaluations per gait", "{:,}"),
     "failed": ("failed", "{}"),
 }
+BATCHES = {
+    "engine": ("engine", "{}"),
+    "setting": ("setting", "{}"),
+    "gaits": ("gaits at a time", "{}"),
+    "cores": ("cores", "{}"),
+    "real_time_factor_per_core": ("times real time per core", "{:,.1f}"),
+    "real_time_factor": ("in total", "{:,.1f}"),
+    "failed": ("failed", "{}"),
+}
 STEP_COSTS = {
     "tetrahedra": ("tetrahedra", "{}"),
     "steps": ("steps", "{:,}"),
     "microseconds_per_step": ("μs per step", "{:.1f}"),
     "microseconds_per_tetrahedron": ("μs per step and tetrahedron", "{:.2f}"),
+    "microseconds_per_step_in_lanes": ("in lanes: μs per step", "{:.1f}"),
+    "microseconds_per_tetrahedron_in_lanes": ("μs per step and tetrahedron", "{:.2f}"),
 }
 
 
@@ -45,8 +56,18 @@ def to_markdown(found: dict[str, Any]) -> str:
         )
     elif mujoco["left_out"]:
         parts.append(f"Without MuJoCo: it is not installed ({INSTALL}), or cables may go slack.")
+    if found["batches"]:
+        parts.append(_table(found["batches"], BATCHES))
+        parts.append(
+            "Batches are of different random gaits, through simulate_many(); on each core MuJoCo's "
+            f"rollout has a thread. Medians of {ROUNDS} measurements, from gaits to results."
+        )
     if found["step_costs"]:
         parts.append(_table(found["step_costs"], STEP_COSTS))
+        parts.append(
+            "What a step of one gait takes a core on the compiled engine, without preparation: of "
+            f"a gait alone, and of one of {LANES} that share the lanes of a core."
+        )
     return "\n\n".join(parts)
 
 

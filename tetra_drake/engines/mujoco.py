@@ -9,22 +9,21 @@ times the normal force, not after a deflection, and then does not slide almost f
 
 from __future__ import annotations
 
-import functools
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
-from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
-from tetra_drake.physics.cable import PASSIVE, add_cable_forces
-from tetra_drake.physics.kinematics import move_nodes
+from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
+from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -42,6 +41,8 @@ _POINT = 1e-5  # radius (m) of the spheres that touch the floor: it acts on the 
 
 _STRETCH = 5000  # steps between two checks of whether a simulation is still stable
 
+_GAITS = 8  # for each thread at a time; each takes some 10 MB, mostly for a stretch of states
+
 _MAX_SPEED = 1.0
 """Of a body (m/s), where the scenario allows more. Too long a step throws a robot about for ever,
 at times far forward; a walking robot stays below 0.2 m/s."""
@@ -53,28 +54,50 @@ def simulate_mujoco(*, scenario: Scenario, gait: Gait, record: bool) -> Simulati
     Instants asked for, as of samples, are those of the nearest steps. Other threads run meanwhile.
     Raises InputError, too, if MuJoCo is missing or cannot do it.
     """
+    (outcome,) = simulate_in_rollouts(scenario=scenario, gaits=[gait], record=record, threads=1)
+    if isinstance(outcome, SimulationFailure):
+        raise outcome
+    return outcome
+
+
+def simulate_in_rollouts(
+    *, scenario: Scenario, gaits: Sequence[Gait], record: bool, threads: int
+) -> list[SimulationResult | SimulationFailure]:
+    """Simulates gaits as simulate_mujoco() does, on so many threads of MuJoCo's `Rollout`: the
+    same numbers, bit for bit; for a gait that fails its Diverged or StepBudgetExceeded."""
     check_mujoco(scenario)
     simulation, step = scenario.simulation, scenario.mujoco.step
     steps = max(1, round(simulation.duration / step))
     if steps > simulation.max_evaluations:
-        limit = f"the budget of {simulation.max_evaluations}"
-        raise StepBudgetExceeded(time=0.0, reason=f"{steps} steps exceed {limit}")
+        reason = f"{steps} steps exceed the budget of {simulation.max_evaluations}"
+        return [StepBudgetExceeded(time=0.0, reason=reason) for _ in gaits]
     times = sample_times(simulation.duration, simulation.sample_period)
     ends = (0.0, simulation.steady_from, simulation.duration)
     instants = np.array([*ends, *(times if record else ())])
-    robot = _Robot(scenario, gait, steps=steps)
-    started = time.perf_counter()
-    found = robot.walk(np.rint(instants / step).astype(int))
-    wall_time = time.perf_counter() - started
-
-    return make_result(
-        scenario,
-        robot.structure,
-        states=robot.states(found[:3]),
-        wall_time=wall_time,
-        integrator=IntegratorWork(scenario.mujoco.integrator, step, steps, steps),
-        trajectory=robot.dataset(times, found[3:]) if record else None,
-    )
+    robot = _Robot(scenario)
+    work = IntegratorWork(scenario.mujoco.integrator, step, steps, steps)
+    outcomes: list[SimulationResult | SimulationFailure] = []
+    for first in range(0, len(gaits), threads * _GAITS):
+        group = gaits[first : first + threads * _GAITS]
+        signals = [signals_at(scenario, gait, step * np.arange(steps)) for gait in group]
+        started = time.perf_counter()
+        walks = robot.walk(signals, np.rint(instants / step).astype(int), threads=threads)
+        wall_time = (time.perf_counter() - started) * min(threads, len(group)) / len(group)
+        for gait, walk in zip(group, walks, strict=True):
+            if isinstance(walk, Diverged):
+                walk.wall_time = wall_time
+                outcomes.append(walk)
+                continue
+            result = make_result(
+                scenario,
+                robot.structure,
+                states=robot.states(walk[:3]),
+                wall_time=wall_time,
+                integrator=work,
+                trajectory=robot.dataset(gait, times, walk[3:]) if record else None,
+            )
+            outcomes.append(result)
+    return outcomes
 
 
 def installed() -> bool:
@@ -93,16 +116,16 @@ def make_mjcf(scenario: Scenario) -> str:
     robot = make_model(scenario, structure)
     steps = {"integrator": settings.integrator, "timestep": settings.step}
     _add(model, "compiler", inertiafromgeom="false")
-    _add(model, "option", gravity=[0.0, 0.0, -robot.gravity], cone="elliptic", **steps)
+    _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], cone="elliptic", **steps)
     _add_bodies(model, structure, robot, _contact(scenario, structure, robot))
     _add_cables(model, structure)
     return tostring(model, encoding="unicode")
 
 
 class _Robot:
-    """MuJoCo's model of the robot, driven by the signals of one gait."""
+    """MuJoCo's model of the robot."""
 
-    def __init__(self, scenario: Scenario, gait: Gait, *, steps: int) -> None:
+    def __init__(self, scenario: Scenario) -> None:
         import mujoco
 
         if mujoco.get_mju_user_warning() is None:
@@ -110,41 +133,58 @@ class _Robot:
             # working folder. Not set back: other threads may be simulating.
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
+        self._scenario = scenario
         self.structure = MakeStructure(scenario.robot, scenario.cables)
         self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario))
-        self._data = mujoco.MjData(self._model)
         self._max_speed = min(scenario.simulation.max_speed, _MAX_SPEED)
         driven = self.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # the signal of each motor
-        self._signals = functools.partial(signals_at, scenario, gait)
-        self._control = self._signals(scenario.mujoco.step * np.arange(steps))[:, self._motors]
 
-    def walk(self, wanted: Array) -> Array:
-        """Simulates all steps; MuJoCo's states (time, qpos, qvel) after each of the `wanted`."""
+    def walk(
+        self, signals: Sequence[Array], wanted: Array, *, threads: int
+    ) -> list[Array | Diverged]:
+        """Simulates gaits by their signals (steps, n); MuJoCo's states (time, qpos, qvel) after
+        each of the `wanted` steps, or how a gait failed."""
         from mujoco.rollout import Rollout
 
+        data = [self._mujoco.MjData(self._model) for _ in range(threads)]
         kind = self._mujoco.mjtState.mjSTATE_FULLPHYSICS
-        state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
-        self._mujoco.mj_getState(self._model, self._data, state, kind)
-        found = np.tile(state, (len(wanted), 1))
-        with Rollout(nthread=0) as rollout:
-            for first in range(0, len(self._control), _STRETCH):
-                control = self._control[None, first : first + _STRETCH]
-                (states,), _ = rollout.rollout(self._model, self._data, state[None], control)
-                self._check(states)
-                state = states[-1]
-                here = (first < wanted) & (wanted <= first + len(states))
-                found[here] = states[wanted[here] - first - 1]
-        return found
+        start = np.empty(self._mujoco.mj_stateSize(self._model, kind))
+        self._mujoco.mj_getState(self._model, data[0], start, kind)
+        found = np.tile(start, (len(signals), len(wanted), 1))
+        latest = dict.fromkeys(range(len(signals)), start)  # of gaits that have not failed
+        failures: dict[int, Diverged] = {}
+        with Rollout(nthread=threads if threads > 1 else 0) as rollout:
+            for first in range(0, len(signals[0]), _STRETCH):
+                chosen = [signals[i][first : first + _STRETCH, self._motors] for i in latest]
+                if not chosen:
+                    break
+                initial = np.array(list(latest.values()))
+                stretches, _ = rollout.rollout(self._model, data, initial, np.array(chosen))
+                here = (first < wanted) & (wanted <= first + len(chosen[0]))
+                for i, states in zip(list(latest), stretches, strict=True):
+                    found[i, here] = states[wanted[here] - first - 1]
+                    latest[i] = states[-1]
+                    if failure := self._failure(states, first):
+                        failures[i] = failure
+                        del latest[i]
+        return [failures.get(i, states) for i, states in enumerate(found)]
 
-    def _check(self, states: Array) -> None:
+    def _failure(self, states: Array, first: int) -> Diverged | None:
+        """How the states after step `first` and the next ones tell that a simulation failed."""
+        step = self._scenario.mujoco.step
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
         fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
         if fast.any():
             reason = f"a body's velocity exceeds the limit of {self._max_speed:g} m/s"
-            raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
-        if any(warning.number for warning in self._data.warning):
-            raise Diverged(time=float(states[-1, 0]), reason="MuJoCo warns of instability")
+            return Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
+        # Where MuJoCo warns of instability, it starts again from time 0, or stops.
+        times = step * (first + 1.0 + np.arange(len(states)))
+        warned = np.abs(states[:, 0] - times) > 0.5 * step
+        if warned.any():
+            reason = "MuJoCo warns of instability"
+            return Diverged(time=float(times[warned.argmax()]), reason=reason)
+        return None
 
     def states(self, found: Array) -> Array:
         """[q; v] (rows, 13 bodies) of MuJoCo's states, where w is given in the body's frame."""
@@ -156,14 +196,17 @@ class _Robot:
         parts = (pose[..., 3:], pose[..., :3]), (w_WB, velocity[..., :3])
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
-    def dataset(self, times: Array, found: Array) -> xarray.Dataset:
+    def dataset(self, gait: Gait, times: Array, found: Array) -> xarray.Dataset:
         """The trajectory: MuJoCo's states at `times` (s), and the forces there."""
         structure = self.structure
-        states, signals = self.states(found), self._signals(times)
-        nodes = [move_nodes(state, structure.p_BN) for state in states]
-        pulls = zip(nodes, signals, strict=True)
-        cables = np.array([add_cable_forces(*pull, structure.cables, False) for pull in pulls])
-        ground = np.array([self._ground_forces(*row) for row in zip(found, signals, strict=True)])
+        states, signals = self.states(found), signals_at(self._scenario, gait, times)
+        pulls = np.empty((len(times), len(structure.cables), PULL_COLUMNS))
+        for state, driving, pull in zip(states, signals, pulls, strict=True):
+            nodes = moved_nodes(structure, state)
+            add_cable_forces(nodes, driving, structure.cables, False, True, pull)
+        data = self._mujoco.MjData(self._model)
+        rows = zip(found, signals, strict=True)
+        ground = np.array([self._ground_forces(data, *row) for row in rows])
         modes = np.zeros_like(ground)  # of friction: 0, as MuJoCo's has none
         modes[:, :, 0] = ground[:, :, 2] > 0.0
         return assemble_dataset(
@@ -171,16 +214,16 @@ class _Robot:
             times=times,
             states=states,
             signals=signals,
-            tensions=cables[:, 0],
-            lengths=cables[:, 1],
+            tensions=pulls[:, :, TENSION],
+            lengths=pulls[:, :, LENGTH],
             normal_forces=ground[:, :, 2],
             friction_forces=ground[:, :, :2],
             modes=modes,
         )
 
-    def _ground_forces(self, found: Array, signals: Array) -> Array:
+    def _ground_forces(self, data: Any, found: Array, signals: Array) -> Array:
         """(contacts, 3): MuJoCo's contact forces on the nodes in World, in N."""
-        mujoco, model, data = self._mujoco, self._model, self._data
+        mujoco, model = self._mujoco, self._model
         mujoco.mj_setState(model, data, found, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         data.ctrl[:] = signals[self._motors]
         mujoco.mj_forward(model, data)
@@ -206,10 +249,11 @@ def _add_bodies(model: Element, structure: Structure, robot: Model, contact: dic
     alone = {"contype": "0", "conaffinity": "0"}  # only the pairs touch each other
     _add(world, "geom", name="floor", type="plane", pos=[0, 0, -_POINT], size="0 0 1", **alone)
     names = iter(enumerate(structure.node_names))
+    mass, moment = robot.body.mass[0], robot.body.moment[0]
     for body_name, p_WB in zip(structure.bodies, structure.p_WB, strict=True):
         body = _add(world, "body", name=body_name, pos=p_WB)
         _add(body, "freejoint")
-        _add(body, "inertial", pos="0 0 0", mass=robot.mass, diaginertia=3 * [robot.moment])
+        _add(body, "inertial", pos="0 0 0", mass=mass, diaginertia=3 * [moment])
         for p_BN in structure.p_BN:
             node, name = next(names)
             _add(body, "site", name=name, pos=p_BN)
@@ -222,11 +266,12 @@ def _contact(scenario: Scenario, structure: Structure, robot: Model) -> dict:
     """How the floor acts on a node."""
     ground, friction = scenario.ground, scenario.mujoco.friction
     stiction_damping = scenario.friction.stiction_damping
-    weight = robot.mass * len(structure.bodies) * robot.gravity
+    mass = robot.body.mass[0]
+    weight = mass * len(structure.bodies) * scenario.robot.gravity
     rest_damping = ground.damping * weight / len(structure.contacts) / ground.stiffness
     # MuJoCo takes accelerations for forces, and divides them by 1 - impedance. The minus says
     # that the numbers are stiffness and damping.
-    per_mass = -(1.0 - _IMPEDANCE) / robot.mass
+    per_mass = -(1.0 - _IMPEDANCE) / mass
     return {
         "condim": "3",
         "friction": [friction, friction, 0, 0, 0],
