@@ -5,11 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from pydrake.systems.analysis import Simulator
 
+from tetra_drake.benchmark.measure import CONVERGED
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.robot.gait import Gait, load_gait, weight_count
+from tetra_drake.errors import StepBudgetExceeded
+from tetra_drake.robot.gait import Gait, load_gait, seeded_gait, weight_count
 from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, node_positions
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
@@ -58,6 +61,58 @@ def test_a_step_ends_at_the_start_up_jump(scenario, gait):
     simulator.set_monitor(lambda context: ends.append(context.get_time()))
     simulator.AdvanceTo(1.5)
     assert scenario.cpg.start_up in ends
+
+
+class _Counter:
+    """A viewer that only counts the steps."""
+
+    def __init__(self) -> None:
+        self.times: set[float] = set()
+
+    def wants(self, time: float) -> bool:
+        self.times.add(time)
+        return False
+
+    def show(self, frame: xarray.Dataset) -> None:
+        raise AssertionError("nothing was asked for")
+
+
+def test_the_work_counts_all_steps_from_the_start(scenario, gait):
+    # New Jacobians after mode changes clear the integrator's own counts.
+    brief = scenario.with_changes({"simulation.duration": 2.0, "simulation.steady_from": 1.0})
+    counter = _Counter()
+    work = simulate(scenario=brief, gait=gait, viewer=counter).integrator
+    assert work.steps == len(counter.times)  # AdvanceTo(0) counts as a step, of no length
+    assert work.derivative_evaluations > work.jacobian_evaluations > 0
+    assert work.derivative_evaluations > 5 * work.steps
+
+
+def test_the_budget_of_evaluations_is_for_the_whole_simulation(scenario, gait):
+    budget = scenario.with_changes({"simulation.max_evaluations": 5000})
+    with pytest.raises(StepBudgetExceeded):
+        simulate(scenario=budget, gait=gait)
+
+
+def test_a_mode_change_is_due_until_it_is_made(scenario, gait):
+    diagram = MakeTensegrityDiagram(scenario, gait)
+    simulator = MakeSimulator(diagram, scenario.simulation)
+    ground = diagram.GetSubsystemByName("ground")
+    context = ground.GetMyContextFromRoot(simulator.get_context())
+    assert ground.ModeChangeIsDue(context)  # the feet stand on the ground, not yet in contact
+    simulator.Initialize()
+    assert not ground.ModeChangeIsDue(context)
+
+
+@pytest.mark.slow
+def test_random_gaits_walk_as_far_as_converged_ones(scenario):
+    errors = []
+    for seed in (7, 10, 14, 22, 24, 26, 30, 31):  # where a late mode change costs 0.1 in or more
+        walked, exact = (
+            simulate(scenario=changed, gait=seeded_gait(changed, seed)).metrics.distance_in
+            for changed in (scenario, scenario.with_changes(CONVERGED))
+        )
+        errors.append(abs(walked - exact))
+    assert np.median(errors) < 0.05
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 3, 8])

@@ -73,7 +73,11 @@ def test_recorded_scenarios_load(file):
 def test_a_file_of_schema_1_means_what_it_meant(data, scenario):
     file = data / "scenario_schema_1.yaml"
     loaded = load_scenario(file)
-    assert differences(loaded, scenario) == [("simulation.engine", "compiled")]
+    assert differences(loaded, scenario) == [
+        ("simulation.engine", "compiled"),
+        ("simulation.look_ahead", "0.00025 s"),
+        ("simulation.fresh_steps", "false"),
+    ]
     assert (loaded.reference, loaded.robot.offsets) == (None, [])
     assert dump_scenario(loaded) == file.read_text()
 

@@ -22,7 +22,10 @@ _WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; how Drake's Simulator derives the isol
 _IMPLICIT_SCHEMES = ("radau3", "radau1", "implicit_euler", "velocity_implicit_euler")
 """Those whose steps may be long; stability keeps the steps of the others short."""
 
-_AIM_BEYOND = 1.02, 5e-5  # factor and s: a step shall end just after the mode change it aims at
+_AIM_FACTOR, _AIM_BEYOND = 1.02, 5e-5  # and s: a step shall end just after the change it aims at
+_APPROACH = 0.8, 1e-3  # share and s: a change that is farther away is approached, then aimed at
+_FIRST_STEP, _GROWTH = 3e-4, 3.0  # s, and factor per step: how steps begin again after a change
+_RENEW_FROM = 8e-4  # s: shorter steps converge with any Jacobian, most often
 
 
 def simulate_drake(
@@ -34,14 +37,15 @@ def simulate_drake(
     structure = MakeStructure(scenario.robot, scenario.cables)
     simulator = MakeSimulator(diagram, settings)
     integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
-    aimer = _StepAimer(diagram, simulator, settings)
+    work = _Work(integrator)
+    aimer = _StepAimer(diagram, simulator, settings, work)
     times = sample_times(settings.duration, settings.sample_period)
     recorder = Recorder(structure, times)
 
     def after_step(context: Context) -> None:
         # What is done here must not depend on whether somebody records or watches.
         velocities = state.Eval(context)[7 * len(structure.bodies) :]
-        _check(settings, context.get_time(), velocities, integrator)
+        _check(settings, context.get_time(), velocities, work)
         aimer.aim(context, velocities)
         if record:
             recorder.after_step(context)
@@ -63,7 +67,7 @@ def simulate_drake(
         raise Diverged(time=now, reason=reason.splitlines()[0]) from error
     wall_time = time.perf_counter() - started
 
-    for_jacobian = "integrator_num_derivative_evaluations_for_jacobian"
+    steps, derivative_evaluations, jacobian_evaluations = work.total()
     return make_result(
         scenario,
         structure,
@@ -72,9 +76,9 @@ def simulate_drake(
         integrator=IntegratorWork(
             scheme=settings.scheme,
             accuracy=settings.accuracy,
-            steps=integrator.get_num_steps_taken(),
-            derivative_evaluations=integrator.get_num_derivative_evaluations(),
-            jacobian_evaluations=int(dict(integrator.GetStatisticsSummary()).get(for_jacobian, 0)),
+            steps=steps,
+            derivative_evaluations=derivative_evaluations,
+            jacobian_evaluations=jacobian_evaluations,
         ),
         trajectory=make_dataset(diagram, structure, recorder.samples) if record else None,
     )
@@ -94,12 +98,37 @@ def MakeSimulator(diagram: Diagram, settings: SimulationScenario) -> Simulator:
     return simulator
 
 
-def _check(
-    settings: SimulationScenario, now: float, velocities: np.ndarray, integrator: IntegratorBase
-) -> None:
+class _Work:
+    """What an integrator has done, including what it forgets when it is initialised again."""
+
+    def __init__(self, integrator: IntegratorBase) -> None:
+        self._integrator = integrator
+        self._before = (0, 0, 0)
+
+    def total(self) -> tuple[int, int, int]:
+        """Steps, derivative evaluations, and those of them for Jacobians."""
+        statistics = dict(self._integrator.GetStatisticsSummary())
+        for_jacobian = int(statistics.get("integrator_num_derivative_evaluations_for_jacobian", 0))
+        steps, _, jacobian = self._before
+        return (
+            steps + self._integrator.get_num_steps_taken(),
+            self.derivative_evaluations(),
+            jacobian + for_jacobian,
+        )
+
+    def derivative_evaluations(self) -> int:
+        """The second of total()."""
+        return self._before[1] + self._integrator.get_num_derivative_evaluations()
+
+    def keep(self) -> None:
+        """Call it before the integrator is initialised again."""
+        self._before = self.total()
+
+
+def _check(settings: SimulationScenario, now: float, velocities: np.ndarray, work: _Work) -> None:
     """Raises Diverged or StepBudgetExceeded if the simulation has failed."""
     speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
-    used = integrator.get_num_derivative_evaluations()
+    used = work.derivative_evaluations()
     if not speed <= settings.max_speed:
         reason = f"a body moves at {speed:g} m/s, the limit is {settings.max_speed:g} m/s"
         raise Diverged(time=now, reason=reason)
@@ -109,15 +138,24 @@ def _check(
 
 
 class _StepAimer:
-    """Lets steps end where the next mode change is predicted, if that is near.
+    """Lets steps end where the next mode change is predicted, and begin anew after it.
 
-    The prediction takes the mean acceleration of the last step, which costs nothing.
+    The prediction takes the mean acceleration of the last step, which costs nothing. That of the
+    instant is no better: what follows a change dies out at rates of 1e4 /s.
+
+    With `fresh_steps`: over a long step the mean is not good enough, so such a step only
+    approaches the change. A change of mode changes the Jacobian. The integrator would keep the
+    old one as long as its Newton iterations converge at all: slowly then, and stopped farther
+    from the solution, always on the same side. So it gets a new one, unless the next change is
+    so near that it does not pay. And it would try the step it took before the change, which
+    mostly fails.
     """
 
     def __init__(
-        self, diagram: Diagram, simulator: Simulator, settings: SimulationScenario
+        self, diagram: Diagram, simulator: Simulator, settings: SimulationScenario, work: _Work
     ) -> None:
         self._integrator, self._settings = simulator.get_mutable_integrator(), settings
+        self._work = work
         self._ground = diagram.GetSubsystemByName("ground")
         self._ground_context = self._ground.GetMyContextFromRoot(simulator.get_mutable_context())
         self._aims = (
@@ -128,6 +166,8 @@ class _StepAimer:
         self._last_time = 0.0
         size = simulator.get_context().get_continuous_state().num_v()
         self._last_velocities = self._acceleration = np.zeros(size)
+        self._longest = settings.max_step
+        self._jacobian_is_old = False
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
         """Limits the next step; call it after each step."""
@@ -137,10 +177,32 @@ class _StepAimer:
         if step_taken > 0.0:
             self._acceleration = (velocities - self._last_velocities) / step_taken
         self._last_time, self._last_velocities = context.get_time(), velocities
-        horizon = self._settings.max_step
+
+        if self._settings.fresh_steps:
+            if self._ground.ModeChangeIsDue(self._ground_context):
+                self._longest, self._jacobian_is_old = _FIRST_STEP, True
+            elif self._longest < self._settings.max_step:
+                self._longest = _GROWTH * max(step_taken, _FIRST_STEP)
+        step = min(self._settings.max_step, self._longest, self._step_to_change())
+        if self._jacobian_is_old and step >= _RENEW_FROM:
+            self._renew_jacobian()
+        self._integrator.set_maximum_step_size(step)
+
+    def _step_to_change(self) -> float:
+        """The step (s) towards the next mode change."""
+        look_ahead, horizon = self._settings.look_ahead, self._settings.max_step
         predicted = self._ground.TimeToModeChange(
             self._ground_context, acceleration=self._acceleration, horizon=horizon
         )
-        factor, margin = _AIM_BEYOND
-        step = max(self._settings.look_ahead, factor * predicted + margin)
-        self._integrator.set_maximum_step_size(min(horizon, step))
+        share, near = _APPROACH
+        if self._settings.fresh_steps and near < predicted < horizon:
+            return share * predicted
+        margin = min(_AIM_BEYOND, 0.25 * look_ahead)
+        return max(look_ahead, _AIM_FACTOR * predicted + margin)
+
+    def _renew_jacobian(self) -> None:
+        self._work.keep()
+        # Its initial step, which is the longest, must be allowed then.
+        self._integrator.set_maximum_step_size(self._settings.max_step)
+        self._integrator.Initialize()
+        self._jacobian_is_old = False

@@ -125,6 +125,9 @@ class SimulationScenario:
     max_evaluations: int = setting(at_least=1)  # of the derivatives, in one simulation
     max_speed: float = quantity("m/s", above=0)  # a faster body counts as diverged
     sample_period: float = quantity("s", above=0)  # of a recorded trajectory
+    fresh_steps: bool = setting(default=False)
+    """With look-ahead: whether steps begin anew after a mode change, short and with a new
+    Jacobian, and approach a distant change before they aim at it."""
 
 
 @dataclass
