@@ -58,36 +58,34 @@ def simulate_many(
     Scenarios may differ; those with the same number of tetrahedra, `cables.slack` and kind of
     signals share a core. `say` is told if the engine has to be compiled.
 
-    On the engine `mujoco`, MuJoCo's rollout simulates the gaits on `workers` threads if there is
-    one scenario. The diagram simulates one gait after another.
+    On the engine `mujoco`, MuJoCo's rollout simulates the gaits of one scenario on `workers`
+    threads. Otherwise, as on the diagram, one gait is simulated after another.
 
-    Raises InputError if there is not one scenario or as many as gaits.
+    Raises InputError if there is not one scenario or as many as gaits, or if a gait does not fit.
     """
     scenarios = [scenario] * len(gaits) if isinstance(scenario, Scenario) else list(scenario)
     if len(scenarios) != len(gaits):
         problem = f"found {len(scenarios)}, expected one, or one for each of {len(gaits)} gaits"
         raise InputError("simulate_many", "scenario", problem)
-    threads = workers or available_cores()
+    threads = available_cores() if workers is None else workers
+    if threads < 1:
+        raise InputError("simulate_many", "workers", f"found {workers}, expected at least 1")
+    if all(each.simulation.engine == "compiled" for each in scenarios):
+        from tetra_drake.engines.compiled.lane_pool import simulate_in_lanes
+
+        walks = list(zip(scenarios, gaits, strict=True))
+        return simulate_in_lanes(walks, record=record, threads=threads, say=say)
     if isinstance(scenario, Scenario) and scenario.simulation.engine == "mujoco":
         from tetra_drake.engines.mujoco import simulate_in_rollouts
 
         return simulate_in_rollouts(scenario=scenario, gaits=gaits, record=record, threads=threads)
-    walks = list(zip(scenarios, gaits, strict=True))
-    compiled = [i for i, each in enumerate(scenarios) if each.simulation.engine == "compiled"]
-    found: dict[int, SimulationResult | SimulationFailure] = {}
-    if compiled:
-        from tetra_drake.engines.compiled.lane_pool import simulate_in_lanes
-
-        chosen = [walks[i] for i in compiled]
-        outcomes = simulate_in_lanes(chosen, record=record, threads=threads, say=say)
-        found = dict(zip(compiled, outcomes, strict=True))
-    for i, (own, gait) in enumerate(walks):
-        if i not in found:
-            try:
-                found[i] = simulate(scenario=own, gait=gait, record=record)
-            except SimulationFailure as failure:
-                found[i] = failure
-    return [found[i] for i in range(len(walks))]
+    found: list[SimulationResult | SimulationFailure] = []
+    for own, gait in zip(scenarios, gaits, strict=True):
+        try:
+            found.append(simulate(scenario=own, gait=gait, record=record))
+        except SimulationFailure as failure:
+            found.append(failure)
+    return found
 
 
 def available_cores() -> int:

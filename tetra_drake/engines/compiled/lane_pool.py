@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from tetra_drake.engines.compiled.engine import Course, Walk, make_outcome, ready_engine
 from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
-from tetra_drake.errors import SimulationFailure, TimeBudgetExceeded
+from tetra_drake.errors import InputError, SimulationFailure, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.schema import Scenario
@@ -39,7 +39,9 @@ class LanePool:
     waiting gaits fill. At the end of its `with` block, what is under way is cancelled."""
 
     def __init__(self, threads: int, *, say: Callable[[str], None] = lambda text: None) -> None:
-        """`say` is told when the engine has to be compiled."""
+        """`say` is told when the engine has to be compiled. Raises InputError without threads."""
+        if threads < 1:
+            raise InputError("workers", "", f"found {threads}, expected at least 1")
         self._say = say
         self._waiting: deque[_Job] = deque()
         self._changed = threading.Condition()
