@@ -174,6 +174,19 @@ def test_a_gait_that_takes_too_long_leaves_its_lane_to_others(short):
     assert found.metrics == simulate(scenario=short, gait=gait).metrics
 
 
+def test_an_error_of_the_engine_reaches_those_who_wait(short, monkeypatch):
+    def fail(self, iterations):
+        raise MemoryError
+
+    gait = seeded_gait(short)
+    with LanePool(1) as pool:
+        with monkeypatch.context() as patch:
+            patch.setattr(LaneEngine, "advance", fail)
+            futures = pool.submit([(short, gait)] * 12)
+            assert all(isinstance(future.exception(), MemoryError) for future in futures)
+        assert pool.simulate(scenario=short, gait=gait).metrics.distance != 0.0
+
+
 def test_the_end_of_a_pool_cancels_what_is_under_way(short):
     endless = short.with_changes({"simulation.duration": "1 h"})
     before = threading.active_count()

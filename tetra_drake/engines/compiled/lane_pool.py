@@ -99,9 +99,11 @@ class LanePool:
                 if not crew.load(job):
                     with self._changed:
                         self._waiting.appendleft(job)
-            crew.advance()
-        for job in crew.jobs.values():
-            job.future.set_exception(CancelledError())
+            try:
+                crew.advance()
+            except Exception as error:  # those who wait for the lanes are told
+                crew.give_up(error)
+        crew.give_up(CancelledError())
 
     def _take(self, crew: _Crew) -> list[_Job] | None:
         """Jobs for the idle lanes of a thread; None at the pool's end."""
@@ -168,6 +170,12 @@ class _Crew:
             error = TimeBudgetExceeded(f"not done after {job.time_budget:g} s")
             error.wall_time = engine.stop(lane)
             job.future.set_exception(error)
+
+    def give_up(self, error: Exception) -> None:
+        """Ends all jobs with an error."""
+        for job in self.jobs.values():
+            job.future.set_exception(error)
+        self.jobs, self._engine, self._engines = {}, None, {}
 
     def _prepare(self, job: _Job) -> Walk:
         latest = self._latest
