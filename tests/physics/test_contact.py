@@ -22,7 +22,7 @@ from tetra_drake.physics.contact import (
     update_modes,
 )
 from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
-from tetra_drake.physics.kinematics import FORCE
+from tetra_drake.physics.kinematics import FORCE, V_WN
 from tetra_drake.robot.model import ground_law
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.schema import Scenario
@@ -125,6 +125,20 @@ def test_a_node_that_sticks_again_does_so_where_it_is(ground):
         assert modes[0, MODE + 1] == STICK, "the sideways axis is on its own"
 
 
+def test_an_update_tells_whether_a_mode_has_changed(ground):
+    for change, expected in [
+        ({"z": 1e-3}, False),
+        ({"z": -1e-5}, True),  # lands
+        ({"z": -1e-5}, False),
+        ({"z": -1e-5, "x": 1e-3, "v_x": 0.1}, True),  # breaks free
+        ({"z": -1e-5, "x": 2e-3, "v_x": 0.1}, False),
+        ({"z": -1e-5, "x": 2e-3, "v_x": -0.1}, True),  # sticks
+        ({"z": 1e-3}, True),
+    ]:
+        nodes = ground.nodes(**change)
+        assert update_modes(nodes, *ground.args, ground.modes) == expected, change
+
+
 def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground):
     ground.modes[:, CONTACT] = ground.modes[:, MODE] = 1.0
     modes = ground.update(z=1e-3, v_x=0.1)
@@ -144,6 +158,16 @@ def test_the_margin_crosses_zero_at_a_mode_change(ground):
 
     assert margin(x=0.9 * p0) > 0.0 > margin(x=1.1 * p0)
     assert margin(z=-1e-6) > 0.0 > margin(z=1e-6)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("mode", [-1.0, 1.0])
+def test_the_margin_of_a_slipping_node_is_its_speed_that_way(ground, axis, mode):
+    modes, nodes = ground.update(z=-1e-4), ground.nodes(z=-1e-4)
+    modes[2, MODE + axis] = mode
+    for speed in (3e-6, -3e-6):  # the least of all margins; the others are 1e-4 m
+        nodes[4, V_WN + axis] = mode * speed  # contact node 2 is T2's bottom left, node 4
+        assert mode_margin(nodes, modes, *ground.args) == pytest.approx(speed, rel=1e-12)
 
 
 @pytest.mark.parametrize(
