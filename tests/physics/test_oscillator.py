@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from tetra_drake.physics.oscillator import (
-    NEURON_COLUMNS,
     U_RATE,
     V_RATE,
     Network,
-    U,
-    V,
     inhibition_matrix,
+    make_neurons,
     network_output,
     neuron_rates,
     oscillator_output,
@@ -22,9 +20,7 @@ from tetra_drake.physics.oscillator import (
 
 def neurons_at(u: list[float] | np.ndarray, v: list[float] | np.ndarray) -> np.ndarray:
     """The neurons with these states."""
-    neurons = np.zeros((len(u), NEURON_COLUMNS))
-    neurons[:, U], neurons[:, V] = u, v
-    return neurons
+    return make_neurons(np.concatenate([u, v]))
 
 
 def test_weights_stand_in_the_listings_order():

@@ -47,6 +47,13 @@ def inhibition_matrix(weights: Array, *, oscillators: int, partner_weight: float
     return matrix
 
 
+def make_neurons(state: Array) -> Array:
+    """The `neurons` of a state (4n,): u, then v, of all neurons."""
+    neurons = np.zeros((state.size // 2, NEURON_COLUMNS))
+    neurons[:, U], neurons[:, V] = state.reshape(2, -1)
+    return neurons
+
+
 @compiled
 def neuron_rates(network: Network, feedback: Table, neurons: Table) -> None:
     """Writes the rates of u and v (Eq. 7; -u as in listing B.2); `feedback` is (2n,)."""

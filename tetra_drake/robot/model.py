@@ -11,7 +11,7 @@ from tetra_drake.physics.contact import GROUND, Ground
 from tetra_drake.physics.lanes import Table
 from tetra_drake.physics.oscillator import Network, inhibition_matrix
 from tetra_drake.robot.bodies import tetrahedron_inertia
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import Gait, weight_count
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import CpgScenario, FrictionScenario, GroundScenario, Scenario
 
@@ -78,9 +78,9 @@ def ground_law(ground: GroundScenario, friction: FrictionScenario) -> np.ndarray
 def make_network(cpg: CpgScenario, gait: Gait, *, oscillators: int) -> Network:
     """The network of a gait; raises InputError where that is for another number of oscillators."""
     weights, partner = np.array(gait.weights), cpg.partner_weight
-    expected = 2 * oscillators * (oscillators - 1)
-    if weights.size != expected:
-        problem = f"found {weights.size}, expected {expected} for {oscillators + 1} tetrahedra"
+    if weights.size != weight_count(oscillators):
+        expected = f"{weight_count(oscillators)} for {oscillators + 1} tetrahedra"
+        problem = f"found {weights.size}, expected {expected}"
         raise InputError(f"gait {gait.name}", "weights", problem)
     return Network(
         inhibition=inhibition_matrix(weights, oscillators=oscillators, partner_weight=partner),

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tetra_drake.files import whole_file
-from tetra_drake.physics.oscillator import NEURON_COLUMNS, U, V, network_output
+from tetra_drake.physics.oscillator import make_neurons, network_output
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import initial_state, make_network
 from tetra_drake.scenario.schema import Scenario
@@ -31,8 +31,7 @@ def raw_output(scenario: Scenario, gait: Gait) -> np.ndarray:
     """
     cpg, oscillators = scenario.cpg, scenario.oscillators
     network = make_network(cpg, gait, oscillators=oscillators)
-    neurons = np.zeros((2 * oscillators, NEURON_COLUMNS))
-    neurons[:, U], neurons[:, V] = np.split(initial_state(cpg, oscillators), 2)
+    neurons = make_neurons(initial_state(cpg, oscillators))
     output, listing = np.empty((sample_count(scenario), oscillators)), cpg.signals == "listing"
     network_output(network, np.zeros(len(neurons)), cpg.listing_step, listing, neurons, output)
     return output

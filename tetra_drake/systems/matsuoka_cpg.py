@@ -6,11 +6,10 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
 from tetra_drake.physics.oscillator import (
-    NEURON_COLUMNS,
     U_RATE,
     V_RATE,
     U,
-    V,
+    make_neurons,
     neuron_rates,
     oscillator_output,
 )
@@ -55,9 +54,7 @@ class MatsuokaCpg(LeafSystem):
 
     def _neurons(self, context: Context) -> np.ndarray:
         """The `neurons` of physics.oscillator."""
-        neurons = np.zeros((self._no_feedback.size, NEURON_COLUMNS))
-        neurons[:, U : V + 1] = context.get_continuous_state_vector().value().reshape(2, -1).T
-        return neurons
+        return make_neurons(context.get_continuous_state_vector().value())
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:
         signals = output.get_mutable_value()
