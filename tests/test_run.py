@@ -91,6 +91,13 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     assert progress.warnings == []
 
 
+def test_workers_of_ones_own_find_the_engine_compiled(tiny, tmp_path, reports, monkeypatch):
+    prepared = []
+    monkeypatch.setattr("tetra_drake.run.prepare", lambda scenario, say: prepared.append(scenario))
+    tetra_drake.evolve(tiny, tmp_path / "own", executor=OneByOne, reevaluate=False)
+    assert prepared == [tiny]
+
+
 def test_candidates_side_by_side_have_the_records_of_candidates_one_by_one(tiny, tmp_path, reports):
     several = tiny.with_changes({"evolution.trials": 3})
     ways = {"lanes": {"workers": 1}, "threads": {"workers": 3}, "own": {"executor": OneByOne}}

@@ -6,7 +6,7 @@ import contextlib
 from pathlib import Path
 
 from tetra_drake.engines.compiled.lane_pool import LanePool
-from tetra_drake.engines.simulate import available_cores
+from tetra_drake.engines.simulate import available_cores, prepare
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import (
@@ -86,6 +86,8 @@ def evolve(
             if in_lanes:
                 lanes = stack.enter_context(LanePool(workers, say=progress.say))
                 evaluate, at_a_time = GaitEvaluation(own, objective, lanes), lanes.capacity
+            else:
+                prepare(own, say=progress.say)
             run_trials(
                 record,
                 evaluate=evaluate,
