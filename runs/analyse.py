@@ -20,10 +20,10 @@ import numpy as np
 import pandas
 import xarray
 
-from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.simulate import available_cores, simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.executors import available_cores, evaluate_all, process_executor
+from tetra_drake.evolution.executors import evaluate_all, process_executor
 from tetra_drake.evolution.robustness import robustness
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.files import write_whole

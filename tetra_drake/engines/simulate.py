@@ -97,6 +97,7 @@ def prepare(scenario: Scenario, *, say: Callable[[str], None] = lambda text: Non
     """Compiles the scenario's engine, so that no simulation has to wait for that; `say` is told if
     it takes longer than a moment."""
     if scenario.simulation.engine == "compiled":
-        from tetra_drake.engines.compiled.engine import Walk, ready_engine
+        from tetra_drake.engines.compiled.engine import ready_engine
+        from tetra_drake.engines.compiled.lane_engine import Walk
 
         ready_engine(Walk.of(scenario, seeded_gait(scenario), record=False), 1, say=say)

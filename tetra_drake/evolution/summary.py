@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.evolution.executors import available_cores
+from tetra_drake.engines.simulate import available_cores
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.tables import Run

@@ -1,4 +1,4 @@
-"""One gait through the compiled engine: what simulate() does when the scenario asks for it."""
+"""From a gait to its result through the compiled engine."""
 
 from __future__ import annotations
 
@@ -52,11 +52,9 @@ def ready_engine(
     timer = threading.Timer(1.0, say, [message])
     timer.start()
     try:
-        engine = LaneEngine(walk, width=width)
-        engine.advance(0)
+        return LaneEngine(walk, width=width)
     finally:
         timer.cancel()
-    return engine
 
 
 def make_outcome(walk: Walk, course: Course) -> SimulationResult:

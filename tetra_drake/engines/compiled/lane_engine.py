@@ -35,7 +35,7 @@ from tetra_drake.physics.cable import PULL_COLUMNS, Cables
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, update_modes
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.lanes import FieldArray, lane_table
-from tetra_drake.physics.oscillator import NEURON_COLUMNS, U, V
+from tetra_drake.physics.oscillator import NEURON_COLUMNS, make_neurons
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import (
@@ -123,10 +123,10 @@ class LaneEngine:
     """Simulates walks of one kind in `width` lanes."""
 
     def __init__(self, first: Walk, *, width: int) -> None:
-        """For walks like the first; see `accepts`."""
+        """For walks like the first; see `accepts`. Compiles the engine where that is not done."""
         self._kind = first.kind
-        self._robot, self._robot_tables = _lane_model(first.model, width)
-        self._walks = _tables(first, self._robot, width)
+        robot, self._robot_tables = _lane_model(first.model, width)
+        self._walks = _tables(first, robot, width)
         structure = first.structure
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
@@ -173,13 +173,12 @@ class LaneEngine:
         numbers |= {name: getattr(simulation, name) for name in ("max_speed", "max_evaluations")}
         numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
         numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
+        numbers["neurons"] = make_neurons(initial_state(cpg, scenario.oscillators))
         for name, values in numbers.items():
             getattr(self._walks, name).array[..., lane] = values
         for table, values in zip(self._robot_tables, _numbers(model), strict=True):
             table.array[..., lane] = values
         self._walks.step.state.array[:, lane] = start
-        u_and_v = initial_state(cpg, scenario.oscillators).reshape(2, -1)
-        self._walks.neurons.array[:, U, lane], self._walks.neurons.array[:, V, lane] = u_and_v
 
         log, clock = self._log, self._walks.clock.array
         log.times[lane] = log.marks[lane] = math.inf

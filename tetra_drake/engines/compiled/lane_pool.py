@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
-from tetra_drake.engines.compiled.engine import Course, Walk, make_outcome, ready_engine
-from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
+from tetra_drake.engines.compiled.engine import make_outcome, ready_engine
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk, lanes_for
 from tetra_drake.errors import InputError, SimulationFailure, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
@@ -96,7 +96,7 @@ class LanePool:
         crew = _Crew(self._say)
         while (jobs := self._take(crew)) is not None:
             for job in jobs:
-                if not crew.load(job):
+                if not crew.load(job, among=len(jobs)):
                     with self._changed:
                         self._waiting.appendleft(job)
             try:
@@ -118,7 +118,6 @@ class LanePool:
             if not crew.jobs:
                 share = math.ceil(len(self._waiting) / len(self._threads))
                 room = min(share, lanes_for(share))
-                crew.planned = room
             return [self._waiting.popleft() for _ in range(min(room, len(self._waiting)))]
 
 
@@ -128,8 +127,6 @@ class _Crew:
     def __init__(self, say: Callable[[str], None]) -> None:
         self.jobs: dict[int, _Job] = {}
         """By lane."""
-        self.planned = 1
-        """How many jobs come next, if there are none."""
         self._say = say
         self._engine: LaneEngine | None = None
         self._engines: dict[int, LaneEngine] = {}
@@ -141,11 +138,14 @@ class _Crew:
         """The number of idle lanes."""
         return len(self._engine.idle) if self._engine else 0
 
-    def load(self, job: _Job) -> bool:
-        """Puts a job in an idle lane; False if it has to wait until all lanes are idle."""
+    def load(self, job: _Job, *, among: int) -> bool:
+        """Puts a job in an idle lane; False if it has to wait until all lanes are idle.
+
+        If they are, there will be lanes for as many jobs as it is `among`.
+        """
         try:
             walk = self._prepare(job)
-            engine = self._engine if self.jobs else self._engine_for(walk)
+            engine = self._engine if self.jobs else self._engine_for(walk, lanes_for(among))
             if engine is None or not engine.accepts(walk):
                 return False
             self._engine, lane = engine, engine.idle[0]
@@ -184,8 +184,7 @@ class _Crew:
         self._latest = Walk.of(job.scenario, job.gait, record=job.record)
         return self._latest
 
-    def _engine_for(self, walk: Walk) -> LaneEngine:
-        width = lanes_for(self.planned)
+    def _engine_for(self, walk: Walk, width: int) -> LaneEngine:
         engine = self._engines.get(width)
         if engine is None or not engine.accepts(walk):
             engine = self._engines[width] = ready_engine(walk, width, say=self._say)

@@ -38,7 +38,7 @@ the settings' `look_ahead`."""
 EVALUATIONS = 3
 """Force evaluations of an attempted step."""
 
-(STATUS, TIME, STEP, END, MARK, DUE, ACTIVE, SAMPLES, FLAG, TRIED, TAKEN, CLOCK_ROWS) = range(12)
+STATUS, TIME, STEP, END, MARK, DUE, ACTIVE, SAMPLES, FLAG, TRIED, TAKEN, CLOCK_ROWS = range(12)
 """Rows of `clock`, (CLOCK_ROWS,): status, time, length of the step tried and its end, times of the
 next mark and of the next sample to keep (s), whether signals act (0 or 1), number of samples of the
 signals that exist, a flag for what comes next, steps tried, steps taken; and their number."""
