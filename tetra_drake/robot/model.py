@@ -13,7 +13,7 @@ from tetra_drake.physics.oscillator import Network, inhibition_matrix
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import Gait, weight_count
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.schema import CpgScenario, FrictionScenario, GroundScenario, Scenario
+from tetra_drake.scenario.schema import CpgScenario, Friction, GroundScenario, Scenario
 
 JUNCTION_CABLES = 6
 """The cables between two neighbouring bodies."""
@@ -69,7 +69,7 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
     )
 
 
-def ground_law(ground: GroundScenario, friction: FrictionScenario) -> np.ndarray:
+def ground_law(ground: GroundScenario, friction: Friction) -> np.ndarray:
     """The constants of the ground's laws as `physics.contact` takes them: (1,) of dtype GROUND."""
     normal = ground.stiffness, ground.damping
     return np.array([(*normal, *(getattr(friction, n) for n in Ground._fields[2:]))], dtype=GROUND)

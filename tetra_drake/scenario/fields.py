@@ -2,9 +2,10 @@
 
 Works on any dataclass whose fields come from the helpers below. Types: float, int, str, bool,
 another dataclass, `X | None`, `list[X]`, `dict[str, X]`, and tagged kinds: a union of dataclasses,
-written `!Name {...}` as in Drake's YAML. A *tree* is what YAML holds (dicts, lists, scalars) with
-all numbers in SI; the dict of a tagged kind has its tag under "_tag". Annotations are read as
-types, so a module with such dataclasses must not postpone them.
+written `!Name {...}` as in Drake's YAML; without a tag, a mapping is the first of them. A *tree* is
+what YAML holds (dicts, lists, scalars) with all numbers in SI; the dict of a tagged kind has its
+tag under "_tag". Annotations are read as types, so a module with such dataclasses must not postpone
+them.
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ class Check:
             return None
         kinds = {f"!{k.__name__}": k for k in _kinds(kind)}
         if len(kinds) > 1:
-            tag = str(value.get(TAG, "")) if isinstance(value, dict) else ""
+            tag = _tag(value, kinds) if isinstance(value, dict) else ""
             if tag not in kinds:
                 raise ValueError(f"found {tag or _describe(value)}; {_hint(tag, kinds)}")
             section = self._section(kinds[tag], value, key)
@@ -155,14 +156,15 @@ class Check:
             raise ValueError(f"found {found}, expected a finite number")
         for name, (words, holds) in _LIMITS.items():
             if name in limits and not holds(value, limits[name]):
-                raise ValueError(f"found {found}, expected {words} {limits[name]}")
+                limit = f"{limits[name]:.4g} {unit or ''}".strip()
+                raise ValueError(f"found {found}, expected {words} {limit}")
         return kind(value)
 
 
 def tree_of(node: Any, show: Show | None = None, *, sparse: bool = False) -> Tree:
     """The tree of a dataclass; `show` gives the text of a quantity from number and unit.
 
-    If `sparse`, values that are their fields' defaults are left out.
+    If `sparse`, values that are their fields' defaults, and tags of first kinds, are left out.
     """
     return {
         f.name: _tree(f.type, value, f.metadata.get("unit"), show, sparse)
@@ -174,7 +176,8 @@ def tree_of(node: Any, show: Show | None = None, *, sparse: bool = False) -> Tre
 def _tree(kind: Any, value: Any, unit: str | None, show: Show | None, sparse: bool) -> Any:
     kind, *others = _kinds(kind)
     if dataclasses.is_dataclass(value):
-        tag = {TAG: f"!{type(value).__name__}"} if others else {}
+        untagged = not others or (sparse and type(value) is kind)
+        tag = {} if untagged else {TAG: f"!{type(value).__name__}"}
         return tag | tree_of(value, show, sparse=sparse)
     if isinstance(value, list):
         return [_tree(typing.get_args(kind)[0], v, unit, show, sparse) for v in value]
@@ -255,6 +258,13 @@ def _kinds(kind: Any) -> list[Any]:
     return [member for member in members if member is not types.NoneType]
 
 
+def _tag(value: Tree, kinds: Mapping[str, Any]) -> str:
+    """The tag of a mapping: if not given, the first, unless only another kind has all the keys."""
+    fits = [t for t, k in kinds.items() if value.keys() <= {f.name for f in dataclasses.fields(k)}]
+    first = next(iter(kinds))
+    return str(value.get(TAG, "" if fits and first not in fits else first))
+
+
 def _describe(value: Any) -> str:
     """What was found, for a message."""
     if isinstance(value, dict):
@@ -265,4 +275,6 @@ def _describe(value: Any) -> str:
 
 def _hint(name: Any, known: Iterable[str]) -> str:
     close = difflib.get_close_matches(str(name), list(known), n=1)
-    return f"did you mean '{close[0]}'?" if close else f"expected one of {', '.join(known)}"
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return f"expected one of {', '.join(known)}" if known else "expected none"

@@ -12,6 +12,7 @@ from tetra_drake.files import read_text
 from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import TAG, Check, Tree, dump_yaml, parse_yaml, tree_of
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.terrain import make_grid
 
 
 def shipped_scenarios() -> list[str]:
@@ -22,10 +23,13 @@ def shipped_scenarios() -> list[str]:
 def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     """Loads a shipped scenario by its name, or a scenario file by its path.
 
-    Raises InputError, naming file and key, for whatever is wrong in the file.
+    Raises InputError, naming file and key, for whatever is wrong in the file, or in the height
+    file that it names.
     """
     file = _file(str(name_or_file), Path())
-    return Scenario.from_tree(_load_tree(file), file)
+    scenario = Scenario.from_tree(_load_tree(file), file)
+    make_grid(scenario.terrain, ahead=0.0, source=file)
+    return scenario
 
 
 def dump_scenario(scenario: Scenario) -> str:
@@ -69,6 +73,9 @@ def _load_tree(file: Path, seen: tuple[Path, ...] = ()) -> Tree:
     raw = parse_yaml(content, file)
     base = raw.pop("base", None) if isinstance(raw, dict) else None
     given: Tree = Check(file).value(Scenario, raw)
+    terrain = given.get("terrain", {})
+    if "file" in terrain:
+        terrain["file"] = os.path.abspath(file.parent / terrain["file"])
     if base is None:
         return given
     if not isinstance(base, str) or not base:

@@ -13,6 +13,8 @@ from typing import Any, Self
 from tetra_drake.errors import InputError
 from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import Check, quantity, setting, tree_of, with_values
+from tetra_drake.scenario.terrain import Flat, Terrain
+from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 ENGINES = ("drake", "compiled", "mujoco")
 SCHEMES = (
@@ -39,6 +41,10 @@ class RobotScenario:
     gravity: float = quantity("m/s^2", at_least=0)
     offsets: list[list[float]] = quantity("m", default=[], length=3)
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
+    contacts: str = setting(choices=("thesis", "all"), default="thesis")
+    """The nodes that the ground can touch: the thesis's, which are the two bottom nodes of every
+    tetrahedron and the tip of the first in line, or all four of every tetrahedron. Only flat
+    ground leaves the others untouched."""
 
 
 @dataclass
@@ -52,13 +58,45 @@ class GroundScenario:
 
 
 @dataclass
-class FrictionScenario:
-    """The reset-integrator friction (Table 2)."""
+class ResetIntegrator:
+    """The friction of the thesis (Table 2, Eq. 3-5), which does not know the load.
+
+    For each contact and each of two tangents of the ground, with x the deflection from the stick
+    point and v the velocity: F = -(sigma_0 |v| (1 + a_c) x + sigma_1 v) in stick and
+    F = -sigma_0 |v| x in slip, where x is held at +-p0. A contact breaks free where |x| >= p0
+    moving outward, and sticks again, with x = 0, where v changes sign.
+    """
 
     stiction_range: float = quantity("m", above=0)  # p0: deflection at which a node breaks free
     stiction_damping: float = quantity("N*s/m", at_least=0)  # sigma_1
     stiction_switch: float = setting(at_least=0)  # a_c
     proportional_stiction: float = quantity("N*s/m^2", at_least=0)  # sigma_0
+
+
+@dataclass
+class Coulomb:
+    """Friction that grows with the load F_N, and may depend on the direction of travel.
+
+    In the tangent plane u = c v + k x, with x the deflection from the stick point (in stick only)
+    and v the velocity. F = -u min(1, mu F_N / s(u)), mu static in stick and kinetic in slip, and
+    s(u) = sqrt((u_f / a_f)^2 + (u_l / a_l)^2): u_f is along the body's heading at touchdown and
+    a_f is `forward` or `backward` by its sign, u_l is sideways and a_l is `lateral`. A contact
+    breaks free where s(u) > static F_N moving outward, and sticks again where v has no part left
+    along the direction in which it broke free. Without stiffness, and with static = kinetic, the
+    law has no memory: it is MuJoCo's soft friction.
+    """
+
+    static: float = setting(above=0, default=0.5)  # mu in stick
+    kinetic: float = setting(above=0, default=0.5)  # mu in slip; at most `static`
+    stiffness: float = quantity("N/m", at_least=0, default=0.0)  # k
+    damping: float = quantity("N*s/m", above=0, default=0.4 * POUND_FORCE / INCH)  # c
+    forward: float = setting(above=0, default=1.0)  # factors on mu by the direction of slip
+    backward: float = setting(above=0, default=1.0)
+    lateral: float = setting(above=0, default=1.0)
+
+
+Friction = ResetIntegrator | Coulomb
+"""What `friction` may be; without a tag it is the first."""
 
 
 @dataclass
@@ -213,7 +251,8 @@ class Scenario:
     name: str = setting()
     robot: RobotScenario
     ground: GroundScenario
-    friction: FrictionScenario
+    friction: Friction
+    terrain: Terrain = setting(default=Flat())
     cables: CableScenario
     cpg: CpgScenario
     gait_bounds: GaitBoundsScenario
@@ -281,10 +320,13 @@ def _check_relations(scenario: Scenario, source: object) -> None:
     bounds, simulation, n = scenario.gait_bounds, scenario.simulation, scenario.robot.tetrahedra
     weight, tau_a, offsets = bounds.weight_min, bounds.tau_a_min, len(scenario.robot.offsets)
     start, end = simulation.steady_from, simulation.duration
+    friction = scenario.friction if isinstance(scenario.friction, Coulomb) else Coulomb()
+    mu, most = friction.kinetic, friction.static
     for wrong, key, found, expected in (
         (weight > bounds.weight_max, "gait_bounds.weight_min", weight, "at most weight_max"),
         (tau_a > bounds.tau_a_max, "gait_bounds.tau_a_min", f"{tau_a} s", "at most tau_a_max"),
         (start >= end, "simulation.steady_from", f"{start} s", f"less than the duration, {end} s"),
+        (mu > most, "friction.kinetic", mu, f"at most static, {most}"),
         (offsets not in (0, n), "robot.offsets", f"{offsets} items", f"none or {n}, one each"),
     ):
         if wrong:

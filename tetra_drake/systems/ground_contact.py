@@ -26,7 +26,7 @@ from tetra_drake.physics.contact import (
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.robot.model import ground_law
 from tetra_drake.robot.structure import Structure, moved_nodes
-from tetra_drake.scenario.schema import FrictionScenario, GroundScenario
+from tetra_drake.scenario.schema import Friction, GroundScenario
 
 
 class GroundContact(LeafSystem):
@@ -53,7 +53,7 @@ class GroundContact(LeafSystem):
         self,
         structure: Structure,
         ground: GroundScenario,
-        friction: FrictionScenario,
+        friction: Friction,
         *,
         witness: bool = False,
     ) -> None:

@@ -1,0 +1,250 @@
+"""The kinds of ground that is not flat, and the grid of heights that each of them is simulated as.
+
+The ground is the surface z = h(x, y) in the world: x forward, y left, z up. The robot starts around
+the origin, T1's base at x = 0, and walks along +x. The surface is the uniform biquadratic B-spline
+whose control points are the heights of a grid: smooth, exact on planes, nowhere above the highest
+height around, with edges rounded by a cell; outside the grid it goes on as it is at the edge.
+
+(The annotations below are read as types, so they are not postponed.)
+"""
+
+import math
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.fields import quantity, setting
+from tetra_drake.scenario.units import INCH
+
+BEHIND, AHEAD, ASIDE = 24.0 * INCH, 120.0 * INCH, 30.0 * INCH
+"""What generated grids cover at least, m from the origin."""
+MOST_CELLS = 4_000_000
+STEEPEST = math.radians(60.0)
+
+
+@dataclass
+class Flat:
+    """h = 0 everywhere: the thesis's floor, and the default."""
+
+
+@dataclass
+class Incline:
+    """A plane that rises along +x.
+
+    Without `start`, h = tan(slope) x everywhere, and the robot starts on it, turned with it; with
+    it, h = tan(slope) max(0, x - start). A negative slope goes down.
+    """
+
+    slope: float = quantity("rad", at_least=-STEEPEST, at_most=STEEPEST)  # 60 deg either way
+    start: float | None = quantity("m", default=None)
+
+
+@dataclass
+class Steps:
+    """Stairs across the way: h = height min(count, floor((x - start) / depth) + 1) from `start` on.
+
+    The first step begins at `start`, 1 in ahead of the robot if not given. A negative height goes
+    down. A step rises over a cell before and after its edge: the height of a step, or a quarter of
+    its depth if that is less.
+    """
+
+    height: float = quantity("m")  # of each step above the one before
+    depth: float = quantity("m", above=0)  # of each step along x
+    count: int = setting(at_least=1)
+    start: float | None = quantity("m", default=None)
+
+
+@dataclass
+class Rough:
+    """Heights drawn uniformly between -2 amplitude and 0, independent, every half wavelength.
+
+    So the mean is -amplitude, and a robot that stands at 0 touches but does not sink in. Flat, at
+    0, before `start` if that is given. The same seed is the same ground.
+    """
+
+    amplitude: float = quantity("m", at_least=0)
+    wavelength: float = quantity("m", above=0)
+    seed: int = setting(at_least=0, default=0)
+    start: float | None = quantity("m", default=None)
+
+
+@dataclass
+class Obstacles:
+    """Round bumps, h = height max(0, 1 - (r / radius)^2), the highest where two overlap.
+
+    One stands at a random place in each square of side `spacing`, none reaches before `start`, 1 in
+    ahead of the robot if not given. The grid lowers a bump's top by about an eighth. The same seed
+    is the same ground.
+    """
+
+    height: float = quantity("m", above=0)
+    radius: float = quantity("m", above=0)
+    spacing: float = quantity("m", above=0)
+    seed: int = setting(at_least=0, default=0)
+    start: float | None = quantity("m", default=None)
+
+
+@dataclass
+class HeightField:
+    """Heights in m from a file: rows along x, columns along y, both upward.
+
+    The file is numpy's `.npy`, or text of numbers separated by blanks or commas; at least 3 x 3.
+    A relative path starts at the scenario file that names it.
+    """
+
+    file: str = setting()
+    cell: float = quantity("m", above=0)  # between neighbours, along x and y
+    corner: list[float] | None = quantity("m", length=2, default=None)
+    """x and y of the first height; the grid's centre is the origin if not given."""
+
+
+Terrain = Flat | Incline | Steps | Rough | Obstacles | HeightField
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Heights on a regular grid: the control points of the surface."""
+
+    heights: np.ndarray
+    """(rows, columns), m: rows along x, columns along y."""
+    corner: tuple[float, float]
+    """x and y of heights[0, 0], m."""
+    cell: tuple[float, float]
+    """Along x and y, m."""
+
+
+def make_grid(terrain: Terrain, *, ahead: float, source: object) -> Grid:
+    """The grid of a terrain.
+
+    Steps and obstacles without a start begin at x = `ahead` (m). Raises InputError, naming `source`
+    and the key, for more than MOST_CELLS cells, and for a height file that cannot be used.
+    """
+    if isinstance(terrain, HeightField):
+        return _height_field(terrain, source)
+    if isinstance(terrain, Incline):
+        return _incline(terrain)
+    if isinstance(terrain, Steps):
+        return _steps(terrain, ahead, source)
+    if isinstance(terrain, Rough):
+        return _rough(terrain, source)
+    if isinstance(terrain, Obstacles):
+        return _obstacles(terrain, ahead, source)
+    return Grid(np.zeros((3, 3)), (-ASIDE, -ASIDE), (ASIDE, ASIDE))
+
+
+def _incline(incline: Incline) -> Grid:
+    rise = math.tan(incline.slope)
+    cell = 0.5 * INCH, ASIDE
+    if incline.start is None:
+        cell = 2.0 * AHEAD, 2.0 * AHEAD  # three heights make a plane one cell wide
+    x, y = _axes(cell, incline.start or 0.0)
+    along = x if incline.start is None else np.maximum(0.0, x - incline.start)
+    return _grid(x, y, rise * along, cell)
+
+
+def _steps(steps: Steps, ahead: float, source: object) -> Grid:
+    start = ahead if steps.start is None else steps.start
+    quarter, height = 0.25 * steps.depth, abs(steps.height)
+    key, finest = ("height", height) if 0.0 < height < quarter else ("depth", quarter)
+    _check_size((finest, ASIDE), source, key)
+    cell = steps.depth / math.ceil(steps.depth / finest), ASIDE
+    x, y = _axes(cell, start + 0.5 * cell[0])  # edges midway between two heights
+    risen = np.clip(np.floor((x - start) / steps.depth) + 1.0, 0.0, steps.count)
+    return _grid(x, y, steps.height * risen, cell)
+
+
+def _rough(rough: Rough, source: object) -> Grid:
+    half = 0.5 * rough.wavelength
+    _check_size((half, half), source, "wavelength")
+    x, y = _axes((half, half), 0.0)
+    generator = np.random.default_rng(rough.seed)
+    heights = generator.uniform(-2.0 * rough.amplitude, 0.0, (len(x), len(y)))
+    if rough.start is not None:
+        heights[x < rough.start + 1.5 * half] = 0.0  # how far a control point reaches
+    return _grid(x, y, heights, (half, half))
+
+
+def _obstacles(obstacles: Obstacles, ahead: float, source: object) -> Grid:
+    cell, spacing = 0.5 * obstacles.radius, obstacles.spacing
+    _check_size((cell, cell), source, "radius")
+    _check_size((spacing, spacing), source, "spacing")
+    x, y = _axes((cell, cell), 0.0)
+    start = ahead if obstacles.start is None else obstacles.start
+    first = max(-BEHIND, start + obstacles.radius + 1.5 * cell)  # a bump and its control points
+    squares = np.arange(first, AHEAD, spacing), np.arange(-ASIDE, ASIDE, spacing)
+    corners = np.stack(np.meshgrid(*squares, indexing="ij"), axis=-1).reshape(-1, 2)
+    generator = np.random.default_rng(obstacles.seed)
+    centres = corners + spacing * generator.uniform(size=corners.shape)
+    heights = np.zeros((len(x), len(y)))
+    nearest = np.rint((centres - (x[0], y[0])) / cell).astype(int)
+    for offset in np.ndindex(5, 5):  # a bump is four cells wide
+        at = nearest + offset - np.array([2, 2])
+        inside = ((at >= 0) & (at < heights.shape)).all(axis=1)
+        at, centre = at[inside], centres[inside]
+        r_squared = (x[at[:, 0]] - centre[:, 0]) ** 2 + (y[at[:, 1]] - centre[:, 1]) ** 2
+        bumps = obstacles.height * (1.0 - r_squared / obstacles.radius**2)
+        np.maximum.at(heights, (at[:, 0], at[:, 1]), bumps)
+    return _grid(x, y, heights, (cell, cell))
+
+
+def _height_field(field: HeightField, source: object) -> Grid:
+    heights = _read_heights(field.file, source)
+    if heights.ndim != 2 or min(heights.shape) < 3:
+        shape = " x ".join(map(str, heights.shape)) or "a single number"
+        raise _file_error(source, f"'{field.file}' holds {shape}, expected at least 3 x 3 heights")
+    bad = np.argwhere(~np.isfinite(heights))
+    if len(bad):
+        row, column = bad[0]
+        found = f"{heights[row, column]} in row {row + 1}, column {column + 1}"
+        raise _file_error(source, f"'{field.file}' has {found}, expected finite heights in m")
+    middle = [-0.5 * (size - 1) * field.cell for size in heights.shape]
+    x, y = middle if field.corner is None else field.corner
+    return Grid(heights, (x, y), (field.cell, field.cell))
+
+
+def _read_heights(file: str, source: object) -> np.ndarray:
+    """What a file holds, as floats of any shape."""
+    try:
+        if file.endswith(".npy"):
+            with Path(file).open("rb") as stream:
+                return np.lib.format.read_array(stream).astype(float, casting="same_kind")
+        text = re.sub("#.*", "", Path(file).read_text(encoding="utf-8"))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that it holds nothing
+            return np.loadtxt(text.splitlines(), delimiter="," if "," in text else None, ndmin=2)
+    except FileNotFoundError as error:
+        raise _file_error(source, f"'{file}': no such height file") from error
+    except (OSError, ValueError, TypeError, MemoryError) as error:
+        raise _file_error(source, f"'{file}' cannot be read as heights: {error}") from error
+
+
+def _file_error(source: object, problem: str) -> InputError:
+    return InputError(source, "terrain.file", problem)
+
+
+def _check_size(cell: tuple[float, float], source: object, key: str) -> None:
+    """Raises InputError that names `key` if cells that small make too many of them."""
+    if MOST_CELLS * cell[0] * cell[1] < (BEHIND + AHEAD) * 2.0 * ASIDE:
+        problem = f"is too small: cells of {min(cell):.3g} m would be more than {MOST_CELLS}"
+        raise InputError(source, f"terrain.{key}", problem)
+
+
+def _axes(cell: tuple[float, float], origin: float) -> tuple[np.ndarray, np.ndarray]:
+    """x, one of them at `origin`, and y of a grid that covers all with a cell to spare."""
+    first, last = math.floor((-BEHIND - origin) / cell[0]), math.ceil((AHEAD - origin) / cell[0])
+    aside = math.ceil(ASIDE / cell[1]) + 1
+    return (
+        origin + cell[0] * np.arange(first - 1, last + 2),
+        cell[1] * np.arange(-aside, aside + 1.0),
+    )
+
+
+def _grid(x: np.ndarray, y: np.ndarray, heights: np.ndarray, cell: tuple[float, float]) -> Grid:
+    """The grid of heights on two axes, or on x alone."""
+    if heights.ndim == 1:
+        heights = np.repeat(heights[:, None], len(y), axis=1)
+    return Grid(heights, (float(x[0]), float(y[0])), cell)
