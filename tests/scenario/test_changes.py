@@ -13,7 +13,7 @@ from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.fields import dump_yaml, tree_of
 from tetra_drake.scenario.load import differences, load_scenario
 from tetra_drake.scenario.perturb import displaced, scaled
-from tetra_drake.scenario.schema import ReferenceScenario, Scenario
+from tetra_drake.scenario.schema import Coulomb, ReferenceScenario, Scenario
 
 IN = 0.0254
 
@@ -75,6 +75,9 @@ def axial_force(scenario: Scenario) -> float:
         ("simulation: {duration: 10 s}", False, False),
         ("fitness: {drift: 0}", False, False),
         ("robot: {tetrahedra: 7, density: 5 g/cm^3}", False, False),
+        ("robot: {contacts: all}", False, False),
+        ("friction: !Coulomb", False, False),
+        ("terrain: !Incline {slope: 1 deg}", False, False),
         ("cables: {outer_stiffness: 0.2 lbf/in}", False, True),
         ("robot: {spacing: balanced}", True, False),
         (STIFF, True, False),
@@ -164,7 +167,14 @@ def test_a_difference_to_a_base_with_other_than_default_values_is_seen(scenario)
     assert differences(base, scenario) == [("mujoco.friction", "0.7")]
 
 
-def test_drakes_own_loader_reads_what_is_written_in_si(scenario):
-    changed = scenario.with_changes({"robot.tetrahedra": 3, "robot.offsets": [[0.0, 0.0, 0.1]] * 3})
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"robot.tetrahedra": 3, "robot.offsets": [[0.0, 0.0, 0.1]] * 3},
+        {"friction": Coulomb(lateral=2.0)},  # not kinds with required keys: Drake starts from none
+    ],
+)
+def test_drakes_own_loader_reads_what_is_written_in_si(scenario, changes):
+    changed = scenario.with_changes(changes)
     text = dump_yaml(tree_of(changed))
     assert yaml_load_typed(schema=Scenario, data=text, defaults=scenario) == changed

@@ -81,6 +81,8 @@ GOOD: list[tuple[str, str, Any]] = [
     ("limits: {a: 1 kN}", "limits", {"a": 1000.0}),
     ("probes: [{at: [0 m, 1 m, 2 m]}]", "probes", [Probe(at=[0.0, 1.0, 2.0])]),
     ("ramps: [!Flat , !Incline {slope: 1 rad}]", "ramps", [Flat(), Incline(slope=1.0)]),
+    ("ramps: [{slope: 1 rad}]", "ramps", [Incline(slope=1.0)]),  # without a tag, the first kind
+    ("terrain: {}", "terrain", Flat()),
     ("probe: {at: [0 m, 0 m, 0 m], active: false}", "probe", Probe(at=[0.0] * 3, active=False)),
     ("probe:", "probe", None),
     ("inner: {slope: 4 rad}", "inner", Incline(slope=4.0)),
@@ -103,6 +105,14 @@ def test_defaults_and_missing_fields_are_not_shared_or_dumped():
     assert parse_yaml(shown(load("")), "file") == {"count": 2, "inner": {"slope": "0.0 rad"}}
 
 
+def test_the_first_kind_is_dumped_without_a_tag():
+    settings = load("ramps: [!Flat , !Incline {slope: 1 rad}], terrain: !Incline {slope: 1 rad}")
+    assert [line for line in shown(settings).splitlines() if "!" in line] == [
+        "terrain: !Incline",
+        "- !Flat {}",
+    ]
+
+
 BAD = [
     ("terrain: !Flat 5", "", "!Flat"),
     ("terrain: !Flat [1]", "", "!Flat"),
@@ -112,7 +122,7 @@ BAD = [
     ("1: 2", "1", "unknown key"),
     ("inner: 5", "inner", "5"),
     ("inner: !Inner {}", "inner", "!Inner"),
-    ("inner: {slope: 5 rad}", "inner.slope", "'5 rad'"),
+    ("inner: {slope: 5 rad}", "inner.slope", "'5 rad', expected at most 4 rad"),
     ("inner: {slope: -5 deg}", "inner.slope", "'-5 deg'"),
     ("inner: {slope: 3 degz}", "inner.slope", "'3 degz'"),
     ("inner: {surface: wet}", "inner.surface", "'wet'"),
@@ -129,6 +139,9 @@ BAD = [
     ("terrain: !Inclin {slope: 1 rad}", "terrain", "'!Incline'"),
     ("terrain: !Sea {}", "terrain", "!Flat, !Incline, !Cells"),
     ("terrain: {slope: 1 rad}", "terrain", "a mapping"),
+    ("terrain: {slop: 1 rad}", "terrain.slop", "none"),
+    ("ramps: [{slop: 1 rad}]", "ramps[0].slop", "'slope'"),
+    ("ramps: [{}]", "ramps[0].slope", "missing"),
     ("terrain: 5", "terrain", "5"),
     ("terrain:", "terrain", "nothing"),
     ("terrain: !Incline {slop: 1 rad}", "terrain.slop", "'slope'"),

@@ -1,5 +1,6 @@
 """Scenario files: the thesis's numbers, files based on files, dumping, and bad files."""
 
+from dataclasses import replace
 from operator import attrgetter
 from pathlib import Path
 
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario, shipped_scenarios
+from tetra_drake.scenario.schema import Coulomb
+from tetra_drake.scenario.terrain import Flat, Incline, Rough, Steps
 
 # Exact by definition.
 IN = 0.0254
@@ -52,7 +55,27 @@ def test_thesis_scenario_holds_the_numbers_of_the_thesis(scenario, section, name
     assert held == pytest.approx(values, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+GROUNDS = {
+    "coulomb": ("thesis", Flat, []),
+    "incline": ("all", Incline, [np.pi / 36]),  # 5 deg
+    "steps": ("all", Steps, [0.25 * IN, 12 * IN, 4]),
+    "rough": ("all", Rough, [0.25 * IN, 6 * IN, 0]),
+}
+
+
+@pytest.mark.parametrize("name", GROUNDS)
+def test_shipped_grounds_are_the_thesis_on_other_ground(name, scenario):
+    contacts, kind, numbers = GROUNDS[name]
+    loaded = load_scenario(name)
+    changes = {"name": name, "friction": Coulomb(), "robot.contacts": contacts}
+    assert loaded == scenario.with_changes(changes | {"terrain": loaded.terrain})
+    assert type(loaded.terrain) is kind
+    given = [value for value in vars(loaded.terrain).values() if value is not None]
+    assert given == pytest.approx(numbers, rel=1e-15)
+    assert loaded.reference is None
+
+
+@pytest.mark.parametrize("name", sorted({*shipped_scenarios()} - {*GROUNDS}))
 def test_shipped_scenarios_load_and_keep_the_thesis_reference(name, scenario):
     loaded = load_scenario(name)
     assert (loaded.name, loaded.reference) == (name, scenario.reference)
@@ -100,6 +123,49 @@ def test_a_base_file_is_found_beside_the_file_that_names_it(tmp_path, scenario):
     assert load_scenario(str(file)) == scenario.with_changes(changes)
 
 
+# Friction: the thesis's, which needs no tag, or another kind
+
+
+def test_coulombs_friction_begins_with_the_damping_of_the_thesis(scenario):
+    law = Coulomb()
+    assert law.damping == pytest.approx(scenario.friction.stiction_damping, rel=1e-15)
+    assert (law.static, law.kinetic, law.stiffness) == (0.5, 0.5, 0.0)
+    assert (law.forward, law.backward, law.lateral) == (1.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("base", "given", "expected"),
+    [
+        ("", "{stiction_range: 1 mm}", None),
+        ("", "!ResetIntegrator {stiction_range: 1 mm}", None),
+        ("", "!Coulomb {static: 0.6}", Coulomb(static=0.6)),
+        ("!Coulomb {static: 0.6}", "!Coulomb {kinetic: 0.4}", Coulomb(static=0.6, kinetic=0.4)),
+        ("!Coulomb {static: 0.6}", "!Coulomb", Coulomb(static=0.6)),
+    ],
+)
+def test_friction_is_merged_with_that_of_the_base(tmp_path, scenario, base, given, expected):
+    write(tmp_path, f"base: thesis\n{base and f'friction: {base}'}\n", "low.yaml")
+    loaded = load_scenario(write(tmp_path, f"base: low.yaml\nfriction: {given}\n"))
+    assert loaded.friction == (expected or replace(scenario.friction, stiction_range=1e-3))
+    assert load_scenario(write(tmp_path, dump_scenario(loaded))) == loaded
+
+
+def test_another_kind_of_the_base_is_replaced_whole(tmp_path, refused):
+    write(tmp_path, "base: thesis\nfriction: !Coulomb {}\n", "low.yaml")
+    file = write(tmp_path, "base: low.yaml\nfriction: {stiction_range: 1 mm}\n")
+    with refused(file, "friction.stiction_damping", "missing"):
+        load_scenario(file)
+
+
+def test_friction_changes_from_python(scenario):
+    changed = scenario.with_changes({"friction": Coulomb(static=0.7)})
+    assert changed.friction == Coulomb(static=0.7)
+    assert changed.with_changes({"friction.kinetic": 0.3}).friction == Coulomb(
+        static=0.7, kinetic=0.3
+    )
+    assert scenario.with_changes({"friction.stiction_damping": 3}).friction.stiction_damping == 3.0
+
+
 # Dumping and comparing
 
 
@@ -141,6 +207,13 @@ BAD = [
     ("gait_bounds: {weight_max: 0.5}", "gait_bounds.weight_min", "1.0"),
     ("simulation: {steady_from: 15 s}", "simulation.steady_from", "15.0 s"),
     ("simulation: {duration: 2 s}", "simulation.steady_from", "3.0 s"),
+    ("friction: !Coulomb {static: 0.4}", "friction.kinetic", "0.5"),
+    ("friction: !Coulomb {damping: 0 N*s/m}", "friction.damping", "'0 N*s/m'"),
+    ("friction: !Coulomb {stiction_range: 1 in}", "friction.stiction_range", "kinetic"),
+    ("friction: {static: 0.4}", "friction", "!Coulomb"),
+    ("friction: {stiction_rage: 1 in}", "friction.stiction_rage", "'stiction_range'"),
+    ("friction:", "friction", "nothing"),
+    ("robot: {contacts: some}", "robot.contacts", "thesis, all"),
     ("cables: {free_length: 1 km}", "robot.spacing", "balance"),
 ]
 BAD_FILES = [
