@@ -59,7 +59,7 @@ def make_standing_tetrahedron(scenario: Scenario) -> Structure:
 
     Its body frame is turned with it, which its inertia, the same about all axes, allows.
     """
-    robot = MakeStructure(scenario.robot, scenario.cables)
+    robot = MakeStructure(scenario)
     p_BN = robot.p_BN @ R_WB.T
     return dataclasses.replace(
         robot,
@@ -80,7 +80,7 @@ def make_diagram(scenario: Scenario) -> Diagram:
     AddTetrahedra(plant, tetrahedron)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
-    contact = GroundContact(tetrahedron, scenario.ground, scenario.friction, witness=True)
+    contact = GroundContact(tetrahedron, scenario, witness=True)
     ground = builder.AddNamedSystem("ground", contact)
 
     state, force = plant.get_state_output_port(), ground.GetOutputPort("generalized_force")

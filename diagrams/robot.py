@@ -49,7 +49,7 @@ BEST_GAIT = DIAGRAMS.parent / "runs" / "thesis" / "trial_05" / "best_gait.json"
 
 def make_diagram(scenario: Scenario, gait: Gait) -> Diagram:
     """The robot, at rest where the scenario places it."""
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     builder = DiagramBuilder()
 
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
@@ -68,7 +68,7 @@ def make_diagram(scenario: Scenario, gait: Gait) -> Diagram:
     gate = StartUpGate(scenario.oscillators, start_up=scenario.cpg.start_up)
     start_up = builder.AddNamedSystem("start_up", gate)
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
-    contact = GroundContact(structure, scenario.ground, scenario.friction)
+    contact = GroundContact(structure, scenario)
     ground = builder.AddNamedSystem("ground", contact)
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
 
@@ -111,7 +111,7 @@ def main() -> None:
     # Contact and stiction change where a step ends, so no step may be long.
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.001)
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     recorder = Recorder(structure, sample_times(options.duration, 0.01))
     simulator.set_monitor(recorder.after_step)
     simulator.AdvanceTo(options.duration)

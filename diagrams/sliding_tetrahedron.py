@@ -24,7 +24,7 @@ from tetra_drake.figures.style import SHADE, common_style, make_figure, save_fig
 from tetra_drake.results.measures import intervals
 from tetra_drake.robot.structure import BASE, NODES
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import ResetIntegrator, Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 INITIAL_SPEED = 30.0 * INCH  # m/s
@@ -97,6 +97,7 @@ def main() -> None:
     scenario = load_scenario("thesis")
     save_block_diagram(make_diagram(scenario), out / "one_tetrahedron.svg")
     motion = slide(scenario)
+    assert isinstance(scenario.friction, ResetIntegrator)
     figure = draw(motion, stiction_range=scenario.friction.stiction_range)
     save_figure(figure, out, "sliding_tetrahedron_motion", kinds=["svg"])
     for node in BASE:

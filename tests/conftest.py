@@ -23,7 +23,7 @@ def scenario() -> Scenario:
 @pytest.fixture
 def structure(scenario: Scenario) -> Structure:
     """That of the thesis's robot."""
-    return MakeStructure(scenario.robot, scenario.cables)
+    return MakeStructure(scenario)
 
 
 @pytest.fixture(scope="session")

@@ -27,7 +27,7 @@ FALLING = {
 @pytest.mark.parametrize("engine", ["drake", "compiled"])
 def test_a_falling_robot_keeps_momentum_and_energy(scenario, engine):
     falling = scenario.with_changes({**FALLING, "simulation.engine": engine})
-    structure = MakeStructure(falling.robot, falling.cables)
+    structure = MakeStructure(falling)
     body = make_model(falling, structure).body
     mass, moment = body.mass[0], body.moment[0]
     flight = simulate(scenario=falling, gait=seeded_gait(falling), record=True).trajectory

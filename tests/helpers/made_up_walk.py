@@ -18,7 +18,7 @@ def make_walk(*, bodies: int = 5, duration: float = 9.0) -> xarray.Dataset:
     and T2, T4 ... in the second. The tip of the lead never touches the ground."""
     scenario = load_scenario("thesis")
     scenario.robot.tetrahedra = bodies
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     times = np.linspace(0.0, duration, round(duration / 0.01) + 1)
     phase = 2.0 * np.pi * times / PERIOD
     turn = np.where(np.arange(bodies) % 2, -1.0, 1.0)

@@ -34,7 +34,7 @@ IN = 0.0254
 def row(request, scenario) -> Structure:
     """A structure of some number of tetrahedra."""
     scenario.robot.tetrahedra = request.param
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     assert len(structure.bodies) == request.param
     return structure
 

@@ -57,7 +57,7 @@ STIFF = "cables: {outer_stiffness: 0.4 lbf/in}"
 
 def axial_force(scenario: Scenario) -> float:
     """Of the cables between two tetrahedra as they start, relative to that of the outer ones."""
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     p_WN = (structure.p_WB[:, None] + structure.p_BN).reshape(-1, 3)
     cables = structure.cables[:6]
     spans = p_WN[cables["node_b"]] - p_WN[cables["node_a"]]
@@ -150,8 +150,7 @@ def test_scaled_values(scenario):
 
 def test_displaced_starts_are_seeded_and_move_every_tetrahedron(scenario):
     structure, moved = (
-        MakeStructure(each.robot, each.cables)
-        for each in (scenario, displaced(scenario, percent=5, seed=3))
+        MakeStructure(each) for each in (scenario, displaced(scenario, percent=5, seed=3))
     )
     reach = 0.05 * scenario.robot.spacing
     moves = np.random.default_rng(3).uniform(-reach, reach, (5, 3))

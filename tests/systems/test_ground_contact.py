@@ -34,7 +34,7 @@ def make_simulator(
     AddTetrahedra(plant, structure)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
-    system = GroundContact(structure, scenario.ground, scenario.friction, witness=witness)
+    system = GroundContact(structure, scenario, witness=witness)
     ground = builder.AddNamedSystem("ground", system)
     builder.Connect(plant.get_state_output_port(), ground.GetInputPort("state"))
     force = plant.get_applied_generalized_force_input_port()

@@ -34,7 +34,7 @@ def simulate_drake(
     """Simulates a gait as simulate() does, on the Drake diagram."""
     settings = scenario.simulation
     diagram = MakeTensegrityDiagram(scenario, gait)
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     simulator = MakeSimulator(diagram, settings)
     integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
     work = _Work(integrator)

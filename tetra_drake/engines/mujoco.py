@@ -112,7 +112,7 @@ def installed() -> bool:
 def make_mjcf(scenario: Scenario) -> str:
     """The robot in MuJoCo's format, with one motor per driven cable."""
     model = Element("mujoco", model=scenario.name)
-    structure, settings = MakeStructure(scenario.robot, scenario.cables), scenario.mujoco
+    structure, settings = MakeStructure(scenario), scenario.mujoco
     robot = make_model(scenario, structure)
     steps = {"integrator": settings.integrator, "timestep": settings.step}
     _add(model, "compiler", inertiafromgeom="false")
@@ -134,7 +134,7 @@ class _Robot:
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
         self._scenario = scenario
-        self.structure = MakeStructure(scenario.robot, scenario.cables)
+        self.structure = MakeStructure(scenario)
         self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario))
         self._max_speed = min(scenario.simulation.max_speed, _MAX_SPEED)
         driven = self.structure.cables["signal"]

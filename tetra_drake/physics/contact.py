@@ -1,37 +1,55 @@
-"""Ground contact: normal force (Eq. 1), and the contact and friction modes of contact nodes.
+"""Ground contact: normal force (Eq. 1), friction, and the modes of contact nodes.
 
-What a contact node remembers is a row of `modes`, (contacts, 5): whether it touches the
-ground, per horizontal axis its friction mode (STICK, or the sign of the direction it slips
-in), and per axis the stick point: where its bristle deflection is zero.
+What a contact node remembers is a row of `modes`, (contacts, 8): whether it touches the ground, its
+friction mode along the tangents t1 and t2 (see `friction`), its stick point, a point of World where
+its bristle deflection is zero, and, for Coulomb friction, the heading of its body at touchdown.
+
+The laws act in the frames of `terrain`: on flat ground these are the axes of World.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
+from tetra_drake.physics.friction import (
+    STICK,
+    Pair,
+    Slide,
+    coulomb_force,
+    next_coulomb_mode,
+    next_reset_mode,
+    reset_force,
+)
 from tetra_drake.physics.kinematics import (
     FORCE,
     P_WN,
     V_WN,
+    forward_axis,
     gather_forces,
     move_nodes,
-    node_acceleration,
 )
-from tetra_drake.physics.lanes import Real, Table, Truth, any_lane, maximum, minimum, select
+from tetra_drake.physics.lanes import (
+    Real,
+    Table,
+    Truth,
+    any_lane,
+    inverse_sqrt,
+    maximum,
+    select,
+)
+from tetra_drake.physics.terrain import GAP, find_frames, to_frame, to_world
 
-Array = np.ndarray
+CONTACT, MODE, STICK_POINT, HEADING, MODE_COLUMNS = 0, 1, 3, 6, 8
+"""Columns of `modes`: contact (0 or 1), mode (along t1, t2), stick point (x, y, z) in m, heading
+(along t1, t2); and their number."""
 
-CONTACT, MODE, STICK_POINT, MODE_COLUMNS = 0, 1, 3, 5
-"""Columns of `modes`: contact (0 or 1), mode (x, y), stick point (x, y) in m; and their number."""
 
-
-class Ground(NamedTuple):
-    """The constants of the ground's laws (Tables 1 and 2) in SI units."""
+class Law(NamedTuple):
+    """The constants of the ground in SI units: Tables 1 and 2, Coulomb's law, and the grid of the
+    terrain. Those of what a ground does not have are zeros."""
 
     stiffness: Real
     damping: Real
@@ -39,29 +57,99 @@ class Ground(NamedTuple):
     stiction_damping: Real
     stiction_switch: Real
     proportional_stiction: Real
+    static: Real
+    kinetic: Real
+    bristle_stiffness: Real
+    bristle_damping: Real
+    per_forward: Real
+    """1 / factor; likewise the next two."""
+    per_backward: Real
+    per_lateral: Real
+    corner_x: Real
+    """Of the first control point; m."""
+    corner_y: Real
+    per_cell_x: Real
+    """1 / m."""
+    per_cell_y: Real
+    last_row: Real
+    """The largest coordinate, in cells along x, with three rows of control points around it."""
+    last_column: Real
+    columns: Real
+    """Control points in a row."""
+    first: Real
+    """The index of the first one."""
+    top: Real
+    """Height of the highest one."""
 
 
-GROUND = np.dtype([(name, float) for name in Ground._fields])
-"""The same as a record. What kernels call `ground` is an array of one, or Ground of tables of one;
-what they call `law` is ground_law(ground)."""
+LAW = np.dtype([(name, float) for name in Law._fields])
+"""The same as a record."""
+
+
+class Ground(NamedTuple):
+    """The ground as kernels take it, and the nodes that may touch it."""
+
+    contacts: Table
+    """(contacts,), the indices of the nodes."""
+    law: Table
+    """(1,) of dtype LAW, or Law of tables of one."""
+    heights: Table
+    """(points,): the control points of the surface in m, row by row."""
+    flat: bool
+    coulomb: bool
+    """Whether friction is Coulomb's, else the reset integrator's."""
 
 
 @compiled
-def ground_law(ground: Table) -> Ground:
+def law_of(ground: Ground) -> Law:
     """The constants as numbers."""
-    return Ground(
-        ground.stiffness[0],
-        ground.damping[0],
-        ground.stiction_range[0],
-        ground.stiction_damping[0],
-        ground.stiction_switch[0],
-        ground.proportional_stiction[0],
+    law = ground.law
+    return Law(
+        law.stiffness[0],
+        law.damping[0],
+        law.stiction_range[0],
+        law.stiction_damping[0],
+        law.stiction_switch[0],
+        law.proportional_stiction[0],
+        law.static[0],
+        law.kinetic[0],
+        law.bristle_stiffness[0],
+        law.bristle_damping[0],
+        law.per_forward[0],
+        law.per_backward[0],
+        law.per_lateral[0],
+        law.corner_x[0],
+        law.corner_y[0],
+        law.per_cell_x[0],
+        law.per_cell_y[0],
+        law.last_row[0],
+        law.last_column[0],
+        law.columns[0],
+        law.first[0],
+        law.top[0],
     )
 
 
 @compiled
-def normal_force(depth: Real, depth_rate: Real, law: Ground) -> Real:
-    """Upward force (N) on a node `depth` (m) below the ground, sinking at `depth_rate` (m/s).
+def meet_ground(nodes: Table, ground: Ground, frames: Table) -> None:
+    """Writes the `frames`, (contacts, FRAME_COLUMNS), of nodes that have just been moved; on flat
+    ground nothing."""
+    if not ground.flat:
+        find_frames(nodes, ground.contacts, law_of(ground), ground.heights, frames)
+
+
+@compiled
+def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
+    """Distance (m) of a contact node from the ground, negative in it."""
+    if ground.flat:
+        return nodes[ground.contacts[i], P_WN + 2]
+    return frames[i, GAP]
+
+
+@compiled
+def normal_force(depth: Real, depth_rate: Real, law: Law) -> Real:
+    """Force (N) along the normal on a node `depth` (m) in the ground, which sinks at `depth_rate`
+    (m/s).
 
     Eq. 1 with n = 1; the ground never pulls.
     """
@@ -70,30 +158,54 @@ def normal_force(depth: Real, depth_rate: Real, law: Ground) -> Real:
 
 
 @compiled
+def sliding(
+    nodes: Table, modes: Table, ground: Ground, law: Law, frames: Table, i: int
+) -> tuple[Slide, Real]:
+    """How a contact node slides, and the rate (m/s) at which its gap grows."""
+    node, flat = ground.contacts[i], ground.flat
+    v_x, v_y, v_z = nodes[node, V_WN], nodes[node, V_WN + 1], nodes[node, V_WN + 2]
+    x = nodes[node, P_WN] - modes[i, STICK_POINT]
+    y = nodes[node, P_WN + 1] - modes[i, STICK_POINT + 1]
+    z = nodes[node, P_WN + 2] - modes[i, STICK_POINT + 2]
+    v_1, v_2, v_n = to_frame(v_x, v_y, v_z, frames, i, flat)
+    x_1, x_2, _ = to_frame(x, y, z, frames, i, flat)
+    mode = modes[i, MODE], modes[i, MODE + 1]
+    heading = modes[i, HEADING], modes[i, HEADING + 1]
+    normal = normal_force(-gap(nodes, ground, frames, i), -v_n, law)
+    return Slide((v_1, v_2), (x_1, x_2), mode, heading, normal), v_n
+
+
+@compiled
+def friction_force(slide: Slide, law: Law, coulomb: bool) -> Pair:
+    """Friction (N) along the tangents on a node that touches the ground."""
+    if coulomb:
+        return coulomb_force(slide, law)
+    (v_1, v_2), (x_1, x_2), (m_1, m_2) = slide.velocity, slide.deflection, slide.mode
+    return reset_force(v_1, x_1, m_1, law), reset_force(v_2, x_2, m_2, law)
+
+
+@compiled
 def add_ground_forces(
-    nodes: Table, modes: Table, contacts: Table, ground: Table, keep: bool, pushes: Table
+    nodes: Table, modes: Table, ground: Ground, frames: Table, keep: bool, pushes: Table
 ) -> None:
     """Adds the forces of the ground to those on the `nodes` of `kinematics`.
 
-    `contacts`, (contacts,), are the indices of the nodes that may touch the ground; `modes` is
-    (contacts, MODE_COLUMNS). With `keep`, writes `pushes`, (contacts, 3): friction along x and y,
-    normal force.
+    `modes` is (contacts, MODE_COLUMNS). With `keep`, writes `pushes`, (contacts, 3): friction along
+    t1 and t2, normal force.
     """
-    law = ground_law(ground)
+    law = law_of(ground)
     for i in range(pushes.shape[0]):
-        node = contacts[i]
-        normal = normal_force(-nodes[node, P_WN + 2], -nodes[node, V_WN + 2], law)
-        if keep:
-            pushes[i, 2] = normal
-        nodes[node, FORCE + 2] += normal
+        node = ground.contacts[i]
+        slide, _ = sliding(nodes, modes, ground, law, frames, i)
         touches = modes[i, CONTACT] != 0.0
-        for axis in range(2):
-            deflection = nodes[node, P_WN + axis] - modes[i, STICK_POINT + axis]
-            velocity, mode = nodes[node, V_WN + axis], modes[i, MODE + axis]
-            friction = select(touches, friction_force(velocity, deflection, mode, law), 0.0)
-            if keep:
-                pushes[i, axis] = friction
-            nodes[node, FORCE + axis] += friction
+        f_1, f_2 = friction_force(slide, law, ground.coulomb)
+        f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
+        if keep:
+            pushes[i, 0], pushes[i, 1], pushes[i, 2] = f_1, f_2, slide.normal
+        f_x, f_y, f_z = to_world(f_1, f_2, slide.normal, frames, i, ground.flat)
+        nodes[node, FORCE] += f_x
+        nodes[node, FORCE + 1] += f_y
+        nodes[node, FORCE + 2] += f_z
 
 
 @compiled
@@ -101,119 +213,90 @@ def ground_forces(
     state: Table,
     modes: Table,
     p_BN: Table,
-    contacts: Table,
-    ground: Table,
+    ground: Ground,
     nodes: Table,
+    frames: Table,
     pushes: Table,
     generalized_force: Table,
 ) -> None:
     """Writes [t_W; f_W] of the ground at each Bo, (6 bodies,), for a state of the bodies; also
-    `nodes` and `pushes`."""
+    `nodes`, `frames` and `pushes`."""
     move_nodes(state, p_BN, nodes)
-    add_ground_forces(nodes, modes, contacts, ground, True, pushes)
+    meet_ground(nodes, ground, frames)
+    add_ground_forces(nodes, modes, ground, frames, True, pushes)
     gather_forces(nodes, generalized_force)
 
 
 @compiled
-def update_modes(nodes: Table, contacts: Table, ground: Table, modes: Table) -> Truth:
-    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with `nodes`; whether they changed.
+def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, modes: Table) -> Truth:
+    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with the nodes of a state; whether they
+    changed.
 
     A node that lands sticks where it lands; one that sticks again does so where it is
-    (the reset of the integrator). The arguments are those of `add_ground_forces`.
+    (the reset of the integrator). The other arguments are those of `add_ground_forces`.
     """
-    changed = False
-    for i in range(contacts.size):
-        node = contacts[i]
+    changed, law = False, law_of(ground)
+    for i in range(ground.contacts.size):
         touched = modes[i, CONTACT] != 0.0
-        touches = nodes[node, P_WN + 2] <= 0.0
+        touches = gap(nodes, ground, frames, i) <= 0.0
         if not any_lane(touched | touches):
             continue
         modes[i, CONTACT] = select(touches, 1.0, 0.0)
         changed = changed | (touched ^ touches)
-        for axis in range(2):
-            position, velocity = nodes[node, P_WN + axis], nodes[node, V_WN + axis]
-            before, stick_point = modes[i, MODE + axis], modes[i, STICK_POINT + axis]
-            deflection = position - stick_point
-            after = next_friction_mode(velocity, deflection, before, ground.stiction_range[0])
-            after = select(touched & touches, after, STICK)
-            resets = (after == STICK) & ((before != STICK) | (touches & (touched ^ touches)))
-            modes[i, STICK_POINT + axis] = select(resets, position, stick_point)
-            modes[i, MODE + axis] = after
-            changed = changed | (after != before)
+        lands, stays = touches & (touched ^ touches), touched & touches
+        slide, _ = sliding(nodes, modes, ground, law, frames, i)
+        m_1, m_2 = slide.mode
+        if ground.coulomb:
+            (n_1, n_2), anew = next_coulomb_mode(slide, law)
+            n_1, n_2 = select(stays, n_1, STICK), select(stays, n_2, STICK)
+            resets_1 = resets_2 = lands | (stays & anew)
+            set_heading(state, nodes, ground, frames, i, lands, modes)
+        else:
+            (v_1, v_2), (x_1, x_2) = slide.velocity, slide.deflection
+            n_1 = select(stays, next_reset_mode(v_1, x_1, m_1, law.stiction_range), STICK)
+            n_2 = select(stays, next_reset_mode(v_2, x_2, m_2, law.stiction_range), STICK)
+            resets_1 = (n_1 == STICK) & ((m_1 != STICK) | lands)
+            resets_2 = (n_2 == STICK) & ((m_2 != STICK) | lands)
+        modes[i, MODE], modes[i, MODE + 1] = n_1, n_2
+        changed = changed | (n_1 != m_1) | (n_2 != m_2)
+        move_stick_point(nodes, ground, frames, i, resets_1, resets_2, slide, modes)
     return changed
 
 
 @compiled
-def mode_margin(nodes: Array, modes: Array, contacts: Array, ground: Table) -> float:
-    """Positive while no mode is due to change; crosses zero where the first one is.
-
-    The least of: height in the air, depth on the ground (m), stiction range less deflection
-    (m), speed in the direction of slip (m/s). Only its sign has a meaning.
-    """
-    margin = math.inf
-    for i in range(contacts.size):
-        node = contacts[i]
-        if modes[i, CONTACT] == 0.0:
-            margin = min(margin, nodes[node, P_WN + 2])
-            continue
-        margin = min(margin, -nodes[node, P_WN + 2])
-        for axis in range(2):
-            mode = modes[i, MODE + axis]
-            if mode == STICK:
-                deflection = nodes[node, P_WN + axis] - modes[i, STICK_POINT + axis]
-                margin = min(margin, ground.stiction_range[0] - abs(deflection))
-            else:
-                margin = min(margin, mode * nodes[node, V_WN + axis])
-    return margin
-
-
-@compiled
-def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
-    """First time in (0, horizon) at which value + rate t + rate_rate t²/2 falls to zero;
-    the horizon where it does not, or where the value is not positive now."""
-    reach = horizon * (abs(rate) + 0.5 * horizon * abs(rate_rate))
-    if not any_lane((value > 0.0) & (value <= reach)):
-        return horizon
-    discriminant = rate * rate - 2.0 * rate_rate * value
-    # Twice the mean speed at which the value falls until it is zero.
-    speed = math.sqrt(maximum(discriminant, 0.0)) - rate
-    falls = (value > 0.0) & (discriminant >= 0.0) & (speed > 0.0)
-    return select(falls, minimum(2.0 * value / select(falls, speed, 1.0), horizon), horizon)
-
-
-@compiled
-def time_to_mode_change(
-    state: Table,
-    acceleration: Table,
+def move_stick_point(
     nodes: Table,
+    ground: Ground,
+    frames: Table,
+    i: int,
+    along_1: Truth,
+    along_2: Truth,
+    slide: Slide,
     modes: Table,
-    contacts: Table,
-    ground: Table,
-    horizon: Real,
-) -> Real:
-    """Time (s) to the next mode change, at most `horizon`, at constant node accelerations.
+) -> None:
+    """Moves the stick point of a contact node to the node, along t1 and along t2."""
+    node, s = ground.contacts[i], STICK_POINT
+    p_x, p_y, p_z = nodes[node, P_WN], nodes[node, P_WN + 1], nodes[node, P_WN + 2]
+    if ground.flat:
+        modes[i, s] = select(along_1, p_x, modes[i, s])
+        modes[i, s + 1] = select(along_2, p_y, modes[i, s + 1])
+        return
+    x_1, x_2 = select(along_1, slide.deflection[0], 0.0), select(along_2, slide.deflection[1], 0.0)
+    x, y, z = to_world(x_1, x_2, 0.0, frames, i, False)
+    both = along_1 & along_2
+    modes[i, s] = select(both, p_x, modes[i, s] + x)
+    modes[i, s + 1] = select(both, p_y, modes[i, s + 1] + y)
+    modes[i, s + 2] = select(both, p_z, modes[i, s + 2] + z)
 
-    `acceleration` is dv/dt, 6 numbers per body, and `nodes` that of `state`; the other arguments
-    are those of `add_ground_forces`.
-    """
-    time, p_0 = horizon, ground.stiction_range[0]
-    for i in range(contacts.size):
-        node = contacts[i]
-        a_WN = node_acceleration(state, acceleration, nodes, node)
-        touches = modes[i, CONTACT] != 0.0
-        up = select(touches, -1.0, 1.0)  # the way that leads to the ground's surface
-        p_z, v_z = nodes[node, P_WN + 2], nodes[node, V_WN + 2]
-        time = minimum(time, first_zero(up * p_z, up * v_z, up * a_WN[2], horizon))
-        if not any_lane(touches):
-            continue
-        for axis in range(2):
-            velocity, a = nodes[node, V_WN + axis], a_WN[0] if axis == 0 else a_WN[1]
-            mode, x = modes[i, MODE + axis], nodes[node, P_WN + axis] - modes[i, STICK_POINT + axis]
-            sticks, slips = touches & (mode == STICK), touches & (mode != STICK)
-            # A value of 0 is never reached: it counts as no mode change.
-            to_front, to_back = select(sticks, p_0 - x, 0.0), select(sticks, p_0 + x, 0.0)
-            time = minimum(time, first_zero(to_front, -velocity, -a, horizon))
-            time = minimum(time, first_zero(to_back, velocity, a, horizon))
-            slip = select(slips, mode * velocity, 0.0)
-            time = minimum(time, first_zero(slip, mode * a, 0.0, horizon))
-    return time
+
+@compiled
+def set_heading(
+    state: Table, nodes: Table, ground: Ground, frames: Table, i: int, where: Truth, modes: Table
+) -> None:
+    """Notes the heading of a contact node's body: its x axis, projected into the tangent plane."""
+    bodies = state.size // 13
+    x, y, z = forward_axis(state, ground.contacts[i] // (nodes.shape[0] // bodies))
+    h_1, h_2, _ = to_frame(x, y, z, frames, i, ground.flat)
+    per_length = inverse_sqrt(maximum(h_1 * h_1 + h_2 * h_2, 1e-30))
+    modes[i, HEADING] = select(where, h_1 * per_length, modes[i, HEADING])
+    modes[i, HEADING + 1] = select(where, h_2 * per_length, modes[i, HEADING + 1])

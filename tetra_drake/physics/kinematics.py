@@ -50,6 +50,15 @@ def move_nodes(state: Table, p_BN: Table, nodes: Table) -> None:
 
 
 @compiled
+def forward_axis(state: Table, body: int) -> tuple[Real, Real, Real]:
+    """The x axis of a body in World."""
+    q = 7 * body
+    w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    return 1.0 - s * (y * y + z * z), s * (x * y + w * z), s * (x * z - w * y)
+
+
+@compiled
 def node_acceleration(
     state: Table, acceleration: Table, nodes: Table, node: int
 ) -> tuple[Real, Real, Real]:

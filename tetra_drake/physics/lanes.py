@@ -261,6 +261,50 @@ def _overload_inverse_sqrt(x):  # type: ignore[no-untyped-def]
     return newton
 
 
+def floor(x: Real) -> Real:
+    """The largest whole number that is not larger."""
+    return float(math.floor(x))
+
+
+@_intrinsic
+def _floor(context: Any, x: types.Type) -> Any:
+    return signature(x, x), lambda c, builder, s, args: _call(builder, "llvm.floor", *args)
+
+
+overload(floor)(lambda x: lambda x: _floor(x))
+
+
+def gather(numbers: Table, index: Real, offset: int) -> Real:
+    """The number at a whole `index`, which each lane has for itself, plus `offset`; `numbers`,
+    (size,), have no lanes."""
+    return numbers[int(index) + offset]
+
+
+@_intrinsic
+def _gather(context: Any, numbers: Any, index: Any, offset: Any) -> Any:
+    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
+        field = cgutils.create_struct_proxy(numbers)(c, builder, args[0])
+        first = builder.gep(field.data, [args[2]])
+        vector = ir.VectorType(_INT, index.width)
+        indices, found = builder.fptosi(args[1], vector), ir.Constant(args[1].type, ir.Undefined)
+        for lane in range(index.width):
+            place = builder.extract_element(indices, ir.Constant(_INT32, lane))
+            number = builder.load(builder.gep(first, [place]))
+            found = builder.insert_element(found, number, ir.Constant(_INT32, lane))
+        return found
+
+    return signature(index, numbers, index, types.intp), emit
+
+
+overload(gather)(
+    lambda numbers, index, offset: (
+        (lambda numbers, index, offset: _gather(numbers, index, offset))
+        if isinstance(index, Lanes)
+        else (lambda numbers, index, offset: numbers[int(index) + offset])
+    )
+)
+
+
 def any_lane(mask: Truth) -> bool:
     """Whether the mask is true in any lane."""
     return mask

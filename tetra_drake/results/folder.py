@@ -81,7 +81,7 @@ def load_result_folder(folder: Path) -> Recording:
             problem = f"holds no {name}, so it was not written by `simulate`"
             raise InputError(folder, name, problem)
     scenario = load_scenario(folder / SCENARIO)
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     return Recording(
         scenario=scenario,
         gait=load_gait(folder / RESULT, scenario, key="gait"),

@@ -43,7 +43,7 @@ def assemble_dataset(
     import xarray
 
     bodies, contacts = len(structure.bodies), len(structure.contacts)
-    modes = modes.reshape(-1, contacts, 3).astype(np.int8)
+    modes = np.sign(modes).reshape(-1, contacts, 3).astype(np.int8)
     friction = friction_forces.reshape(-1, contacts, 2)
     positions = np.array([node_positions(structure, state) for state in states])
     velocities = np.array([node_velocities(structure, state) for state in states])

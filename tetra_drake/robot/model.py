@@ -7,13 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.contact import GROUND, Ground
+from tetra_drake.physics.contact import Ground
 from tetra_drake.physics.lanes import Table
 from tetra_drake.physics.oscillator import Network, inhibition_matrix
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import Gait, weight_count
+from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.schema import CpgScenario, Friction, GroundScenario, Scenario
+from tetra_drake.scenario.schema import CpgScenario, Scenario
 
 JUNCTION_CABLES = 6
 """The cables between two neighbouring bodies."""
@@ -37,10 +38,7 @@ class Model(NamedTuple):
     """(nodes per body, 3)."""
     cables: Table
     """(cables,) of dtype CABLE or Cables; JUNCTION_CABLES from each body to the next, in order."""
-    contacts: Table
-    """(contacts,), the indices of the nodes that may touch the ground."""
-    ground: Table
-    """(1,) of dtype GROUND, or Ground of tables of one."""
+    ground: Ground
     body: Body
     slack: bool
 
@@ -62,17 +60,10 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
     return Model(
         p_BN=structure.p_BN,
         cables=cables,
-        contacts=structure.contacts,
-        ground=ground_law(scenario.ground, scenario.friction),
+        ground=make_ground(scenario, structure),
         body=Body(*(np.array([number]) for number in body)),
         slack=scenario.cables.slack,
     )
-
-
-def ground_law(ground: GroundScenario, friction: Friction) -> np.ndarray:
-    """The constants of the ground's laws as `physics.contact` takes them: (1,) of dtype GROUND."""
-    normal = ground.stiffness, ground.damping
-    return np.array([(*normal, *(getattr(friction, n) for n in Ground._fields[2:]))], dtype=GROUND)
 
 
 def make_network(cpg: CpgScenario, gait: Gait, *, oscillators: int) -> Network:

@@ -9,7 +9,8 @@ import numpy as np
 
 from tetra_drake.physics.cable import CABLE, PASSIVE
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN, move_nodes
-from tetra_drake.scenario.schema import CableScenario, RobotScenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.terrain import Incline
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
 """The nodes of a tetrahedron; the first three form the base triangle."""
@@ -31,13 +32,15 @@ class Structure:
     p_BN: np.ndarray
     """(4, 3): the nodes in the frame of a body, whose origin is the centre of mass."""
     p_WB: np.ndarray
-    """(n, 3): the bodies at t = 0, all with the axes of World."""
+    """(n, 3): the bodies at t = 0."""
+    q_WB: np.ndarray
+    """(4,): the quaternion, w first, that all have then."""
     cables: np.ndarray
     """(6 (n - 1),) of dtype CABLE."""
     cable_names: tuple[str, ...]
     """Such as "T1-T2 outer bottom_left"."""
     contacts: np.ndarray
-    """(2 n + 1,): the indices of the nodes that the ground can touch."""
+    """(2 n + 1,) or (4 n,): the indices of the nodes that the ground can touch."""
     strut_radius: float
     node_radius: float
     density: float
@@ -55,18 +58,20 @@ class Structure:
     @property
     def initial_state(self) -> np.ndarray:
         """(13 n,): [q; v] at t = 0, at rest."""
-        q = [np.concatenate(([1.0, 0.0, 0.0, 0.0], p_WBi)) for p_WBi in self.p_WB]
+        q = [np.concatenate((self.q_WB, p_WBi)) for p_WBi in self.p_WB]
         return np.concatenate([*q, np.zeros(6 * len(self.bodies))])
 
 
-def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
+def MakeStructure(scenario: Scenario) -> Structure:
     """The robot of thesis section 2.1 with `robot.tetrahedra` tetrahedra.
 
     Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0; the
     tips point forward (+x) into the next tetrahedron. Junction i joins T(i+1) and T(i+2)
     by 3 outer cables (base node to base node), of which signal i drives the bottom two,
-    and 3 inner ones (tip to base nodes).
+    and 3 inner ones (tip to base nodes). On an incline without start, the robot is turned with
+    the slope, about World's y axis.
     """
+    robot, cables = scenario.robot, scenario.cables
     n = robot.tetrahedra
     edge = robot.strut_length
     circumradius = edge / math.sqrt(3.0)
@@ -78,6 +83,11 @@ def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
     p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
     if robot.offsets:
         p_WB += np.array(robot.offsets)
+    terrain, slope = scenario.terrain, 0.0
+    if isinstance(terrain, Incline) and terrain.start is None:
+        slope = terrain.slope
+    s, c = math.sin(slope), math.cos(slope)
+    p_WB = p_WB @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     rows, names = [], []
     for i in range(n - 1):
         junction = f"{bodies[i]}-{bodies[i + 1]}"
@@ -91,13 +101,15 @@ def MakeStructure(robot: RobotScenario, cables: CableScenario) -> Structure:
             rows.append((a, b, PASSIVE, cables.inner_stiffness, cables.damping, cables.free_length))
             names.append(f"{junction} inner {NODES[node]}")
     bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
+    contacts = [*bottom, 4 * (n - 1) + TIP] if robot.contacts == "thesis" else range(4 * n)
     return Structure(
         bodies=bodies,
         p_BN=p_BN,
         p_WB=p_WB,
+        q_WB=np.array([math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]),
         cables=np.array(rows, dtype=CABLE),
         cable_names=tuple(names),
-        contacts=np.array([*bottom, 4 * (n - 1) + TIP]),
+        contacts=np.array(contacts),
         strut_radius=robot.strut_diameter / 2,
         node_radius=robot.node_diameter / 2,
         density=robot.density,

@@ -29,7 +29,7 @@ def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
     friction_forces and modes (ground); the systems' docstrings give shapes and units. There is
     no SceneGraph: pictures are made from trajectories.
     """
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     builder = DiagramBuilder()
 
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
@@ -43,7 +43,7 @@ def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
     start_up = builder.AddNamedSystem("start_up", gate)
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
     witness = scenario.simulation.mode_changes == "witness"
-    contact = GroundContact(structure, scenario.ground, scenario.friction, witness=witness)
+    contact = GroundContact(structure, scenario, witness=witness)
     ground = builder.AddNamedSystem("ground", contact)
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
 

@@ -1,4 +1,4 @@
-"""The ground under the robot as a system: normal force and reset-integrator friction."""
+"""The ground under the robot as a system: normal force and friction."""
 
 from __future__ import annotations
 
@@ -19,27 +19,32 @@ from tetra_drake.physics.contact import (
     MODE_COLUMNS,
     STICK_POINT,
     ground_forces,
-    mode_margin,
-    time_to_mode_change,
+    meet_ground,
     update_modes,
 )
-from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.robot.model import ground_law
-from tetra_drake.robot.structure import Structure, moved_nodes
-from tetra_drake.scenario.schema import Friction, GroundScenario
+from tetra_drake.physics.kinematics import NODE_COLUMNS, move_nodes
+from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
+from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.robot.ground import make_ground
+from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario.schema import Scenario
 
 
 class GroundContact(LeafSystem):
-    """Normal force (thesis Eq. 1) and reset-integrator friction (Eq. 3-5) at m contact nodes.
+    """Normal force (thesis Eq. 1) and friction at m contact nodes, on the scenario's terrain.
 
-    | port              | shape   | unit   | meaning                                          |
-    |-------------------|---------|--------|--------------------------------------------------|
-    | state             | (13 n,) | SI     | [q; v] of n free bodies, from the plant          |
-    | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin                 |
-    | normal_forces     | (m,)    | N      | upward, by contact node                          |
-    | friction_forces   | (2 m,)  | N      | along x and y, by contact node                   |
-    | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along x and y |
-    |                   |         |        | (0 sticks, ±1 slips that way), by contact node   |
+    | port              | shape   | unit   | meaning                                           |
+    |-------------------|---------|--------|---------------------------------------------------|
+    | state             | (13 n,) | SI     | [q; v] of n free bodies, from the plant           |
+    | generalized_force | (6 n,)  | N m, N | [t_W; f_W] at each body's origin                  |
+    | normal_forces     | (m,)    | N      | along the normal of the surface, by contact node  |
+    | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
+    | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along t1 and   |
+    |                   |         |        | t2: where it slips to, 0 sticks, by contact node  |
+
+    On flat ground t1 and t2 are x and y; else see `physics.terrain`. The law of friction is the
+    scenario's (see `physics.friction`): the reset integrator of the thesis (Eq. 3-5), whose modes
+    are 0 or ±1 along each tangent, or Coulomb's, whose mode is a unit vector or 0.
 
     Discrete state: `modes` of `physics.contact`; deflections follow from the stick points, so no
     continuous state has to be reset. The modes are frozen within a step, which keeps the forces
@@ -49,19 +54,12 @@ class GroundContact(LeafSystem):
     window: 0.01 s times the accuracy set by Context.SetAccuracy.
     """
 
-    def __init__(
-        self,
-        structure: Structure,
-        ground: GroundScenario,
-        friction: Friction,
-        *,
-        witness: bool = False,
-    ) -> None:
+    def __init__(self, structure: Structure, scenario: Scenario, *, witness: bool = False) -> None:
+        """Raises InputError as make_ground does."""
         super().__init__()
-        self._structure, self._contacts = structure, structure.contacts
-        self._law = ground_law(ground, friction)
+        self._p_BN, self._ground = structure.p_BN, make_ground(scenario, structure)
         bodies, count = len(structure.bodies), len(structure.contacts)
-        self._size, self._shape = 6 * bodies, (len(structure.node_names), NODE_COLUMNS)
+        self._size, self._count, self._nodes = 6 * bodies, count, len(structure.node_names)
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self.DeclareDiscreteState(MODE_COLUMNS * count)
         self.DeclareInitializationDiscreteUpdateEvent(self._start)
@@ -86,15 +84,16 @@ class GroundContact(LeafSystem):
         `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
         Changes due right now count as made.
         """
-        nodes, rows = self._nodes(context), self._rows(context).copy()
-        update_modes(nodes, self._contacts, self._law, rows)
-        state, ground = self._state.Eval(context), (self._contacts, self._law)
-        return time_to_mode_change(state, acceleration, nodes, rows, *ground, horizon)
+        state, rows, (nodes, frames) = self._at(context)
+        rows = rows.copy()
+        update_modes(state, nodes, self._ground, frames, rows)
+        ground = rows, self._ground, frames
+        return time_to_mode_change(state, acceleration, nodes, *ground, horizon)
 
     def ModeChangeIsDue(self, context: Context) -> bool:
         """Whether a mode will change if a step ends here."""
-        rows = self._rows(context).copy()
-        return update_modes(self._nodes(context), self._contacts, self._law, rows)
+        state, rows, (nodes, frames) = self._at(context)
+        return update_modes(state, nodes, self._ground, frames, rows.copy())
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """The one witness, if asked for."""
@@ -103,34 +102,42 @@ class GroundContact(LeafSystem):
     def _rows(self, context: Context) -> np.ndarray:
         return context.get_discrete_state_vector().value().reshape(-1, MODE_COLUMNS)
 
-    def _nodes(self, context: Context) -> np.ndarray:
-        return moved_nodes(self._structure, self._state.Eval(context))
+    def _at(self, context: Context) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """The state, the modes, and nodes and frames."""
+        state = self._state.Eval(context)
+        nodes, frames = self._tables()
+        move_nodes(state, self._p_BN, nodes)
+        meet_ground(nodes, self._ground, frames)
+        return state, self._rows(context), (nodes, frames)
+
+    def _tables(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.empty((self._nodes, NODE_COLUMNS)), np.empty((self._count, FRAME_COLUMNS))
 
     def _start(self, context: Context, values: DiscreteValues) -> EventStatus:
-        # From "nowhere in contact", an update makes every node at or below 0 stick where it is.
+        # From "nowhere in contact", an update makes every node in the ground stick where it is.
         values.set_value(np.zeros(values.value().size))
         self._update(context, values)
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         rows = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
-        if update_modes(self._nodes(context), self._contacts, self._law, rows):
+        state, _, (nodes, frames) = self._at(context)
+        if update_modes(state, nodes, self._ground, frames, rows):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
     def _margin(self, context: Context) -> float:
-        rows = self._rows(context)
-        return mode_margin(self._nodes(context), rows, self._contacts, self._law)
+        _, rows, (nodes, frames) = self._at(context)
+        return mode_margin(nodes, rows, self._ground, frames)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._push(context, output.get_mutable_value())
 
     def _push(self, context: Context, force: np.ndarray) -> np.ndarray:
-        """Writes the generalized force; returns (m, 3): friction along x and y, normal force."""
+        """Writes the generalized force; returns (m, 3): friction along t1 and t2, normal force."""
         state, rows = self._state.Eval(context), self._rows(context)
-        nodes, pushes = np.empty(self._shape), np.empty((len(self._contacts), 3))
-        law = self._structure.p_BN, self._contacts, self._law
-        ground_forces(state, rows, *law, nodes, pushes, force)
+        pushes = np.empty((self._count, 3))
+        ground_forces(state, rows, self._p_BN, self._ground, *self._tables(), pushes, force)
         return pushes
 
     def _calc_normal(self, context: Context, output: BasicVector) -> None:

@@ -43,7 +43,7 @@ class LiveView:
     ) -> None:
         self._meshcat, self._scenario = meshcat, scenario
         self._clock, self._sleep = clock, sleep
-        self._structure = MakeStructure(scenario.robot, scenario.cables)
+        self._structure = MakeStructure(scenario)
         self._started: float | None = None
         self._due = 0.0
         p_WN = self._structure.p_WB[:, np.newaxis] + self._structure.p_BN

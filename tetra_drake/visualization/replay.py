@@ -66,7 +66,7 @@ def save_replay(
     Raises InputError if `path` cannot be written.
     """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
-    add_robot(meshcat, MakeStructure(scenario.robot, scenario.cables))
+    add_robot(meshcat, MakeStructure(scenario))
     show_replay(meshcat, scenario=scenario, trajectory=trajectory)
     write_whole(path, pack_page(_with_overlay(meshcat.StaticHtml(), title), title=title))
 
@@ -80,7 +80,7 @@ def replay_title(gait: str, trajectory: xarray.Dataset) -> str:
 
 def show_replay(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset) -> None:
     """Lets a Meshcat that shows the scenario's robot (scene.add_robot) play a trajectory."""
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     set_surroundings(meshcat, structure, trajectory["p_WN"].values)
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     film = _Film(meshcat, frames["time"].values)

@@ -40,7 +40,7 @@ def inertia_of(robot: Model, bodies: int) -> np.ndarray:
 
 def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, np.ndarray]:
     """The robot, its state in motion with some nodes in the ground, and their modes."""
-    structure = MakeStructure(scenario.robot, scenario.cables)
+    structure = MakeStructure(scenario)
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
     robot = make_model(scenario, structure)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))

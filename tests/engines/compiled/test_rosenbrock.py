@@ -22,7 +22,7 @@ class Stepper:
     signals: nothing jumps, so a method shows its order."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self.structure: Structure = MakeStructure(scenario.robot, scenario.cables)
+        self.structure: Structure = MakeStructure(scenario)
         self.robot = make_model(scenario, self.structure)
         bodies, contacts = len(self.structure.bodies), self.structure.contacts
         self.modes = np.zeros((len(contacts), MODE_COLUMNS))

@@ -10,10 +10,20 @@ from typing import NamedTuple
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
 from tetra_drake.physics.cable import DIRECTION, add_cable_forces
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.contact import CONTACT, MODE, add_ground_forces, ground_law
-from tetra_drake.physics.friction import STICK
-from tetra_drake.physics.kinematics import P_BN_W, P_WN, gather_forces
+from tetra_drake.physics.contact import (
+    CONTACT,
+    Ground,
+    Law,
+    add_ground_forces,
+    gap,
+    law_of,
+    meet_ground,
+    sliding,
+)
+from tetra_drake.physics.friction import STICK, coulomb_damping
+from tetra_drake.physics.kinematics import P_BN_W, gather_forces, move_nodes
 from tetra_drake.physics.lanes import Real, Table, any_lane, inverse_sqrt, select
+from tetra_drake.physics.terrain import to_world
 from tetra_drake.robot.model import JUNCTION_CABLES, Model
 
 
@@ -22,10 +32,19 @@ class Forces(NamedTuple):
 
     nodes: Table
     """(nodes, NODE_COLUMNS)."""
+    frames: Table
+    """(contacts, FRAME_COLUMNS): where the nodes meet the ground."""
     pulls: Table
     """(cables, PULL_COLUMNS): of the cables."""
     pushes: Table
     """(contacts, 3): of the ground."""
+
+
+@compiled
+def move_robot(robot: Model, state: Table, forces: Forces) -> None:
+    """Moves the nodes to where a state (13 bodies,) has them; no forces act on them yet."""
+    move_nodes(state, robot.p_BN, forces.nodes)
+    meet_ground(forces.nodes, robot.ground, forces.frames)
 
 
 @compiled
@@ -37,7 +56,7 @@ def compute_forces(
     With `keep`, those of the cables and the ground by themselves, too.
     """
     add_cable_forces(forces.nodes, signals, robot.cables, robot.slack, keep, forces.pulls)
-    add_ground_forces(forces.nodes, modes, robot.contacts, robot.ground, keep, forces.pushes)
+    add_ground_forces(forces.nodes, modes, robot.ground, forces.frames, keep, forces.pushes)
     gather_forces(forces.nodes, generalized)
     weight = robot.body.mass[0] * robot.body.gravity[0]
     for body in range(generalized.size // BLOCK):
@@ -96,18 +115,10 @@ def implicit_matrix(
     for body in range(rows.shape[0]):
         for r in range(BLOCK):
             rows[body, r, r] += inertia(robot, r)
-    law, per_body = ground_law(robot.ground), robot.p_BN.shape[0]
-    for i in range(robot.contacts.size):
-        touches = modes[i, CONTACT] != 0.0
-        if not any_lane(touches):
-            continue
-        node = robot.contacts[i]
-        depth = -forces.nodes[node, P_WN + 2]
-        presses, stiction = touches & (forces.pushes[i, 2] > 0.0), time * law.stiction_damping
-        k_x = select(touches & (modes[i, MODE] == STICK), stiction, 0.0)
-        k_y = select(touches & (modes[i, MODE + 1] == STICK), stiction, 0.0)
-        k_z = select(presses, time * (law.damping * depth + time * law.stiffness), 0.0)
-        add_contact(forces.nodes, node, node // per_body, k_x, k_y, k_z, rows)
+    law = law_of(robot.ground)
+    for i in range(robot.ground.contacts.size):
+        if any_lane(modes[i, CONTACT] != 0.0):
+            add_contact(modes, forces, robot.ground, law, i, time, rows)
 
 
 @compiled
@@ -197,11 +208,45 @@ def product(column: tuple[Real, ...], lines: Table, c: int) -> Real:
 
 @compiled
 def add_contact(
-    nodes: Table, node: int, body: int, k_x: Real, k_y: Real, k_z: Real, rows: Table
+    modes: Table, forces: Forces, ground: Ground, law: Law, i: int, time: Real, rows: Table
+) -> None:
+    """Adds time * damping + time² * stiffness of a contact, which acts where it touches."""
+    nodes, frames = forces.nodes, forces.frames
+    touches, node = modes[i, CONTACT] != 0.0, ground.contacts[i]
+    depth = -gap(nodes, ground, frames, i)
+    slide, _ = sliding(nodes, modes, ground, law, frames, i)
+    presses, stiction = touches & (forces.pushes[i, 2] > 0.0), time * law.stiction_damping
+    k_1 = select(touches & (slide.mode[0] == STICK), stiction, 0.0)
+    k_2 = select(touches & (slide.mode[1] == STICK), stiction, 0.0)
+    k_n = select(presses, time * (law.damping * depth + time * law.stiffness), 0.0)
+    body = node // (nodes.shape[0] // rows.shape[0])
+    if ground.flat and not ground.coulomb:
+        add_diagonal(nodes, node, body, (k_1, k_2, k_n), rows)
+        return
+    k_12 = 0.0 * k_n
+    if ground.coulomb:
+        found = coulomb_damping(slide, time, law)
+        k_1, k_12 = select(touches, found[0], 0.0), select(touches, found[1], 0.0)
+        k_2 = select(touches, found[2], 0.0)
+    # The columns of the matrix in World, and from the frame's: R K, then (R K) Rᵀ.
+    a = to_world(k_1, k_12, 0.0, frames, i, ground.flat)
+    b = to_world(k_12, k_2, 0.0, frames, i, ground.flat)
+    c = to_world(0.0, 0.0, k_n, frames, i, ground.flat)
+    x = to_world(a[0], b[0], c[0], frames, i, ground.flat)
+    y = to_world(a[1], b[1], c[1], frames, i, ground.flat)
+    z = to_world(a[2], b[2], c[2], frames, i, ground.flat)
+    add_diagonal(nodes, node, body, (x[0], y[1], z[2]), rows)
+    add_off_diagonal(nodes, node, body, (x[1], x[2], y[2]), rows)
+
+
+@compiled
+def add_diagonal(
+    nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], rows: Table
 ) -> None:
     """Adds Jᵀ diag(k_x, k_y, k_z) J of a node at p from its body's origin, where J = [-[p]x 1]
     times the velocity of the body is the node's."""
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
+    k_x, k_y, k_z = k
     rows[body, 0, 0] += p_y * p_y * k_z + p_z * p_z * k_y
     rows[body, 1, 1] += p_z * p_z * k_x + p_x * p_x * k_z
     rows[body, 2, 2] += p_x * p_x * k_y + p_y * p_y * k_x
@@ -217,3 +262,29 @@ def add_contact(
     rows[body, 3, 3] += k_x
     rows[body, 4, 4] += k_y
     rows[body, 5, 5] += k_z
+
+
+@compiled
+def add_off_diagonal(
+    nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], rows: Table
+) -> None:
+    """The same for the symmetric matrix of k_xy, k_xz and k_yz."""
+    p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
+    xy, xz, yz = k
+    # The rows of [p]x K.
+    a = p_y * xz - p_z * xy, p_y * yz, -p_z * yz
+    b = -p_x * xz, p_z * xy - p_x * yz, p_z * xz
+    c = p_x * xy, -p_y * xy, p_x * yz - p_y * xz
+    rows[body, 0, 0] += p_y * a[2] - p_z * a[1]
+    rows[body, 0, 1] += p_z * a[0] - p_x * a[2]
+    rows[body, 0, 2] += p_x * a[1] - p_y * a[0]
+    rows[body, 1, 1] += p_z * b[0] - p_x * b[2]
+    rows[body, 1, 2] += p_x * b[1] - p_y * b[0]
+    rows[body, 2, 2] += p_x * c[1] - p_y * c[0]
+    for column in range(3):
+        rows[body, 0, 3 + column] += a[column]
+        rows[body, 1, 3 + column] += b[column]
+        rows[body, 2, 3 + column] += c[column]
+    rows[body, 3, 4] += xy
+    rows[body, 3, 5] += xz
+    rows[body, 4, 5] += yz

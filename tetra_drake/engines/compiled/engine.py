@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces
+from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk
 from tetra_drake.engines.compiled.walk import (
     DONE,
@@ -19,10 +19,11 @@ from tetra_drake.engines.compiled.walk import (
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import LENGTH, PULL_COLUMNS, TENSION
 from tetra_drake.physics.contact import STICK_POINT
+from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.structure import moved_nodes
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -97,10 +98,13 @@ def _dataset(walk: Walk, course: Course, times: np.ndarray) -> xarray.Dataset:
     states, modes, signals = course.states[chosen], course.modes[chosen], course.signals[chosen]
     count, model = len(times), walk.model
     pulls = np.empty((count, len(model.cables), PULL_COLUMNS))
-    pushes = np.empty((count, len(model.contacts), 3))
+    contacts, nodes = len(model.ground.contacts), len(walk.structure.node_names)
+    pushes = np.empty((count, contacts, 3))
+    moved, frames = np.empty((nodes, NODE_COLUMNS)), np.empty((contacts, FRAME_COLUMNS))
     generalized = np.empty(6 * len(walk.structure.bodies))
     for i, state in enumerate(states):
-        forces = Forces(moved_nodes(walk.structure, state), pulls[i], pushes[i])
+        forces = Forces(moved, frames, pulls[i], pushes[i])
+        move_robot(model, state, forces)
         compute_forces(model, modes[i], signals[i], True, forces, generalized)
     return assemble_dataset(
         walk.structure,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import operator
 import time
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -32,12 +33,14 @@ from tetra_drake.engines.compiled.walk import (
     advance,
 )
 from tetra_drake.physics.cable import PULL_COLUMNS, Cables
-from tetra_drake.physics.contact import MODE_COLUMNS, Ground, update_modes
+from tetra_drake.physics.contact import MODE_COLUMNS, Ground, Law
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.lanes import FieldArray, lane_table
 from tetra_drake.physics.oscillator import NEURON_COLUMNS, make_neurons
+from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.ground import starting_modes
 from tetra_drake.robot.model import (
     JUNCTION_CABLES,
     Body,
@@ -47,7 +50,7 @@ from tetra_drake.robot.model import (
     make_network,
 )
 from tetra_drake.robot.signals import sample_count
-from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
+from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -71,7 +74,7 @@ class Walk:
     def of(cls, scenario: Scenario, gait: Gait, *, record: bool) -> Walk:
         """Prepares a gait."""
         simulation, start_up = scenario.simulation, scenario.cpg.start_up
-        structure = MakeStructure(scenario.robot, scenario.cables)
+        structure = MakeStructure(scenario)
         ends = 0.0, simulation.steady_from, simulation.duration
         times = sample_times(simulation.duration, simulation.sample_period) if record else ()
         return cls(
@@ -90,10 +93,11 @@ class Walk:
         return dataclasses.replace(self, gait=gait)
 
     @property
-    def kind(self) -> tuple[int, bool, bool]:
+    def kind(self) -> tuple[int, int, bool, bool, bool, bool]:
         """What walks that share an engine must have in common."""
-        scenario = self.scenario
-        return scenario.robot.tetrahedra, scenario.cables.slack, scenario.cpg.signals == "listing"
+        scenario, ground = self.scenario, self.model.ground
+        robot = scenario.robot.tetrahedra, len(ground.contacts), scenario.cables.slack
+        return *robot, scenario.cpg.signals == "listing", ground.flat, ground.coulomb
 
     @property
     def recent_signals(self) -> int:
@@ -126,6 +130,7 @@ class LaneEngine:
         """For walks like the first; see `accepts`. Compiles the engine where that is not done."""
         self._kind = first.kind
         robot, self._robot_tables = _lane_model(first.model, width)
+        self._heights = robot.ground.heights.array.reshape(width, -1)
         self._walks = _tables(first, robot, width)
         structure = first.structure
         shape, signals = (width, len(first.times)), structure.signals
@@ -153,9 +158,10 @@ class LaneEngine:
     def accepts(self, each: Walk) -> bool:
         """Whether a walk can be simulated: one like the first in structure and kind of signals,
         and with no more to keep."""
-        room = self._log.times.shape[1] - 1, self._log.recent.shape[1]
-        needs = len(each.times), each.recent_signals
-        return each.kind == self._kind and needs[0] <= room[0] and needs[1] <= room[1]
+        log, heights = self._log, self._heights.shape[1]
+        room = log.times.shape[1] - 1, log.recent.shape[1], heights
+        needs = len(each.times), each.recent_signals, each.model.ground.heights.size
+        return each.kind == self._kind and all(map(operator.le, needs, room))
 
     @property
     def idle(self) -> list[int]:
@@ -165,8 +171,7 @@ class LaneEngine:
     def load(self, lane: int, each: Walk) -> None:
         """Starts a walk in a lane; raises InputError if its gait does not fit its scenario."""
         scenario, model, start = each.scenario, each.model, each.structure.initial_state
-        nodes, modes = moved_nodes(each.structure, start), np.zeros(self._log.modes.shape[2:])
-        update_modes(nodes, model.contacts, model.ground, modes)
+        modes = starting_modes(each.structure, model.ground)
         cpg, simulation, compiled = scenario.cpg, scenario.simulation, scenario.compiled
         numbers = make_network(cpg, each.gait, oscillators=scenario.oscillators)._asdict()
         numbers |= dataclasses.asdict(compiled)
@@ -178,6 +183,9 @@ class LaneEngine:
             getattr(self._walks, name).array[..., lane] = values
         for table, values in zip(self._robot_tables, _numbers(model), strict=True):
             table.array[..., lane] = values
+        heights = self._heights[lane]
+        heights[: model.ground.heights.size] = model.ground.heights
+        self._walks.robot.ground.law.first.array[0, lane] = lane * heights.size
         self._walks.step.state.array[:, lane] = start
 
         log, clock = self._log, self._walks.clock.array
@@ -248,8 +256,8 @@ def processor_features() -> str:
 def _numbers(model: Model) -> list[np.ndarray]:
     """The arrays of a model that differ between scenarios, in the order of its lane tables."""
     cables = [model.cables[name] for name in Cables._fields[3:]]
-    ground = [model.ground[name] for name in Ground._fields]
-    return [model.p_BN, *cables, *ground, *model.body]
+    law = [model.ground.law[name] for name in Law._fields]
+    return [model.p_BN, *cables, *law, *model.body]
 
 
 def _lane_model(model: Model, width: int) -> tuple[Model, list[FieldArray]]:
@@ -261,8 +269,13 @@ def _lane_model(model: Model, width: int) -> tuple[Model, list[FieldArray]]:
     lanes = Model(
         p_BN=p_BN,
         cables=Cables(*indices, *(next(rest) for _ in Cables._fields[3:])),
-        contacts=FieldArray(model.contacts.copy()),
-        ground=Ground(*(next(rest) for _ in Ground._fields)),  # type: ignore[arg-type]
+        ground=Ground(
+            contacts=FieldArray(model.ground.contacts.copy()),
+            law=Law(*(next(rest) for _ in Law._fields)),  # type: ignore[arg-type]
+            heights=FieldArray(np.zeros(width * model.ground.heights.size)),
+            flat=model.ground.flat,
+            coulomb=model.ground.coulomb,
+        ),
         body=Body(*(next(rest) for _ in Body._fields)),
         slack=model.slack,
     )
@@ -298,6 +311,7 @@ def _tables(first: Walk, robot: Model, width: int) -> Walks:
         ),
         "forces": Forces(
             nodes=table(len(structure.node_names), NODE_COLUMNS),
+            frames=table(contacts, FRAME_COLUMNS),
             pulls=table(len(structure.cables), PULL_COLUMNS),
             pushes=table(contacts, 3),
         ),

@@ -27,9 +27,9 @@ from tetra_drake.engines.compiled.dynamics import (
     implicit_matrix,
     inertia,
     move_bodies,
+    move_robot,
 )
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.kinematics import move_nodes
 from tetra_drake.physics.lanes import Real, Table, select
 from tetra_drake.robot.model import Model
 
@@ -59,7 +59,7 @@ def take_step(
     robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, step: Real
 ) -> Real:
     """Writes the end of a step (s); `signals` are the end's. What is given of the state: `forces`,
-    whose nodes are overwritten, and work.force.
+    whose nodes and frames are overwritten, and work.force.
 
     Returns the difference to the first-order solution within: the largest of any body's
     velocity (m/s), of rotation that of its nodes; NaN if one is.
@@ -74,7 +74,7 @@ def take_step(
     for i in range(size):
         stage[i] = end[first + i] = state[first + i]
     move_bodies(state, stage, step, end)
-    move_nodes(end, robot.p_BN, forces.nodes)
+    move_robot(robot, end, forces)
     compute_forces(robot, modes, signals, False, forces, work.end_force)
     for i in range(size):
         work.change[i] = GAMMA * (work.end_force[i] - work.force[i])
@@ -85,7 +85,7 @@ def take_step(
         stage[i] = state[first + i] + scaled * k1[i]
         end[first + i] = state[first + i] + step * k1[i]
     move_bodies(state, stage, step, end)
-    move_nodes(end, robot.p_BN, forces.nodes)
+    move_robot(robot, end, forces)
     compute_forces(robot, modes, signals, False, forces, work.end_force)
     for body in range(bodies):
         for j in range(BLOCK):

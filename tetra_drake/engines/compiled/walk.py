@@ -13,12 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces
+from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.contact import MODE_COLUMNS, time_to_mode_change, update_modes
-from tetra_drake.physics.kinematics import interpolate_state, move_nodes
+from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.lanes import Real, Table, any_lane, by_lane, maximum, minimum, select
+from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.oscillator import Network, next_output
 from tetra_drake.robot.model import Model
 
@@ -114,7 +115,7 @@ def advance(w: Walks, log: Log, listing: bool, iterations: int) -> None:
 
     `listing`: see physics.oscillator.next_output.
     """
-    clock, robot, nodes = w.clock, w.robot, w.forces.nodes
+    clock, robot, forces = w.clock, w.robot, w.forces
     state, end = w.step.state, w.step.end
     for _ in range(iterations):
         if any_lane((clock[STATUS] == WALKING) & (clock[TIME] >= clock[MARK])):
@@ -122,16 +123,16 @@ def advance(w: Walks, log: Log, listing: bool, iterations: int) -> None:
             if pass_marks(w, log):
                 return
         walks = clock[STATUS] == WALKING
-        move_nodes(state, robot.p_BN, nodes)
-        update_modes(nodes, robot.contacts, robot.ground, w.modes)
-        compute_forces(robot, w.modes, w.signals, True, w.forces, w.step.force)
+        move_robot(robot, state, forces)
+        update_modes(state, forces.nodes, robot.ground, forces.frames, w.modes)
+        compute_forces(robot, w.modes, w.signals, True, forces, w.step.force)
         step = select(walks, aim(w), 0.0)
         step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
         clock[STEP], clock[END] = step, step_end
         produce_signals(w, log, listing, step_end)
         for lane in range(log.kept.size):
             interpolate(w, log, lane, by_lane(clock)[END, lane], by_lane(w.end_signals))
-        error = take_step(robot, w.step, w.modes, w.forces, w.end_signals, step)
+        error = take_step(robot, w.step, w.modes, forces, w.end_signals, step)
 
         accepted = walks & (error <= w.tolerance[0])
         if any_lane(accepted & (clock[DUE] <= step_end)):
@@ -161,8 +162,8 @@ def aim(w: Walks) -> Real:
         for j in range(BLOCK):
             i = BLOCK * body + j
             w.acceleration[i] = w.step.force[i] * (per_moment if j < 3 else per_mass)
-    motion, ground = (w.step.state, w.acceleration, w.forces.nodes), (robot.contacts, robot.ground)
-    change = time_to_mode_change(*motion, w.modes, *ground, planned)
+    motion, where = (w.step.state, w.acceleration, w.forces.nodes), (robot.ground, w.forces.frames)
+    change = time_to_mode_change(*motion, w.modes, *where, planned)
     step = minimum(planned, AIM_FACTOR * change + w.look_ahead[0])
     remaining = w.clock[MARK] - w.clock[TIME]
     halved = select(2.0 * step > remaining, 0.5 * remaining, step)

@@ -1,0 +1,138 @@
+"""When contact and friction modes change: the margin until then, and a prediction of the time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.contact import CONTACT, Ground, Law, gap, law_of, sliding
+from tetra_drake.physics.friction import STICK, Slide, coulomb_pull, coulomb_size, sticks
+from tetra_drake.physics.kinematics import node_acceleration
+from tetra_drake.physics.lanes import Real, Table, Truth, any_lane, maximum, minimum, select
+from tetra_drake.physics.terrain import to_frame
+
+Array = np.ndarray
+
+
+@compiled
+def mode_margin(nodes: Array, modes: Array, ground: Ground, frames: Array) -> float:
+    """Positive while no mode is due to change; crosses zero where the first one is.
+
+    The least of: gap in the air, depth on the ground (m); with the reset integrator stiction range
+    less deflection (m), with Coulomb friction what is left of the limit (N); speed in the direction
+    of slip (m/s). Only its sign has a meaning. The arguments are those of `add_ground_forces`.
+    """
+    margin, law = math.inf, law_of(ground)
+    for i in range(ground.contacts.size):
+        distance = gap(nodes, ground, frames, i)
+        if modes[i, CONTACT] == 0.0:
+            margin = min(margin, distance)
+            continue
+        margin = min(margin, -distance)
+        slide, _ = sliding(nodes, modes, ground, law, frames, i)
+        (v_1, v_2), (x_1, x_2), (m_1, m_2) = slide.velocity, slide.deflection, slide.mode
+        if not ground.coulomb:
+            margin = min(margin, reset_margin(v_1, x_1, m_1, law))
+            margin = min(margin, reset_margin(v_2, x_2, m_2, law))
+        elif sticks(slide.mode):
+            pull = coulomb_pull(slide, law)
+            outward = pull.u[0] * v_1 + pull.u[1] * v_2
+            margin = min(margin, max(pull.limit - pull.size, -outward))
+        else:
+            margin = min(margin, v_1 * m_1 + v_2 * m_2)
+    return margin
+
+
+@compiled
+def reset_margin(velocity: float, deflection: float, mode: float, law: Law) -> float:
+    """That of one tangent by the reset integrator."""
+    return law.stiction_range - abs(deflection) if mode == STICK else mode * velocity
+
+
+@compiled
+def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
+    """First time in (0, horizon) at which value + rate t + rate_rate t²/2 falls to zero;
+    the horizon where it does not, or where the value is not positive now."""
+    reach = horizon * (abs(rate) + 0.5 * horizon * abs(rate_rate))
+    if not any_lane((value > 0.0) & (value <= reach)):
+        return horizon
+    discriminant = rate * rate - 2.0 * rate_rate * value
+    # Twice the mean speed at which the value falls until it is zero.
+    speed = math.sqrt(maximum(discriminant, 0.0)) - rate
+    falls = (value > 0.0) & (discriminant >= 0.0) & (speed > 0.0)
+    return select(falls, minimum(2.0 * value / select(falls, speed, 1.0), horizon), horizon)
+
+
+@compiled
+def time_to_mode_change(
+    state: Table,
+    acceleration: Table,
+    nodes: Table,
+    modes: Table,
+    ground: Ground,
+    frames: Table,
+    horizon: Real,
+) -> Real:
+    """Time (s) to the next mode change, at most `horizon`, at constant node accelerations, over the
+    local tangent plane.
+
+    `acceleration` is dv/dt, 6 numbers per body, and `nodes` that of `state`; the other arguments
+    are those of `add_ground_forces`.
+    """
+    time, law = horizon, law_of(ground)
+    for i in range(ground.contacts.size):
+        a_WN = node_acceleration(state, acceleration, nodes, ground.contacts[i])
+        a_1, a_2, a_n = to_frame(a_WN[0], a_WN[1], a_WN[2], frames, i, ground.flat)
+        slide, v_n = sliding(nodes, modes, ground, law, frames, i)
+        touches, distance = modes[i, CONTACT] != 0.0, gap(nodes, ground, frames, i)
+        up = select(touches, -1.0, 1.0)  # the way that leads to the ground's surface
+        time = minimum(time, first_zero(up * distance, up * v_n, up * a_n, horizon))
+        if not any_lane(touches):
+            continue
+        (v_1, v_2), (x_1, x_2), (m_1, m_2) = slide.velocity, slide.deflection, slide.mode
+        if ground.coulomb:
+            depth = -distance
+            squeeze = law.stiffness * -v_n + law.damping * (v_n * v_n - depth * a_n)
+            rate = select(slide.normal > 0.0, law.static * squeeze, 0.0)
+            change = time_to_break_free(slide, (a_1, a_2), rate, law, horizon)
+            turns = first_zero(v_1 * m_1 + v_2 * m_2, a_1 * m_1 + a_2 * m_2, 0.0, horizon)
+            time = select(touches, minimum(time, minimum(change, turns)), time)
+        else:
+            p_0 = law.stiction_range
+            time = minimum(time, time_to_reset_change(v_1, x_1, m_1, a_1, touches, p_0, horizon))
+            time = minimum(time, time_to_reset_change(v_2, x_2, m_2, a_2, touches, p_0, horizon))
+    return time
+
+
+@compiled
+def time_to_reset_change(
+    v: Real, x: Real, mode: Real, a: Real, touches: Truth, stiction_range: Real, horizon: Real
+) -> Real:
+    """That of the reset integrator along one tangent, on nodes that touch the ground; velocity,
+    deflection, mode and acceleration are along it."""
+    stuck, slips = touches & (mode == STICK), touches & (mode != STICK)
+    # A value of 0 is never reached: it counts as no mode change.
+    to_front = select(stuck, stiction_range - x, 0.0)
+    to_back = select(stuck, stiction_range + x, 0.0)
+    time = first_zero(to_front, -v, -a, horizon)
+    time = minimum(time, first_zero(to_back, v, a, horizon))
+    return minimum(time, first_zero(select(slips, mode * v, 0.0), mode * a, 0.0, horizon))
+
+
+@compiled
+def time_to_break_free(
+    slide: Slide, acceleration: tuple[Real, Real], rate: Real, law: Law, horizon: Real
+) -> Real:
+    """Time (s) until a node's pull exceeds the limit of Coulomb friction, which grows at `rate`
+    (N/s), both taken as linear; `acceleration` is along the tangents."""
+    pull, (v_1, v_2) = coulomb_pull(slide, law), slide.velocity
+    # A short way along the motion gives the rate of the pull's size.
+    time = 1e-6
+    u_1 = law.bristle_damping * acceleration[0] + law.bristle_stiffness * v_1
+    u_2 = law.bristle_damping * acceleration[1] + law.bristle_stiffness * v_2
+    later = coulomb_size((pull.u[0] + time * u_1, pull.u[1] + time * u_2), slide.heading, law)
+    grows = (later - pull.size) / time
+    left = select(sticks(slide.mode), pull.limit - pull.size, 0.0)
+    return first_zero(left, rate - grows, 0.0, horizon)

@@ -1,0 +1,123 @@
+"""The surface of the ground, z = h(x, y), and the frame in which a node meets it.
+
+The surface is the uniform biquadratic B-spline whose control points are a regular grid of heights:
+its gradient is continuous, a plane is exact, and it lies nowhere higher than the highest control
+point. An edge is rounded by a cell. Beyond the grid the surface goes on as it is at the edge.
+
+A *frame*, a row of `frames`, holds the distance of a node from the surface, positive above it, and
+the axes of the local tangent plane: normal n, t1 (World's x axis projected into the plane), and
+t2 = n x t1. On flat ground these are z and the axes of World, and frames are neither made nor used.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.kinematics import P_WN
+from tetra_drake.physics.lanes import (
+    Real,
+    Table,
+    any_lane,
+    floor,
+    gather,
+    inverse_sqrt,
+    maximum,
+    minimum,
+    select,
+)
+
+GAP, N_X, N_Y, N_Z, T1_X, T1_Y, T1_Z, T2_Y, T2_Z, FRAME_COLUMNS = range(10)
+"""Columns of `frames`, (contacts, 9): distance (m), n, t1, t2 (whose x is 0); and their number."""
+
+
+@compiled
+def surface(x: Real, y: Real, grid: Any, heights: Table) -> tuple[Real, Real, Real]:
+    """Height (m) of the surface at x and y (m), and its gradient.
+
+    `heights`, (points,), are the control points, row by row; `grid` has the fields of
+    `contact.Law` that describe them.
+    """
+    across = (x - grid.corner_x) * grid.per_cell_x, (y - grid.corner_y) * grid.per_cell_y
+    # In this order, a NaN becomes a bound, and no index leaves the grid.
+    s = maximum(minimum(across[0], grid.last_row), 0.5)
+    t = maximum(minimum(across[1], grid.last_column), 0.5)
+    row, column = floor(s + 0.5), floor(t + 0.5)
+    a, b = s - row, t - column
+    index = grid.first + (row - 1.0) * grid.columns + (column - 1.0)
+    h_0, b_0 = _across_row(heights, index, b)
+    h_1, b_1 = _across_row(heights, index + grid.columns, b)
+    h_2, b_2 = _across_row(heights, index + 2.0 * grid.columns, b)
+    height, by_a = _spline(h_0, h_1, h_2, a)
+    by_b, _ = _spline(b_0, b_1, b_2, a)
+    h_x = select(s == across[0], by_a * grid.per_cell_x, 0.0)
+    h_y = select(t == across[1], by_b * grid.per_cell_y, 0.0)
+    return height, h_x, h_y
+
+
+@compiled
+def _across_row(heights: Table, index: Real, b: Real) -> tuple[Real, Real]:
+    three = gather(heights, index, 0), gather(heights, index, 1), gather(heights, index, 2)
+    return _spline(three[0], three[1], three[2], b)
+
+
+@compiled
+def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Real]:
+    """A quadratic B-spline and its derivative, `part` (-1/2 to 1/2) of a cell from a control
+    point."""
+    less, more = 0.5 - part, 0.5 + part
+    middle = 0.75 - part * part
+    value = 0.5 * less * less * before + middle * here + 0.5 * more * more * after
+    return value, less * (here - before) + more * (after - here)
+
+
+@compiled
+def find_frames(nodes: Table, contacts: Table, grid: Any, heights: Table, frames: Table) -> None:
+    """Writes the `frames` of the contact nodes, whose indices are `contacts`, (contacts,).
+
+    A node above the highest control point has the frame of level ground at that height.
+    """
+    for i in range(contacts.size):
+        node = contacts[i]
+        z = nodes[node, P_WN + 2]
+        height, h_x, h_y = grid.top, 0.0 * z, 0.0 * z
+        near = z <= grid.top
+        if any_lane(near):
+            found = surface(nodes[node, P_WN], nodes[node, P_WN + 1], grid, heights)
+            height = select(near, found[0], height)
+            h_x, h_y = select(near, found[1], h_x), select(near, found[2], h_y)
+        c = inverse_sqrt(1.0 + h_y * h_y)
+        n_z = inverse_sqrt(1.0 + h_x * h_x + h_y * h_y)
+        frames[i, GAP] = (z - height) * n_z  # exact on a plane
+        frames[i, N_X], frames[i, N_Y], frames[i, N_Z] = -h_x * n_z, -h_y * n_z, n_z
+        frames[i, T1_X] = (1.0 + h_y * h_y) * c * n_z
+        frames[i, T1_Y], frames[i, T1_Z] = -h_x * h_y * c * n_z, h_x * c * n_z
+        frames[i, T2_Y], frames[i, T2_Z] = c, h_y * c
+
+
+@compiled
+def to_frame(
+    x: Real, y: Real, z: Real, frames: Table, i: int, flat: bool
+) -> tuple[Real, Real, Real]:
+    """A vector of World along t1, t2 and n of a frame."""
+    if flat:
+        return x, y, z
+    return (
+        x * frames[i, T1_X] + y * frames[i, T1_Y] + z * frames[i, T1_Z],
+        y * frames[i, T2_Y] + z * frames[i, T2_Z],
+        x * frames[i, N_X] + y * frames[i, N_Y] + z * frames[i, N_Z],
+    )
+
+
+@compiled
+def to_world(
+    t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool
+) -> tuple[Real, Real, Real]:
+    """A vector along t1, t2 and n of a frame, in World."""
+    if flat:
+        return t_1, t_2, n
+    return (
+        t_1 * frames[i, T1_X] + n * frames[i, N_X],
+        t_1 * frames[i, T1_Y] + t_2 * frames[i, T2_Y] + n * frames[i, N_Y],
+        t_1 * frames[i, T1_Z] + t_2 * frames[i, T2_Z] + n * frames[i, N_Z],
+    )

@@ -1,0 +1,118 @@
+"""The ground of a scenario as the kernels take it: laws, terrain, contact nodes."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.physics.contact import (
+    LAW,
+    MODE_COLUMNS,
+    Ground,
+    law_of,
+    meet_ground,
+    update_modes,
+)
+from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
+from tetra_drake.physics.terrain import FRAME_COLUMNS, GAP, N_Z, find_frames
+from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.terrain import Flat, Grid, make_grid
+from tetra_drake.scenario.units import INCH
+
+STEP_AHEAD = 1.0 * INCH
+"""From the robot's foremost contact node to a terrain that begins ahead of it."""
+
+START_DEPTH = 1e-6
+"""Depth (m) in the ground from which on a node counts as placed there by mistake."""
+
+
+def make_ground(scenario: Scenario, structure: Structure) -> Ground:
+    """The ground as kernels take it.
+
+    Raises InputError if its heights cannot be had, or if the structure starts off their grid or
+    with a contact node in the ground.
+    """
+    start = moved_nodes(structure, structure.initial_state)[structure.contacts, P_WN : P_WN + 3]
+    ahead = start[:, 0].max() + STEP_AHEAD
+    grid = make_grid(scenario.terrain, ahead=ahead, source=scenario.name)
+    law, coulomb = np.zeros(1, dtype=LAW), isinstance(scenario.friction, Coulomb)
+    law["stiffness"], law["damping"] = scenario.ground.stiffness, scenario.ground.damping
+    numbers = dataclasses.asdict(scenario.friction)
+    if coulomb:
+        for name in ("stiffness", "damping"):
+            numbers[f"bristle_{name}"] = numbers.pop(name)
+        for name in ("forward", "backward", "lateral"):
+            numbers[f"per_{name}"] = 1.0 / numbers.pop(name)
+    for name, number in (numbers | _grid_numbers(grid)).items():
+        law[name] = number
+    made = Ground(
+        contacts=structure.contacts,
+        law=law,
+        heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
+        flat=isinstance(scenario.terrain, Flat),
+        coulomb=coulomb,
+    )
+    if not made.flat:
+        _check_start(structure, made, start, grid, scenario.name)
+    return made
+
+
+def _grid_numbers(grid: Grid) -> dict[str, float]:
+    rows, columns = grid.heights.shape
+    (x, y), (cell_x, cell_y) = grid.corner, grid.cell
+    inside = 1.5 + 1e-9  # so that rounding finds a control point beyond the last one's neighbour
+    return {
+        "corner_x": x,
+        "corner_y": y,
+        "per_cell_x": 1.0 / cell_x,
+        "per_cell_y": 1.0 / cell_y,
+        "last_row": rows - inside,
+        "last_column": columns - inside,
+        "columns": columns,
+        "top": grid.heights.max(),
+    }
+
+
+def _check_start(
+    structure: Structure, ground: Ground, start: np.ndarray, grid: Grid, source: str
+) -> None:
+    """Raises InputError if a contact node, at `start` (contacts, 3), is off the grid or too low."""
+    corner, cells = np.array(grid.corner), np.array(grid.heights.shape) - 1
+    low, high = start[:, :2].min(axis=0), start[:, :2].max(axis=0)
+    if (low < corner).any() or (high > corner + cells * grid.cell).any():
+        reach = [f"{side / INCH:.4g} in" for side in (*corner, *(corner + cells * grid.cell))]
+        problem = f"the robot starts off its grid, which goes from x, y = {reach[0]}, {reach[1]} "
+        raise InputError(source, "terrain", problem + f"to {reach[2]}, {reach[3]}")
+    gaps = ground_frames(start, ground)[:, GAP]
+    if gaps.min() < -START_DEPTH:
+        node = structure.node_names[structure.contacts[gaps.argmin()]]
+        problem = f"the robot starts with node {node} {-gaps.min() / INCH:.3g} in in the ground"
+        raise InputError(source, "terrain", f"{problem}; move what is there, or robot.offsets")
+
+
+def starting_modes(structure: Structure, ground: Ground) -> np.ndarray:
+    """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
+    state, modes = structure.initial_state, np.zeros((len(ground.contacts), MODE_COLUMNS))
+    nodes, frames = moved_nodes(structure, state), np.empty((len(ground.contacts), FRAME_COLUMNS))
+    meet_ground(nodes, ground, frames)
+    update_modes(state, nodes, ground, frames, modes)
+    return modes
+
+
+def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:
+    """Heights (...) in m of the surface at x and y (..., 2) in m."""
+    top = np.full((x_y.size // 2, 1), ground.law["top"][0])
+    frames = ground_frames(np.hstack([x_y.reshape(-1, 2), top]), ground)
+    return (top[:, 0] - frames[:, GAP] / frames[:, N_Z]).reshape(x_y.shape[:-1])
+
+
+def ground_frames(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
+    """The frames (points, FRAME_COLUMNS) of physics.terrain for points (points, 3) in m."""
+    frames = np.empty((len(p_WN), FRAME_COLUMNS))
+    nodes = np.zeros((len(p_WN), NODE_COLUMNS))
+    nodes[:, P_WN : P_WN + 3] = p_WN
+    find_frames(nodes, np.arange(len(p_WN)), law_of(ground), ground.heights, frames)
+    return frames
