@@ -12,7 +12,7 @@ import pytest
 import tetra_drake
 
 PROGRAM = (
-    "from tetra_drake.physics.contact import first_zero;print(first_zero(1.0, -0.5, 0.0, 9.0))"
+    "from tetra_drake.physics.mode_change import first_zero;print(first_zero(1.0, -0.5, 0.0, 9.0))"
 )
 
 
@@ -41,7 +41,7 @@ def test_a_read_only_installation_caches_in_the_users_folder_if_it_can(
 ):
     (tmp_path / "file").write_text("")
     assert float(run(package, tmp_path / folder)) == pytest.approx(2.0)
-    assert any(tmp_path.rglob("contact.first_zero*.nbi")) == caches
+    assert any(tmp_path.rglob("mode_change.first_zero*.nbi")) == caches
 
 
 @pytest.mark.parametrize("folder", ["physics", "elsewhere/deeper"])

@@ -13,22 +13,21 @@ from tetra_drake.physics.contact import (
     MODE,
     MODE_COLUMNS,
     STICK_POINT,
-    Ground,
+    Law,
     add_ground_forces,
-    first_zero,
-    mode_margin,
     normal_force,
-    time_to_mode_change,
     update_modes,
 )
-from tetra_drake.physics.friction import STICK, friction_force, next_friction_mode
+from tetra_drake.physics.friction import STICK, next_reset_mode, reset_force
 from tetra_drake.physics.kinematics import FORCE, V_WN
-from tetra_drake.robot.model import ground_law
+from tetra_drake.physics.mode_change import first_zero, mode_margin, time_to_mode_change
+from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.schema import Scenario
 
 P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0
-LAW = Ground(4000.0, 2e5, P0, SIGMA_1, A_C, SIGMA_0)
+LAW = Law(4000.0, 2e5, P0, SIGMA_1, A_C, SIGMA_0, *[0.0] * (len(Law._fields) - 6))
 
 
 def test_normal_force_is_equation_1():
@@ -41,7 +40,7 @@ def test_normal_force_is_equation_1():
 @pytest.mark.parametrize("mode", [-1.0, 1.0])
 def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity, mode):
     # F = -s0 abs(v) x with x held at +-p0: it opposes a slip in the direction of `mode`.
-    force = friction_force(velocity, 12.3, mode, LAW)
+    force = reset_force(velocity, 12.3, mode, LAW)
     assert force == pytest.approx(-mode * SIGMA_0 * 0.02 * P0, rel=1e-14)
 
 
@@ -49,7 +48,7 @@ def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity, mode):
 @pytest.mark.parametrize("x", [0.5 * P0, -0.9 * P0])
 def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
     expected = -(SIGMA_0 * 0.02 * (1.0 + A_C) * x + SIGMA_1 * velocity)
-    assert friction_force(velocity, x, STICK, LAW) == pytest.approx(expected, rel=1e-14)
+    assert reset_force(velocity, x, STICK, LAW) == pytest.approx(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +67,7 @@ def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
     ],
 )
 def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection, mode, after):
-    assert next_friction_mode(velocity, deflection, mode, P0) == after
+    assert next_reset_mode(velocity, deflection, mode, P0) == after
 
 
 class RobotOnGround:
@@ -76,8 +75,9 @@ class RobotOnGround:
 
     def __init__(self, structure: Structure, scenario: Scenario) -> None:
         self.structure = structure
-        self.law = ground_law(scenario.ground, scenario.friction)
-        self.args = (structure.contacts, self.law)
+        self.ground = make_ground(scenario, structure)
+        self.frames = np.full((len(structure.contacts), FRAME_COLUMNS), np.nan)  # not used
+        self.args = (self.ground, self.frames)
         self.modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
 
     def state(self, *, x: float = 0.0, z: float = 0.0, v_x: float = 0.0) -> np.ndarray:
@@ -94,8 +94,12 @@ class RobotOnGround:
 
     def update(self, **change: float) -> np.ndarray:
         """The modes updated in that state."""
-        update_modes(self.nodes(**change), *self.args, self.modes)
+        self.changes(**change)
         return self.modes
+
+    def changes(self, **change: float) -> bool:
+        """Whether the modes have changed in that state."""
+        return update_modes(self.state(**change), self.nodes(**change), *self.args, self.modes)
 
 
 @pytest.fixture
@@ -135,8 +139,7 @@ def test_an_update_tells_whether_a_mode_has_changed(ground):
         ({"z": -1e-5, "x": 2e-3, "v_x": -0.1}, True),  # sticks
         ({"z": 1e-3}, True),
     ]:
-        nodes = ground.nodes(**change)
-        assert update_modes(nodes, *ground.args, ground.modes) == expected, change
+        assert ground.changes(**change) == expected, change
 
 
 def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground):
@@ -150,7 +153,7 @@ def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground):
 
 
 def test_the_margin_crosses_zero_at_a_mode_change(ground):
-    p0 = ground.law[0]["stiction_range"]
+    p0 = ground.ground.law["stiction_range"][0]
     modes = ground.update(z=-1e-4)
 
     def margin(x: float = 0.0, z: float = -1e-4) -> float:
@@ -205,7 +208,7 @@ def test_a_mode_change_is_foreseen_when_it_comes(ground, v_x, upward, expected):
 
 @pytest.mark.parametrize("depth", [-1e-4, 0.0, 1e-4, 5e-4])
 @pytest.mark.parametrize("rate", [-0.03, 0.0, 0.02])
-def test_normal_force_is_drakes_hunt_crossley_point_contact(scenario, depth, rate):
+def test_normal_force_is_drakes_hunt_crossley_point_contact(scenario, structure, depth, rate):
     # Drake: f = k d (1 + dissipation dd/dt), never negative; two equal stiffnesses 2 k act in
     # series as k, and their dissipation, weighted by stiffness, stays what both have.
     ground, radius, mass = scenario.ground, 0.02, 0.05
@@ -229,6 +232,6 @@ def test_normal_force_is_drakes_hunt_crossley_point_contact(scenario, depth, rat
     state = np.array([1.0, 0, 0, 0, 0, 0, radius - depth, 0, 0, 0, 0, 0, -rate])
     plant.GetMyMutableContextFromRoot(context).SetContinuousState(state)
     force = mass * diagram.EvalTimeDerivatives(context).CopyToVector()[12]
-    law = Ground(*ground_law(ground, scenario.friction)[0].item())
+    law = Law(*make_ground(scenario, structure).law[0].item())
     expected = normal_force(depth, rate, law)
     assert force == pytest.approx(expected, rel=1e-9, abs=1e-12)

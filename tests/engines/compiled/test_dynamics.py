@@ -10,25 +10,33 @@ from tetra_drake.engines.compiled.dynamics import (
     compute_forces,
     implicit_matrix,
     move_bodies,
+    move_robot,
 )
 from tetra_drake.physics.cable import PULL_COLUMNS
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
-from tetra_drake.physics.kinematics import NODE_COLUMNS, move_nodes
+from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.model import JUNCTION_CABLES, Model, make_model
-from tetra_drake.robot.structure import MakeStructure, moved_nodes
+from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+
+def moved(robot: Model, state: np.ndarray) -> Forces:
+    """The tables of forces, with the nodes where a state has them."""
+    contacts, bodies = len(robot.ground.contacts), len(state) // 13
+    nodes, frames = np.empty((4 * bodies, NODE_COLUMNS)), np.empty((contacts, FRAME_COLUMNS))
+    pulls, pushes = np.empty((len(robot.cables), PULL_COLUMNS)), np.empty((contacts, 3))
+    forces = Forces(nodes, frames, pulls, pushes)
+    move_robot(robot, state, forces)
+    return forces
 
 
 def forces_at(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Forces, np.ndarray]:
     """All forces without actuation, and as forces on the bodies."""
     bodies = len(state) // 13
-    nodes = np.empty((4 * bodies, NODE_COLUMNS))
-    pulls = np.empty((len(robot.cables), PULL_COLUMNS))
-    forces = Forces(nodes, pulls, np.empty((len(robot.contacts), 3)))
-    generalized = np.empty(6 * bodies)
-    move_nodes(state, robot.p_BN, nodes)
+    forces, generalized = moved(robot, state), np.empty(6 * bodies)
     compute_forces(robot, modes, np.zeros(bodies - 1), True, forces, generalized)
     return forces, generalized
 
@@ -44,7 +52,8 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
     robot = make_model(scenario, structure)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
-    update_modes(moved_nodes(structure, state), robot.contacts, robot.ground, modes)
+    forces = moved(robot, state)
+    update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
     assert np.count_nonzero(modes[:, 0]) > 0, "some nodes touch the ground"
     return robot, state, modes
 

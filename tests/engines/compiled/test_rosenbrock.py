@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces
+from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.cable import PULL_COLUMNS
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
-from tetra_drake.physics.kinematics import NODE_COLUMNS, move_nodes
+from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.model import JUNCTION_CABLES, make_model
 from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
 from tetra_drake.scenario.schema import Scenario
@@ -41,6 +42,7 @@ class Stepper:
         )
         self.forces = Forces(
             np.empty((4 * bodies, NODE_COLUMNS)),
+            np.empty((len(contacts), FRAME_COLUMNS)),
             np.empty((len(self.robot.cables), PULL_COLUMNS)),
             np.empty((len(contacts), 3)),
         )
@@ -59,7 +61,7 @@ class Stepper:
         work.state[:] = self.start()
         estimates = []
         for i in range(steps):
-            move_nodes(work.state, self.robot.p_BN, self.forces.nodes)
+            move_robot(self.robot, work.state, self.forces)
             signals = 1e2 * PULL * i * h
             compute_forces(self.robot, self.modes, signals, True, self.forces, work.force)
             signals = 1e2 * PULL * (i + 1) * h

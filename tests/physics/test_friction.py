@@ -1,0 +1,108 @@
+"""Coulomb friction of a node, against the law's own statements."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tetra_drake.physics.contact import Law
+from tetra_drake.physics.friction import (
+    Slide,
+    coulomb_damping,
+    coulomb_force,
+    next_coulomb_mode,
+)
+
+C, K, STATIC, KINETIC, NORMAL = 70.0, 1000.0, 0.6, 0.5, 0.2
+ALONG_X = (1.0, 0.0)
+
+
+def law(*, k: float = K, forward: float = 1.0, backward: float = 1.0, lateral: float = 1.0) -> Law:
+    """With directional factors."""
+    numbers = dict.fromkeys(Law._fields, 0.0)
+    numbers |= {"static": STATIC, "kinetic": KINETIC}
+    numbers |= {"bristle_stiffness": k, "bristle_damping": C}
+    factors = {"per_forward": forward, "per_backward": backward, "per_lateral": lateral}
+    return Law(**numbers | {name: 1.0 / factor for name, factor in factors.items()})
+
+
+def slide(v=(0.0, 0.0), x=(0.0, 0.0), mode=(0.0, 0.0), heading=ALONG_X) -> Slide:
+    return Slide(v, x, mode, heading, NORMAL)
+
+
+def test_in_stick_the_bristle_is_a_spring_and_a_damper():
+    # -(70 * 2e-4 + 1000 * 3e-5) = -0.044 < 0.6 * 0.2 N
+    force = coulomb_force(slide(v=(2e-4, 0.0), x=(3e-5, -1e-5)), law())
+    assert force == pytest.approx((-0.044, 0.01), rel=1e-12)
+
+
+@pytest.mark.parametrize(("mode", "coefficient"), [((0.0, 0.0), STATIC), ((0.6, 0.8), KINETIC)])
+@pytest.mark.parametrize("angle", [0.0, 1.0, 2.5])
+def test_the_force_is_limited_by_the_load_and_opposes_the_motion(mode, coefficient, angle):
+    v = 0.05 * math.cos(angle), 0.05 * math.sin(angle)
+    force = coulomb_force(slide(v=v, mode=mode), law())
+    expected = [-coefficient * NORMAL * each / 0.05 for each in v]
+    assert force == pytest.approx(expected, rel=1e-12)
+
+
+def test_slow_slip_is_viscous_and_forgets_the_bristle():
+    # c v = 0.07 N < 0.5 * 0.2 N
+    force = coulomb_force(slide(v=(1e-3, 0.0), x=(1.0, 1.0), mode=ALONG_X), law())
+    assert force == pytest.approx((-0.07, 0.0), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("v", "factor"),
+    [((0.3, 0.0), 2.0), ((-0.3, 0.0), 3.0), ((0.0, 0.3), 0.5), ((0.0, -0.3), 0.5)],
+)
+def test_directional_factors_are_those_along_and_across_the_heading(v, factor):
+    directional = law(forward=2.0, backward=3.0, lateral=0.5)
+    force = coulomb_force(slide(v=v, mode=ALONG_X), directional)
+    expected = [-factor * KINETIC * NORMAL * each / 0.3 for each in v]
+    assert force == pytest.approx(expected, rel=1e-12)
+    turned = slide(v=(v[1], -v[0]), mode=ALONG_X, heading=(0.0, -1.0))
+    force = coulomb_force(turned, directional)
+    assert force == pytest.approx([expected[1], -expected[0]], rel=1e-12)
+
+
+def test_between_the_axes_the_limit_is_an_ellipse():
+    # On (u / a)^2 + (v / b)^2 = 1 in the direction (1, 1): u = v = ab / sqrt(a^2 + b^2).
+    force = coulomb_force(slide(v=(0.3, 0.3), mode=ALONG_X), law(forward=2.0, lateral=0.5))
+    half = KINETIC * NORMAL * 2.0 * 0.5 / math.hypot(2.0, 0.5)
+    assert force == pytest.approx((-half, -half), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("v", "x", "before", "after", "anew"),
+    [
+        ((1e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (0.0, 0.0), False),  # 0.107 < 0.12 N
+        ((3e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (1.0, 0.0), False),  # 0.121 N
+        ((0.0, 3e-4), (0.0, 1e-4), (0.0, 0.0), (0.0, 1.0), False),
+        ((-1e-4, 0.0), (2e-4, 0.0), (0.0, 0.0), (0.0, 0.0), False),  # beyond it, but moving back
+        ((1e-3, 1e-3), (0.0, 0.0), (1.0, 0.0), (1.0, 0.0), False),  # slips on
+        ((-1e-4, 0.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0), True),  # has turned round: sticks
+        ((-0.1, 0.1), (9.0, 9.0), (1.0, 0.0), (-(0.5**0.5), 0.5**0.5), True),  # and breaks free
+    ],
+)
+def test_breaks_free_beyond_the_static_limit_and_sticks_at_a_reversal(v, x, before, after, anew):
+    mode, sticks_anew = next_coulomb_mode(slide(v=v, x=x, mode=before), law())
+    assert mode == pytest.approx(after, abs=1e-15)
+    assert sticks_anew == anew
+
+
+@pytest.mark.parametrize("mode", [(0.0, 0.0), (0.8, 0.6)])
+@pytest.mark.parametrize("v", [(3e-4, -2e-4), (0.02, 0.01)])
+def test_the_damping_is_the_derivative_of_the_force(mode, v):
+    time, h, x = 1e-3, 1e-9, (2e-5, 1e-5)
+
+    def force(dv: np.ndarray, dx: np.ndarray) -> np.ndarray:
+        moved = slide(v=tuple(np.array(v) + dv), x=tuple(np.array(x) + dx), mode=mode)
+        return np.array(coulomb_force(moved, law()))
+
+    zero, expected = np.zeros(2), np.zeros((2, 2))
+    for i, step in enumerate(h * np.eye(2)):
+        by_velocity = (force(step, zero) - force(-step, zero)) / (2 * h)
+        by_deflection = (force(zero, step) - force(zero, -step)) / (2 * h)
+        expected[:, i] = -(time * by_velocity + time**2 * by_deflection)
+    a, b, c = coulomb_damping(slide(v=v, x=x, mode=mode), time, law())
+    np.testing.assert_allclose([[a, b], [b, c]], expected, atol=1e-6 * time * C)
