@@ -1,10 +1,12 @@
-"""One tetrahedron on the ground: the diagram of settling_node.py and sliding_tetrahedron.py.
+"""One tetrahedron on the ground: the diagram of settling_node.py, sliding_tetrahedron.py, and
+tetrahedron_on_incline.py.
 
     ground ──→ plant ──┬──→ state
       ↑                │
       └────────────────┘
 
-It stands on its base triangle, `top` in front and the two bottom nodes behind, which move alike.
+It stands on its base triangle, `top` in front and the two bottom nodes behind, which move alike;
+on an incline without start it is turned with the slope.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
@@ -49,13 +53,13 @@ class Motion:
     normal_forces: np.ndarray
     """(samples, 3)."""
     friction_forces: np.ndarray
-    """(samples, 3, 2): along x and y."""
+    """(samples, 3, 2): along t1 and t2, which are x and y on flat ground."""
     modes: np.ndarray
-    """(samples, 3, 3): contact, and friction modes along x and y, as GroundContact has them."""
+    """(samples, 3, 3): contact, and friction modes along t1 and t2, as GroundContact has them."""
 
 
 def make_standing_tetrahedron(scenario: Scenario) -> Structure:
-    """One tetrahedron of the robot, without cables, with its base at height 0.
+    """One tetrahedron of the robot, without cables, with its base on the ground around the origin.
 
     Its body frame is turned with it, which its inertia, the same about all axes, allows.
     """
@@ -65,11 +69,16 @@ def make_standing_tetrahedron(scenario: Scenario) -> Structure:
         robot,
         bodies=("T1",),
         p_BN=p_BN,
-        p_WB=np.array([[0.0, 0.0, -p_BN[TRAILING, 2]]]),
+        p_WB=-p_BN[TRAILING, 2] * ground_axes(robot)[None, 2],
         cables=robot.cables[:0],
         cable_names=(),
         contacts=np.array(BASE),
     )
+
+
+def ground_axes(structure: Structure) -> np.ndarray:
+    """(3, 3): the tangents t1 and t2 and the normal of the ground at the start, as rows."""
+    return RotationMatrix(Quaternion(structure.q_WB)).matrix().T
 
 
 def make_diagram(scenario: Scenario) -> Diagram:
@@ -95,7 +104,8 @@ def make_diagram(scenario: Scenario) -> Diagram:
 def let_go(
     scenario: Scenario, *, height: float, velocity: Sequence[float], duration: float
 ) -> Motion:
-    """Simulates the tetrahedron from `height` (m) of its base and `velocity` (3,) in m/s."""
+    """Simulates the tetrahedron from `height` (m) of its base over the ground and `velocity` (3,)
+    in m/s along t1, t2 and the ground's normal."""
     tetrahedron, diagram = make_standing_tetrahedron(scenario), make_diagram(scenario)
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-4).set_target_accuracy(1e-4)
@@ -103,8 +113,9 @@ def let_go(
     context.SetAccuracy(1e-4)  # localises contact and stiction changes to 1e-4 times 0.01 s
 
     start = tetrahedron.initial_state  # [q; v]: quaternion, position, angular velocity, velocity
-    start[6] += height
-    start[10:] = velocity
+    axes = ground_axes(tetrahedron)
+    start[4:7] += height * axes[2]
+    start[10:] = velocity @ axes
     plant = diagram.GetSubsystemByName("plant")
     plant.SetPositionsAndVelocities(plant.GetMyMutableContextFromRoot(context), start)
     simulator.AdvanceTo(duration)

@@ -8,6 +8,7 @@ import robot
 import settling_node
 import single_oscillator
 import sliding_tetrahedron
+import tetrahedron_on_incline
 from pydrake.systems.analysis import Simulator
 
 from tetra_drake.figures.block_diagram import graphviz_source
@@ -18,7 +19,13 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 @pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
 @pytest.mark.parametrize(
     ("script", "files"),
-    [(single_oscillator, 3), (settling_node, 2), (sliding_tetrahedron, 2), (robot, 2)],
+    [
+        (single_oscillator, 3),
+        (settling_node, 2),
+        (sliding_tetrahedron, 2),
+        (tetrahedron_on_incline, 2),
+        (robot, 2),
+    ],
 )
 def test_a_script_writes_its_pictures(script, files, tmp_path, monkeypatch):
     options = ["--duration", "0.1"] if script is robot else []

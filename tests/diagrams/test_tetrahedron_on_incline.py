@@ -1,0 +1,194 @@
+"""A tetrahedron on an incline, and on level ground under directional friction, against mechanics.
+
+For the centre of mass, whatever the nodes' loads and however it rocks: friction that is mu times
+the normal force at every node gives m dv_t = -m g sin dt - mu dP along the slope and
+m dv_n = dP - m g cos dt across it, P the impulse of the normal forces. So v_t + mu v_n changes by
+-g (sin + mu cos) t exactly, while all nodes slip uphill; downhill the sign of mu changes.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from one_tetrahedron import ground_axes, let_go, make_standing_tetrahedron, weight
+from tetrahedron_on_incline import (
+    GENTLE,
+    KINETIC,
+    SPEED,
+    STATIC,
+    STEEP,
+    acceleration,
+    analytic_travel,
+    creep_speed,
+    deflection,
+    friction_ratio,
+    on_incline,
+    parts_of_weight,
+    start,
+    stopping,
+    travel,
+    velocity,
+)
+
+from tetra_drake.robot.bodies import tetrahedron_inertia
+from tetra_drake.robot.structure import BASE
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Coulomb
+from tetra_drake.scenario.units import INCH
+
+
+def centre_velocity(motion, scenario):
+    """(samples, 3): that of the centre of mass along t1, t2 and the normal."""
+    return motion.v_WN.mean(axis=1) @ ground_axes(make_standing_tetrahedron(scenario)).T
+
+
+def slips(motion):
+    """(samples,): whether all nodes slip."""
+    return (motion.modes[:, :, 1:] != 0.0).any(axis=2).all(axis=1)
+
+
+def energy(motion, scenario):
+    """(samples,): of motion, weight, ground, and the bristles that stick."""
+    structure = make_standing_tetrahedron(scenario)
+    inertia, law = tetrahedron_inertia(structure), scenario.friction
+    t1, t2, n = ground_axes(structure)
+    v_WB, p_WB = motion.v_WN.mean(axis=1), motion.p_WN.mean(axis=1)
+    # The angular velocity from the nodes: sum |w x r|^2 = 2/3 |w|^2 sum r^2.
+    moment = inertia.get_unit_inertia().get_moments()[0] / (structure.p_BN**2).sum() * 3 / 2
+    turning = moment * ((motion.v_WN - v_WB[:, None]) ** 2).sum(axis=(1, 2))
+    kinetic = 0.5 * inertia.get_mass() * ((v_WB**2).sum(axis=1) + turning)
+    depth = np.maximum(-motion.p_WN[:, BASE] @ n, 0.0)
+    ground = 0.5 * scenario.ground.stiffness * (depth**2).sum(axis=1)
+    total = kinetic + weight(scenario) * p_WB[:, 2] + ground
+    if isinstance(law, Coulomb) and law.stiffness:
+        # A node sticks where it was at the last sample at which it did not, or at first.
+        sticks = (motion.modes[:, :, 0] == 1.0) & (motion.modes[:, :, 1:] == 0.0).all(axis=2)
+        since = np.where(sticks, 0, np.arange(len(sticks))[:, None])
+        p_WN = motion.p_WN[:, BASE] @ np.array([t1, t2]).T
+        stick_point = p_WN[np.maximum.accumulate(since), np.arange(len(BASE))]
+        stretch = ((p_WN - stick_point) ** 2).sum(axis=2)
+        total += 0.5 * law.stiffness * (sticks * stretch).sum(axis=1)
+    return total
+
+
+def test_below_the_coefficient_it_stays():
+    # What is left after t decays with k / c: exp(-62.5 / s t), 1e-8 in 0.3 s.
+    scenario = on_incline(GENTLE)
+    motion = start(scenario, duration=0.35)
+    assert not slips(motion).any()
+    assert travel(motion, scenario)[-1] == pytest.approx(-deflection(scenario), rel=1e-6)
+    assert abs(velocity(motion, scenario)[-1]) < 1e-6 * creep_speed(scenario)
+    assert friction_ratio(motion)[-1] == pytest.approx(math.tan(GENTLE), rel=1e-6)
+    # Rigid, so that the nodes move alike but for its tilt: each bears a third, whatever its load.
+    np.testing.assert_allclose(
+        motion.friction_forces[-1, :, 0], parts_of_weight(scenario)[0] / 3.0, rtol=2e-5
+    )
+
+
+def test_without_stiffness_it_creeps():
+    scenario = on_incline(GENTLE, stiffness=0.0)
+    motion = start(scenario, duration=0.2)
+    assert velocity(motion, scenario)[-1] == pytest.approx(-creep_speed(scenario), rel=1e-6)
+
+
+def test_above_the_coefficient_it_slides():
+    scenario = on_incline(STEEP)
+    assert math.tan(STEEP) > STATIC > KINETIC
+    motion = start(scenario, duration=0.3)
+    first = int(np.argmax(slips(motion)))
+    assert motion.times[first] < 1e-3
+    # A node breaks free at mu_static and slips at mu_kinetic once it is faster than mu F_N / c,
+    # which is all of them a hundredth of a second later.
+    late = motion.times > 0.01
+    np.testing.assert_allclose(friction_ratio(motion)[late], KINETIC, rtol=1e-12)
+    v, t = centre_velocity(motion, scenario)[late], motion.times[late]
+    a = acceleration(scenario, way=-1.0)
+    gain = v[:, 0] - KINETIC * v[:, 2]
+    np.testing.assert_allclose(gain - gain[0], a * (t - t[0]), atol=1e-9 * abs(gain[-1]))
+    settled = motion.times > 0.2
+    slope, _ = np.polyfit(motion.times[settled], velocity(motion, scenario)[settled], 1)
+    assert slope == pytest.approx(a, rel=1e-6)
+
+
+@pytest.mark.parametrize("forward", [1.0, 2.0])
+def test_thrown_uphill_it_stops_and_stays(forward):
+    scenario = on_incline(GENTLE, forward=forward)
+    motion = start(scenario, speed=SPEED, duration=0.35)
+    a = acceleration(scenario, way=1.0)
+    time, way = stopping(motion, scenario)
+    ups = slips(motion) & (motion.times < -SPEED / a - 1e-3)
+    np.testing.assert_allclose(friction_ratio(motion)[ups], -forward * KINETIC, rtol=1e-12)
+    v, t = centre_velocity(motion, scenario)[ups], motion.times[ups]
+    gain = v[:, 0] + forward * KINETIC * v[:, 2]
+    np.testing.assert_allclose(gain - gain[0], a * (t - t[0]), atol=1e-9 * SPEED)
+    # Below mu F_N / c, at most 1.5 mm/s, friction is damping, and the body rocks: 0.7 ms more.
+    assert time == pytest.approx(-SPEED / a, abs=1e-3)
+    assert way == pytest.approx(-(SPEED**2) / (2.0 * a), abs=5e-3 * INCH)
+    rest = motion.times > time
+    after = travel(motion, scenario)[rest]
+    assert after.max() - after.min() < 2.0 * deflection(scenario)
+    assert abs(velocity(motion, scenario)[-1]) < 1e-3 * creep_speed(scenario)
+
+
+def test_the_lines_of_the_figure_are_those_of_the_simulation():
+    for slope, settings, speed, close in (
+        (GENTLE, {}, 0.0, 5e-6),
+        (GENTLE, {"stiffness": 0.0}, 0.0, 5e-6),
+        (STEEP, {}, 0.0, 5e-3),
+        (GENTLE, {}, SPEED, 5e-3),
+    ):
+        scenario = on_incline(slope, **settings)
+        motion = start(scenario, speed=speed, duration=0.1)
+        analytic = analytic_travel(motion, scenario)
+        np.testing.assert_allclose(travel(motion, scenario), analytic, rtol=0, atol=close * INCH)
+
+
+FACTORS = {"forward": 1.5, "backward": 2.0, "lateral": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("degrees", "factor"),
+    [
+        (0.0, 1.5),
+        (180.0, 2.0),
+        (90.0, 0.5),
+        (-90.0, 0.5),
+        # On the ellipse: 1 / sqrt((cos / a_f)^2 + (sin / a_l)^2).
+        (60.0, 1.0 / math.hypot(0.5 / 1.5, math.sqrt(0.75) / 0.5)),
+        (120.0, 1.0 / math.hypot(0.5 / 2.0, math.sqrt(0.75) / 0.5)),
+    ],
+)
+def test_friction_has_the_factor_of_the_direction_of_slip(degrees, factor):
+    # It lands and is thrown with its heading along x. On level ground friction opposes the
+    # velocity, so the path is straight, but for a yaw while it rocks.
+    law = Coulomb(static=0.3, kinetic=0.3, **FACTORS)
+    scenario = load_scenario("thesis").with_changes({"friction": law})
+    way = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
+    depth = weight(scenario) / (len(BASE) * scenario.ground.stiffness)
+    motion = let_go(scenario, height=-depth, velocity=SPEED * way, duration=0.1)
+    mu, v = 0.3 * factor, motion.v_WN.mean(axis=1)
+    expected = SPEED - mu * scenario.robot.gravity * motion.times
+    np.testing.assert_allclose(v @ way + mu * v[:, 2], expected, atol=1e-9 * SPEED)
+    sideways = v @ np.array([-way[1], way[0], 0.0])
+    np.testing.assert_allclose(sideways, 0.0, atol=1e-7 * SPEED)
+
+
+@pytest.mark.parametrize(
+    ("slope", "settings", "speed"),
+    [
+        (GENTLE, {}, SPEED),
+        (GENTLE, {"stiffness": 0.0}, SPEED),
+        (GENTLE, {"forward": 2.0}, SPEED),
+        (STEEP, {}, 0.0),
+        (GENTLE, None, SPEED),
+        (STEEP, None, 0.0),
+    ],
+)
+def test_energy_never_rises(slope, settings, speed):
+    scenario = on_incline(slope, **(settings or {}))
+    if settings is None:
+        friction = load_scenario("thesis").friction
+        scenario = scenario.with_changes({"friction": friction})
+    motion = start(scenario, speed=speed, duration=0.2)
+    total = energy(motion, scenario)
+    assert np.diff(total).max() < 1e-12 * np.ptp(total)
