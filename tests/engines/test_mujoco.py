@@ -1,6 +1,7 @@
 """The engine `mujoco`: the same robot as on the other engines, on ground of its own."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -10,9 +11,14 @@ from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
+from tetra_drake.physics.terrain import GAP, N_Z, T1_Z, T2_Z
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.robot.ground import ground_frames, make_ground
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.terrain import Flat, HeightField, Incline, Rough
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 needs_mujoco = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
@@ -30,6 +36,12 @@ def trajectory_of(scenario: Scenario) -> xarray.Dataset:
     result = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True)
     assert result.trajectory is not None
     return result.trajectory
+
+
+def weight_of(scenario: Scenario) -> float:
+    """Of the robot, in N."""
+    mass = tetrahedron_inertia(MakeStructure(scenario)).get_mass()
+    return scenario.robot.tetrahedra * mass * scenario.robot.gravity
 
 
 @needs_mujoco
@@ -177,3 +189,87 @@ def test_the_command_simulate_takes_the_engine(tmp_path):
     found = json.loads((out / "result.json").read_text())
     assert found["engine"] == "mujoco" and "mujoco" in found["versions"]
     assert {"trajectory.nc", "replay.html"} <= {path.name for path in out.iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("static", 0.6), ("stiffness", 1e3), ("forward", 0.5), ("backward", 0.5), ("lateral", 2.0)],
+)
+def test_coulomb_friction_that_mujoco_has_not_is_refused(short, name, value, monkeypatch):
+    monkeypatch.setattr(engine, "installed", lambda: True)
+    with pytest.raises(InputError) as caught:
+        simulate(
+            scenario=short.with_changes({"friction": Coulomb(**{name: value})}),
+            gait=seeded_gait(short),
+        )
+    assert caught.value.key == f"friction.{name}"
+
+
+@needs_mujoco
+def test_nodes_that_do_not_touch_the_ground_change_nothing(short):
+    few, all_nodes = (
+        trajectory_of(short.with_changes({"robot.contacts": nodes})) for nodes in ("thesis", "all")
+    )
+    xarray.testing.assert_allclose(few["p_WN"], all_nodes["p_WN"], rtol=0.0, atol=1e-9)
+
+
+@needs_mujoco
+def test_walks_on_an_incline_as_the_compiled_engine_does(short):
+    # The damping of the normal force differs, so that the robot lands a little differently.
+    slope = {"terrain": Incline(slope=math.radians(5.0)), "friction": Coulomb()}
+    walk = short.with_changes(slope | {"simulation.duration": 1.0})
+    ours = trajectory_of(walk.with_changes({"simulation.engine": "compiled"}))
+    theirs = trajectory_of(walk)
+    assert np.ptp(ours["p_WB"].sel(axis="x").values, axis=0).max() > 3e-3
+    assert float(abs(theirs["p_WN"] - ours["p_WN"]).max()) < 2e-4  # 0.2 mm
+
+
+@needs_mujoco
+def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure):
+    angle, times = math.radians(3.0), {"simulation.duration": 1.2, "cpg.start_up": 1.25}
+    creeping = {"terrain": Incline(slope=angle), "friction": Coulomb(), **times}
+    scenario = short.with_changes(creeping)
+    end = trajectory_of(scenario).isel(time=-1)
+    weight = weight_of(scenario)
+    normal, friction = end["normal_force"].values, end["friction_force"].values
+    assert normal.sum() == pytest.approx(weight * math.cos(angle), rel=1e-4)
+    uphill = [weight * math.sin(angle), 0.0]
+    np.testing.assert_allclose(friction.sum(axis=0), uphill, rtol=1e-3, atol=1e-9)
+    # The law in stick, at each node: F = -c v.
+    v_WN = end["v_WN"].values.reshape(-1, 3)[structure.contacts]
+    t_1 = np.array([math.cos(angle), 0.0, math.sin(angle)])
+    creep = np.where(normal > 0.0, v_WN @ t_1, 0.0)
+    expected = -Coulomb().damping * creep
+    np.testing.assert_allclose(friction[:, 0], expected, atol=5e-3 * expected.max())
+
+
+@needs_mujoco
+def test_a_height_field_that_is_level_is_flat_ground(short, tmp_path):
+    np.save(tmp_path / "level.npy", np.zeros((61, 61)))
+    level = HeightField(str(tmp_path / "level.npy"), cell=INCH)
+    flat, field = (
+        trajectory_of(short.with_changes({"friction": Coulomb(), "terrain": terrain}))
+        for terrain in (Flat(), level)
+    )
+    assert float(abs(field["p_WN"] - flat["p_WN"]).max()) < 1e-4
+
+
+@needs_mujoco
+def test_stands_on_the_surface_of_the_terrain(short):
+    rough = Rough(amplitude=0.25 * INCH, wavelength=6.0 * INCH)
+    times = {"simulation.duration": 1.2, "cpg.start_up": 1.25}
+    changes = {"terrain": rough, "robot.contacts": "all", "friction": Coulomb(), **times}
+    standing = short.with_changes(changes)
+    structure = MakeStructure(standing)
+    end = trajectory_of(standing).isel(time=-1)
+    nodes = end["p_WN"].values.reshape(-1, 3)[structure.contacts]
+    frames = ground_frames(nodes, make_ground(standing, structure))
+    normal, friction = end["normal_force"].values, end["friction_force"].values
+    borne = normal > 0.0
+    assert borne.any() and np.ptp(nodes[borne, 2]) > 1e-3
+    # Triangles between points 0.3 in apart are off by some 0.01 mm.
+    depth = normal[borne] / standing.ground.stiffness
+    np.testing.assert_allclose(-frames[borne, GAP], depth, atol=3e-5)
+    along_z = normal * frames[:, N_Z] + friction[:, 0] * frames[:, T1_Z]
+    upward = (along_z + friction[:, 1] * frames[:, T2_Z]).sum()
+    assert upward == pytest.approx(weight_of(standing), rel=1e-3)

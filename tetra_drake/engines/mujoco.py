@@ -2,13 +2,21 @@
 
 Bodies, cables, actuation and gravity are those of the other engines. The ground is MuJoCo's soft
 contact with a cone of friction. The normal force has the scenario's stiffness, but constant
-damping: the scenario's at the depth of rest, which otherwise grows with depth. A node that sticks
-is held by the scenario's stiction damping, but breaks free where that exceeds `mujoco.friction`
-times the normal force, not after a deflection, and then does not slide almost freely.
+damping: the scenario's at the depth of rest on the nodes of the thesis, which otherwise grows with
+depth. Coulomb friction without stiffness is the scenario's own, and robots walk as far as on the
+other engines. In place of the reset integrator, a node that sticks is held by the scenario's
+stiction damping, but breaks free where that exceeds `mujoco.friction` times the normal force, not
+after a deflection, and then does not slide almost freely.
+
+A plane is exact. Any other terrain is a height field of MuJoCo: triangles between heights of the
+scenario's surface. A node that crosses an edge between two of them is pushed by both for an
+instant, so that distances differ by some 0.1 in. The field ends where the terrain's grid does: a
+robot that leaves it falls, and has diverged.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -18,13 +26,18 @@ import numpy as np
 
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
+from tetra_drake.physics.contact import Ground
+from tetra_drake.physics.terrain import N_X, N_Z, T1_X, T1_Z, T2_Y, T2_Z
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.ground import ground_frames, ground_heights
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.terrain import Flat, Incline
+from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
     import xarray
@@ -37,7 +50,20 @@ _IMPEDANCE = 0.5
 """Of contacts. Nothing at rest depends on it, nor do converged distances by more than 0.01 in;
 with a smaller one friction chatters in steps beyond 0.06 ms, with a larger one errors grow."""
 
-_POINT = 1e-5  # radius (m) of the spheres that touch the floor: it acts on the centres of nodes
+_POINT = 1e-5  # radius (m) of the spheres that touch a plane: it acts on the centres of nodes
+
+_BALL = 1e-3
+"""Radius (m) of those that touch a height field. A sphere that sinks in by more is caught at the
+edges of triangles, and a robot on rough ground lands 0.7 mm deep; a larger one is pushed by two
+triangles for longer."""
+
+_FINER, _FINEST, _MOST_CELLS = 10, 0.1 * INCH, 1000
+"""Cells of a height field along x and along y: for each one of the terrain's, but none smaller than
+the second (m), lest several push a sphere at once, and not more than the third in all."""
+
+_BASE = 0.1  # m of solid below the lowest point of a height field
+
+_ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs of `contact` touch each other
 
 _STRETCH = 5000  # steps between two checks of whether a simulation is still stable
 
@@ -109,15 +135,15 @@ def installed() -> bool:
     return hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE")
 
 
-def make_mjcf(scenario: Scenario) -> str:
-    """The robot in MuJoCo's format, with one motor per driven cable."""
-    model = Element("mujoco", model=scenario.name)
-    structure, settings = MakeStructure(scenario), scenario.mujoco
-    robot = make_model(scenario, structure)
+def make_mjcf(scenario: Scenario, structure: Structure, robot: Model) -> str:
+    """The robot and its ground in MuJoCo's format, with one motor per driven cable."""
+    model, settings = Element("mujoco", model=scenario.name), scenario.mujoco
     steps = {"integrator": settings.integrator, "timestep": settings.step}
     _add(model, "compiler", inertiafromgeom="false")
     _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], cone="elliptic", **steps)
-    _add_bodies(model, structure, robot, _contact(scenario, structure, robot))
+    world = _add(model, "worldbody")
+    radius = _add_floor(model, world, scenario, structure, robot.ground)
+    _add_bodies(model, world, structure, robot, _contact(scenario, structure, robot), radius)
     _add_cables(model, structure)
     return tostring(model, encoding="unicode")
 
@@ -135,7 +161,9 @@ class _Robot:
         self._mujoco: Any = mujoco
         self._scenario = scenario
         self.structure = MakeStructure(scenario)
-        self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario))
+        robot = make_model(scenario, self.structure)
+        self._ground = robot.ground
+        self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario, self.structure, robot))
         self._max_speed = min(scenario.simulation.max_speed, _MAX_SPEED)
         driven = self.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # the signal of each motor
@@ -222,7 +250,7 @@ class _Robot:
         )
 
     def _ground_forces(self, data: Any, found: Array, signals: Array) -> Array:
-        """(contacts, 3): MuJoCo's contact forces on the nodes in World, in N."""
+        """(contacts, 3): MuJoCo's contact forces on the nodes along t1, t2 and n, in N."""
         mujoco, model = self._mujoco, self._model
         mujoco.mj_setState(model, data, found, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         data.ctrl[:] = signals[self._motors]
@@ -232,7 +260,12 @@ class _Robot:
             mujoco.mj_contactForce(model, data, i, wrench)
             # The floor is geom 0; those of the contact nodes follow in their order.
             forces[contact.geom[1] - 1] += contact.frame.reshape(3, 3).T @ wrench[:3]
-        return forces
+        frames = ground_frames(data.site_xpos[self.structure.contacts], self._ground)
+        axes = np.zeros((len(frames), 3, 3))  # t1, t2 and n, by rows
+        axes[:, 0] = frames[:, T1_X : T1_Z + 1]
+        axes[:, 1, 1:] = frames[:, T2_Y : T2_Z + 1]
+        axes[:, 2] = frames[:, N_X : N_Z + 1]
+        return (axes @ forces[:, :, None])[:, :, 0]
 
 
 def check_mujoco(scenario: Scenario) -> None:
@@ -241,34 +274,89 @@ def check_mujoco(scenario: Scenario) -> None:
         raise InputError(scenario.name, "simulation.engine", f"mujoco is not installed: {INSTALL}")
     if scenario.cables.slack:
         raise InputError(scenario.name, "cables.slack", "found true, which mujoco cannot simulate")
+    if isinstance(law := scenario.friction, Coulomb):
+        possible = {"static": law.kinetic, "stiffness": 0.0}
+        possible |= {"forward": 1.0, "backward": 1.0, "lateral": 1.0}
+        for name, value in possible.items():
+            if (found := getattr(law, name)) != value:
+                problem = f"found {found:g}, but mujoco can simulate only {value:g}"
+                raise InputError(scenario.name, f"friction.{name}", problem)
 
 
-def _add_bodies(model: Element, structure: Structure, robot: Model, contact: dict) -> None:
-    """The tetrahedra, with a site at each node, and the floor, which only contact nodes touch."""
-    world, pairs = _add(model, "worldbody"), _add(model, "contact")
-    alone = {"contype": "0", "conaffinity": "0"}  # only the pairs touch each other
-    _add(world, "geom", name="floor", type="plane", pos=[0, 0, -_POINT], size="0 0 1", **alone)
-    names = iter(enumerate(structure.node_names))
+def _add_floor(
+    model: Element, world: Element, scenario: Scenario, structure: Structure, ground: Ground
+) -> float:
+    """The floor, which is geom 0: a plane, or a height field. Returns the radius (m) of the spheres
+    on the nodes that touch it, below whose centres it lies by as much."""
+    terrain = scenario.terrain
+    floor = {"name": "floor", **_ALONE}
+    if isinstance(terrain, Flat) or (isinstance(terrain, Incline) and terrain.start is None):
+        slope = terrain.slope if isinstance(terrain, Incline) else 0.0
+        pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
+        _add(world, "geom", type="plane", pos=pos, quat=structure.q_WB, size="0 0 1", **floor)
+        return _POINT
+    low, far, heights = _sampled(ground)
+    least, span = heights.min(), max(np.ptp(heights), _BALL)
+    rows = (heights.T[::-1] - least) / span  # of constant y, the largest first
+    size = [*(far - low) / 2, span, _BASE]
+    shape = {"nrow": str(len(rows)), "ncol": str(len(heights))}
+    _add(_add(model, "asset"), "hfield", name="floor", size=size, elevation=rows, **shape)
+    pos = [*(low + far) / 2, least]
+    _add(world, "geom", type="hfield", hfield="floor", pos=pos, **floor)
+    return _BALL
+
+
+def _sampled(ground: Ground) -> tuple[Array, Array, Array]:
+    """The corners (x, y) of the ground's grid, and the heights on a finer one, rows along x, of a
+    surface that lies _BALL below it along the normal."""
+    law = ground.law[0]
+    columns = int(law["columns"])
+    cells = np.array([ground.heights.size // columns - 1, columns - 1])
+    low = np.array([law["corner_x"], law["corner_y"]])
+    far = low + cells / (law["per_cell_x"], law["per_cell_y"])
+    finer = np.minimum(_FINER * cells, np.minimum((far - low) / _FINEST, _MOST_CELLS))
+    # Odd numbers of cells: else edges would run under rows of nodes, which two triangles then bear.
+    points = 2 * (finer // 2).astype(int) + 2
+    axes = (np.linspace(a, b, n) for a, b, n in zip(low, far, points, strict=True))
+    x_y = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    p_WN = np.column_stack([x_y, ground_heights(x_y, ground)])
+    heights = p_WN[:, 2] - _BALL / ground_frames(p_WN, ground)[:, N_Z]
+    return low, far, heights.reshape(points)
+
+
+def _add_bodies(
+    model: Element,
+    world: Element,
+    structure: Structure,
+    robot: Model,
+    contact: dict,
+    radius: float,
+) -> None:
+    """The tetrahedra, with a site at each node, and spheres on those that touch the floor."""
+    pairs, names = _add(model, "contact"), iter(enumerate(structure.node_names))
     mass, moment = robot.body.mass[0], robot.body.moment[0]
     for body_name, p_WB in zip(structure.bodies, structure.p_WB, strict=True):
-        body = _add(world, "body", name=body_name, pos=p_WB)
+        body = _add(world, "body", name=body_name, pos=p_WB, quat=structure.q_WB)
         _add(body, "freejoint")
         _add(body, "inertial", pos="0 0 0", mass=mass, diaginertia=3 * [moment])
         for p_BN in structure.p_BN:
             node, name = next(names)
             _add(body, "site", name=name, pos=p_BN)
             if node in structure.contacts:
-                _add(body, "geom", name=name, pos=p_BN, size=_POINT, **alone)
+                _add(body, "geom", name=name, pos=p_BN, size=radius, **_ALONE)
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
 
 
 def _contact(scenario: Scenario, structure: Structure, robot: Model) -> dict:
     """How the floor acts on a node."""
-    ground, friction = scenario.ground, scenario.mujoco.friction
-    stiction_damping = scenario.friction.stiction_damping
-    mass = robot.body.mass[0]
-    weight = mass * len(structure.bodies) * scenario.robot.gravity
-    rest_damping = ground.damping * weight / len(structure.contacts) / ground.stiffness
+    ground, law = scenario.ground, scenario.friction
+    if isinstance(law, Coulomb):
+        friction, stiction_damping = law.kinetic, law.damping
+    else:
+        friction, stiction_damping = scenario.mujoco.friction, law.stiction_damping
+    mass, bodies = robot.body.mass[0], len(structure.bodies)
+    borne = mass * bodies * scenario.robot.gravity / (2 * bodies + 1)  # by a foot of the thesis's
+    rest_damping = ground.damping * borne / ground.stiffness
     # MuJoCo takes accelerations for forces, and divides them by 1 - impedance. The minus says
     # that the numbers are stiffness and damping.
     per_mass = -(1.0 - _IMPEDANCE) / mass
