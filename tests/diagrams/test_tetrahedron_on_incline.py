@@ -130,6 +130,17 @@ def test_thrown_uphill_it_stops_and_stays(forward):
     assert abs(velocity(motion, scenario)[-1]) < 1e-3 * creep_speed(scenario)
 
 
+def test_thrown_downhill_it_stops_and_stays():
+    # v^2 / (2 g (mu cos - sin)); below c v = mu F_N the damping alone brakes it, some 0.01 in/s.
+    gentle, speed = on_incline(GENTLE), 0.5 * SPEED
+    motion = start(gentle, speed=-speed, duration=0.4)
+    expected = 0.5 * speed**2 / acceleration(gentle, way=-1.0)
+    way = -travel(motion, gentle)
+    assert way[-1] == pytest.approx(expected, rel=0.005)
+    assert not motion.modes[-1, :, 1:].any(), "all nodes stick"
+    assert np.ptp(way[motion.times > 0.3]) < 1e-4 * expected
+
+
 def test_the_lines_of_the_figure_are_those_of_the_simulation():
     for slope, settings, speed, close in (
         (GENTLE, {}, 0.0, 5e-6),

@@ -73,21 +73,21 @@ def test_between_the_axes_the_limit_is_an_ellipse():
 
 
 @pytest.mark.parametrize(
-    ("v", "x", "before", "after", "anew"),
+    ("v", "x", "before", "after"),
     [
-        ((1e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (0.0, 0.0), False),  # 0.107 < 0.12 N
-        ((3e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (1.0, 0.0), False),  # 0.121 N
-        ((0.0, 3e-4), (0.0, 1e-4), (0.0, 0.0), (0.0, 1.0), False),
-        ((-1e-4, 0.0), (2e-4, 0.0), (0.0, 0.0), (0.0, 0.0), False),  # beyond it, but moving back
-        ((1e-3, 1e-3), (0.0, 0.0), (1.0, 0.0), (1.0, 0.0), False),  # slips on
-        ((-1e-4, 0.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0), True),  # has turned round: sticks
-        ((-0.1, 0.1), (9.0, 9.0), (1.0, 0.0), (-(0.5**0.5), 0.5**0.5), True),  # and breaks free
+        ((1e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (0.0, 0.0)),  # 0.107 N < 0.6 * 0.2 N
+        ((3e-4, 0.0), (1e-4, 0.0), (0.0, 0.0), (1.0, 0.0)),  # 0.121 N
+        ((0.0, 3e-4), (0.0, 1e-4), (0.0, 0.0), (0.0, 1.0)),
+        ((-1e-4, 0.0), (2e-4, 0.0), (0.0, 0.0), (0.0, 0.0)),  # 0.193 N, but moving back
+        ((1.5e-3, 0.0), (9.0, 9.0), (1.0, 0.0), (1.0, 0.0)),  # 0.105 N > 0.5 * 0.2 N: slips on
+        ((0.0, 1.5e-3), (9.0, 9.0), (1.0, 0.0), (1.0, 0.0)),  # whichever way
+        ((1.4e-3, 0.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0)),  # 0.098 N: the damping holds it
+        ((0.0, 0.0), (9.0, 9.0), (1.0, 0.0), (0.0, 0.0)),
     ],
 )
-def test_breaks_free_beyond_the_static_limit_and_sticks_at_a_reversal(v, x, before, after, anew):
-    mode, sticks_anew = next_coulomb_mode(slide(v=v, x=x, mode=before), law())
+def test_breaks_free_beyond_the_static_limit_and_sticks_below_the_kinetic_one(v, x, before, after):
+    mode = next_coulomb_mode(slide(v=v, x=x, mode=before), law())
     assert mode == pytest.approx(after, abs=1e-15)
-    assert sticks_anew == anew
 
 
 @pytest.mark.parametrize("mode", [(0.0, 0.0), (0.8, 0.6)])

@@ -13,6 +13,8 @@ from numba.core.errors import TypingError
 from tetra_drake.physics.lanes import (
     FieldArray,
     any_lane,
+    floor,
+    gather,
     inverse_sqrt,
     lane_table,
     maximum,
@@ -166,7 +168,7 @@ def functions(x, y):
     constant = (select(x < y, 1.0, -0.0), select(x < y, 1, y), select(x < y, 1, 0))
     smaller = (minimum(x, y), minimum(y, x), minimum(x, 0.0), minimum(0.0, x), minimum(1, x))
     larger = (maximum(x, y), maximum(y, x), maximum(x, 0.0), maximum(0.0, x), maximum(x, 1))
-    return picked + constant + smaller + larger
+    return picked + constant + smaller + larger + (floor(x),)
 
 
 def functions_in_numpy(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -188,6 +190,7 @@ def functions_in_numpy(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
         *constant,
         *(the_better(np.minimum, *pair) for pair in smaller),
         *(the_better(np.maximum, *pair) for pair in larger),
+        np.floor(x),
     )
 
 
@@ -245,6 +248,21 @@ def count_rows_with_any(x, counts):
     for n in range(x.size):
         if any_lane(x[n] > 0.0):
             counts[n] += 1
+
+
+def test_gather_takes_for_each_lane_the_number_at_its_own_index(width):
+    numbers = np.arange(100.0) ** 2
+    indices = np.random.default_rng(0).integers(2, 97, 16).astype(float)
+    found = lane_table((16 // width,), width)
+
+    @jit
+    def kernel(numbers, indices, found):
+        for i in range(found.size):
+            found[i] = gather(numbers, indices[i], -2) + gather(numbers, indices[i], 3)
+
+    kernel(FieldArray(numbers), in_lanes(indices, width), found)
+    assert_same(found.array.ravel(), (indices - 2) ** 2 + (indices + 3) ** 2)
+    assert gather(numbers, 7.0, 1) == 64.0, "in plain Python"
 
 
 def test_any_lane_is_true_where_one_is(width):

@@ -1,4 +1,4 @@
-"""The surface of the ground and the frames in it, against planes, finite differences and splines."""
+"""The surface of the ground and the frames in it, against planes, differences and splines."""
 
 import numpy as np
 import pytest

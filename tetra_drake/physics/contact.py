@@ -22,6 +22,7 @@ from tetra_drake.physics.friction import (
     next_coulomb_mode,
     next_reset_mode,
     reset_force,
+    sticks,
 )
 from tetra_drake.physics.kinematics import (
     FORCE,
@@ -247,9 +248,10 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         slide, _ = sliding(nodes, modes, ground, law, frames, i)
         m_1, m_2 = slide.mode
         if ground.coulomb:
-            (n_1, n_2), anew = next_coulomb_mode(slide, law)
+            n_1, n_2 = next_coulomb_mode(slide, law)
             n_1, n_2 = select(stays, n_1, STICK), select(stays, n_2, STICK)
-            resets_1 = resets_2 = lands | (stays & anew)
+            resets_1 = sticks((n_1, n_2)) & ((sticks(slide.mode) ^ True) | lands)
+            resets_2 = resets_1
             set_heading(state, nodes, ground, frames, i, lands, modes)
         else:
             (v_1, v_2), (x_1, x_2) = slide.velocity, slide.deflection

@@ -113,25 +113,18 @@ def coulomb_force(slide: Slide, law: Any) -> Pair:
 
 
 @compiled
-def next_coulomb_mode(slide: Slide, law: Any) -> tuple[Pair, Truth]:
-    """The mode that follows, and whether the node sticks anew, if only for an instant.
-
-    It breaks free where its pull exceeds the limit as it moves outward, and sticks again once it
-    no longer moves the way it broke free.
-    """
-    (v_1, v_2), (m_1, m_2) = slide.velocity, slide.mode
-    stuck, onward = sticks(slide.mode), v_1 * m_1 + v_2 * m_2
-    anew = (stuck ^ True) & (onward <= 0.0)
-    slips_on = onward > 0.0
-    x = select(stuck, slide.deflection[0], 0.0), select(stuck, slide.deflection[1], 0.0)
-    zero = 0.0 * v_1
-    pull = coulomb_pull(Slide(slide.velocity, x, (zero, zero), slide.heading, slide.normal), law)
-    u_1, u_2 = pull.u
-    breaks = (stuck | anew) & (pull.size > pull.limit) & (u_1 * v_1 + u_2 * v_2 > 0.0)
+def next_coulomb_mode(slide: Slide, law: Any) -> Pair:
+    """The mode that follows: breaks free beyond the static limit moving outward, and sticks again
+    where its damping alone holds it."""
+    pull, stuck = coulomb_pull(slide, law), sticks(slide.mode)
+    (u_1, u_2), (v_1, v_2) = pull.u, slide.velocity
+    beyond = pull.size > pull.limit
+    breaks = stuck & beyond & (u_1 * v_1 + u_2 * v_2 > 0.0)
     length = math.sqrt(u_1 * u_1 + u_2 * u_2)
-    n_1 = select(breaks, u_1 / length, select(slips_on, m_1, STICK))
-    n_2 = select(breaks, u_2 / length, select(slips_on, m_2, STICK))
-    return (n_1, n_2), anew
+    return (
+        select(breaks, u_1 / length, select(beyond, slide.mode[0], STICK)),
+        select(breaks, u_2 / length, select(beyond, slide.mode[1], STICK)),
+    )
 
 
 @compiled

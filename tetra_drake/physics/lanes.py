@@ -263,7 +263,7 @@ def _overload_inverse_sqrt(x):  # type: ignore[no-untyped-def]
 
 def floor(x: Real) -> Real:
     """The largest whole number that is not larger."""
-    return float(math.floor(x))
+    return float(np.floor(x))
 
 
 @_intrinsic

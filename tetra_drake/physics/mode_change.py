@@ -36,12 +36,10 @@ def mode_margin(nodes: Array, modes: Array, ground: Ground, frames: Array) -> fl
         if not ground.coulomb:
             margin = min(margin, reset_margin(v_1, x_1, m_1, law))
             margin = min(margin, reset_margin(v_2, x_2, m_2, law))
-        elif sticks(slide.mode):
-            pull = coulomb_pull(slide, law)
-            outward = pull.u[0] * v_1 + pull.u[1] * v_2
-            margin = min(margin, max(pull.limit - pull.size, -outward))
-        else:
-            margin = min(margin, v_1 * m_1 + v_2 * m_2)
+            continue
+        pull = coulomb_pull(slide, law)
+        left, outward = pull.limit - pull.size, pull.u[0] * v_1 + pull.u[1] * v_2
+        margin = min(margin, max(left, -outward) if sticks(slide.mode) else -left)
     return margin
 
 
@@ -93,12 +91,10 @@ def time_to_mode_change(
             continue
         (v_1, v_2), (x_1, x_2), (m_1, m_2) = slide.velocity, slide.deflection, slide.mode
         if ground.coulomb:
-            depth = -distance
-            squeeze = law.stiffness * -v_n + law.damping * (v_n * v_n - depth * a_n)
-            rate = select(slide.normal > 0.0, law.static * squeeze, 0.0)
-            change = time_to_break_free(slide, (a_1, a_2), rate, law, horizon)
-            turns = first_zero(v_1 * m_1 + v_2 * m_2, a_1 * m_1 + a_2 * m_2, 0.0, horizon)
-            time = select(touches, minimum(time, minimum(change, turns)), time)
+            rate = law.damping * (v_n * v_n + distance * a_n) - law.stiffness * v_n
+            rate = select(slide.normal > 0.0, rate, 0.0)
+            change = time_to_coulomb_change(slide, (a_1, a_2), rate, law, horizon)
+            time = select(touches, minimum(time, change), time)
         else:
             p_0 = law.stiction_range
             time = minimum(time, time_to_reset_change(v_1, x_1, m_1, a_1, touches, p_0, horizon))
@@ -122,17 +118,20 @@ def time_to_reset_change(
 
 
 @compiled
-def time_to_break_free(
+def time_to_coulomb_change(
     slide: Slide, acceleration: tuple[Real, Real], rate: Real, law: Law, horizon: Real
 ) -> Real:
-    """Time (s) until a node's pull exceeds the limit of Coulomb friction, which grows at `rate`
-    (N/s), both taken as linear; `acceleration` is along the tangents."""
-    pull, (v_1, v_2) = coulomb_pull(slide, law), slide.velocity
-    # A short way along the motion gives the rate of the pull's size.
-    time = 1e-6
-    u_1 = law.bristle_damping * acceleration[0] + law.bristle_stiffness * v_1
-    u_2 = law.bristle_damping * acceleration[1] + law.bristle_stiffness * v_2
+    """Time (s) until a node's pull crosses the limit of Coulomb friction, by its rate now.
+
+    `acceleration` is along the tangents; `rate` (N/s) is that of the normal force.
+    """
+    pull, (v_1, v_2), stuck = coulomb_pull(slide, law), slide.velocity, sticks(slide.mode)
+    k = select(stuck, law.bristle_stiffness, 0.0)
+    u_1, u_2 = law.bristle_damping * acceleration[0], law.bristle_damping * acceleration[1]
+    u_1, u_2 = u_1 + k * v_1, u_2 + k * v_2
+    time = 1e-6  # s; the difference gives the rate of the pull's size
     later = coulomb_size((pull.u[0] + time * u_1, pull.u[1] + time * u_2), slide.heading, law)
-    grows = (later - pull.size) / time
-    left = select(sticks(slide.mode), pull.limit - pull.size, 0.0)
-    return first_zero(left, rate - grows, 0.0, horizon)
+    left = pull.limit - pull.size
+    left_rate = select(stuck, law.static, law.kinetic) * rate - (later - pull.size) / time
+    sign = select(stuck, 1.0, -1.0)
+    return first_zero(sign * left, sign * left_rate, 0.0, horizon)

@@ -19,7 +19,8 @@ from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.model import JUNCTION_CABLES, Model, make_model
 from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import Coulomb, ResetIntegrator, Scenario
+from tetra_drake.scenario.terrain import Flat, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
@@ -59,9 +60,10 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 5, 8])
+@pytest.mark.parametrize("changes", [{}, {"terrain": Rough(2e-4, 0.03), "friction": Coulomb()}])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_accelerations_are_those_of_the_diagram(scenario, tetrahedra, seed):
-    scenario.robot.tetrahedra = tetrahedra
+def test_accelerations_are_those_of_the_diagram(scenario, tetrahedra, changes, seed):
+    scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra, **changes})
     robot, state, modes = disturbed_robot(scenario, seed)
     acceleration = forces_at(robot, state, modes)[1] / inertia_of(robot, tetrahedra)
 
@@ -75,10 +77,17 @@ def test_accelerations_are_those_of_the_diagram(scenario, tetrahedra, seed):
     np.testing.assert_allclose(acceleration, expected, rtol=1e-7, atol=1e-7)
 
 
-def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario):
+UNEVEN = Rough(amplitude=0.0005, wavelength=0.03, seed=1)
+"""Ground that slopes by some degrees under the robot, of which some nodes touch it."""
+
+
+@pytest.mark.parametrize("terrain", [Flat(), UNEVEN])
+@pytest.mark.parametrize("friction", [ResetIntegrator(1e-4, 70.0, 0.7, 0.0), Coulomb(static=50.0)])
+def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario, terrain, friction):
     # With stiffness left out (it enters squared in time) and the small dependence of bristles
-    # on speed switched off, d force / d velocity is minus the damping matrix.
-    scenario.friction.proportional_stiction = 0.0
+    # on speed switched off, d force / d velocity is minus the damping matrix. (A limit of Coulomb
+    # friction would depend on the velocity by the normal force, too.)
+    scenario = scenario.with_changes({"terrain": terrain, "friction": friction})
     robot, state, modes = disturbed_robot(scenario, 0)
 
     def with_velocity(velocity: np.ndarray) -> np.ndarray:

@@ -1,0 +1,196 @@
+"""The robot on ground that is not flat and under both laws of friction, on both engines."""
+
+import numpy as np
+import pytest
+import xarray
+from pydrake.systems.analysis import Simulator
+
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.ground import ground_frames, make_ground
+from tetra_drake.robot.model import make_model
+from tetra_drake.robot.structure import MakeStructure, node_positions
+from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.terrain import (
+    Flat,
+    HeightField,
+    Incline,
+    Obstacles,
+    Rough,
+    Steps,
+    Terrain,
+)
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+INCH = 0.0254
+COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
+
+# Obstacles and steps are where the robot meets them at once.
+TERRAINS: dict[str, Terrain] = {
+    "flat": Flat(),
+    "incline": Incline(np.radians(5.0)),
+    "steps": Steps(-0.25 * INCH, 4.0 * INCH, 4, start=2.0 * INCH),
+    "rough": Rough(0.1 * INCH, 6.0 * INCH),
+    "obstacles": Obstacles(0.25 * INCH, 1.0 * INCH, 2.5 * INCH, start=14.0 * INCH),
+}
+
+FINE = {
+    "simulation.scheme": "runge_kutta3",
+    "simulation.accuracy": 1e-6,
+    "simulation.max_step": 1e-4,
+    "simulation.mode_changes": "witness",
+    "simulation.witness_window": 1e-8,
+    "compiled.tolerance": 1e-8,
+    "compiled.max_step": 3e-5,
+    "compiled.look_ahead": 1e-8,
+}
+"""Settings at which both engines have converged, mode changes placed to 1e-8 s."""
+
+
+def shortly(scenario: Scenario, duration: float, **changes: object) -> Scenario:
+    """A short converged simulation, driven from the start."""
+    times = {"simulation.duration": duration, "simulation.steady_from": 0.5 * duration}
+    given = {key.replace("__", "."): value for key, value in changes.items()}
+    return scenario.with_changes({"cpg.start_up": 0.0, **times, **FINE, **given})
+
+
+def trajectory(scenario: Scenario, engine: str) -> xarray.Dataset:
+    on_engine = scenario.with_changes({"simulation.engine": engine})
+    result = simulate(scenario=on_engine, gait=seeded_gait(scenario, 2), record=True)
+    assert result.trajectory is not None
+    return result.trajectory
+
+
+@pytest.fixture
+def height_field(tmp_path) -> HeightField:
+    """Waves of 4 in, 0.2 in high, that lie across the way at an angle."""
+    x, y = np.meshgrid(0.02 * np.arange(100), 0.02 * np.arange(50), indexing="ij")
+    np.save(tmp_path / "waves.npy", 0.0025 * (np.sin(60.0 * x + 20.0 * y) - 1.0))
+    return HeightField(str(tmp_path / "waves.npy"), 0.02, corner=[-0.5, -0.5])
+
+
+@pytest.mark.parametrize("terrain", ["incline", "steps", "rough", "obstacles", "field"])
+@pytest.mark.parametrize("friction", ["reset", COULOMB, FIRM])
+def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, height_field):
+    friction = scenario.friction if friction == "reset" else friction
+    surface = TERRAINS.get(terrain, height_field)
+    changes = {"terrain": surface, "friction": friction, "robot__contacts": "all"}
+    short = shortly(scenario, 0.15, **changes)
+    ours, drakes = (trajectory(short, engine)["p_WN"].values for engine in ("compiled", "drake"))
+    # As in test_compiled_simulation: with the reset integrator 1.75e-6 m/s per mode change, for
+    # 0.15 s, and some forty of them. Coulomb friction hardly jumps.
+    tolerance = 1e-5 if friction is scenario.friction else 1e-6
+    assert np.abs(ours[-1] - drakes[-1]).max() < tolerance
+    assert np.abs(ours[-1] - ours[0]).max() > 5e-4, "it moves"
+
+
+@pytest.mark.parametrize("friction", ["reset", FIRM])
+@pytest.mark.parametrize("engine", ["compiled", "drake"])
+def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction, engine):
+    slope, friction = np.radians(8.0), scenario.friction if friction == "reset" else friction
+    short = shortly(scenario, 0.3, friction=friction)
+    inclined = short.with_changes({"terrain": Incline(slope)})
+    up_the_slope = trajectory(inclined, engine)["p_WN"].values[-1].reshape(-1, 3)
+
+    diagram = MakeTensegrityDiagram(short, seeded_gait(short, 2))
+    g, s, c = short.robot.gravity, np.sin(slope), np.cos(slope)
+    gravity = diagram.GetSubsystemByName("plant").mutable_gravity_field()
+    gravity.set_gravity_vector([-g * s, 0.0, -g * c])
+    simulator: Simulator = MakeSimulator(diagram, short.simulation)
+    simulator.AdvanceTo(0.3)
+    state = diagram.GetOutputPort("state").Eval(simulator.get_context())
+    level = node_positions(MakeStructure(short), state)
+    turned = level @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    np.testing.assert_allclose(up_the_slope, turned, atol=1e-6)
+
+
+@pytest.mark.parametrize("friction", ["reset", COULOMB, FIRM])
+def test_contact_never_gives_energy(scenario, friction):
+    # Kinetic energy, weight, cables and the springs of contacts (k d^2 / 2); a bristle's spring
+    # can only hold what it has taken.
+    friction = scenario.friction if friction == "reset" else friction
+    fall = {"robot__offsets": [[0.0, 0.0, 0.005]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
+    rough = Rough(0.25 * INCH, 4.0 * INCH, seed=5)
+    falling = shortly(scenario, 0.6, terrain=rough, friction=friction, **fall)
+    structure, gravity = MakeStructure(falling), falling.robot.gravity
+    body = make_model(falling, structure).body
+    walk = trajectory(falling.with_changes({"simulation.sample_period": 2e-3}), "compiled")
+    v_WB = walk.v_WN.mean("node").values
+    v_BN = walk.v_WN.values - v_WB[:, :, None]
+    p_BN = walk.p_WN.values - walk.p_WB.values[:, :, None]
+    w_WB = np.cross(p_BN, v_BN).sum(axis=2) / (8 / 3 * (structure.p_BN[0] ** 2).sum())
+    energy = 0.5 * (body.mass[0] * v_WB**2 + body.moment[0] * w_WB**2).sum(axis=(1, 2))
+    energy += body.mass[0] * gravity * walk.p_WB.values[:, :, 2].sum(axis=1)
+    stretch = walk.length.values - structure.cables["free_length"]
+    energy += 0.5 * stretch**2 @ structure.cables["stiffness"]
+    ground = make_ground(falling, structure)
+    gaps = ground_frames(walk.p_WN.values.reshape(-1, 3), ground)[:, 0].reshape(len(energy), -1)
+    energy += 0.5 * falling.ground.stiffness * (np.minimum(gaps, 0.0) ** 2).sum(axis=1)
+    lost = energy[0] - energy[-1]
+    assert np.diff(energy).max() < 1e-4 * lost
+    assert lost > 0.5 * 5 * body.mass[0] * gravity * 0.005
+
+
+def test_on_a_rough_grid_without_relief_the_robot_walks_as_on_flat_ground(scenario):
+    # The same forces, by frames whose axes are World's.
+    changes = {"simulation.duration": 2.0, "simulation.engine": "compiled", "cpg.start_up": 0.1}
+    flat = scenario.with_changes({**changes, "simulation.steady_from": 1.0})
+    for friction in (scenario.friction, FIRM):
+        both = [
+            flat.with_changes({"terrain": t, "friction": friction})
+            for t in (Flat(), Rough(0.0, 1.0))
+        ]
+        first, second = simulate_many(scenario=both, gaits=[seeded_gait(flat)] * 2)
+        assert second.metrics.distance == pytest.approx(first.metrics.distance, abs=1e-9)
+
+
+def test_the_robot_stands_on_what_is_under_it(scenario):
+    # Settled on rough ground: contacts press by their depth, and together bear the weight.
+    times = {"simulation.duration": 2.5, "simulation.steady_from": 2.0, "cpg.start_up": 2.5}
+    rough = {"terrain": Rough(0.25 * INCH, 6.0 * INCH), "friction": FIRM, "robot.contacts": "all"}
+    resting = scenario.with_changes({**times, **rough})
+    end = trajectory(resting, "compiled").isel(time=-1)
+    structure, ground = MakeStructure(resting), make_ground(resting, MakeStructure(resting))
+    p_WN = end.p_WN.values.reshape(-1, 3)[structure.contacts]
+    gaps = ground_frames(p_WN, ground)[:, 0]
+    expected = resting.ground.stiffness * np.maximum(-gaps, 0.0)
+    np.testing.assert_allclose(end.normal_force, expected, atol=0.01 * expected.max())
+    assert 5 <= (gaps < 0.0).sum() < 11, "some feet hang in the air"
+    weight = 5 * make_model(resting, structure).body.mass[0] * resting.robot.gravity
+    assert expected.sum() == pytest.approx(weight, rel=0.02)
+
+
+SLOWLY = {
+    # Errors against finer settings are below 0.001 in (Coulomb), 0.005 in (reset integrator).
+    "coulomb": {"simulation.accuracy": 1e-4, "simulation.max_step": 2e-3},
+    "reset": {
+        "simulation.scheme": "runge_kutta3",
+        "simulation.accuracy": 1e-3,
+        "simulation.max_step": 2e-3,
+        "simulation.mode_changes": "witness",
+    },
+}
+CONVERGED = {"compiled.tolerance": 1e-6, "compiled.max_step": 5e-4, "compiled.look_ahead": 1e-6}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("terrain", [*TERRAINS, "field"])
+@pytest.mark.parametrize("law", ["reset", "coulomb"])
+def test_random_gaits_end_where_the_diagrams_do(scenario, terrain, law, height_field):
+    friction = scenario.friction if law == "reset" else COULOMB
+    changes = {"terrain": TERRAINS.get(terrain, height_field), "friction": friction}
+    changes |= {"robot.contacts": "all"} if terrain != "flat" else {}
+    walking = scenario.with_changes(changes | SLOWLY[law] | CONVERGED)
+    gaits = [seeded_gait(walking, seed) for seed in range(20)]
+
+    def distances(engine: str) -> np.ndarray:
+        own = walking.with_changes({"simulation.engine": engine})
+        results = simulate_many(scenario=own, gaits=gaits)
+        assert all(isinstance(result, SimulationResult) for result in results)
+        return np.array([result.metrics.distance_in for result in results])
+
+    apart = np.abs(distances("compiled") - distances("drake"))
+    assert np.median(apart) < 0.05
+    assert np.quantile(apart, 0.9, method="lower") < 0.2, "nine of ten"
