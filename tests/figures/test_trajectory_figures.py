@@ -9,11 +9,30 @@ from tetra_drake.figures.forces import ground_forces, signals_and_tensions
 from tetra_drake.figures.motion import before_and_after, one_step, relative_distances, time_lapse
 from tetra_drake.figures.style import OKABE_ITO, save_figure
 from tetra_drake.results.measures import last_step, lifted
-from tetra_drake.robot.structure import STRUTS
-from tetra_drake.scenario.schema import ReferenceScenario
+from tetra_drake.robot.ground import ground_heights, make_ground
+from tetra_drake.robot.structure import STRUTS, MakeStructure
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Coulomb, ReferenceScenario
+from tetra_drake.scenario.terrain import Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 FIGURES = (relative_distances, time_lapse, one_step, signals_and_tensions, ground_forces)
+ON_GROUND = (one_step, ground_forces)
+
+
+DOWNSTAIRS = {
+    "robot.contacts": "all",
+    "friction": Coulomb(),
+    "terrain": Steps(height=-INCH, depth=6.0 * INCH, count=9),
+}
+
+
+def ground_on(changes=None):
+    scenario = load_scenario().with_changes(changes or {})
+    return make_ground(scenario, MakeStructure(scenario))
+
+
+FLAT = ground_on()
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +45,9 @@ def walk():
 def test_any_robot_and_duration_can_be_drawn(bodies, tmp_path):
     walk = make_walk(bodies=bodies, duration=0.5 if bodies == 3 else 9.0)
     for draw in FIGURES:
-        save_figure(draw(walk), tmp_path, draw.__name__, kinds=["svg"])
+        save_figure(
+            draw(walk, *[FLAT] * (draw in ON_GROUND)), tmp_path, draw.__name__, kinds=["svg"]
+        )
         assert 10_000 < (tmp_path / f"{draw.__name__}.svg").stat().st_size < 500_000
 
 
@@ -74,7 +95,7 @@ def test_distances_before_and_after_have_one_scale(walk):
 
 def test_in_one_step_tetrahedra_off_the_ground_stand_out(walk):
     step = last_step(walk)
-    for panel in one_step(walk, instants=5).axes[:2]:
+    for panel in one_step(walk, FLAT, instants=5).axes[:2]:
         assert panel.get_aspect() == 1.0
         for row, time in zip(robots(panel), np.linspace(*step, 5), strict=True):
             off = lifted(walk).sel(time=time, method="nearest").values
@@ -83,7 +104,7 @@ def test_in_one_step_tetrahedra_off_the_ground_stand_out(walk):
 
 
 def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
-    panels = one_step(walk).axes[2:]
+    panels = one_step(walk, FLAT).axes[2:]
     assert [panel.get_title() for panel in panels] == walk.tetrahedron.values.tolist()
     for panel in panels:
         path, in_the_air, start = panel.lines
@@ -93,7 +114,7 @@ def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
         np.testing.assert_array_equal(aloft, path.get_ydata() > 1e-9)
         assert start.get_xdata()[0] == 0.0
     # Without a step the end is shown.
-    panel = one_step(walk.assign(signal=0.0 * walk.signal)).axes[2]
+    panel = one_step(walk.assign(signal=0.0 * walk.signal), FLAT).axes[2]
     shown = 0.25 * float(walk.time[-1]) * SPEED / INCH
     assert np.ptp(panel.lines[0].get_xdata()) == pytest.approx(shown, rel=0.01)
 
@@ -109,7 +130,7 @@ def test_tensions_are_those_of_the_driven_cables(walk):
 
 
 def test_ground_forces_are_those_of_the_last_seconds(walk):
-    panels = ground_forces(walk, seconds=3.0).axes
+    panels = ground_forces(walk, FLAT, seconds=3.0).axes
     names = [f"T{i} bottom left" for i in range(1, 6)]
     assert [panel.get_ylabel().split("\n")[0] for panel in panels] == [*names, "T5 tip"]
     end = walk.sel(time=slice(6.0, None))
@@ -122,7 +143,7 @@ def test_ground_forces_are_those_of_the_last_seconds(walk):
 
 
 def test_shaded_intervals_are_those_off_the_ground(walk):
-    panels = ground_forces(walk.sel(time=slice(0.0, 4 * PERIOD)), seconds=4.0).axes
+    panels = ground_forces(walk.sel(time=slice(0.0, 4 * PERIOD)), FLAT, seconds=4.0).axes
     for panel, expected, percent in (
         (panels[0], [(4.0, 5.0), (6.0, 7.0)], 50),
         (panels[1], [(5.0, 6.0), (7.0, 8.0)], 50),
@@ -132,3 +153,44 @@ def test_shaded_intervals_are_those_off_the_ground(walk):
         np.testing.assert_allclose(spans, expected, atol=0.011)
         (shown,) = (word for word in panel.get_title(loc="right").split() if word.isdigit())
         assert int(shown) == pytest.approx(percent, abs=1)
+
+
+def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
+    ground = ground_on(DOWNSTAIRS)
+    figure = one_step(walk, ground, instants=3)
+    above, side, *paths = figure.axes
+    profiles = [line for line in side.lines if len(line.get_xdata()) > 300]
+    level = one_step(walk, FLAT, instants=3).axes
+    assert len(above.lines) == len(level[0].lines)
+    assert len(profiles) == 3
+    lowest = []
+    for line in profiles:
+        x, z = line.get_xdata(), line.get_ydata()
+        expected = ground_heights(np.column_stack([x, 0.0 * x]) * INCH, ground) / INCH
+        np.testing.assert_allclose(z - z[0], expected - expected[0], rtol=0, atol=1e-9)
+        lowest.append((z[0] - expected[0], np.ptp(z)))
+    shift, depth = np.array(lowest).T
+    assert depth.min() > 0.9  # the robot's tip is above the first step down
+    assert -np.diff(shift).min() > 5.2 + depth.max()  # no row reaches into the next
+    assert side.get_ylim()[0] < min(line.get_ydata().min() for line in profiles)
+    for panel, flat in zip(paths, level[2:], strict=True):
+        assert len(panel.lines) == len(flat.lines) + 1
+
+
+def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(walk):
+    names = [f"{body} {node}" for body in walk.tetrahedron.values for node in walk.node.values]
+    every = walk.reindex(contact=names, fill_value=0)
+    every.normal_force.loc[{"contact": "T2 tip"}][-10:] = LOAD
+    every.normal_force.loc[{"contact": "T3 tip"}][:10] = LOAD  # before the time shown
+    every.normal_force.loc[{"contact": "T4 bottom_right"}] *= 0.5
+    left = [f"T{i} bottom left" for i in range(1, 6)]
+    for ground, others in (
+        (FLAT, {"T2 tip"}),
+        (ground_on(DOWNSTAIRS), {"T2 tip", "T4 bottom right"}),
+    ):
+        figure = ground_forces(every, ground)
+        shown = [panel.get_ylabel().split("\n")[0] for panel in figure.axes]
+        assert shown == sorted({*left, *others})
+        (legend,) = figure.legends
+        (friction,) = (t.get_text() for t in legend.get_texts() if "friction" in t.get_text())
+        assert friction.endswith("along x") == ground.flat

@@ -17,7 +17,9 @@ from tetra_drake.evolution.tables import load_run
 from tetra_drake.figures.evolution import two_best
 from tetra_drake.figures.study import study_run
 from tetra_drake.report.run_page import render_report, write_report
+from tetra_drake.results.result import ground_text
 from tetra_drake.scenario.schema import ReferenceScenario
+from tetra_drake.scenario.terrain import Flat, Incline
 from tetra_drake.scenario.units import INCH
 
 from .conftest import TRIALS
@@ -184,3 +186,13 @@ def test_an_unfinished_run_and_what_the_diagram_made_of_its_best(tmp_path):
     page = render(study, reevaluations=study.run.evaluations.assign(distance_in=1.23))
     assert any("--resume" in text for text in page.texts["p"])
     assert page.texts["td"].count("1.23") == 2
+
+
+@pytest.mark.parametrize("terrain", [Flat(), Incline(slope=0.1)])
+def test_the_ground_is_named_unless_it_is_the_thesiss(tmp_path, terrain):
+    scenario = tiny_scenario().with_changes({"terrain": terrain})
+    study = study_run(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
+    page = Page(render_report(study, {}, folder=tmp_path))
+    ground = ground_text(scenario)
+    assert ("ground" in page.texts["th"]) == bool(ground)
+    assert not ground or ground in page.texts["td"]

@@ -15,23 +15,27 @@ from tetra_drake.figures import evolution, forces, motion
 from tetra_drake.figures.study import Study
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
+from tetra_drake.robot.ground import make_ground
+from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.schema import Scenario
 
 TWO_BEST = "two_best.csv"
 
 
-def draw_trajectory(trajectory: xarray.Dataset, folder: Path) -> dict[str, str]:
+def draw_trajectory(trajectory: xarray.Dataset, scenario: Scenario, folder: Path) -> dict[str, str]:
     """Writes the figures of one simulation; returns their captions by name of file, no suffix.
 
     Raises InputError if the folder cannot be written to.
     """
-    draws = (
-        motion.time_lapse,
-        motion.relative_distances,
-        motion.one_step,
-        forces.signals_and_tensions,
-        forces.ground_forces,
+    ground = make_ground(scenario, MakeStructure(scenario))
+    return _save(
+        folder,
+        (motion.time_lapse, trajectory),
+        (motion.relative_distances, trajectory),
+        (motion.one_step, trajectory, ground),
+        (forces.signals_and_tensions, trajectory),
+        (forces.ground_forces, trajectory, ground),
     )
-    return _save(folder, *((draw, trajectory) for draw in draws))
 
 
 def draw_run(study: Study, folder: Path) -> dict[str, str]:
@@ -48,8 +52,9 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
     if study.trial in trials:
         pictures.append((evolution.initial_fitness, run, study.trial))
     walks = [(walk.label, walk.trajectory) for walk in (initial, best)]
-    pictures.append((motion.before_and_after, walks, run.manifest.scenario.reference))
-    return _save(folder, *pictures) | draw_trajectory(best.trajectory, folder)
+    scenario = run.manifest.scenario
+    pictures.append((motion.before_and_after, walks, scenario.reference))
+    return _save(folder, *pictures) | draw_trajectory(best.trajectory, scenario, folder)
 
 
 def _save(folder: Path, *pictures: tuple[Any, ...]) -> dict[str, str]:

@@ -13,19 +13,24 @@ from matplotlib.patches import Patch
 
 from tetra_drake.figures.style import OKABE_ITO, SHADE, common_style, legend_below, make_figure
 from tetra_drake.formatting import fixed
+from tetra_drake.physics.contact import Ground
 from tetra_drake.results.measures import intervals, off_ground, share_of_time
+from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, NODES
 from tetra_drake.scenario.units import POUND_FORCE
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
 _SECOND: Any = {"color": OKABE_ITO["vermillion"], "linestyle": (0, (4, 1.2))}
+
+_MIRRORED = 0.01
+"""Mean difference, as a share of the mean force, below which two nodes are mirror images."""
 
 
 @common_style()
 def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
     """Actuation signals and the tension of a cable that each drives (lbf) over time (s).
 
-    One panel per junction. A signal drives a left and a right cable, mirror images of each other;
-    the left one is shown.
+    One panel per junction. A signal drives a left and a right cable, mirror images of each other
+    where the ground is; the left one is shown.
     """
     forces = trajectory[["signal", "tension"]] / POUND_FORCE
     figure, panels = _panels_over_time(forces.junction.values)
@@ -42,15 +47,17 @@ def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
 
 
 @common_style()
-def ground_forces(trajectory: xarray.Dataset, *, seconds: float = 5.0) -> Figure:
+def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float = 5.0) -> Figure:
     """Normal force and friction along x (lbf) over the last `seconds` of time (s).
 
-    One panel per tetrahedron, for its bottom left node (the right one is its mirror image), and
-    one for each other contact node. Shaded: intervals without normal force.
+    On uneven ground, friction along the forward tangent, which is x projected on the slope. One
+    panel per tetrahedron, for its bottom left node, one for each right one that is not its mirror
+    image, and one for each other node that touches. Shaded: intervals without normal force.
     """
     end = trajectory.sel(time=slice(trajectory.time[-1] - seconds, None))
     forces = end[["normal_force", "friction_force"]] / POUND_FORCE
-    shown = [name for name in end.contact.values if not name.endswith(" bottom_right")]
+    shown = _contacts_to_show(end, ground)
+    along = "along x" if ground.flat else "along the forward tangent"
     figure, panels = _panels_over_time(shown)
     for contact, panel in panels.items():
         node, off = forces.sel(contact=contact), off_ground(end.sel(contact=contact))
@@ -60,10 +67,27 @@ def ground_forces(trajectory: xarray.Dataset, *, seconds: float = 5.0) -> Figure
         panel.plot(node.time, node.friction_force.sel(horizontal="x"), **_SECOND)
         share = fixed(100 * share_of_time(off), 0)
         panel.set_title(f"off the ground {share} % of the time shown", loc="right")
-    lines = {"normal force": _FIRST, "friction force along x": _SECOND}
+    lines = {"normal force": _FIRST, f"friction force {along}": _SECOND}
     legend_below(figure, lines, Patch(color=SHADE, label="no normal force"))
     figure.suptitle("Forces of the ground on each tetrahedron")
     return figure
+
+
+def _contacts_to_show(trajectory: xarray.Dataset, ground: Ground) -> list[str]:
+    """The bottom left nodes, those right ones that bear something else, which they do on uneven
+    ground only, the lead's tip where the tips of others cannot touch, and other nodes that do."""
+    shown, normal = [], trajectory.normal_force
+    thesis = not trajectory.contact.str.endswith(" top").any()
+    for name in trajectory.contact.values:
+        body, node = name.split()
+        force = normal.sel(contact=name)
+        show = thesis or node == NODES[BOTTOM_LEFT] or bool((force > 0.0).any())
+        if node == NODES[BOTTOM_RIGHT]:
+            left = normal.sel(contact=f"{body} {NODES[BOTTOM_LEFT]}")
+            show = not ground.flat and bool(abs(force - left).mean() > _MIRRORED * left.mean())
+        if show:
+            shown.append(name)
+    return shown
 
 
 def _panels_over_time(names: Sequence[str]) -> tuple[Figure, dict[str, Axes]]:

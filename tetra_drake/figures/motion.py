@@ -21,7 +21,9 @@ from tetra_drake.figures.style import (
     make_figure,
 )
 from tetra_drake.formatting import fixed, signed
+from tetra_drake.physics.contact import Ground
 from tetra_drake.results import measures
+from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.structure import BOTTOM_LEFT, STRUTS, TOP
 from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.units import INCH
@@ -32,14 +34,18 @@ OVERHEAD, SIDE = (X, Y), (X, Z)
 """World axes shown by a view, across and up the page."""
 
 _PITCH_IN = 7.3
-"""Distance between the rows of a time lapse, in inches of the robot's world."""
+"""Distance between the rows of a time lapse, in inches of the robot's world, at least."""
 
 _MARGIN_IN = 0.6
 """Free space around a time lapse, in inches of the robot's world."""
 
+_PROFILE_IN = 0.05
+"""Distance between points of the ground's profile, in inches."""
+
 _ON_GROUND: Any = {"color": "0.25", "linewidth": 0.8, "linestyle": "-"}
 _LIFTED: Any = {"color": OKABE_ITO["vermillion"], "linewidth": 1.6, "linestyle": "-"}
 _PATH: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.1, "linestyle": "-"}
+_GROUND: Any = {"color": "0.6", "linewidth": 0.7, "linestyle": "-"}
 _FOOTPRINTS: Any = {"color": "0.45", "marker": "o", "linestyle": "", "markersize": 2.5}
 
 
@@ -109,11 +115,12 @@ def time_lapse(trajectory: xarray.Dataset, *, instants: int = 6) -> Figure:
 
 
 @common_style()
-def one_step(trajectory: xarray.Dataset, *, instants: int = 5) -> Figure:
+def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -> Figure:
     """One step from above and from the side, to scale; lifted tetrahedra stand out.
 
-    Below, the path of one bottom node per tetrahedron, enlarged. If no signal oscillates, the
-    last quarter of the trajectory is shown."""
+    Below, the path of one bottom node per tetrahedron, enlarged. Grey: the ground, where it is not
+    flat along the middle of the robot, and below the node. If no signal oscillates, the last
+    quarter of the trajectory is shown."""
     ends = measures.last_step(trajectory)
     start, end = ends or (float(trajectory.time.quantile(0.75)), float(trajectory.time[-1]))
     what, why = ("one step", "") if ends else ("the end", "\nno step, as no signal oscillates")
@@ -123,7 +130,9 @@ def one_step(trajectory: xarray.Dataset, *, instants: int = 5) -> Figure:
     for sample in _nearest(step, np.linspace(start, end, instants)):
         styles = [_LIFTED if up else _ON_GROUND for up in off.values[sample]]
         paths = inches[: sample + 1, :, :TOP].reshape(sample + 1, -1, 3)
-        rows.append(_Row(f"{since.values[sample]:.2f} s", inches[sample], styles, paths, _PATH))
+        profile = None if ground.flat else _profile(inches, sample, ground)
+        time = f"{since.values[sample]:.2f} s"
+        rows.append(_Row(time, inches[sample], styles, paths, _PATH, profile))
     width, height = _size(rows, width_in=3.6, height_in=6.0)
     figure = Figure(figsize=(max(2 * width + 1.2, 5.8), height + 3.1))  # with room for the legend
     heights = [height + 0.8, 1.9]
@@ -133,22 +142,38 @@ def one_step(trajectory: xarray.Dataset, *, instants: int = 5) -> Figure:
         _draw_rows(panel, rows, view, step.tetrahedron.values)
         panel.set_title(f"from {title}")
     panel.tick_params(left=False, labelleft=False)
-    for row in range(instants):
-        panel.axhline(-_PITCH_IN * row, color="0.6", linewidth=0.7)
-    _draw_paths(below, step, off)
+    if ground.flat:
+        for row in range(instants):
+            panel.axhline(-_PITCH_IN * row, **_GROUND)
+    _draw_paths(below, step, off, ground)
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
     legend_below(figure, {**lines, "path of the bottom nodes": _PATH})
     figure.suptitle(f"Time lapse of {what}, {start:.2f} to {end:.2f} s{why}")
     return figure
 
 
-def _draw_paths(figure: SubFigure, step: xarray.Dataset, off: xarray.DataArray) -> None:
+def _profile(nodes: np.ndarray, sample: int, ground: Ground) -> np.ndarray:
+    """Points (points, 3) of the ground along x wherever nodes (samples, n, 4, 3) are, at their mean
+    y in a sample; in inches."""
+    x, y = nodes[..., X], nodes[sample, ..., Y].mean()
+    along = np.arange(x.min() - _MARGIN_IN, x.max() + _MARGIN_IN, _PROFILE_IN)
+    x_y = np.column_stack([along, np.full_like(along, y)])
+    return np.column_stack([x_y, ground_heights(x_y * INCH, ground) / INCH])
+
+
+def _draw_paths(
+    figure: SubFigure, step: xarray.Dataset, off: xarray.DataArray, ground: Ground
+) -> None:
     """The path of the bottom left node of each tetrahedron in the step, enlarged."""
     names = step.tetrahedron.values
     panels = figure.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
     for panel, name in zip(panels, names, strict=True):
         node = step.p_WN.sel(tetrahedron=name).isel(node=BOTTOM_LEFT) / INCH
         x, z = node.sel(axis="x") - node.sel(axis="x")[0], node.sel(axis="z")
+        if not ground.flat:
+            below = ground_heights(node.values[:, :2] * INCH, ground) / INCH
+            z, below = z - below[0], below - below[0]
+            panel.plot(x, below, **_GROUND)
         up = off.sel(tetrahedron=name)
         panel.plot(x, z, **_PATH)
         panel.plot(x.where(up), z.where(up), **_LIFTED)
@@ -157,7 +182,7 @@ def _draw_paths(figure: SubFigure, step: xarray.Dataset, off: xarray.DataArray) 
         panel.margins(0.08)
         panel.update_datalim([(-0.1, 0.0), (0.1, 0.1)])  # even if nothing moves
     figure.supxlabel("displacement of the bottom left node since the start of the step (in)")
-    figure.supylabel("height (in)")
+    figure.supylabel("height (in)" if ground.flat else "height above the\nground at 0 (in)")
 
 
 def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
@@ -177,12 +202,25 @@ class _Row:
     paths: np.ndarray
     """(samples, nodes, 3): where some nodes have been."""
     path_style: Any
+    profile: np.ndarray | None = None
+    """(points, 3) of the ground, for views from the side."""
+
+
+def _heights(rows: Sequence[_Row]) -> np.ndarray:
+    """All heights of nodes and ground, in inches."""
+    points = [a for row in rows for a in (row.nodes, row.profile) if a is not None]
+    return np.concatenate([a[..., Z].ravel() for a in points])
+
+
+def _pitch(rows: Sequence[_Row]) -> float:
+    """Distance in inches between rows, with room for what climbs."""
+    return max(_PITCH_IN, float(np.ptp(_heights(rows))) + _MARGIN_IN)
 
 
 def _size(rows: Sequence[_Row], *, width_in: float, height_in: float) -> tuple[float, float]:
     """Width and height on paper of a time lapse, to scale, within bounds."""
     wide = float(np.ptp([row.nodes[..., X] for row in rows])) + 2 * _MARGIN_IN
-    high = _PITCH_IN * len(rows)
+    high = _pitch(rows) * len(rows)
     scale = min(width_in / wide, height_in / high)
     return scale * wide, scale * high
 
@@ -191,22 +229,26 @@ def _draw_rows(
     panel: Axes, rows: Sequence[_Row], view: tuple[int, int], names: Sequence[str]
 ) -> None:
     """Draws a time lapse, one row below the other, and names the tetrahedra of the first."""
+    pitch = _pitch(rows)
     for i, row in enumerate(rows):
-        down = [0.0, _PITCH_IN * i]
+        down = [0.0, pitch * i]
+        if row.profile is not None and view == SIDE:
+            panel.plot(*(row.profile[..., view] - down).T, **_GROUND)
         panel.plot(*np.moveaxis(row.paths[..., view] - down, -1, 0), **row.path_style)
         for nodes, style in zip(row.nodes[..., view] - down, row.styles, strict=True):
             # NaN after each strut makes one line of all six.
             ends = np.pad(nodes[np.array(STRUTS)], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
             panel.plot(*ends.reshape(-1, 2).T, **style)
     across, up = np.moveaxis(np.array([row.nodes[..., view] for row in rows]), -1, 0)
-    middle = (up.min() + up.max()) / 2
+    heights = _heights(rows) if view == SIDE else up
+    middle = (heights.min() + heights.max()) / 2
     panel.set(
         xlabel="x (in)",
         xlim=(across.min() - _MARGIN_IN, across.max() + _MARGIN_IN),
-        ylim=(middle - _PITCH_IN * (len(rows) - 0.5), middle + 0.5 * _PITCH_IN + 0.6),
+        ylim=(middle - pitch * (len(rows) - 0.5), middle + 0.5 * pitch + 0.6),
         aspect="equal",
     )
-    panel.set_yticks(middle - _PITCH_IN * np.arange(len(rows)), [row.label for row in rows])
+    panel.set_yticks(middle - pitch * np.arange(len(rows)), [row.label for row in rows])
     panel.grid(visible=False, axis="y")
     for name, x, y in zip(names, across[0], up[0], strict=True):
         place = x[y.argmax()], y.max()

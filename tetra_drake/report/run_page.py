@@ -20,7 +20,7 @@ from tetra_drake.figures.study import Study, study_run
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import render
 from tetra_drake.results.folder import RESULT, RUN_MANIFEST, load_result_folder
-from tetra_drake.results.result import versions
+from tetra_drake.results.result import ground_text, versions
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.units import INCH
@@ -43,7 +43,8 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
         draw_run(study_run(load_run(source)), folder)
     elif (source / RESULT).exists():
         check_folder(folder)
-        draw_trajectory(load_result_folder(source).trajectory, folder)
+        recording = load_result_folder(source)
+        draw_trajectory(recording.trajectory, recording.scenario, folder)
     else:
         problem = f"holds neither {RUN_MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
         raise InputError(source, "", problem)
@@ -74,6 +75,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         "report/report.html.jinja",
         run=run,
         manifest=manifest,
+        ground=ground_text(manifest.scenario),
         best=study.best,
         changed={label: inches for label, inches in walks.items() if inches > 1e-6},
         versions=versions(),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from tetra_drake.formatting import fixed
 from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.fields import tree_of
+from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.terrain import Flat
 from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
@@ -110,6 +113,37 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
     write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
+def ground_text(scenario: Scenario) -> str:
+    """On what the robot walks, in a line; empty for the thesis's flat ground and friction.
+
+    As "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)". Lengths are in inches;
+    values that are their defaults are left out, but for the coefficients of friction.
+    """
+    terrain, law = scenario.terrain, scenario.friction
+    if scenario.simulation.engine == "mujoco":
+        friction = f"MuJoCo's friction (coefficient {scenario.mujoco.friction:g})"
+    elif isinstance(law, Coulomb):
+        numbers = {"static": law.static, "kinetic": law.kinetic}
+        friction = f"Coulomb friction ({_listed(numbers | tree_of(law, _shown, sparse=True))})"
+    elif isinstance(terrain, Flat):
+        return ""
+    else:
+        friction = "the thesis's friction"
+    sizes = _listed(tree_of(terrain, _shown, sparse=True))
+    return f"{type(terrain).__name__.lower()}{f' ({sizes})' if sizes else ''}, {friction}"
+
+
+def _shown(number: float, unit: str) -> str:
+    """A quantity as people read it; `unit` is SI."""
+    factor, name = {"m": (INCH, "in"), "rad": (math.pi / 180.0, "deg")}.get(unit, (1.0, unit))
+    return f"{number / factor:.4g} {name}"
+
+
+def _listed(values: Mapping[str, Any]) -> str:
+    texts = {k: " ".join(v) if isinstance(v, list) else str(v) for k, v in values.items()}
+    return ", ".join(f"{k} {Path(v).name if k == 'file' else v}" for k, v in texts.items())
+
+
 def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     """Metrics, lengths in inches, and what the simulation took, as lines for the terminal."""
     metrics, work = result.metrics, result.integrator
@@ -121,6 +155,8 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
         ("lateral drift", metrics.lateral_drift, ""),
     ]
     lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
+    if ground := ground_text(scenario):
+        lines.append(f"  ground: {ground}")
     for name, metres, note in rows:
         line = f"  {name:<16}{fixed(metres / INCH):>8} in   {f'({note})' if note else ''}"
         lines.append(line.rstrip())

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.ground import ground_heights, make_ground
+from tetra_drake.robot.structure import MakeStructure, node_positions
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.replay import quiet_meshcat, show_replay
@@ -46,10 +47,14 @@ class LiveView:
         self._structure = MakeStructure(scenario)
         self._started: float | None = None
         self._due = 0.0
-        p_WN = self._structure.p_WB[:, np.newaxis] + self._structure.p_BN
+        self._ground = make_ground(scenario, self._structure)
+        p_WN = node_positions(self._structure, self._structure.initial_state)
         room = np.array([ROOM, 0.0, 0.0])
+        points = np.stack([p_WN - room, p_WN + room])
+        rise = ground_heights(points[..., :2], self._ground)
+        points[..., 2] += rise - ground_heights(p_WN[:, :2], self._ground)
         add_robot(meshcat, self._structure)
-        set_surroundings(meshcat, self._structure, np.stack([p_WN - room, p_WN + room]))
+        set_surroundings(meshcat, self._structure, self._ground, points)
 
     def wants(self, time: float) -> bool:
         """Whether the frame before is over at this time (s)."""
@@ -60,7 +65,7 @@ class LiveView:
         time = float(frame["time"].values[0])
         if self._started is not None:
             self._sleep(max(0.0, self._started + time - self._clock()))
-        for motion in motions(self._structure, frame):
+        for motion in motions(self._structure, self._ground, frame):
             self._meshcat.SetTransform(motion.path, motion.matrix(0))
         if self._started is None:
             while self._meshcat.GetNumActiveConnections() == 0:

@@ -17,6 +17,7 @@ from pydrake.math import RigidTransform
 
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed, render
+from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, MakeStructure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
@@ -81,11 +82,12 @@ def replay_title(gait: str, trajectory: xarray.Dataset) -> str:
 def show_replay(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset) -> None:
     """Lets a Meshcat that shows the scenario's robot (scene.add_robot) play a trajectory."""
     structure = MakeStructure(scenario)
-    set_surroundings(meshcat, structure, trajectory["p_WN"].values)
+    ground = make_ground(scenario, structure)
+    set_surroundings(meshcat, structure, ground, trajectory["p_WN"].values)
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     film = _Film(meshcat, frames["time"].values)
     film.add_traces(frames["p_WN"].values[:, :, [BOTTOM_LEFT, BOTTOM_RIGHT]])
-    for motion in motions(structure, frames):
+    for motion in motions(structure, ground, frames):
         film.add(motion)
     film.publish()
 

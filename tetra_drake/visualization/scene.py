@@ -12,7 +12,10 @@ from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, Rgba, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.contact import Ground
+from tetra_drake.physics.terrain import N_X, N_Z, T1_X, T1_Z, T2_Y, T2_Z
 from tetra_drake.robot.bodies import strut_pose
+from tetra_drake.robot.ground import ground_frames, ground_heights
 from tetra_drake.robot.structure import NODES, STRUTS, TIP, Structure
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -30,11 +33,15 @@ COLOURS = {
     "odd": "#5d6672",
     "even": "#b4bbc3",
     "floor": "#f2f1ec",
+    "low": "#c4b080",
+    "high": "#f6f3ea",
+    "inch_on_relief": "#b5ad98",
     "inch": "#d3d2cb",
     "six_inches": "#8f8e87",
 }
 """Colours of what is drawn (those of cables and forces are Okabe and Ito's, for colour-blind
-people); neighbouring tetrahedra alternate between odd and even."""
+people); neighbouring tetrahedra alternate between odd and even. Uneven ground goes from low to
+high."""
 
 CABLE_RADIUS, HAIRLINE = 0.0003, 0.0001
 """Drawn radius of a cable: m per N of tension, and the least, in m."""
@@ -50,6 +57,23 @@ HIDDEN = 1e-6
 
 FORWARD_LENGTH = 6.0 * INCH
 """Length of the arrow on the floor that shows the direction of travel."""
+
+MARGIN, UNEVEN_MARGIN = 2, 6
+"""Whole inches of floor around the robot's way; more where one wants to see where it goes."""
+
+_BEND = 1e-6  # m: a second difference of heights below which the ground is straight
+
+FINEST, MOST_POINTS = 12, 12_000
+"""Points per inch at which uneven ground is looked at, and in all that are drawn, about: they take
+some 0.8 MB of a page."""
+
+RELIEF, WALL = 2.0, 0.25 * INCH
+"""How many times as steep slopes are shaded as they are; height of the lowest wall, in m."""
+
+_GAMMA = 2.2  # browsers take the colours of vertices as linear, others as sRGB
+
+LIGHT = np.array([-0.5, 0.3, 0.8]) / np.linalg.norm([-0.5, 0.3, 0.8])
+"""Direction to the light that shades uneven ground: from behind the robot and its left."""
 
 FIELD_OF_VIEW, ASPECT = 35.0, 1.7
 """Of the camera: degrees top to bottom, and the width to height of a window it is placed for."""
@@ -94,11 +118,11 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
             _add_unit_arrow(meshcat, path, rgba(kind))
 
 
-def motions(structure: Structure, frames: xarray.Dataset) -> Iterator[Motion]:
+def motions(structure: Structure, ground: Ground, frames: xarray.Dataset) -> Iterator[Motion]:
     """Motions of all objects over `frames`, samples of a trajectory."""
     yield from _tetrahedron_motions(structure, frames)
     yield from _cable_motions(structure, frames)
-    yield from _force_motions(structure, frames)
+    yield from _force_motions(structure, ground, frames)
 
 
 def aligning_quaternions(directions: np.ndarray) -> np.ndarray:
@@ -117,35 +141,67 @@ def aligning_quaternions(directions: np.ndarray) -> np.ndarray:
     return q / norm
 
 
-def set_surroundings(meshcat: Meshcat, structure: Structure, points: np.ndarray) -> None:
-    """Sets floor, light and camera for a robot whose nodes stay around `points` (..., 3), in m."""
-    corners = floor_corners(points)
-    height = -structure.node_radius
-    _add_floor(meshcat, corners, height=height)
+def set_surroundings(
+    meshcat: Meshcat, structure: Structure, ground: Ground, points: np.ndarray
+) -> None:
+    """Sets floor, light and camera for a robot whose nodes stay around `points` (..., 3), in m.
+
+    The floor is the ground lowered by the radius of a node, as the ground acts on node centres.
+    """
+    corners = floor_corners(points, MARGIN if ground.flat else UNEVEN_MARGIN)
+    floor = floor_points(ground, corners) - [0.0, 0.0, structure.node_radius]
+    if ground.flat:
+        _add_slab(meshcat, floor)
+    else:
+        _add_relief(meshcat, floor)
+    _add_grid(meshcat, floor, inch="inch" if ground.flat else "inch_on_relief")
     for unused in ("/Grid", "/Axes"):
         meshcat.SetProperty(unused, "visible", False)
     meshcat.SetProperty("/Background/<object>", "top_color", [0.86, 0.9, 0.95])
     meshcat.SetProperty("/Background/<object>", "bottom_color", [1.0, 1.0, 1.0])
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 0.9)
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
-    (x, y), (X, Y) = corners * INCH
-    _add_unit_arrow(meshcat, "/floor/forward", rgba("forward"))
-    start = np.array([[(x + X - FORWARD_LENGTH) / 2, y + INCH, height]])
-    size = np.full((1, 3), FORWARD_LENGTH)
-    forward = Motion("/floor/forward", start, aligning_quaternions(np.eye(3)[:1]), size)
-    meshcat.SetTransform(forward.path, forward.matrix(0))
-    floor = [(a, b, height) for a in (x, X) for b in (y, Y)]
-    seen = np.vstack([points.reshape(-1, 3), floor])
+    _add_forward_arrow(meshcat, floor)
+    bottom = floor if ground.flat else floor * [1.0, 1.0, 0.0] + [0.0, 0.0, _bottom(floor)]
+    seen = np.vstack([part.reshape(-1, 3) for part in (points, floor, bottom)])
     target = (seen.min(axis=0) + seen.max(axis=0)) / 2
     meshcat.SetCameraPose(camera_position(seen, target), target)
 
 
-def floor_corners(points: np.ndarray) -> np.ndarray:
+def floor_corners(points: np.ndarray, margin: int = MARGIN) -> np.ndarray:
     """Least and greatest x, y (2, 2) of the floor, in whole inches around `points` (..., 3)."""
-    margin = 2
     x_y = points.reshape(-1, 3)[:, :2] / INCH
     low, high = np.floor(x_y.min(axis=0)) - margin, np.ceil(x_y.max(axis=0)) + margin
     return np.array([low, high], dtype=int)
+
+
+def floor_points(ground: Ground, corners: np.ndarray) -> np.ndarray:
+    """Points (rows, columns, 3) in m of the ground between corners (2, 2) in whole inches.
+
+    Rows along x, columns along y: at every inch, and between them where the ground bends, as
+    finely as MOST_POINTS allows.
+    """
+    low, high = corners
+    for per_inch in (1,) if ground.flat else range(FINEST, 0, -1):
+        ticks = [np.arange(a * per_inch, b * per_inch + 1) for a, b in zip(low, high, strict=True)]
+        x_y = np.stack(np.meshgrid(*(t / per_inch * INCH for t in ticks), indexing="ij"), axis=-1)
+        heights = ground_heights(x_y, ground)
+        kept = []
+        for axis, tick in enumerate(ticks):
+            bend = np.abs(np.diff(heights, 2, axis)).max(1 - axis)
+            kept.append((tick % per_inch == 0) | np.pad(bend > _BEND, 1))
+        if kept[0].sum() * kept[1].sum() <= MOST_POINTS:
+            break
+    return np.concatenate([x_y, heights[..., np.newaxis]], axis=-1)[np.ix_(*kept)]
+
+
+def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
+    """(points, 3, 3): t1, t2 and n of physics.terrain in the rows, for points (points, 3) in m."""
+    frames = ground_frames(p_WN, ground)
+    axes = np.zeros((len(p_WN), 3, 3))
+    axes[:, 0], axes[:, 1, 1:] = frames[:, T1_X : T1_Z + 1], frames[:, T2_Y : T2_Z + 1]
+    axes[:, 2] = frames[:, N_X : N_Z + 1]
+    return axes
 
 
 def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -222,15 +278,24 @@ def _cable_motions(structure: Structure, frames: xarray.Dataset) -> Iterator[Mot
         )
 
 
-def _force_motions(structure: Structure, frames: xarray.Dataset) -> Iterator[Motion]:
-    """Unit arrows on the contact nodes, scaled to the forces there."""
+def _force_motions(
+    structure: Structure, ground: Ground, frames: xarray.Dataset
+) -> Iterator[Motion]:
+    """Unit arrows on the contact nodes, scaled to the forces there, along the ground's normal and
+    in its tangent plane."""
     p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
     normal, friction = frames["normal_force"].values, frames["friction_force"].values
     for c, node in enumerate(structure.contacts):
         name = structure.node_names[node]
-        yield Motion(f"/forces/normal/{name}", p_WN[:, node], None, _arrow_scales(normal[:, c]))
         force = np.append(friction[:, c], np.zeros((len(friction), 1)), axis=1)
         size = np.linalg.norm(force, axis=1)
+        upright = None
+        if not ground.flat:
+            axes = ground_axes(p_WN[:, node], ground)
+            upright = aligning_quaternions(axes[:, 2])
+            force = np.einsum("fi,fij->fj", force, axes)
+        scales = _arrow_scales(normal[:, c])
+        yield Motion(f"/forces/normal/{name}", p_WN[:, node], upright, scales)
         quaternions = aligning_quaternions(force)
         yield Motion(f"/forces/friction/{name}", p_WN[:, node], quaternions, _arrow_scales(size))
 
@@ -242,20 +307,77 @@ def _arrow_scales(sizes: np.ndarray) -> np.ndarray:
     return np.column_stack([width, width, length])
 
 
-def _add_floor(meshcat: Meshcat, corners: np.ndarray, *, height: float) -> None:
-    """A slab with its top at z = height (m), and on it a grid of inches."""
-    low, high = corners
-    thickness, lift = 0.002, 0.0002  # lines float a little, else the slab shows through them
-    (width, depth), middle = (high - low) * INCH, (high + low) / 2 * INCH
+def _add_slab(meshcat: Meshcat, floor: np.ndarray) -> None:
+    """A slab whose top is the flat floor (rows, columns, 3), in m."""
+    thickness = 0.002
+    (width, depth, _), middle = floor[-1, -1] - floor[0, 0], (floor[-1, -1] + floor[0, 0]) / 2
     meshcat.SetObject("/floor/slab", Box(width, depth, thickness), rgba("floor"))
-    meshcat.SetTransform("/floor/slab", RigidTransform([*middle, height - thickness / 2]))
+    meshcat.SetTransform("/floor/slab", RigidTransform(middle - [0.0, 0.0, thickness / 2]))
+
+
+def _add_relief(meshcat: Meshcat, floor: np.ndarray) -> None:
+    """The surface through the floor's points (rows, columns, 3), the lighter the higher, with
+    shaded slopes, and walls around it."""
+    x, y, z = np.moveaxis(floor, -1, 0)
+    slopes = RELIEF * np.array(np.gradient(z, x[:, 0], y[0]))
+    normal = np.stack([*-slopes, np.ones_like(z)], axis=-1)
+    lit = (normal @ LIGHT / np.linalg.norm(normal, axis=-1) / LIGHT[2]).clip(0.6, 1.2)
+    share = (z - z.min()) / max(np.ptp(z), 0.1 * INCH)
+    low, high = (np.array([c.r(), c.g(), c.b()]) for c in map(rgba, ("low", "high")))
+    colours = (low + share[..., np.newaxis] * (high - low)) * lit[..., np.newaxis]
+    around = ((1, 1), (1, 1), (0, 0))
+    walls = np.pad(np.ones_like(z), 1) == 0.0
+    vertices, colours = np.pad(floor, around, "edge"), np.pad(colours, around, "edge")
+    vertices[walls, 2] = _bottom(floor)
+    colours[walls] *= 0.5
+    index = np.arange(walls.size, dtype=np.int32).reshape(walls.shape)
+    a, b = index[:-1, :-1].ravel(), index[1:, :-1].ravel()
+    c, d = index[1:, 1:].ravel(), index[:-1, 1:].ravel()
+    meshcat.SetTriangleColorMesh(
+        "/floor/relief",
+        vertices.reshape(-1, 3).T,
+        np.hstack([[a, b, c], [a, c, d]]),
+        colours.clip(0.0, 1.0).reshape(-1, 3).T ** _GAMMA,
+    )
+
+
+def _bottom(floor: np.ndarray) -> float:
+    """Height (m) at which the walls around uneven floor end."""
+    return float(floor[..., 2].min()) - WALL
+
+
+def _add_grid(meshcat: Meshcat, floor: np.ndarray, *, inch: str) -> None:
+    """Lines along and across the floor (rows, columns, 3), of colour `inch` at every inch."""
+    lift = 0.0002  # lines float a little, else the floor shows through them
+    colours = {"inch": rgba(inch), "six_inches": rgba("six_inches")}
     lines: dict[str, list[np.ndarray]] = {"inch": [], "six_inches": []}
     for axis in (0, 1):
-        for inch in range(low[axis], high[axis] + 1):
-            line = corners.copy()
-            line[:, axis] = inch
-            lines["six_inches" if inch % 6 == 0 else "inch"].append(line)
+        for line in np.moveaxis(floor, axis, 0):
+            place = line[0, axis] / INCH
+            if abs(place - round(place)) < 1e-6:
+                straight = np.ptp(line[:, 2]) == 0.0
+                points = line[[0, -1]] if straight else line
+                lines["six_inches" if round(place) % 6 == 0 else "inch"].append(points)
     for rank, (kind, some) in enumerate(lines.items(), start=1):
-        level = np.full((1, len(some)), height + rank * lift)
-        start, end = (np.vstack([np.array(some)[:, i].T * INCH, level]) for i in (0, 1))
-        meshcat.SetLineSegments(f"/floor/{kind}", start, end, rgba=rgba(kind))
+        raised = [line + np.array([0.0, 0.0, rank * lift]) for line in some]
+        start, end = (np.vstack([r[part] for r in raised]).T for part in (np.s_[:-1], np.s_[1:]))
+        meshcat.SetLineSegments(f"/floor/{kind}", start, end, rgba=colours[kind])
+
+
+def _add_forward_arrow(meshcat: Meshcat, floor: np.ndarray) -> None:
+    """An arrow on the floor (rows, columns, 3), in the middle of its right side, along x."""
+    _add_unit_arrow(meshcat, "/floor/forward", rgba("forward"))
+    (x, y, _), (X, _, _) = floor[0, 0], floor[-1, 0]
+    row = floor[:, np.abs(floor[0, :, 1] - (y + INCH)).argmin()]
+    start = (x + X - FORWARD_LENGTH) / 2
+    way = np.linspace(0.0, 1.0, 25)
+    z = np.interp(start + way * FORWARD_LENGTH, row[:, 0], row[:, 2])
+    rise = z[-1] - z[0]
+    lift = (z - z[0] - way * rise).max()  # onto what is between its ends
+    forward = Motion(
+        "/floor/forward",
+        np.array([[start, y + INCH, z[0] + lift]]),
+        aligning_quaternions(np.array([[1.0, 0.0, rise / FORWARD_LENGTH]])),
+        np.full((1, 3), FORWARD_LENGTH),
+    )
+    meshcat.SetTransform(forward.path, forward.matrix(0))
