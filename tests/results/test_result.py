@@ -15,6 +15,7 @@ from tetra_drake.scenario.terrain import HeightField, Rough
         ("thesis", {"simulation.engine": "compiled"}, set()),
         ("thesis", {"simulation.engine": "mujoco"}, {"flat", "MuJoCo", "0.5"}),
         ("thesis", {"terrain": Rough(amplitude=0.0254, wavelength=0.1)}, {"amplitude 1 in"}),
+        ("coulomb", {"simulation.engine": "mujoco"}, {"flat", "Coulomb"}),
         ("coulomb", {}, {"flat", "static 0.5", "kinetic 0.5"}),
         ("incline", {}, {"incline", "slope 5 deg", "static 0.5"}),
         ("steps", {"friction": Coulomb(lateral=2.0)}, {"height 0.25 in", "count 4", "lateral 2"}),

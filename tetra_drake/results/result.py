@@ -120,11 +120,11 @@ def ground_text(scenario: Scenario) -> str:
     values that are their defaults are left out, but for the coefficients of friction.
     """
     terrain, law = scenario.terrain, scenario.friction
-    if scenario.simulation.engine == "mujoco":
-        friction = f"MuJoCo's friction (coefficient {scenario.mujoco.friction:g})"
-    elif isinstance(law, Coulomb):
+    if isinstance(law, Coulomb):
         numbers = {"static": law.static, "kinetic": law.kinetic}
         friction = f"Coulomb friction ({_listed(numbers | tree_of(law, _shown, sparse=True))})"
+    elif scenario.simulation.engine == "mujoco":
+        friction = f"MuJoCo's friction (coefficient {scenario.mujoco.friction:g})"
     elif isinstance(terrain, Flat):
         return ""
     else:
