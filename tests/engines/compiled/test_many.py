@@ -24,7 +24,8 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.perturb import displaced, scaled
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.terrain import Rough
 
 FAR_TOO_STRONG = {"cpg.gain": 4e9}
 """A pull that throws the robot about at the first step."""
@@ -71,6 +72,19 @@ def test_a_gait_walks_alike_in_any_number_of_lanes_in_any_order_beside_any_neigh
         for order in (range(11), range(10, -1, -1)):
             found = courses([walks[i] for i in order], width)
             assert all(same(course, alone[i]) for i, course in zip(order, found, strict=True))
+
+
+def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short):
+    # Each lane has a grid of its own size, and constants of its own.
+    rough = {"robot.contacts": "all", "terrain": Rough(2e-3, 0.1), "friction": Coulomb()}
+    finer = rough | {"terrain": Rough(3e-3, 0.05, seed=1), "friction": Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)}
+    kinds = [short.with_changes(changes) for changes in (finer, rough, rough | FAR_TOO_STRONG)]
+    walks = [Walk.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(kinds * 3)]
+    alone = [courses([walk], 1)[0] for walk in walks]
+    assert [course.status for course in alone[:3]] == [DONE, DONE, STEP_TOO_SMALL]
+    assert not same(alone[1], alone[4])
+    for width in (4, 8):
+        assert all(map(same, courses(walks, width), alone))
 
 
 @pytest.mark.parametrize("workers", [1, 3])
