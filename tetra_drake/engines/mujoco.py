@@ -8,9 +8,10 @@ other engines. In place of the reset integrator, a node that sticks is held by t
 stiction damping, but breaks free where that exceeds `mujoco.friction` times the normal force, not
 after a deflection, and then does not slide almost freely.
 
-A plane is exact. Any other terrain is a height field of MuJoCo: triangles between heights of the
-scenario's surface. A node that crosses an edge between two of them is pushed by both for an
-instant, so that distances differ by some 0.1 in. The field ends where the terrain's grid does: a
+Level ground and an incline without start are exact planes. Any other terrain is a height field of
+MuJoCo: triangles between heights of the scenario's surface. A node at an edge is pushed by both
+triangles, and where a body leans by an angle, it meets the ground up to a millimetre times its sine
+beside the node: distances differ by some 0.1 in. The field ends where the terrain's grid does: a
 robot that leaves it falls, and has diverged.
 """
 
@@ -53,9 +54,9 @@ with a smaller one friction chatters in steps beyond 0.06 ms, with a larger one 
 _POINT = 1e-5  # radius (m) of the spheres that touch a plane: it acts on the centres of nodes
 
 _BALL = 1e-3
-"""Radius (m) of those that touch a height field. A sphere that sinks in by more is caught at the
-edges of triangles, and a robot on rough ground lands 0.7 mm deep; a larger one is pushed by two
-triangles for longer."""
+"""Radius (m) of those that touch a height field with their lowest points, which are the nodes while
+bodies stand upright. One that sinks in by more is caught at the edges of triangles, and a robot
+that drops half an inch sinks in by 0.7 mm; a larger one is pushed by two triangles for longer."""
 
 _FINER, _FINEST, _MOST_CELLS = 10, 0.1 * INCH, 1000
 """Cells of a height field along x and along y: for each one of the terrain's, but none smaller than
@@ -142,8 +143,8 @@ def make_mjcf(scenario: Scenario, structure: Structure, robot: Model) -> str:
     _add(model, "compiler", inertiafromgeom="false")
     _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], cone="elliptic", **steps)
     world = _add(model, "worldbody")
-    radius = _add_floor(model, world, scenario, structure, robot.ground)
-    _add_bodies(model, world, structure, robot, _contact(scenario, structure, robot), radius)
+    spheres = _add_floor(model, world, scenario, structure, robot.ground)
+    _add_bodies(model, world, structure, robot, _contact(scenario, structure, robot), **spheres)
     _add_cables(model, structure)
     return tostring(model, encoding="unicode")
 
@@ -285,16 +286,16 @@ def check_mujoco(scenario: Scenario) -> None:
 
 def _add_floor(
     model: Element, world: Element, scenario: Scenario, structure: Structure, ground: Ground
-) -> float:
+) -> dict[str, float]:
     """The floor, which is geom 0: a plane, or a height field. Returns the radius (m) of the spheres
-    on the nodes that touch it, below whose centres it lies by as much."""
+    that touch it, and how far above their nodes their centres are."""
     terrain = scenario.terrain
     floor = {"name": "floor", **_ALONE}
     if isinstance(terrain, Flat) or (isinstance(terrain, Incline) and terrain.start is None):
         slope = terrain.slope if isinstance(terrain, Incline) else 0.0
         pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
         _add(world, "geom", type="plane", pos=pos, quat=structure.q_WB, size="0 0 1", **floor)
-        return _POINT
+        return {"radius": _POINT, "raised": 0.0}
     low, far, heights = _sampled(ground)
     least, span = heights.min(), max(np.ptp(heights), _BALL)
     rows = (heights.T[::-1] - least) / span  # of constant y, the largest first
@@ -303,12 +304,11 @@ def _add_floor(
     _add(_add(model, "asset"), "hfield", name="floor", size=size, elevation=rows, **shape)
     pos = [*(low + far) / 2, least]
     _add(world, "geom", type="hfield", hfield="floor", pos=pos, **floor)
-    return _BALL
+    return {"radius": _BALL, "raised": _BALL}
 
 
 def _sampled(ground: Ground) -> tuple[Array, Array, Array]:
-    """The corners (x, y) of the ground's grid, and the heights on a finer one, rows along x, of a
-    surface that lies _BALL below it along the normal."""
+    """The corners (x, y) of the ground's grid, and its heights on a finer one, rows along x."""
     law = ground.law[0]
     columns = int(law["columns"])
     cells = np.array([ground.heights.size // columns - 1, columns - 1])
@@ -318,10 +318,8 @@ def _sampled(ground: Ground) -> tuple[Array, Array, Array]:
     # Odd numbers of cells: else edges would run under rows of nodes, which two triangles then bear.
     points = 2 * (finer // 2).astype(int) + 2
     axes = (np.linspace(a, b, n) for a, b, n in zip(low, far, points, strict=True))
-    x_y = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    p_WN = np.column_stack([x_y, ground_heights(x_y, ground)])
-    heights = p_WN[:, 2] - _BALL / ground_frames(p_WN, ground)[:, N_Z]
-    return low, far, heights.reshape(points)
+    x_y = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    return low, far, ground_heights(x_y, ground)
 
 
 def _add_bodies(
@@ -330,7 +328,9 @@ def _add_bodies(
     structure: Structure,
     robot: Model,
     contact: dict,
+    *,
     radius: float,
+    raised: float,
 ) -> None:
     """The tetrahedra, with a site at each node, and spheres on those that touch the floor."""
     pairs, names = _add(model, "contact"), iter(enumerate(structure.node_names))
@@ -343,7 +343,8 @@ def _add_bodies(
             node, name = next(names)
             _add(body, "site", name=name, pos=p_BN)
             if node in structure.contacts:
-                _add(body, "geom", name=name, pos=p_BN, size=radius, **_ALONE)
+                p_BS = p_BN + np.array([0.0, 0.0, raised])
+                _add(body, "geom", name=name, pos=p_BS, size=radius, **_ALONE)
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
 
 
