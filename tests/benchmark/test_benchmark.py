@@ -10,7 +10,16 @@ import pytest
 from tetra_drake.benchmark import measure as benchmark
 from tetra_drake.benchmark import tables
 from tetra_drake.benchmark.measure import CLOSE_IN, LANES, Batch, Row, error_statistics, measure
-from tetra_drake.benchmark.settings import SETS, compiled, describe, drake, mujoco, own, settings_of
+from tetra_drake.benchmark.settings import (
+    GROUNDS,
+    SETS,
+    compiled,
+    describe,
+    drake,
+    mujoco,
+    own,
+    settings_of,
+)
 from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as mujoco_engine
 from tetra_drake.errors import InputError
@@ -37,7 +46,12 @@ def no_mujoco(monkeypatch: pytest.MonkeyPatch) -> None:
 def small_batches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two cores; few gaits at a time, measured once."""
     monkeypatch.setattr(benchmark, "available_cores", lambda: 2)
-    for name, value in {"BATCHES": (1, 5), "MUJOCO_BATCH": 1, "ROUNDS": 1}.items():
+    for name, value in {
+        "BATCHES": (1, 5),
+        "MUJOCO_BATCH": 1,
+        "GROUND_BATCH": 5,
+        "ROUNDS": 1,
+    }.items():
         monkeypatch.setattr(benchmark, name, value)
 
 
@@ -98,7 +112,11 @@ def test_every_setting_is_measured_on_every_gait(short, no_mujoco):
         assert 0.0 < per_step == 2.0 * cost[f"microseconds_per_tetrahedron{of}"]
     assert len(stages) >= 2 + len(gaits)
     table = [line for line in tables.to_markdown(found).splitlines() if line.startswith("|")]
-    assert len(table) == 2 + len(rows) + 2 + len(found["batches"]) + 2 + 1
+    lengths = len(rows), len(found["batches"]), 1, len(GROUNDS)
+    assert len(table) == sum(2 + length for length in lengths)
+    assert [row["ground"] for row in found["grounds"]] == list(GROUNDS)
+    for row in found["grounds"]:
+        assert row["compiled"] > row["drake"] > 0.0 < row["compiled_many"] and row["steps"] > 0
     assert table[2].startswith(f"| {rows[0]['engine']} | {rows[0]['setting']} | ")
 
 

@@ -20,6 +20,7 @@ from tetra_drake.evolution.robustness import (
 )
 from tetra_drake.robot.gait import save_gait, seeded_gait
 from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.schema import Coulomb
 
 
 @pytest.fixture(scope="module")
@@ -38,9 +39,19 @@ def table(scenario, gaits):
     return robustness(scenario, gaits, percents=[3.0], workers=2)
 
 
+def test_coulomb_friction_is_changed_by_its_own_constants(scenario, gaits):
+    sliding = scenario.with_changes({"friction": Coulomb()})
+    table = robustness(sliding, dict(list(gaits.items())[:1]), percents=[3.0], workers=2)
+    changed = {what for what in table["what"] if what.startswith(("friction", "sti", "prop"))}
+    assert changed == {"friction coefficients μ", "friction damping c"}
+    distances = table.groupby("what")["distance"].nunique()
+    assert distances["friction coefficients μ"] == 2, "both are felt"
+
+
 def test_every_change_is_simulated_for_every_gait(scenario, gaits, table):
     counts = table.groupby("what").size().to_dict()
-    assert counts == {NOTHING: 2, DISPLACED: 2 * DRAWS} | dict.fromkeys(SCALED, 4)
+    own = [what for what in SCALED if not what.startswith("friction")]  # Coulomb's
+    assert counts == {NOTHING: 2, DISPLACED: 2 * DRAWS} | dict.fromkeys(own, 4)
     assert table["failure"].isna().all()
     assert np.isfinite(table["distance"]).all()
     for what, percent in (

@@ -12,7 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.benchmark.settings import Changes, compiled, describe, mujoco, own, settings_of
+from tetra_drake.benchmark.settings import (
+    GROUNDS,
+    Changes,
+    compiled,
+    describe,
+    mujoco,
+    own,
+    settings_of,
+)
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import available_cores, simulate, simulate_many
 from tetra_drake.errors import SimulationFailure
@@ -32,6 +40,7 @@ SIZES = (5, 10, 20, 40)  # numbers of tetrahedra
 BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time on the compiled engine
 MUJOCO_BATCH = 4  # gaits at a time in MuJoCo, for each core
 LANES = 8  # gaits at a time for the cost per step
+GROUND_BATCH = 30  # gaits at a time on each ground
 ROUNDS = 3  # measurements of batches and costs, of which the medians count
 
 SHORT = {"simulation.duration": 0.02, "simulation.steady_from": 0.01}
@@ -163,9 +172,10 @@ def measure(
     if "mujoco" in engines:
         converged["mujoco"] = _distances(scenario, MUJOCO_CONVERGED, gaits)
     batches = list(_batches(scenario, engines))
+    grounds = list(_grounds(scenario)) if sizes and {"compiled", "drake"} <= engines else []
     sized = [{"robot.tetrahedra": size} | own("compiled") for size in sizes]
     costs = [[Batch(scenario.with_changes(each), n) for n in (1, LANES)] for each in sized]
-    in_turn = list(itertools.chain(batches, *costs))
+    in_turn = list(itertools.chain(batches, *costs, *(ground for _, ground in grounds)))
     if "drake" in engines:
         Row(scenario.with_changes(own("drake") | SHORT)).simulate(gaits[0])
     for batch in in_turn:
@@ -181,7 +191,7 @@ def measure(
             batch.time()
     apart, _ = error_statistics(converged.get("mujoco", exact_in) - exact_in, counted)
     return {
-        "schema": 3,
+        "schema": 4,
         "scenario": scenario.name,
         "duration_s": scenario.simulation.duration,
         "versions": versions("mujoco" if "mujoco" in engines else ""),
@@ -199,6 +209,7 @@ def measure(
         },
         "batches": [batch.to_json() for batch in batches],
         "step_costs": [step_cost(*pair) for pair in costs],
+        "grounds": [ground_speed(name, *three) for name, three in grounds],
     }
 
 
@@ -217,6 +228,20 @@ def step_cost(alone: Batch, in_lanes: Batch) -> dict[str, Any]:
         found[f"microseconds_per_step{which}"] = cost
         found[f"microseconds_per_tetrahedron{which}"] = cost and cost / tetrahedra
     return found
+
+
+def ground_speed(name: str, alone: Batch, many: Batch, diagram: Batch) -> dict[str, Any]:
+    """How fast the engines are on a ground, on one core."""
+    columns = {"compiled": alone, "compiled_many": many, "drake": diagram}
+    factors = {key: statistics.median(batch.factors) for key, batch in columns.items()}
+    return {"ground": name, "steps": many.steps / GROUND_BATCH} | factors
+
+
+def _grounds(scenario: Scenario) -> Iterator[tuple[str, list[Batch]]]:
+    """Batches on each of GROUNDS: one gait, many gaits, and one on the diagram."""
+    for name, changes in GROUNDS.items():
+        ours, diagram = (scenario.with_changes(changes | own(e)) for e in ("compiled", "drake"))
+        yield name, [Batch(ours, 1), Batch(ours, GROUND_BATCH), Batch(diagram, 1)]
 
 
 def _rows(scenario: Scenario, settings: Sequence[Changes]) -> Iterator[Row]:

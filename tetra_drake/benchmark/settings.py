@@ -5,12 +5,25 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.terrain import Rough
+from tetra_drake.scenario.units import INCH
 
 Changes = dict[str, Any]
 
 SETS = ("default", "integrators", "compiled", "mujoco")
 """The names of sets of settings."""
+
+_ROUGH: Changes = {"terrain": Rough(0.25 * INCH, 6.0 * INCH), "robot.contacts": "all"}
+_COULOMB: Changes = {"friction": Coulomb()}
+
+GROUNDS: dict[str, Changes] = {
+    "the scenario's": {},
+    "with Coulomb friction": _COULOMB,
+    "rough": _ROUGH,
+    "rough, with Coulomb friction": _ROUGH | _COULOMB,
+}
+"""Grounds to compare the speed on; rough is that of the scenario of this name."""
 
 
 def settings_of(name: str) -> list[Changes]:

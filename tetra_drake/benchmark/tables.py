@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tetra_drake.benchmark.measure import CLOSE_IN, LANES, ROUNDS
+from tetra_drake.benchmark.measure import CLOSE_IN, GROUND_BATCH, LANES, ROUNDS
 from tetra_drake.engines.mujoco import INSTALL
 from tetra_drake.formatting import fixed, listed, markdown_table
 
@@ -33,6 +33,13 @@ STEP_COSTS = {
     "microseconds_per_tetrahedron": ("μs per step and tetrahedron", "{:.2f}"),
     "microseconds_per_step_in_lanes": ("in lanes: μs per step", "{:.1f}"),
     "microseconds_per_tetrahedron_in_lanes": ("μs per step and tetrahedron", "{:.2f}"),
+}
+GROUNDS = {
+    "ground": ("ground", "{}"),
+    "steps": ("steps per gait", "{:,.0f}"),
+    "compiled": ("times real time: compiled, one gait", "{:,.0f}"),
+    "compiled_many": (f"{GROUND_BATCH} gaits", "{:,.0f}"),
+    "drake": ("drake", "{:.2f}"),
 }
 
 
@@ -68,6 +75,9 @@ def to_markdown(found: dict[str, Any]) -> str:
             "What a step of one gait takes a core on the compiled engine, without preparation: of "
             f"a gait alone, and of one of {LANES} that share the lanes of a core."
         )
+    if found["grounds"]:
+        parts.append(_table(found["grounds"], GROUNDS))
+        parts.append("On one core; rough ground, which all nodes may touch, is that of `rough`.")
     return "\n\n".join(parts)
 
 
@@ -77,5 +87,5 @@ def _table(rows: list[dict[str, Any]], columns: dict[str, tuple[str, str]]) -> s
         ["-" if row[key] is None else form.format(row[key]) for key, (_, form) in columns.items()]
         for row in rows
     ]
-    text = [i for i, key in enumerate(columns) if key in ("engine", "setting")]
+    text = [i for i, key in enumerate(columns) if key in ("engine", "setting", "ground")]
     return markdown_table([heading for heading, _ in columns.values()], cells, text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -30,13 +31,15 @@ SCALED = {
     "stiction damping σ₁": ("friction.stiction_damping",),
     "stiction switch a_c": ("friction.stiction_switch",),
     "proportional stiction σ₀": ("friction.proportional_stiction",),
+    "friction coefficients μ": ("friction.static", "friction.kinetic"),
+    "friction damping c": ("friction.damping",),
     "outer cables' stiffness": ("cables.outer_stiffness",),
     "inner cables' stiffness": ("cables.inner_stiffness",),
     "all cables' stiffness": ("cables.outer_stiffness", "cables.inner_stiffness"),
     "ground stiffness k": ("ground.stiffness",),
     "ground damping λ": ("ground.damping",),
 }
-"""Changes that multiply scenario keys by 1 + percent / 100."""
+"""Changes that multiply scenario keys by 1 + percent / 100, where the scenario has them."""
 
 DISPLACED = "initial place of each tetrahedron"
 """The change that displaces every tetrahedron at random by at most percent of the spacing."""
@@ -156,7 +159,10 @@ def save_table(table: pandas.DataFrame, path: Path) -> None:
 def _changes(base: Scenario, percents: Sequence[float]) -> Iterator[tuple[str, float, Scenario]]:
     """What is changed, by how many percent, and the changed scenario; first the scenario itself."""
     yield NOTHING, 0.0, base
+    friction = {f"friction.{field.name}" for field in dataclasses.fields(base.friction)}
     for what, keys in SCALED.items():
+        if any(key.startswith("friction.") and key not in friction for key in keys):
+            continue
         for percent in (sign * size for size in percents for sign in (-1.0, 1.0)):
             yield what, percent, scaled(base, keys, 1.0 + percent / 100.0)
     for percent in percents:

@@ -65,10 +65,10 @@ def _across_row(heights: Table, index: Real, b: Real) -> tuple[Real, Real]:
 def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Real]:
     """A quadratic B-spline and its derivative, `part` (-1/2 to 1/2) of a cell from a control
     point."""
-    less, more = 0.5 - part, 0.5 + part
-    middle = 0.75 - part * part
-    value = 0.5 * less * less * before + middle * here + 0.5 * more * more * after
-    return value, less * (here - before) + more * (after - here)
+    less, more, rise, next_rise = 0.5 - part, 0.5 + part, here - before, after - here
+    # Each sum has one product in it: there is one way to round the two together.
+    value = here - 0.5 * less * less * rise + 0.5 * more * more * next_rise
+    return value, rise + more * (next_rise - rise)
 
 
 @compiled
