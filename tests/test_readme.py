@@ -72,7 +72,10 @@ def test_the_scenario_loads(work: Path) -> None:
     assert scenario.robot.spacing != td.load_scenario("thesis").robot.spacing, "balanced"
 
 
-@pytest.mark.parametrize("page", ["README.md", *(f"{f}/README.md" for f in ("diagrams", "runs"))])
+FOLDERS = ("diagrams", "runs", "tetra_drake/engines", "tetra_drake/scenario")
+
+
+@pytest.mark.parametrize("page", ["README.md", *(f"{folder}/README.md" for folder in FOLDERS)])
 def test_links_lead_somewhere(page: str) -> None:
     file = CHECKOUT / page
     links = re.findall(r"\]\(([^)#]+)[^)]*\)", file.read_text(encoding="utf-8"))

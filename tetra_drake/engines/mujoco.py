@@ -28,11 +28,10 @@ import numpy as np
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
 from tetra_drake.physics.contact import Ground
-from tetra_drake.physics.terrain import N_X, N_Z, T1_X, T1_Z, T2_Y, T2_Z
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.ground import ground_frames, ground_heights
+from tetra_drake.robot.ground import ground_axes, ground_heights
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
@@ -261,11 +260,7 @@ class _Robot:
             mujoco.mj_contactForce(model, data, i, wrench)
             # The floor is geom 0; those of the contact nodes follow in their order.
             forces[contact.geom[1] - 1] += contact.frame.reshape(3, 3).T @ wrench[:3]
-        frames = ground_frames(data.site_xpos[self.structure.contacts], self._ground)
-        axes = np.zeros((len(frames), 3, 3))  # t1, t2 and n, by rows
-        axes[:, 0] = frames[:, T1_X : T1_Z + 1]
-        axes[:, 1, 1:] = frames[:, T2_Y : T2_Z + 1]
-        axes[:, 2] = frames[:, N_X : N_Z + 1]
+        axes = ground_axes(data.site_xpos[self.structure.contacts], self._ground)
         return (axes @ forces[:, :, None])[:, :, 0]
 
 

@@ -62,7 +62,12 @@ def assemble_dataset(
         "tension": (("time", "cable"), tensions, "N", "cable tension"),
         "length": (("time", "cable"), lengths, "m", "cable length"),
         "signal": (("time", "junction"), signals, "N", "actuation signal"),
-        "normal_force": (("time", "contact"), normal_forces, "N", "upward force"),
+        "normal_force": (
+            ("time", "contact"),
+            normal_forces,
+            "N",
+            "force along the normal of the ground",
+        ),
         "friction_force": (horizontal, friction, "N", "friction force"),
         "in_contact": (("time", "contact"), modes[..., 0], "1", "1 on the ground"),
         "friction_mode": (horizontal, modes[..., 1:], "1", slip),

@@ -16,7 +16,17 @@ from tetra_drake.physics.contact import (
     update_modes,
 )
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
-from tetra_drake.physics.terrain import FRAME_COLUMNS, GAP, N_Z, find_frames
+from tetra_drake.physics.terrain import (
+    FRAME_COLUMNS,
+    GAP,
+    N_X,
+    N_Z,
+    T1_X,
+    T1_Z,
+    T2_Y,
+    T2_Z,
+    find_frames,
+)
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.schema import Coulomb, Scenario
 from tetra_drake.scenario.terrain import Flat, Grid, make_grid
@@ -107,6 +117,15 @@ def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:
     top = np.full((x_y.size // 2, 1), ground.law["top"][0])
     frames = ground_frames(np.hstack([x_y.reshape(-1, 2), top]), ground)
     return (top[:, 0] - frames[:, GAP] / frames[:, N_Z]).reshape(x_y.shape[:-1])
+
+
+def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
+    """(points, 3, 3): t1, t2 and n of physics.terrain in the rows, for points (points, 3) in m."""
+    frames = ground_frames(p_WN, ground)
+    axes = np.zeros((len(p_WN), 3, 3))
+    axes[:, 0], axes[:, 1, 1:] = frames[:, T1_X : T1_Z + 1], frames[:, T2_Y : T2_Z + 1]
+    axes[:, 2] = frames[:, N_X : N_Z + 1]
+    return axes
 
 
 def ground_frames(p_WN: np.ndarray, ground: Ground) -> np.ndarray:

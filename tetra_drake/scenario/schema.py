@@ -81,9 +81,9 @@ class Coulomb:
     and v the velocity. F = -u min(1, mu F_N / s(u)), mu static in stick and kinetic in slip, and
     s(u) = sqrt((u_f / a_f)^2 + (u_l / a_l)^2): u_f is along the body's heading at touchdown and
     a_f is `forward` or `backward` by its sign, u_l is sideways and a_l is `lateral`. A contact
-    breaks free where s(u) > static F_N moving outward, and sticks again where v has no part left
-    along the direction in which it broke free. Without stiffness, and with static = kinetic, the
-    law has no memory: it is MuJoCo's soft friction.
+    breaks free where s(u) > static F_N moving outward, and sticks again, with x = 0, where
+    s(c v) <= kinetic F_N. Without stiffness, and with static = kinetic, the law has no memory: it
+    is MuJoCo's soft friction.
     """
 
     static: float = setting(above=0, default=0.5)  # mu in stick
@@ -320,8 +320,8 @@ def _check_relations(scenario: Scenario, source: object) -> None:
     bounds, simulation, n = scenario.gait_bounds, scenario.simulation, scenario.robot.tetrahedra
     weight, tau_a, offsets = bounds.weight_min, bounds.tau_a_min, len(scenario.robot.offsets)
     start, end = simulation.steady_from, simulation.duration
-    friction = scenario.friction if isinstance(scenario.friction, Coulomb) else Coulomb()
-    mu, most = friction.kinetic, friction.static
+    law = scenario.friction
+    mu, most = (law.kinetic, law.static) if isinstance(law, Coulomb) else (0.0, 0.0)
     for wrong, key, found, expected in (
         (weight > bounds.weight_max, "gait_bounds.weight_min", weight, "at most weight_max"),
         (tau_a > bounds.tau_a_max, "gait_bounds.tau_a_min", f"{tau_a} s", "at most tau_a_max"),

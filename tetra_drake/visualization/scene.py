@@ -13,9 +13,8 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import Ground
-from tetra_drake.physics.terrain import N_X, N_Z, T1_X, T1_Z, T2_Y, T2_Z
 from tetra_drake.robot.bodies import strut_pose
-from tetra_drake.robot.ground import ground_frames, ground_heights
+from tetra_drake.robot.ground import ground_axes, ground_heights
 from tetra_drake.robot.structure import NODES, STRUTS, TIP, Structure
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -193,15 +192,6 @@ def floor_points(ground: Ground, corners: np.ndarray) -> np.ndarray:
         if kept[0].sum() * kept[1].sum() <= MOST_POINTS:
             break
     return np.concatenate([x_y, heights[..., np.newaxis]], axis=-1)[np.ix_(*kept)]
-
-
-def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
-    """(points, 3, 3): t1, t2 and n of physics.terrain in the rows, for points (points, 3) in m."""
-    frames = ground_frames(p_WN, ground)
-    axes = np.zeros((len(p_WN), 3, 3))
-    axes[:, 0], axes[:, 1, 1:] = frames[:, T1_X : T1_Z + 1], frames[:, T2_Y : T2_Z + 1]
-    axes[:, 2] = frames[:, N_X : N_Z + 1]
-    return axes
 
 
 def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
