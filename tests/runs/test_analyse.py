@@ -52,7 +52,7 @@ def test_every_integrator_setting_is_simulated_on_the_diagram(folder):
 
 def test_every_change_is_simulated_on_the_compiled_engine_and_one_oscillator_alone(folder):
     found = analyse.load_analysis(folder)
-    assert set(SCALED) < set(found.variations["what"])
+    assert {what for what in SCALED if "friction" not in what} < set(found.variations["what"])
     unchanged = found.variations[found.variations["what"] == NOTHING]
     assert unchanged["distance_in"].tolist() == found.best_gaits["distance_in"].tolist()
     hertz = found.oscillator_frequency_hz  # that of its equations
