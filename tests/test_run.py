@@ -14,6 +14,7 @@ from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import read_manifest
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.terrain import Steps
 
 
 @pytest.fixture
@@ -117,8 +118,10 @@ def OneByOne(workers):
 
 def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
     on_diagram = tiny.with_changes({"simulation.engine": "drake"})
+    step = Steps(height=0.02, depth=1.0, count=1, start=0.02)
     for scenario, objective, problem in (
         ("quack", None, "quack"),
+        (on_diagram.with_changes({"terrain": step}), None, "in the ground"),
         (None, None, "is needed"),
         (on_diagram, lambda result: 1.0, "lambda"),
     ):

@@ -6,7 +6,7 @@ import contextlib
 from pathlib import Path
 
 from tetra_drake.engines.compiled.lane_pool import LanePool
-from tetra_drake.engines.simulate import available_cores, prepare
+from tetra_drake.engines.simulate import available_cores, check_scenario, prepare
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import (
@@ -69,6 +69,7 @@ def evolve(
     own = read_manifest(out).scenario if resume else scenario
     if own is None:
         raise InputError("scenario", "", "is needed to begin a run")
+    check_scenario(own)  # before there is a directory
     method = Method.of(own, objective=objective, optimizer=optimizer)
     evaluate = GaitEvaluation(own, objective)
     in_lanes = executor is None and own.simulation.engine == "compiled"
@@ -76,7 +77,7 @@ def evolve(
     if resume:
         record = RunRecord.resume(out, scenario=scenario, seed=seed, method=method)
     else:
-        check_sendable(evaluate, where)  # before there is a directory
+        check_sendable(evaluate, where)
         record = RunRecord.create(out, scenario=own, seed=seed or 0, method=method)
     with record, progress:
         progress.say(_introduction(out, record.manifest, workers, report=report))

@@ -10,6 +10,8 @@ from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
+from tetra_drake.robot.model import make_model
+from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -91,6 +93,16 @@ def simulate_many(
 def available_cores() -> int:
     """The cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def check_scenario(scenario: Scenario) -> None:
+    """Raises InputError if the scenario's engine cannot simulate it, say, as the robot would start
+    in the ground."""
+    make_model(scenario, MakeStructure(scenario))
+    if scenario.simulation.engine == "mujoco":
+        from tetra_drake.engines.mujoco import check_mujoco
+
+        check_mujoco(scenario)
 
 
 def prepare(scenario: Scenario, *, say: Callable[[str], None] = lambda text: None) -> None:
