@@ -7,20 +7,30 @@ from tetra_drake.physics.contact import (
     HEADING,
     MODE,
     MODE_COLUMNS,
+    Ground,
     add_ground_forces,
     meet_ground,
     update_modes,
 )
+from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.ground import make_ground
-from tetra_drake.robot.structure import MakeStructure, moved_nodes
+from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Coulomb, Scenario
 from tetra_drake.scenario.terrain import Flat, Incline, Terrain
 
 LAW = Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, damping=70.0)
 SLOPE = 0.2
 R = np.array([[np.cos(SLOPE), 0, -np.sin(SLOPE)], [0, 1, 0], [np.sin(SLOPE), 0, np.cos(SLOPE)]])
+
+
+def on_ground(structure: Structure, state: np.ndarray, ground: Ground) -> tuple:
+    """The nodes of a state, and their frames."""
+    nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
+    frames = np.empty((len(structure.contacts), FRAME_COLUMNS))
+    meet_ground(state, structure.p_BN, ground, nodes, frames)
+    return nodes, frames
 
 
 class Sliding:
@@ -40,9 +50,7 @@ class Sliding:
         state = self.structure.initial_state
         state[:35].reshape(5, 7)[:, 4:] += self.R @ p
         state[35:].reshape(5, 6)[:, 3:] = self.R @ v
-        nodes = moved_nodes(self.structure, state)
-        frames = np.empty((len(self.modes), FRAME_COLUMNS))
-        meet_ground(nodes, self.ground, frames)
+        nodes, frames = on_ground(self.structure, state, self.ground)
         return state, nodes, frames
 
     def update(self, v=(0.0, 0.0, 0.0), p=(0.0, 0.0, -1e-4)) -> bool:
@@ -133,8 +141,7 @@ def test_the_heading_is_that_of_the_body_at_touchdown(sliding):
     turn = np.array([np.cos(0.3), 0.0, 0.0, np.sin(0.3)])  # by 0.6 about z
     state[:35].reshape(5, 7)[:, :4] = turn
     state[:35].reshape(5, 7)[:, 4:] += [0.0, 0.0, -0.2]
-    nodes, frames = moved_nodes(sliding.structure, state), np.empty((11, FRAME_COLUMNS))
-    meet_ground(nodes, sliding.ground, frames)
+    nodes, frames = on_ground(sliding.structure, state, sliding.ground)
     sliding.modes[:] = 0.0
     update_modes(state, nodes, sliding.ground, frames, sliding.modes)
     forward = np.array([np.cos(0.6), np.sin(0.6), 0.0]) @ sliding.R

@@ -132,9 +132,10 @@ def law_of(ground: Ground) -> Law:
 
 
 @compiled
-def meet_ground(nodes: Table, ground: Ground, frames: Table) -> None:
-    """Writes the `frames`, (contacts, FRAME_COLUMNS), of nodes that have just been moved; on flat
-    ground nothing."""
+def meet_ground(state: Table, p_BN: Table, ground: Ground, nodes: Table, frames: Table) -> None:
+    """Writes the `nodes` of `kinematics` for a state of the bodies, without forces, and where they
+    meet the ground: `frames`, (contacts, FRAME_COLUMNS), which flat ground leaves as they are."""
+    move_nodes(state, p_BN, nodes)
     if not ground.flat:
         find_frames(nodes, ground.contacts, law_of(ground), ground.heights, frames)
 
@@ -222,8 +223,7 @@ def ground_forces(
 ) -> None:
     """Writes [t_W; f_W] of the ground at each Bo, (6 bodies,), for a state of the bodies; also
     `nodes`, `frames` and `pushes`."""
-    move_nodes(state, p_BN, nodes)
-    meet_ground(nodes, ground, frames)
+    meet_ground(state, p_BN, ground, nodes, frames)
     add_ground_forces(nodes, modes, ground, frames, True, pushes)
     gather_forces(nodes, generalized_force)
 

@@ -105,9 +105,10 @@ def _check_start(
 
 def starting_modes(structure: Structure, ground: Ground) -> np.ndarray:
     """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
-    state, modes = structure.initial_state, np.zeros((len(ground.contacts), MODE_COLUMNS))
-    nodes, frames = moved_nodes(structure, state), np.empty((len(ground.contacts), FRAME_COLUMNS))
-    meet_ground(nodes, ground, frames)
+    state, count = structure.initial_state, len(ground.contacts)
+    nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
+    modes, frames = np.zeros((count, MODE_COLUMNS)), np.empty((count, FRAME_COLUMNS))
+    meet_ground(state, structure.p_BN, ground, nodes, frames)
     update_modes(state, nodes, ground, frames, modes)
     return modes
 

@@ -22,7 +22,7 @@ from tetra_drake.physics.contact import (
     meet_ground,
     update_modes,
 )
-from tetra_drake.physics.kinematics import NODE_COLUMNS, move_nodes
+from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.ground import make_ground
@@ -106,8 +106,7 @@ class GroundContact(LeafSystem):
         """The state, the modes, and nodes and frames."""
         state = self._state.Eval(context)
         nodes, frames = self._tables()
-        move_nodes(state, self._p_BN, nodes)
-        meet_ground(nodes, self._ground, frames)
+        meet_ground(state, self._p_BN, self._ground, nodes, frames)
         return state, self._rows(context), (nodes, frames)
 
     def _tables(self) -> tuple[np.ndarray, np.ndarray]:

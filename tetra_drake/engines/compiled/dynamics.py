@@ -21,7 +21,7 @@ from tetra_drake.physics.contact import (
     sliding,
 )
 from tetra_drake.physics.friction import STICK, coulomb_damping
-from tetra_drake.physics.kinematics import P_BN_W, gather_forces, move_nodes
+from tetra_drake.physics.kinematics import P_BN_W, gather_forces
 from tetra_drake.physics.lanes import Real, Table, any_lane, inverse_sqrt, select
 from tetra_drake.physics.terrain import to_world
 from tetra_drake.robot.model import JUNCTION_CABLES, Model
@@ -43,8 +43,7 @@ class Forces(NamedTuple):
 @compiled
 def move_robot(robot: Model, state: Table, forces: Forces) -> None:
     """Moves the nodes to where a state (13 bodies,) has them; no forces act on them yet."""
-    move_nodes(state, robot.p_BN, forces.nodes)
-    meet_ground(forces.nodes, robot.ground, forces.frames)
+    meet_ground(state, robot.p_BN, robot.ground, forces.nodes, forces.frames)
 
 
 @compiled
