@@ -197,9 +197,12 @@ def add_ground_forces(
     """
     law = law_of(ground)
     for i in range(pushes.shape[0]):
-        node = ground.contacts[i]
+        node, touches = ground.contacts[i], modes[i, CONTACT] != 0.0
+        if not any_lane(touches | (gap(nodes, ground, frames, i) <= 0.0)):
+            if keep:
+                pushes[i, 0] = pushes[i, 1] = pushes[i, 2] = 0.0
+            continue
         slide, _ = sliding(nodes, modes, ground, law, frames, i)
-        touches = modes[i, CONTACT] != 0.0
         f_1, f_2 = friction_force(slide, law, ground.coulomb)
         f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
         if keep:

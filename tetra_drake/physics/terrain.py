@@ -80,14 +80,14 @@ def find_frames(nodes: Table, contacts: Table, grid: Any, heights: Table, frames
     for i in range(contacts.size):
         node = contacts[i]
         z = nodes[node, P_WN + 2]
-        height, h_x, h_y = grid.top, 0.0 * z, 0.0 * z
         near = z <= grid.top
+        height, h_x, h_y, c, n_z = grid.top, 0.0 * z, 0.0 * z, 0.0 * z + 1.0, 0.0 * z + 1.0
         if any_lane(near):
             found = surface(nodes[node, P_WN], nodes[node, P_WN + 1], grid, heights)
             height = select(near, found[0], height)
             h_x, h_y = select(near, found[1], h_x), select(near, found[2], h_y)
-        c = inverse_sqrt(1.0 + h_y * h_y)
-        n_z = inverse_sqrt(1.0 + h_x * h_x + h_y * h_y)
+            c = inverse_sqrt(1.0 + h_y * h_y)
+            n_z = inverse_sqrt(1.0 + h_x * h_x + h_y * h_y)
         frames[i, GAP] = (z - height) * n_z  # exact on a plane
         frames[i, N_X], frames[i, N_Y], frames[i, N_Z] = -h_x * n_z, -h_y * n_z, n_z
         frames[i, T1_X] = (1.0 + h_y * h_y) * c * n_z
