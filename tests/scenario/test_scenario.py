@@ -68,6 +68,7 @@ def test_shipped_grounds_are_the_thesis_on_other_ground(name, scenario):
     contacts, kind, numbers = GROUNDS[name]
     loaded = load_scenario(name)
     changes = {"name": name, "friction": Coulomb(), "robot.contacts": contacts}
+    changes |= {"compiled.tolerance": "1 mm/s"}
     assert loaded == scenario.with_changes(changes | {"terrain": loaded.terrain})
     assert type(loaded.terrain) is kind
     given = [value for value in vars(loaded.terrain).values() if value is not None]
