@@ -121,7 +121,7 @@ def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
     step = Steps(height=0.02, depth=1.0, count=1, start=0.02)
     for scenario, objective, problem in (
         ("quack", None, "quack"),
-        (on_diagram.with_changes({"terrain": step}), None, "in the ground"),
+        (on_diagram.with_changes({"terrain": step}), None, "below the ground"),
         (None, None, "is needed"),
         (on_diagram, lambda result: 1.0, "lambda"),
     ):

@@ -95,7 +95,7 @@ def test_a_node_above_the_highest_point_has_the_frame_of_level_ground_there(grou
 def test_a_robot_that_starts_in_the_ground_or_off_the_grid_is_refused(ground, refused, tmp_path):
     # Steps of 1 in at 0, 6 and 12 in: T4 stands at 3 * 2.94 in = 8.82 in, on the second one.
     for terrain, found in (
-        (Steps(1.0 * INCH, 6.0 * INCH, 3, start=0.0), "T4 bottom_left 2 in in the ground"),
+        (Steps(1.0 * INCH, 6.0 * INCH, 3, start=0.0), "T4 bottom_left 2 in below the ground"),
         (HeightField(saved(np.zeros((3, 3)), tmp_path), 0.1), "off its grid"),
     ):
         with refused("thesis", "terrain", found):

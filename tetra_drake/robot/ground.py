@@ -99,7 +99,7 @@ def _check_start(
     gaps = ground_frames(start, ground)[:, GAP]
     if gaps.min() < -START_DEPTH:
         node = structure.node_names[structure.contacts[gaps.argmin()]]
-        problem = f"the robot starts with node {node} {-gaps.min() / INCH:.3g} in in the ground"
+        problem = f"the robot starts with node {node} {-gaps.min() / INCH:.3g} in below the ground"
         raise InputError(source, "terrain", f"{problem}; move what is there, or robot.offsets")
 
 
