@@ -163,7 +163,7 @@ def test_the_robot_stands_on_what_is_under_it(scenario):
 
 
 SLOWLY = {
-    # At which errors are below 0.001 in (Coulomb), 0.005 in (reset integrator). With longer steps, a
+    # At which errors are below 0.001 in (Coulomb), 0.005 in (reset integrator). With longer steps a
     # witness misses nodes that leave uneven ground and land again within a step.
     "coulomb": {"simulation.accuracy": 1e-4, "simulation.max_step": 2e-3},
     "reset": {
