@@ -178,6 +178,7 @@ def test_the_margin_of_a_slipping_node_is_its_speed_that_way(ground, axis, mode)
     [
         (1.0, -2.0, 0.0, 0.5),  # 1 - 2 t
         (1.0, 0.0, -2.0, 1.0),  # 1 - t^2
+        (1.0, 0.0, -50.0, 0.2),  # 1 - 25 t^2
         (1.0, -3.0, 4.0, 0.5),  # 1 - 3 t + 2 t^2 = (1 - t)(1 - 2 t)
         (1.0, 1.0, 1.0, 9.0),  # never falls to zero
         (1.0, 3.0, 4.0, 9.0),  # both roots in the past

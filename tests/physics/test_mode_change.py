@@ -117,10 +117,12 @@ def test_the_margin_crosses_zero_where_the_pull_crosses_the_limit(sliding, mode)
     assert (below < 0.0) == bool(mode), "in slip, a mode change is due below it"
 
 
-def test_beyond_the_limit_a_node_that_moves_back_stays_stuck(sliding):
+@pytest.mark.parametrize("way", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-0.6, 0.8, 0.0)])
+def test_beyond_the_limit_a_node_that_moves_back_stays_stuck(sliding, way):
     # The bristle is a millimetre out: 1 N.
-    assert sliding.margin((-1e-5, 0.0, 0.0), p=(1e-3, 0.0, -1e-4)) > 0.0
-    assert sliding.margin((1e-5, 0.0, 0.0), p=(1e-3, 0.0, -1e-4)) < 0.0
+    p = 1e-3 * np.array(way) - [0.0, 0.0, 1e-4]
+    assert sliding.margin(-1e-5 * np.array(way), p=p) > 0.0
+    assert sliding.margin(1e-5 * np.array(way), p=p) < 0.0
 
 
 def test_a_node_that_sticks_again_does_so_where_it_is(sliding):
