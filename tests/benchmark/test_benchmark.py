@@ -11,11 +11,11 @@ from tetra_drake.benchmark import measure as benchmark
 from tetra_drake.benchmark import tables
 from tetra_drake.benchmark.measure import CLOSE_IN, LANES, Batch, Row, error_statistics, measure
 from tetra_drake.benchmark.settings import (
-    GROUNDS,
     SETS,
     compiled,
     describe,
     drake,
+    grounds,
     mujoco,
     own,
     settings_of,
@@ -112,9 +112,9 @@ def test_every_setting_is_measured_on_every_gait(short, no_mujoco):
         assert 0.0 < per_step == 2.0 * cost[f"microseconds_per_tetrahedron{of}"]
     assert len(stages) >= 2 + len(gaits)
     table = [line for line in tables.to_markdown(found).splitlines() if line.startswith("|")]
-    lengths = len(rows), len(found["batches"]), 1, len(GROUNDS)
+    lengths = len(rows), len(found["batches"]), 1, len(grounds())
     assert len(table) == sum(2 + length for length in lengths)
-    assert [row["ground"] for row in found["grounds"]] == list(GROUNDS)
+    assert [row["ground"] for row in found["grounds"]] == list(grounds())
     for row in found["grounds"]:
         assert row["compiled"] > row["drake"] > 0.0 < row["compiled_many"] and row["steps"] > 0
     assert table[2].startswith(f"| {rows[0]['engine']} | {rows[0]['setting']} | ")

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.benchmark.settings import (
-    GROUNDS,
     Changes,
     compiled,
     describe,
+    grounds,
     mujoco,
     own,
     settings_of,
@@ -172,10 +172,10 @@ def measure(
     if "mujoco" in engines:
         converged["mujoco"] = _distances(scenario, MUJOCO_CONVERGED, gaits)
     batches = list(_batches(scenario, engines))
-    grounds = list(_grounds(scenario)) if sizes and {"compiled", "drake"} <= engines else []
+    on_grounds = list(_grounds(scenario)) if sizes and {"compiled", "drake"} <= engines else []
     sized = [{"robot.tetrahedra": size} | own("compiled") for size in sizes]
     costs = [[Batch(scenario.with_changes(each), n) for n in (1, LANES)] for each in sized]
-    in_turn = list(itertools.chain(batches, *costs, *(ground for _, ground in grounds)))
+    in_turn = list(itertools.chain(batches, *costs, *(ground for _, ground in on_grounds)))
     if "drake" in engines:
         Row(scenario.with_changes(own("drake") | SHORT)).simulate(gaits[0])
     for batch in in_turn:
@@ -209,7 +209,7 @@ def measure(
         },
         "batches": [batch.to_json() for batch in batches],
         "step_costs": [step_cost(*pair) for pair in costs],
-        "grounds": [ground_speed(name, *three) for name, three in grounds],
+        "grounds": [ground_speed(name, *three) for name, three in on_grounds],
     }
 
 
@@ -238,8 +238,8 @@ def ground_speed(name: str, alone: Batch, many: Batch, diagram: Batch) -> dict[s
 
 
 def _grounds(scenario: Scenario) -> Iterator[tuple[str, list[Batch]]]:
-    """Batches on each of GROUNDS: one gait, many gaits, and one on the diagram."""
-    for name, changes in GROUNDS.items():
+    """Batches on each of grounds(): one gait, many gaits, and one on the diagram."""
+    for name, changes in grounds().items():
         ours, diagram = (scenario.with_changes(changes | own(e)) for e in ("compiled", "drake"))
         yield name, [Batch(ours, 1), Batch(ours, GROUND_BATCH), Batch(diagram, 1)]
 

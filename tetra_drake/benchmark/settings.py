@@ -5,26 +5,30 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
-from tetra_drake.scenario.schema import Coulomb, Scenario
-from tetra_drake.scenario.terrain import Rough
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
 
 Changes = dict[str, Any]
 
 SETS = ("default", "integrators", "compiled", "mujoco")
 """The names of sets of settings."""
 
-_ROUGH: Changes = {"terrain": Rough(0.25 * INCH, 6.0 * INCH), "robot.contacts": "all"}
-_COULOMB: Changes = {"friction": Coulomb(), "compiled.tolerance": "1 mm/s"}
 
-GROUNDS: dict[str, Changes] = {
-    "the scenario's": {},
-    "with Coulomb friction": _COULOMB,
-    "rough": _ROUGH,
-    "rough, with Coulomb friction": _ROUGH | _COULOMB,
-}
-"""Grounds to compare the speed on, those but the first with the settings of the shipped scenarios
-`coulomb` and `rough`."""
+def grounds() -> dict[str, Changes]:
+    """Grounds to compare the speed on: the scenario's, and with what the shipped scenario `rough`
+    has other than the thesis."""
+    shipped = load_scenario("rough")
+    rough = {"terrain": shipped.terrain, "robot.contacts": shipped.robot.contacts}
+    coulomb = {
+        "friction": shipped.friction,
+        "compiled.tolerance": shipped.compiled.tolerance,
+    }
+    return {
+        "the scenario's": {},
+        "with Coulomb friction": coulomb,
+        "rough": rough,
+        "rough, with Coulomb friction": rough | coulomb,
+    }
 
 
 def settings_of(name: str) -> list[Changes]:
