@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.states import body_velocities
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
@@ -32,10 +33,8 @@ def test_a_falling_robot_keeps_momentum_and_energy(scenario, engine):
     mass, moment = body.mass[0], body.moment[0]
     flight = simulate(scenario=falling, gait=seeded_gait(falling), record=True).trajectory
     assert flight is not None
-    t, p_WB, v_WB = flight.time.values, flight.p_WB.values, flight.v_WN.mean("node").values
-    p_BN, v_BN = flight.p_WN.values - p_WB[:, :, None], flight.v_WN.values - v_WB[:, :, None]
-    # The angular velocity from the nodes: sum r x (w x r) = 8/3 r^2 w.
-    w_WB = np.cross(p_BN, v_BN).sum(axis=2) / (8 / 3 * (structure.p_BN[0] ** 2).sum())
+    t, p_WB = flight.time.values, flight.p_WB.values
+    v_WB, w_WB = body_velocities(flight, structure)
 
     # The centre of mass falls as Galilei says.
     height = p_WB[0, :, 2].mean() - G * t**2 / 2.0

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 import xarray
+from helpers.converged import FINE
+from helpers.states import body_velocities
 from pydrake.systems.analysis import Simulator
 
 from tetra_drake.engines.drake import MakeSimulator
@@ -36,24 +38,12 @@ TERRAINS: dict[str, Terrain] = {
     "obstacles": Obstacles(0.25 * INCH, 1.0 * INCH, 2.5 * INCH, start=14.0 * INCH),
 }
 
-FINE = {
-    "simulation.scheme": "runge_kutta3",
-    "simulation.accuracy": 1e-6,
-    "simulation.max_step": 1e-4,
-    "simulation.mode_changes": "witness",
-    "simulation.witness_window": 1e-8,
-    "compiled.tolerance": 1e-8,
-    "compiled.max_step": 3e-5,
-    "compiled.look_ahead": 1e-8,
-}
-"""Settings at which both engines have converged, mode changes placed to 1e-8 s."""
-
 
 def shortly(scenario: Scenario, duration: float, **changes: object) -> Scenario:
     """A short converged simulation, driven from the start."""
     times = {"simulation.duration": duration, "simulation.steady_from": 0.5 * duration}
     given = {key.replace("__", "."): value for key, value in changes.items()}
-    return scenario.with_changes({"cpg.start_up": 0.0, **times, **FINE, **given})
+    return scenario.with_changes({**times, **FINE, **given})
 
 
 def trajectory(scenario: Scenario, engine: str) -> xarray.Dataset:
@@ -117,10 +107,7 @@ def test_contact_never_gives_energy(scenario, friction):
     structure, gravity = MakeStructure(falling), falling.robot.gravity
     body = make_model(falling, structure).body
     walk = trajectory(falling.with_changes({"simulation.sample_period": 2e-3}), "compiled")
-    v_WB = walk.v_WN.mean("node").values
-    v_BN = walk.v_WN.values - v_WB[:, :, None]
-    p_BN = walk.p_WN.values - walk.p_WB.values[:, :, None]
-    w_WB = np.cross(p_BN, v_BN).sum(axis=2) / (8 / 3 * (structure.p_BN[0] ** 2).sum())
+    v_WB, w_WB = body_velocities(walk, structure)
     energy = 0.5 * (body.mass[0] * v_WB**2 + body.moment[0] * w_WB**2).sum(axis=(1, 2))
     energy += body.mass[0] * gravity * walk.p_WB.values[:, :, 2].sum(axis=1)
     stretch = walk.length.values - structure.cables["free_length"]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray
+from helpers.converged import FINE
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import WALKING_SEED, load_gait, seeded_gait
@@ -15,19 +16,6 @@ def compiled(scenario: Scenario) -> Scenario:
     """The thesis scenario on the compiled engine."""
     return scenario.with_changes({"simulation.engine": "compiled"})
 
-
-FINE = {
-    "cpg.start_up": 0.0,
-    "simulation.scheme": "runge_kutta3",
-    "simulation.accuracy": 1e-6,
-    "simulation.max_step": 1e-4,
-    "simulation.mode_changes": "witness",
-    "simulation.witness_window": 1e-8,
-    "compiled.tolerance": 1e-8,
-    "compiled.max_step": 3e-5,
-    "compiled.look_ahead": 1e-8,
-}
-"""Settings at which both engines have converged, mode changes placed to 1e-8 s."""
 
 SAME_PLACE = 5e-6
 """Largest difference (m) of node positions on the two engines after 0.5 s.

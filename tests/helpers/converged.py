@@ -1,0 +1,15 @@
+"""Settings at which the diagram and the compiled engine agree to micrometres."""
+
+FINE = {
+    "cpg.start_up": 0.0,
+    "simulation.scheme": "runge_kutta3",
+    "simulation.accuracy": 1e-6,
+    "simulation.max_step": 1e-4,
+    "simulation.mode_changes": "witness",
+    "simulation.witness_window": 1e-8,
+    "compiled.tolerance": 1e-8,
+    "compiled.max_step": 3e-5,
+    "compiled.look_ahead": 1e-8,
+}
+"""Settings at which both engines have converged, mode changes placed to 1e-8 s, for short walks
+that are driven from the start."""
