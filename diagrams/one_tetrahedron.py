@@ -69,14 +69,14 @@ def make_standing_tetrahedron(scenario: Scenario) -> Structure:
         robot,
         bodies=("T1",),
         p_BN=p_BN,
-        p_WB=-p_BN[TRAILING, 2] * ground_axes(robot)[None, 2],
+        p_WB=-p_BN[TRAILING, 2] * start_axes(robot)[None, 2],
         cables=robot.cables[:0],
         cable_names=(),
         contacts=np.array(BASE),
     )
 
 
-def ground_axes(structure: Structure) -> np.ndarray:
+def start_axes(structure: Structure) -> np.ndarray:
     """(3, 3): the tangents t1 and t2 and the normal of the ground at the start, as rows."""
     return RotationMatrix(Quaternion(structure.q_WB)).matrix().T
 
@@ -113,7 +113,7 @@ def let_go(
     context.SetAccuracy(1e-4)  # localises contact and stiction changes to 1e-4 times 0.01 s
 
     start = tetrahedron.initial_state  # [q; v]: quaternion, position, angular velocity, velocity
-    axes = ground_axes(tetrahedron)
+    axes = start_axes(tetrahedron)
     start[4:7] += height * axes[2]
     start[10:] = velocity @ axes
     plant = diagram.GetSubsystemByName("plant")

@@ -24,10 +24,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from one_tetrahedron import (
     Motion,
-    ground_axes,
     let_go,
     make_diagram,
     make_standing_tetrahedron,
+    start_axes,
     weight,
 )
 
@@ -75,7 +75,7 @@ def parts_of_weight(scenario: Scenario) -> tuple[float, float]:
 
 def uphill(scenario: Scenario) -> np.ndarray:
     """(3,): unit vector up the slope."""
-    return ground_axes(make_standing_tetrahedron(scenario))[0]
+    return start_axes(make_standing_tetrahedron(scenario))[0]
 
 
 def travel(motion: Motion, scenario: Scenario) -> np.ndarray:

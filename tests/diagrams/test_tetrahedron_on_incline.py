@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 import pytest
-from one_tetrahedron import ground_axes, let_go, make_standing_tetrahedron, weight
+from one_tetrahedron import let_go, make_standing_tetrahedron, start_axes, weight
 from tetrahedron_on_incline import (
     GENTLE,
     KINETIC,
@@ -39,7 +39,7 @@ from tetra_drake.scenario.units import INCH
 
 def centre_velocity(motion, scenario):
     """(samples, 3): that of the centre of mass along t1, t2 and the normal."""
-    return motion.v_WN.mean(axis=1) @ ground_axes(make_standing_tetrahedron(scenario)).T
+    return motion.v_WN.mean(axis=1) @ start_axes(make_standing_tetrahedron(scenario)).T
 
 
 def slips(motion):
@@ -51,7 +51,7 @@ def energy(motion, scenario):
     """(samples,): of motion, weight, ground, and the bristles that stick."""
     structure = make_standing_tetrahedron(scenario)
     inertia, law = tetrahedron_inertia(structure), scenario.friction
-    t1, t2, n = ground_axes(structure)
+    t1, t2, n = start_axes(structure)
     v_WB, p_WB = motion.v_WN.mean(axis=1), motion.p_WN.mean(axis=1)
     # The angular velocity from the nodes: sum |w x r|^2 = 2/3 |w|^2 sum r^2.
     moment = inertia.get_unit_inertia().get_moments()[0] / (structure.p_BN**2).sum() * 3 / 2

@@ -21,8 +21,9 @@ def mode_margin(nodes: Array, modes: Array, ground: Ground, frames: Array) -> fl
     """Positive while no mode is due to change; crosses zero where the first one is.
 
     The least of: gap in the air, depth on the ground (m); with the reset integrator stiction range
-    less deflection (m), with Coulomb friction what is left of the limit (N); speed in the direction
-    of slip (m/s). Only its sign has a meaning. The arguments are those of `add_ground_forces`.
+    less deflection (m), and in slip speed in its direction (m/s); with Coulomb friction what is
+    left of the limit, and in slip what exceeds it (N). Only its sign has a meaning. The arguments
+    are those of `add_ground_forces`.
     """
     margin, law = math.inf, law_of(ground)
     for i in range(ground.contacts.size):

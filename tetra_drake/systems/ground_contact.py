@@ -84,7 +84,7 @@ class GroundContact(LeafSystem):
         `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
         Changes due right now count as made.
         """
-        state, rows, (nodes, frames) = self._at(context)
+        state, rows, nodes, frames = self._at(context)
         rows = rows.copy()
         update_modes(state, nodes, self._ground, frames, rows)
         ground = rows, self._ground, frames
@@ -92,7 +92,7 @@ class GroundContact(LeafSystem):
 
     def ModeChangeIsDue(self, context: Context) -> bool:
         """Whether a mode will change if a step ends here."""
-        state, rows, (nodes, frames) = self._at(context)
+        state, rows, nodes, frames = self._at(context)
         return update_modes(state, nodes, self._ground, frames, rows.copy())
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
@@ -102,12 +102,12 @@ class GroundContact(LeafSystem):
     def _rows(self, context: Context) -> np.ndarray:
         return context.get_discrete_state_vector().value().reshape(-1, MODE_COLUMNS)
 
-    def _at(self, context: Context) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """The state, the modes, and nodes and frames."""
+    def _at(self, context: Context) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The state, the modes, the nodes and the frames."""
         state = self._state.Eval(context)
         nodes, frames = self._tables()
         meet_ground(state, self._p_BN, self._ground, nodes, frames)
-        return state, self._rows(context), (nodes, frames)
+        return state, self._rows(context), nodes, frames
 
     def _tables(self) -> tuple[np.ndarray, np.ndarray]:
         return np.empty((self._nodes, NODE_COLUMNS)), np.empty((self._count, FRAME_COLUMNS))
@@ -120,13 +120,13 @@ class GroundContact(LeafSystem):
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         rows = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
-        state, _, (nodes, frames) = self._at(context)
+        state, _, nodes, frames = self._at(context)
         if update_modes(state, nodes, self._ground, frames, rows):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
     def _margin(self, context: Context) -> float:
-        _, rows, (nodes, frames) = self._at(context)
+        _, rows, nodes, frames = self._at(context)
         return mode_margin(nodes, rows, self._ground, frames)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
