@@ -1,13 +1,16 @@
 """Figures of one trajectory show its data, for any number of tetrahedra."""
 
+import itertools
+
 import numpy as np
 import pytest
 from helpers.made_up_walk import HEIGHT, LOAD, PERIOD, SPEED, make_walk
 from matplotlib.colors import to_hex
+from matplotlib.text import Text
 
 from tetra_drake.figures.forces import ground_forces, signals_and_tensions
 from tetra_drake.figures.motion import before_and_after, one_step, relative_distances, time_lapse
-from tetra_drake.figures.style import OKABE_ITO, save_figure
+from tetra_drake.figures.style import OKABE_ITO, common_style, save_figure
 from tetra_drake.results.measures import last_step, lifted
 from tetra_drake.robot.ground import ground_heights, make_ground
 from tetra_drake.robot.structure import STRUTS, MakeStructure
@@ -41,14 +44,54 @@ def walk():
     return make_walk()
 
 
-@pytest.mark.parametrize("bodies", [2, 8, pytest.param(3, id="3, short")])
-def test_any_robot_and_duration_can_be_drawn(bodies, tmp_path):
+def labels(figure):
+    """Places (labels, 4) on the page, in pixels, of all texts but the numbers at ticks."""
+    axes = [axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)]
+    ticks = {text for axis in axes for text in axis.get_ticklabels(which="both")}
+    ticks |= {axis.offsetText for axis in axes}
+    texts = [text for text in figure.findobj(Text) if text not in ticks and text.get_text()]
+    return np.array([text.get_window_extent().extents for text in texts if text.get_visible()])
+
+
+@pytest.mark.parametrize("draw", FIGURES)
+@pytest.mark.parametrize("bodies", [2, 7, 12, 25, pytest.param(3, id="3, short")])
+def test_any_robot_and_duration_is_drawn_on_a_page_with_no_label_on_another(bodies, draw, tmp_path):
     walk = make_walk(bodies=bodies, duration=0.5 if bodies == 3 else 9.0)
-    for draw in FIGURES:
-        save_figure(
-            draw(walk, *[FLAT] * (draw in ON_GROUND)), tmp_path, draw.__name__, kinds=["svg"]
-        )
-        assert 10_000 < (tmp_path / f"{draw.__name__}.svg").stat().st_size < 500_000
+    figure = draw(walk, *[FLAT] * (draw in ON_GROUND))
+    save_figure(figure, tmp_path, "figure", kinds=["svg"])
+    assert 10_000 < (tmp_path / "figure.svg").stat().st_size < 1_000_000
+    with common_style():
+        figure.draw_without_rendering()
+        (width, height), drawn = figure.get_size_inches(), figure.get_tightbbox()
+    assert width <= 9.0 and height <= 11.5
+    assert drawn.x0 >= 0.0 and drawn.y0 >= 0.0 and drawn.x1 <= width and drawn.y1 <= height
+    for a, b in itertools.combinations(labels(figure), 2):
+        overlap = np.minimum(a[2:], b[2:]) - np.maximum(a[:2], b[:2])
+        assert overlap.min() <= 0.0
+
+
+def test_lines_of_twelve_tetrahedra_differ():
+    [panel] = relative_distances(make_walk(bodies=12)).axes
+    lines = [line for line in panel.lines if line.get_label().startswith("T")]
+    looks = {(line.get_color(), str(line._dash_pattern)) for line in lines}
+    assert len(looks) == len(lines) == 12
+
+
+@pytest.mark.parametrize("draw", [time_lapse, one_step])
+def test_rows_of_a_walk_that_turns_do_not_overlap(walk, draw):
+    """Its last instant is turned by 90 degrees."""
+    angle = np.linspace(0.0, np.pi / 2, walk.sizes["time"])
+    turn = np.zeros((len(angle), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
+    turn[:, 1, 0], turn[:, 2, 2] = np.sin(angle), 1.0
+    turn[:, 0, 1] = -turn[:, 1, 0]
+    p_WN = np.einsum("tij,tbnj->tbni", turn, walk.p_WN.values)
+    panel = draw(walk.assign(p_WN=(walk.p_WN.dims, p_WN)), *[FLAT] * (draw in ON_GROUND)).axes[0]
+    rows = [np.concatenate([line.get_ydata() for line in row]) for row in robots(panel)]
+    for above, below in itertools.pairwise(rows):
+        assert np.nanmin(above) > np.nanmax(below)
+    low, high = panel.get_ylim()
+    assert low < np.nanmin(rows[-1]) and np.nanmax(rows[0]) < high
 
 
 def robots(panel):
@@ -105,7 +148,7 @@ def test_in_one_step_tetrahedra_off_the_ground_stand_out(walk):
 
 def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
     panels = one_step(walk, FLAT).axes[2:]
-    assert [panel.get_title() for panel in panels] == walk.tetrahedron.values.tolist()
+    assert [panel.get_title("left") for panel in panels] == walk.tetrahedron.values.tolist()
     for panel in panels:
         path, in_the_air, start = panel.lines
         assert np.ptp(path.get_xdata()) == pytest.approx(SPEED * PERIOD / INCH, rel=0.04)
@@ -126,13 +169,13 @@ def test_tensions_are_those_of_the_driven_cables(walk):
         expected = walk.signal.sel(junction=junction) / POUND_FORCE
         np.testing.assert_allclose(signal.get_ydata(), expected)
         np.testing.assert_allclose(tension.get_ydata(), expected + 3.0 / POUND_FORCE)
-        assert panel.get_ylabel().startswith(junction)
+        assert panel.get_title("left") == junction
 
 
 def test_ground_forces_are_those_of_the_last_seconds(walk):
     panels = ground_forces(walk, FLAT, seconds=3.0).axes
     names = [f"T{i} bottom left" for i in range(1, 6)]
-    assert [panel.get_ylabel().split("\n")[0] for panel in panels] == [*names, "T5 tip"]
+    assert [panel.get_title("left") for panel in panels] == [*names, "T5 tip"]
     end = walk.sel(time=slice(6.0, None))
     normal, friction = panels[0].lines
     expected = end.normal_force.sel(contact="T1 bottom_left") / POUND_FORCE
@@ -189,7 +232,7 @@ def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(wal
         (ground_on(DOWNSTAIRS), {"T2 tip", "T4 bottom right"}),
     ):
         figure = ground_forces(every, ground)
-        shown = [panel.get_ylabel().split("\n")[0] for panel in figure.axes]
+        shown = [panel.get_title("left") for panel in figure.axes]
         assert shown == sorted({*left, *others})
         (legend,) = figure.legends
         (friction,) = (t.get_text() for t in legend.get_texts() if "friction" in t.get_text())

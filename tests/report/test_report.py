@@ -148,6 +148,15 @@ def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page)
     assert any(f"{best}: 2 in" in text for text in page.texts["p"])
 
 
+def test_many_parameters_are_folded(tmp_path, study):
+    assert len(study.run.vector(0, 0)) == 6
+    assert not any("->" in text for text in render(study).texts["details"])
+    many = tiny_scenario().with_changes({"robot.tetrahedra": 7})  # 2 * 6 * 5 weights
+    page = render(study_run(load_run(write_run(tmp_path / "run", TRIALS, scenario=many))))
+    (folded,) = (text for text in page.texts["details"] if "->" in text)
+    assert folded.count("->") == 60
+
+
 def test_reference_numbers_stand_only_where_the_scenario_has_them(study, page):
     reference = ReferenceScenario("a paper", best_distance=14.34 * INCH, two_best_weights=[0.1] * 4)
     assert reference.source not in " ".join(page.texts["body"])

@@ -1,5 +1,7 @@
 """The robot as a Meshcat scene: arrows, floor and camera."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 from helpers.made_up_walk import make_walk
@@ -50,20 +52,33 @@ def test_aligning_quaternions_turn_z_into_the_direction():
     np.testing.assert_array_equal(aligning_quaternions(np.zeros(3)[np.newaxis]), [[1, 0, 0, 0]])
 
 
+def extent(points, camera, target):
+    """Greatest distances of points from the middle of a camera's picture, across and up; 1 is the
+    edge."""
+    rays = points.reshape(-1, 3) - camera
+    forward = (target - camera) / np.linalg.norm(target - camera)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    upward = np.cross(right, forward)
+    edge = np.tan(np.deg2rad(FIELD_OF_VIEW / 2)) * rays @ forward
+    return np.abs(rays @ right / edge).max() / ASPECT, np.abs(rays @ upward / edge).max()
+
+
 def test_camera_sees_every_point():
     points = np.random.default_rng(4).uniform((0, -0.1, 0), (0.8, 0.1, 0.15), (200, 3))
     target = points.mean(axis=0)
     camera = camera_position(points, target)
     assert camera[2] > 0.15  # looks down on the floor
     assert camera[1] < -0.1  # from the right, so that the robot walks to the right
-    rays = points - camera
-    forward = (target - camera) / np.linalg.norm(target - camera)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    upward = np.cross(right, forward)
-    limit = np.tan(np.deg2rad(FIELD_OF_VIEW / 2))
-    assert np.abs(rays @ upward / (rays @ forward)).max() < limit
-    assert np.abs(rays @ right / (rays @ forward)).max() < ASPECT * limit
+    assert max(extent(points, camera, target)) < 1.0
+
+
+@pytest.mark.parametrize("bodies", [2, 3, 7, 12, 25])
+def test_the_camera_is_as_near_to_a_robot_of_any_length_as_it_can_be(bodies):
+    structure, ground = ground_of(load_scenario().terrain)
+    meshcat, p_WN = Mock(), make_walk(bodies=bodies).p_WN.values
+    set_surroundings(meshcat, structure, ground, p_WN)
+    assert 0.5 < max(extent(p_WN, *meshcat.SetCameraPose.call_args.args)) < 1.0
 
 
 def test_the_floor_reaches_around_every_point_in_whole_inches():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from tetra_drake.figures.style import OKABE_ITO, SHADE, common_style, legend_below, make_figure
+from tetra_drake.figures.style import OKABE_ITO, SHADE, add_grid, common_style, legend_below
 from tetra_drake.formatting import fixed
 from tetra_drake.physics.contact import Ground
 from tetra_drake.results.measures import intervals, off_ground, share_of_time
@@ -20,6 +21,9 @@ from tetra_drake.scenario.units import POUND_FORCE
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
 _SECOND: Any = {"color": OKABE_ITO["vermillion"], "linestyle": (0, (4, 1.2))}
+
+_ROWS, _COLUMNS = 10, 4
+"""Panels one below the other before there is another column, and the most columns."""
 
 _MIRRORED = 0.01
 """Mean difference, as a share of the mean force, below which two nodes are mirror images."""
@@ -52,7 +56,8 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
 
     On uneven ground, friction along the forward tangent, which is x projected on the slope. One
     panel per tetrahedron, for its bottom left node, one for each right one that is not its mirror
-    image, and one for each other node that touches. Shaded: intervals without normal force.
+    image, and one for each other node that touches. Shaded: intervals without normal force, with
+    their share of the time shown.
     """
     end = trajectory.sel(time=slice(trajectory.time[-1] - seconds, None))
     forces = end[["normal_force", "friction_force"]] / POUND_FORCE
@@ -66,7 +71,7 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
         panel.plot(node.time, node.normal_force, **_FIRST)
         panel.plot(node.time, node.friction_force.sel(horizontal="x"), **_SECOND)
         share = fixed(100 * share_of_time(off), 0)
-        panel.set_title(f"off the ground {share} % of the time shown", loc="right")
+        panel.set_title(f"lifted {share} %", loc="right")
     lines = {"normal force": _FIRST, f"friction force {along}": _SECOND}
     legend_below(figure, lines, Patch(color=SHADE, label="no normal force"))
     figure.suptitle("Forces of the ground on each tetrahedron")
@@ -91,12 +96,13 @@ def _contacts_to_show(trajectory: xarray.Dataset, ground: Ground) -> list[str]:
 
 
 def _panels_over_time(names: Sequence[str]) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with one panel of forces per name, one below the other."""
-    height = 1.0 + 1.35 * len(names)
-    figure, panels = make_figure(
-        width_in=7.5, height_in=height, rows=len(names), sharex=True, sharey=True
-    )
-    for name, panel in zip(names, panels[:, 0], strict=True):
-        panel.set_ylabel(f"{name.replace('_', ' ')}\n(lbf)")
-    panel.set_xlabel("time (s)")
-    return figure, dict(zip(names, panels[:, 0], strict=True))
+    """A figure with one panel of forces per name."""
+    columns = min(math.ceil(len(names) / _ROWS), _COLUMNS)
+    rows = math.ceil(len(names) / columns)
+    size = (7.5 if columns == 1 else 9.0), 1.1 + rows * max(min(1.4, 10.0 / rows), 0.75)
+    figure = Figure(figsize=size)
+    panels = add_grid(figure, names, columns=columns)
+    for panel in list(panels.values())[columns * (rows - 1) :]:
+        panel.set_xlabel("time (s)")
+    figure.supylabel("force (lbf)")
+    return figure, panels

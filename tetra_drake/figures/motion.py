@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from tetra_drake.figures.style import (
     OKABE_ITO,
+    add_grid,
     common_style,
     draw_reference,
     legend_below,
@@ -39,6 +41,12 @@ _PITCH_IN = 7.3
 _MARGIN_IN = 0.6
 """Free space around a time lapse, in inches of the robot's world."""
 
+_NAME_WIDTH, _NAME_HEIGHT = 0.33, 0.2
+"""Room for the name of a tetrahedron, in inches on paper."""
+
+_PATHS = 12
+"""Most panels of paths side by side."""
+
 _PROFILE_IN = 0.05
 """Distance between points of the ground's profile, in inches."""
 
@@ -56,7 +64,7 @@ def relative_distances(trajectory: xarray.Dataset) -> Figure:
     Grey lines: the distances at the start."""
     inches = measures.relative_distances(trajectory) / INCH
     names = inches.tetrahedron.values
-    figure, [[panel]] = make_figure(width_in=7.0, height_in=1.5 + 0.7 * len(names))
+    figure, [[panel]] = make_figure(width_in=7.0, height_in=1.5 + min(0.7 * len(names), 7.0))
     for i, name in enumerate(names):
         line, style = inches.sel(tetrahedron=name), line_style(i)
         panel.axhline(float(line[0]), color="0.6", linewidth=0.7)
@@ -107,7 +115,7 @@ def time_lapse(trajectory: xarray.Dataset, *, instants: int = 6) -> Figure:
     width, height = _size(rows, width_in=5.8, height_in=8.5)
     # Wide enough for the title.
     figure, [[panel]] = make_figure(width_in=max(width + 1.0, 4.8), height_in=height + 1.0)
-    _draw_rows(panel, rows, OVERHEAD, trajectory.tetrahedron.values)
+    _draw_rows(panel, rows, OVERHEAD, trajectory.tetrahedron.values, width_in=width)
     panel.axvline(inches[0, 0, BOTTOM_LEFT, X], color="0.45", linewidth=0.8)
     panel.set_ylabel("time, and distance $x_1$ walked by T1")
     figure.suptitle("Time lapse from above\ndots: T1's bottom nodes at each full second")
@@ -119,11 +127,12 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
     """One step from above and from the side, to scale; lifted tetrahedra stand out.
 
     Below, the path of one bottom node per tetrahedron, enlarged. Grey: the ground, where it is not
-    flat along the middle of the robot, and below the node. If no signal oscillates, the last
-    quarter of the trajectory is shown."""
+    flat along the middle of the robot, and below the node. If no signal has two periods in the
+    second half of the trajectory, its last quarter is shown."""
     ends = measures.last_step(trajectory)
     start, end = ends or (float(trajectory.time.quantile(0.75)), float(trajectory.time[-1]))
-    what, why = ("one step", "") if ends else ("the end", "\nno step, as no signal oscillates")
+    why = "\nno step, as no signal has two periods in the second half"
+    what, why = ("one step", "") if ends else ("the end", why)
     step = trajectory.sel(time=slice(start, end))
     inches, off, since = step.p_WN.values / INCH, measures.lifted(step), step.time - step.time[0]
     rows = []
@@ -134,17 +143,19 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
         time = f"{since.values[sample]:.2f} s"
         rows.append(_Row(time, inches[sample], styles, paths, _PATH, profile))
     width, height = _size(rows, width_in=3.6, height_in=6.0)
-    figure = Figure(figsize=(max(2 * width + 1.2, 5.8), height + 3.1))  # with room for the legend
-    heights = [height + 0.8, 1.9]
+    names = step.tetrahedron.values
+    heights = [height + 0.8, 0.7 + 1.2 * math.ceil(len(names) / _PATHS)]
+    legend = 0.4
+    figure = Figure(figsize=(max(2 * width + 1.2, 5.8), sum(heights) + legend))
     above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
     panels: Any = above.subplots(1, 2)
     for panel, view, title in zip(panels, (OVERHEAD, SIDE), ("above", "the side"), strict=True):
-        _draw_rows(panel, rows, view, step.tetrahedron.values)
+        _draw_rows(panel, rows, view, names, width_in=width)
         panel.set_title(f"from {title}")
     panel.tick_params(left=False, labelleft=False)
     if ground.flat:
         for row in range(instants):
-            panel.axhline(-_PITCH_IN * row, **_GROUND)
+            panel.axhline(-_pitch(rows) * row, **_GROUND)
     _draw_paths(below, step, off, ground)
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
     legend_below(figure, {**lines, "path of the bottom nodes": _PATH})
@@ -166,8 +177,7 @@ def _draw_paths(
 ) -> None:
     """The path of the bottom left node of each tetrahedron in the step, enlarged."""
     names = step.tetrahedron.values
-    panels = figure.subplots(1, len(names), sharex=True, sharey=True, squeeze=False)[0]
-    for panel, name in zip(panels, names, strict=True):
+    for name, panel in add_grid(figure, names, columns=min(len(names), _PATHS)).items():
         node = step.p_WN.sel(tetrahedron=name).isel(node=BOTTOM_LEFT) / INCH
         x, z = node.sel(axis="x") - node.sel(axis="x")[0], node.sel(axis="z")
         if not ground.flat:
@@ -178,10 +188,9 @@ def _draw_paths(
         panel.plot(x, z, **_PATH)
         panel.plot(x.where(up), z.where(up), **_LIFTED)
         panel.plot(x[0], z[0], "o", color="black")
-        panel.set_title(name)
         panel.margins(0.08)
         panel.update_datalim([(-0.1, 0.0), (0.1, 0.1)])  # even if nothing moves
-    figure.supxlabel("displacement of the bottom left node since the start of the step (in)")
+    figure.supxlabel("displacement of the bottom left node since the start of the time shown (in)")
     figure.supylabel("height (in)" if ground.flat else "height above the\nground at 0 (in)")
 
 
@@ -213,8 +222,9 @@ def _heights(rows: Sequence[_Row]) -> np.ndarray:
 
 
 def _pitch(rows: Sequence[_Row]) -> float:
-    """Distance in inches between rows, with room for what climbs."""
-    return max(_PITCH_IN, float(np.ptp(_heights(rows))) + _MARGIN_IN)
+    """Distance in inches between rows, with room for what climbs or turns."""
+    sideways = np.ptp([row.nodes[..., Y] for row in rows])
+    return max(_PITCH_IN, float(max(np.ptp(_heights(rows)), sideways)) + _MARGIN_IN)
 
 
 def _size(rows: Sequence[_Row], *, width_in: float, height_in: float) -> tuple[float, float]:
@@ -222,13 +232,16 @@ def _size(rows: Sequence[_Row], *, width_in: float, height_in: float) -> tuple[f
     wide = float(np.ptp([row.nodes[..., X] for row in rows])) + 2 * _MARGIN_IN
     high = _pitch(rows) * len(rows)
     scale = min(width_in / wide, height_in / high)
-    return scale * wide, scale * high
+    return scale * wide, scale * high + _NAME_HEIGHT
 
 
 def _draw_rows(
-    panel: Axes, rows: Sequence[_Row], view: tuple[int, int], names: Sequence[str]
+    panel: Axes, rows: Sequence[_Row], view: tuple[int, int], names: Sequence[str], width_in: float
 ) -> None:
-    """Draws a time lapse, one row below the other, and names the tetrahedra of the first."""
+    """Draws a time lapse, one row below the other, and names tetrahedra of the first.
+
+    On paper it is `width_in` inches wide. Where there is no room for all names, only each second,
+    or third, ... is shown."""
     pitch = _pitch(rows)
     for i, row in enumerate(rows):
         down = [0.0, pitch * i]
@@ -242,14 +255,19 @@ def _draw_rows(
     across, up = np.moveaxis(np.array([row.nodes[..., view] for row in rows]), -1, 0)
     heights = _heights(rows) if view == SIDE else up
     middle = (heights.min() + heights.max()) / 2
+    left, right = across.min() - _MARGIN_IN, across.max() + _MARGIN_IN
+    per_paper_inch = (right - left) / width_in
+    top = middle + pitch / 2 + _NAME_HEIGHT * per_paper_inch
     panel.set(
         xlabel="x (in)",
-        xlim=(across.min() - _MARGIN_IN, across.max() + _MARGIN_IN),
-        ylim=(middle - pitch * (len(rows) - 0.5), middle + 0.5 * pitch + 0.6),
+        xlim=(left, right),
+        ylim=(middle - pitch * (len(rows) - 0.5), top),
         aspect="equal",
     )
     panel.set_yticks(middle - pitch * np.arange(len(rows)), [row.label for row in rows])
     panel.grid(visible=False, axis="y")
-    for name, x, y in zip(names, across[0], up[0], strict=True):
-        place = x[y.argmax()], y.max()
-        panel.annotate(name, place, (3, 1), textcoords="offset points")
+    x, y = across[0].mean(axis=1), up[0].max(axis=1)
+    apart = float(np.hypot(np.diff(x), np.diff(y)).mean())
+    every = math.ceil(_NAME_WIDTH * per_paper_inch / apart)
+    for name, *place in list(zip(names, x, y, strict=True))[::every]:
+        panel.annotate(name, place, (0, 2), textcoords="offset points", ha="center")

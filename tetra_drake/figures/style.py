@@ -7,6 +7,7 @@ figure; save_figure() writes it. Neither a display nor pyplot is needed.
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import matplotlib.style
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 
@@ -69,6 +70,19 @@ def make_figure(
     """A figure and its axes (rows, columns); sizes in inches on paper, `layout` for subplots."""
     figure = Figure(figsize=(width_in, height_in))
     return figure, figure.subplots(rows, columns, squeeze=False, **layout)
+
+
+def add_grid(figure: Figure | SubFigure, names: Sequence[str], *, columns: int) -> dict[str, Axes]:
+    """Adds one titled panel per name, row by row, all of one scale."""
+    rows = math.ceil(len(names) / columns)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for unused in panels[len(names) :]:
+        unused.remove()
+    for lowest in panels[: len(names)][-columns:]:
+        lowest.tick_params(labelbottom=True)
+    for name, panel in zip(names, panels, strict=False):
+        panel.set_title(name.replace("_", " "), loc="left")
+    return dict(zip(names, panels, strict=False))
 
 
 def legend_below(figure: Figure, lines: Mapping[str, Any], *others: Artist) -> None:
