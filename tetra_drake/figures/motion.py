@@ -269,5 +269,5 @@ def _draw_rows(
     x, y = across[0].mean(axis=1), up[0].max(axis=1)
     apart = float(np.hypot(np.diff(x), np.diff(y)).mean())
     every = math.ceil(_NAME_WIDTH * per_paper_inch / apart)
-    for name, *place in list(zip(names, x, y, strict=True))[::every]:
-        panel.annotate(name, place, (0, 2), textcoords="offset points", ha="center")
+    for i in range(0, len(names), every):
+        panel.annotate(names[i], (x[i], y[i]), (0, 2), textcoords="offset points", ha="center")
