@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import pandas
 import pytest
 from helpers.analytic import Bowl, RandomSearch, read_record, small_scenario
+from helpers.meshcat_page import commands, read_page
 
 import tetra_drake
 from tetra_drake import cli
@@ -90,6 +91,20 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     assert progress.shown[0] == 0 and progress.shown[-1] == 8
     assert progress.stages == [(done, 5) for done in range(6)]
     assert progress.warnings == []
+
+
+@pytest.mark.parametrize("bodies", [2, 7])
+def test_a_robot_of_any_length_is_evolved_and_drawn(tiny, tmp_path, bodies):
+    scenario = tiny.with_changes({"robot.tetrahedra": bodies, "simulation.duration": 2.0})
+    run = tetra_drake.evolve(scenario, tmp_path / "run", workers=1, reevaluate=False)
+    trial, index = run.fittest()
+    m = bodies - 1
+    assert len(run.vector(trial, index)) == 2 * m * (m - 1) + 2
+    assert run.statuses[0].failures == 0
+    assert len(list((run.directory / "figures").glob("*.svg"))) >= 9
+    replay = commands(read_page(run.directory / "replay.html"), "set_object")
+    drawn = {one["path"].split("/")[2] for one in replay if one["path"].startswith("/robot/")}
+    assert drawn == {f"T{i + 1}" for i in range(bodies)}
 
 
 def test_workers_of_ones_own_find_the_engine_compiled(tiny, tmp_path, reports, monkeypatch):
