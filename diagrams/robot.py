@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
-from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Adder, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
@@ -40,7 +40,7 @@ from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.systems import CableNetwork, GroundContact, MatsuokaCpg, StartUpGate
+from tetra_drake.systems import CableNetwork, GroundContact, StartUpGate
 from tetra_drake.visualization.replay import replay_title, save_replay
 
 DIAGRAMS = Path(__file__).parent
@@ -58,13 +58,10 @@ def make_diagram(scenario: Scenario, gait: Gait) -> Diagram:
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
-    if scenario.cpg.signals == "live":
-        network: System = MatsuokaCpg(scenario.cpg, gait, oscillators=scenario.oscillators)
-    else:
-        signals = signal_samples(scenario, gait)
-        times = scenario.cpg.listing_step * np.arange(len(signals))
-        network = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, signals.T))
-    cpg = builder.AddNamedSystem("cpg", network)
+    signals = signal_samples(scenario, gait)
+    times = scenario.cpg.listing_step * np.arange(len(signals))
+    source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, signals.T))
+    cpg = builder.AddNamedSystem("cpg", source)
     gate = StartUpGate(scenario.oscillators, start_up=scenario.cpg.start_up)
     start_up = builder.AddNamedSystem("start_up", gate)
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))

@@ -28,8 +28,9 @@ from pydrake.systems.primitives import LogVectorOutput
 
 from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.figures.style import common_style, make_figure, save_figure
+from tetra_drake.physics.oscillator import Network
 from tetra_drake.results.measures import dominant_frequency
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.network import initial_neurons
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import POUND_FORCE
@@ -46,10 +47,21 @@ def make_diagram(
     scenario: Scenario, *, weight: float = WEIGHT, tau_a: float = TAU_A, ratio: float = RATIO
 ) -> Diagram:
     """A network of one oscillator, and a log of its signal."""
-    cpg = scenario.with_changes({"cpg.partner_weight": weight}).cpg
-    gait = Gait(name="one oscillator", weights=(), tau_a=tau_a, tau_b=ratio * tau_a)
+    cpg = scenario.cpg
+    network = Network.of(
+        [[0.0, weight], [weight, 0.0]],
+        tau_a=tau_a,
+        tau_b=ratio * tau_a,
+        self_inhibition_weight=cpg.self_inhibition_weight,
+    )
+    neurons = MatsuokaCpg(
+        network,
+        tonic=cpg.external_input,
+        initial_state=initial_neurons(cpg, oscillators=1),
+        gain=cpg.gain,
+    )
     builder = DiagramBuilder()
-    oscillator = builder.AddNamedSystem("oscillator", MatsuokaCpg(cpg, gait, oscillators=1))
+    oscillator = builder.AddNamedSystem("oscillator", neurons)
     LogVectorOutput(oscillator.GetOutputPort("signals"), builder).set_name("log")
     diagram = builder.Build()
     diagram.set_name("single_oscillator")

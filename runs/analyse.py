@@ -190,11 +190,11 @@ def shares_off_ground(trajectory: xarray.Dataset, *, since: float) -> dict[str, 
 
 
 def signal_frequencies(trajectory: xarray.Dataset, *, since: float) -> dict[str, float]:
-    """Frequency (Hz) of each junction's signal, from `since` (s) on; see dominant_frequency."""
+    """Frequency (Hz) of each oscillator's signal, from `since` (s) on; see dominant_frequency."""
     signals = trajectory.signal.sel(time=slice(since, None))
     return {
-        str(name): dominant_frequency(signals.time.values, signals.sel(junction=name).values)
-        for name in signals.junction.values
+        str(name): dominant_frequency(signals.time.values, signals.sel(oscillator=name).values)
+        for name in signals.oscillator.values
     }
 
 

@@ -186,7 +186,8 @@ def test_the_command_passes_its_options_on_and_writes_json(tmp_path, monkeypatch
 
     monkeypatch.setattr(benchmark, "measure", measured)
     monkeypatch.setattr(tables, "to_markdown", str)
-    save_gait(seeded_gait(load_scenario("thesis")), "walking.json")
+    thesis = load_scenario("thesis")
+    save_gait(seeded_gait(thesis), "walking.json", thesis)
     assert main(["benchmark", "walking.json", "--json", "found.json"]) == 0
     assert main(["benchmark", "--gaits", "2", "--settings", "compiled", "--sizes", "4", "5"]) == 0
     (one, defaults), (random, options) = calls
@@ -211,7 +212,7 @@ def test_bad_input_is_refused_before_measuring(arguments, found, tmp_path, monke
     monkeypatch.chdir(tmp_path)
     monkeypatch.delattr(benchmark, "measure")
     four = load_scenario("thesis").with_changes({"robot.tetrahedra": 4})
-    save_gait(seeded_gait(four), "three.json")
+    save_gait(seeded_gait(four), "three.json", four)
     assert main(["benchmark", *arguments]) == 2
     captured = capsys.readouterr()
     assert captured.out == "" and len(captured.err.splitlines()) == 1 and found in captured.err

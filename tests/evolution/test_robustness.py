@@ -114,7 +114,7 @@ def test_the_summary_is_of_the_changes_from_the_unchanged_distance():
 
 def test_the_command_writes_the_distance_of_every_simulation(scenario, gaits, tmp_path):
     gait, out, short = (tmp_path / name for name in ("gait.json", "out.csv", "short.yaml"))
-    save_gait(gaits["b"], gait)
+    save_gait(gaits["b"], gait, scenario)
     short.write_text(dump_scenario(scenario))
     options = ["--scenario", str(short), "--percent", "3", "--out", str(out)]
     assert main(["robustness", str(gait), *options]) == 0

@@ -164,12 +164,12 @@ def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
 
 def test_tensions_are_those_of_the_driven_cables(walk):
     panels = signals_and_tensions(walk).axes
-    for panel, junction in zip(panels, walk.junction.values, strict=True):
+    for panel, oscillator in zip(panels, walk.oscillator.values, strict=True):
         tension, signal = panel.lines
-        expected = walk.signal.sel(junction=junction) / POUND_FORCE
+        expected = walk.signal.sel(oscillator=oscillator) / POUND_FORCE
         np.testing.assert_allclose(signal.get_ydata(), expected)
         np.testing.assert_allclose(tension.get_ydata(), expected + 3.0 / POUND_FORCE)
-        assert panel.get_title("left") == junction
+        assert panel.get_title("left") == oscillator
 
 
 def test_ground_forces_are_those_of_the_last_seconds(walk):

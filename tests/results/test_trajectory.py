@@ -31,7 +31,7 @@ def test_every_variable_has_a_unit_and_named_dimensions(trajectory: xarray.Datas
         "q_WB": ("time", "tetrahedron", "quaternion"),
         "tension": ("time", "cable"),
         "length": ("time", "cable"),
-        "signal": ("time", "junction"),
+        "signal": ("time", "oscillator"),
         "normal_force": ("time", "contact"),
         "friction_force": ("time", "contact", "horizontal"),
         "in_contact": ("time", "contact"),

@@ -7,6 +7,7 @@ import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.network import initial_neurons, make_network
 from tetra_drake.robot.signals import raw_output, save_signals, signal_samples
 from tetra_drake.systems import MatsuokaCpg
 
@@ -40,11 +41,14 @@ def test_the_converged_network_stays_within_the_listings_own_error(scenario, lis
     assert error.max() < 2e-2
 
 
-def test_the_recorded_network_is_the_live_network(scenario, gait):
+def test_the_recorded_network_is_the_live_network(scenario, structure, gait):
     # Drake's error-controlled integration of the same equations; RK4 in steps of 0.5 ms meets a
     # kink of max(0, u) between samples, which costs it up to 1e-5.
     scenario.cpg.signals = "recorded"
-    simulator = Simulator(MatsuokaCpg(scenario.cpg, gait, oscillators=4))
+    law, network = scenario.cpg, make_network(scenario, structure, gait)
+    start = initial_neurons(law, 4)
+    cpg = MatsuokaCpg(network, tonic=law.external_input, initial_state=start, gain=law.gain)
+    simulator = Simulator(cpg)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.01).set_target_accuracy(1e-9)
     samples = signal_samples(scenario, gait)
     for time in (1.0, 2.5, 7.0):

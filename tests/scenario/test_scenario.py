@@ -176,6 +176,7 @@ def test_a_dumped_scenario_keeps_every_bit_and_needs_no_base(tmp_path, scenario)
         for name, value in list(getattr(section, "__dict__", {}).items()):
             if isinstance(value, float):
                 setattr(section, name, value * float(generator.uniform(0.9, 1.1)))
+    scenario.gait_bounds.time_scale_max = 1.2  # not below the other
     scenario.friction.stiction_range = 1e-5 / 3  # dumped with an exponent
     scenario.robot.offsets = [[0.1 / 3, 0.0, 1e-9]] * 5
     scenario.name = "a: 'name' that needs # quoting"

@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from tetra_drake.physics.oscillator import NEURON_COLUMNS, U_RATE, V_RATE, U, V, neuron_rates
+from tetra_drake.physics.oscillator import (
+    NEURON_COLUMNS,
+    U_RATE,
+    V_RATE,
+    Network,
+    U,
+    V,
+    neuron_rates,
+)
 from tetra_drake.robot.gait import Gait, load_gait
-from tetra_drake.robot.model import make_network
+from tetra_drake.robot.network import initial_neurons, make_network
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import MatsuokaCpg
 
@@ -19,8 +28,15 @@ def gait(scenario: Scenario, data: Path) -> Gait:
 
 
 @pytest.fixture
-def cpg(scenario: Scenario, gait: Gait) -> MatsuokaCpg:
-    return MatsuokaCpg(scenario.cpg, gait, oscillators=4)
+def network(scenario: Scenario, structure: Structure, gait: Gait) -> Network:
+    return make_network(scenario, structure, gait)
+
+
+@pytest.fixture
+def cpg(scenario: Scenario, network: Network) -> MatsuokaCpg:
+    law = scenario.cpg
+    start = initial_neurons(law, 4)
+    return MatsuokaCpg(network, tonic=law.external_input, initial_state=start, gain=law.gain)
 
 
 def test_starts_at_the_values_of_table_4(cpg):
@@ -32,19 +48,19 @@ def test_starts_at_the_values_of_table_4(cpg):
     np.testing.assert_array_equal(cpg.GetOutputPort("signals").Eval(context), np.zeros(4))
 
 
+@pytest.mark.parametrize("tonic", [None, np.linspace(0.3, 0.9, 8)], ids=["0.5", "its own"])
 @pytest.mark.parametrize("feedback", [None, np.linspace(-1.0, 1.0, 8)], ids=["none", "some"])
-def test_derivatives_are_the_laws_without_feedback_where_none_is_connected(
-    scenario, gait, cpg, feedback
-):
+def test_derivatives_are_the_laws_with_what_is_connected(network, cpg, feedback, tonic):
     context = cpg.CreateDefaultContext()
     state, neurons = np.random.default_rng(5).normal(size=16), np.zeros((8, NEURON_COLUMNS))
     context.SetContinuousState(state)
     if feedback is not None:
         cpg.GetInputPort("feedback").FixValue(context, feedback)
-    added = np.zeros(8) if feedback is None else feedback
-    network = make_network(scenario.cpg, gait, oscillators=4)
+    if tonic is not None:
+        cpg.GetInputPort("tonic").FixValue(context, tonic)
+    inputs = (0.5 if tonic is None else tonic) + (np.zeros(8) if feedback is None else feedback)
     neurons[:, U], neurons[:, V] = state[:8], state[8:]
-    neuron_rates(network, added, neurons)
+    neuron_rates(network, inputs, neurons)
     expected = np.concatenate([neurons[:, U_RATE], neurons[:, V_RATE]])
     np.testing.assert_array_equal(cpg.EvalTimeDerivatives(context).CopyToVector(), expected)
 
@@ -60,10 +76,13 @@ def test_signals_are_gain_times_extensor_less_flexor(cpg):
 
 
 @pytest.mark.parametrize("oscillators", [1, 2, 7])
-def test_takes_any_number_of_oscillators(scenario, oscillators):
-    weights = tuple(np.full(2 * oscillators * (oscillators - 1), 1.5))
-    gait = Gait(name="equal", weights=weights, tau_a=0.3, tau_b=0.6)
-    simulator = Simulator(MatsuokaCpg(scenario.cpg, gait, oscillators=oscillators))
+def test_takes_any_number_of_oscillators_and_a_matrix_of_ones_own(oscillators):
+    inhibition = np.kron(np.eye(oscillators), 1.5 * (1.0 - np.eye(2)))
+    inhibition += np.kron(1.5 * (1.0 - np.eye(oscillators)), np.eye(2))
+    taus = {"tau_a": 0.3, "tau_b": 0.6}
+    network = Network.of(inhibition, **taus, self_inhibition_weight=2.5)
+    start = np.repeat([0.3, 0.1, 0.5], [2 * oscillators, oscillators, oscillators])
+    simulator = Simulator(MatsuokaCpg(network, tonic=0.5, initial_state=start))
     simulator.AdvanceTo(1.0)
     signals = simulator.get_system().GetOutputPort("signals").Eval(simulator.get_context())
     assert signals.shape == (oscillators,)

@@ -14,6 +14,7 @@ from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario, SimulationScenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -29,11 +30,16 @@ _RENEW_FROM = 8e-4  # s: shorter steps converge with any Jacobian, most often
 
 
 def simulate_drake(
-    *, scenario: Scenario, gait: Gait, record: bool = False, viewer: Viewer | None = None
+    *,
+    scenario: Scenario,
+    gait: Gait,
+    record: bool = False,
+    viewer: Viewer | None = None,
+    steering: SteeringSignal | None = None,
 ) -> SimulationResult:
     """Simulates a gait as simulate() does, on the Drake diagram."""
     settings = scenario.simulation
-    diagram = MakeTensegrityDiagram(scenario, gait)
+    diagram = MakeTensegrityDiagram(scenario, gait, steering=steering)
     structure = MakeStructure(scenario)
     simulator = MakeSimulator(diagram, settings)
     integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")

@@ -17,6 +17,7 @@ robot that leaves it falls, and has diverged.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from collections.abc import Sequence
@@ -33,6 +34,7 @@ from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import ground_axes, ground_heights
 from tetra_drake.robot.model import Model, make_model
+from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
 from tetra_drake.scenario.schema import Coulomb, Scenario
@@ -74,20 +76,29 @@ _MAX_SPEED = 1.0
 at times far forward; a walking robot stays below 0.2 m/s."""
 
 
-def simulate_mujoco(*, scenario: Scenario, gait: Gait, record: bool) -> SimulationResult:
+def simulate_mujoco(
+    *, scenario: Scenario, gait: Gait, record: bool, steering: SteeringSignal | None = None
+) -> SimulationResult:
     """Simulates a gait as simulate() does, in MuJoCo, in steps of `scenario.mujoco.step`.
 
     Instants asked for, as of samples, are those of the nearest steps. Other threads run meanwhile.
     Raises InputError, too, if MuJoCo is missing or cannot do it.
     """
-    (outcome,) = simulate_in_rollouts(scenario=scenario, gaits=[gait], record=record, threads=1)
+    (outcome,) = simulate_in_rollouts(
+        scenario=scenario, gaits=[gait], record=record, threads=1, steering=steering
+    )
     if isinstance(outcome, SimulationFailure):
         raise outcome
     return outcome
 
 
 def simulate_in_rollouts(
-    *, scenario: Scenario, gaits: Sequence[Gait], record: bool, threads: int
+    *,
+    scenario: Scenario,
+    gaits: Sequence[Gait],
+    record: bool,
+    threads: int,
+    steering: SteeringSignal | None = None,
 ) -> list[SimulationResult | SimulationFailure]:
     """Simulates gaits as simulate_mujoco() does, on so many threads of MuJoCo's `Rollout`: the
     same numbers, bit for bit; for a gait that fails its Diverged or StepBudgetExceeded."""
@@ -105,7 +116,8 @@ def simulate_in_rollouts(
     outcomes: list[SimulationResult | SimulationFailure] = []
     for first in range(0, len(gaits), threads * _GAITS):
         group = gaits[first : first + threads * _GAITS]
-        signals = [signals_at(scenario, gait, step * np.arange(steps)) for gait in group]
+        starts = step * np.arange(steps)
+        signals = [signals_at(scenario, gait, starts, steering=steering) for gait in group]
         started = time.perf_counter()
         walks = robot.walk(signals, np.rint(instants / step).astype(int), threads=threads)
         wall_time = (time.perf_counter() - started) * min(threads, len(group)) / len(group)
@@ -120,8 +132,12 @@ def simulate_in_rollouts(
                 states=robot.states(walk[:3]),
                 wall_time=wall_time,
                 integrator=work,
-                trajectory=robot.dataset(gait, times, walk[3:]) if record else None,
+                trajectory=None,
             )
+            if record:
+                driving = signals_at(scenario, gait, times, steering=steering)
+                trajectory = robot.dataset(times, walk[3:], driving)
+                result = dataclasses.replace(result, trajectory=trajectory)
             outcomes.append(result)
     return outcomes
 
@@ -224,10 +240,9 @@ class _Robot:
         parts = (pose[..., 3:], pose[..., :3]), (w_WB, velocity[..., :3])
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
-    def dataset(self, gait: Gait, times: Array, found: Array) -> xarray.Dataset:
-        """The trajectory: MuJoCo's states at `times` (s), and the forces there."""
-        structure = self.structure
-        states, signals = self.states(found), signals_at(self._scenario, gait, times)
+    def dataset(self, times: Array, found: Array, signals: Array) -> xarray.Dataset:
+        """The trajectory: MuJoCo's states at `times` (s) and the signals, and the forces there."""
+        structure, states = self.structure, self.states(found)
         pulls = np.empty((len(times), len(structure.cables), PULL_COLUMNS))
         for state, driving, pull in zip(states, signals, pulls, strict=True):
             nodes = moved_nodes(structure, state)
@@ -268,6 +283,9 @@ def check_mujoco(scenario: Scenario) -> None:
     """Raises InputError if MuJoCo cannot simulate the scenario."""
     if not installed():
         raise InputError(scenario.name, "simulation.engine", f"mujoco is not installed: {INSTALL}")
+    if scenario.cpg.feedback:
+        problem = f"found {scenario.cpg.feedback}; mujoco computes signals beforehand"
+        raise InputError(scenario.name, "cpg.feedback", problem)
     if scenario.cables.slack:
         raise InputError(scenario.name, "cables.slack", "found true, which mujoco cannot simulate")
     if isinstance(law := scenario.friction, Coulomb):

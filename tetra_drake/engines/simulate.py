@@ -11,30 +11,42 @@ from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.model import make_model
+from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
 
 
 def simulate(
-    *, scenario: Scenario, gait: Gait, record: bool = False, viewer: Viewer | None = None
+    *,
+    scenario: Scenario,
+    gait: Gait,
+    record: bool = False,
+    viewer: Viewer | None = None,
+    steering: SteeringSignal | None = None,
 ) -> SimulationResult:
     """Simulates the scenario's robot walking by a gait for the scenario's duration, on the
     engine that the scenario names.
 
+    `steering`, the turn from -1 to 1 by the time in s, acts in place of the gait's turn.
+
     Pure: the same scenario and gait give the same numbers, bit for bit, wall time aside,
     whether or not a trajectory is recorded and whoever watches.
 
-    Raises Diverged or StepBudgetExceeded, which say when and why.
+    Raises Diverged or StepBudgetExceeded, which say when and why, and InputError if the gait or
+    the steering does not fit the scenario.
     """
     if scenario.simulation.engine == "drake":
         from tetra_drake.engines.drake import simulate_drake
 
-        return simulate_drake(scenario=scenario, gait=gait, record=record, viewer=viewer)
+        return simulate_drake(
+            scenario=scenario, gait=gait, record=record, viewer=viewer, steering=steering
+        )
     if scenario.simulation.engine == "compiled":
         from tetra_drake.engines.compiled.engine import simulate_compiled as run
     else:
         from tetra_drake.engines.mujoco import simulate_mujoco as run
-    result = run(scenario=scenario, gait=gait, record=record or viewer is not None)
+    recorded = record or viewer is not None
+    result = run(scenario=scenario, gait=gait, record=recorded, steering=steering)
     if viewer is None or result.trajectory is None:
         return result
     # These engines are too fast to be watched: the viewer is shown the recording.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import math
 import signal
 import threading
@@ -46,7 +47,7 @@ class GaitEvaluation:
     def __call__(self, vector: Vector) -> Evaluation:
         """Fitness and metrics of one vector, or the reason of a failure."""
         started, scenario = time.perf_counter(), self.scenario
-        gait = ParameterSpace.of(scenario).gait(vector, name="candidate")
+        gait = self._space.gait(vector, name="candidate")
         try:
             result = self._simulate(gait)
         except (SimulationFailure, TimeBudgetExceeded) as error:
@@ -58,6 +59,10 @@ class GaitEvaluation:
                 found = Evaluation.failed("diverged: the fitness is not finite")
         wall_time = time.perf_counter() - started if self.lanes is None else cost
         return dataclasses.replace(found, wall_time=wall_time, engine=scenario.simulation.engine)
+
+    @functools.cached_property
+    def _space(self) -> ParameterSpace:
+        return ParameterSpace.of(self.scenario)
 
     def _simulate(self, gait: Gait) -> SimulationResult:
         budget = self.scenario.evolution.time_budget

@@ -218,9 +218,9 @@ class TrialRecord:
         if evaluations[-1]["index"] >= len(self._evaluations):
             (self._folder / IN_PROGRESS).unlink(missing_ok=True)
 
-    def save_best(self, gait: Gait) -> None:
+    def save_best(self, gait: Gait, scenario: Scenario) -> None:
         """Writes the best gait."""
-        save_gait(gait, self._folder / BEST_GAIT)
+        save_gait(gait, self._folder / BEST_GAIT, scenario)
 
     def finish(self, evaluations: int) -> None:
         """Checks that the record ends where the trial does."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +25,7 @@ from tetra_drake.evolution.record import (
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.results.metrics import Metrics
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
@@ -45,8 +47,8 @@ class Run:
     evaluations: pandas.DataFrame
     """One row per evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
     wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
-    have one), the metrics (distance ...), distance_in, weight_1 ... in the listing's order,
-    tau_a_s, tau_b_s."""
+    have one), the metrics (distance ...), distance_in, and the parameters: weight_1 ... in the
+    listing's order, time_scale_T1-T2 ..., gain_length ..., tau_a_s, tau_b_s."""
     iterations: pandas.DataFrame
     """One row per iteration, 0 being the initial one: trial, iteration, evaluations so far,
     best_fitness, best_evaluation (its index), best_distance_in (that gait's), stop, and the
@@ -101,8 +103,7 @@ class Run:
 
     @property
     def _columns(self) -> list[str]:
-        weights = [name for name in self.evaluations if name.startswith("weight_")]
-        return [*weights, "tau_a_s", "tau_b_s"]
+        return _parameters(self.manifest.scenario)
 
     def _status(self, trial: int) -> TrialStatus:
         rows = self.evaluations[self.evaluations["trial"] == trial]
@@ -126,7 +127,8 @@ def load_run(path: str | Path) -> Run:
     directory = Path(path)
     manifest = read_manifest(directory)
     files = (EVALUATIONS, ITERATIONS, REEVALUATIONS)
-    tables = [_table(directory, manifest.scenario.evolution.trials, name) for name in files]
+    trials, columns = manifest.scenario.evolution.trials, _parameters(manifest.scenario)
+    tables = [_table(directory, trials, name, columns) for name in files]
     evaluations, iterations, _ = tables
     if not iterations.empty:
         distances = evaluations.set_index(["trial", "index"])["distance_in"].to_dict()
@@ -135,11 +137,23 @@ def load_run(path: str | Path) -> Run:
     return Run(directory, manifest, *tables)
 
 
-def _table(directory: Path, trials: int, name: str) -> pandas.DataFrame:
+def _parameters(scenario: Scenario) -> list[str]:
+    """The columns of a gait's parameters, in the order of ParameterSpace.names."""
+    names, count = ParameterSpace.of(scenario).names, itertools.count(1)
+    taus = {"tau_A": "tau_a_s", "tau_B": "tau_b_s"}
+    return [
+        f"weight_{next(count)}"
+        if name.startswith("weight ")
+        else taus.get(name, name).replace(" ", "_")
+        for name in names
+    ]
+
+
+def _table(directory: Path, trials: int, name: str, columns: list[str]) -> pandas.DataFrame:
     import pandas
 
     rows = [
-        {"trial": trial, **(_flat(entry) if "genome" in entry else entry)}
+        {"trial": trial, **(_flat(entry, columns) if "genome" in entry else entry)}
         for trial in range(trials)
         for entry in read_entries(trial_folder(directory, trial) / name)
     ]
@@ -149,10 +163,8 @@ def _table(directory: Path, trials: int, name: str) -> pandas.DataFrame:
     return table.astype({column: kind for column, kind in kinds.items() if column in table})
 
 
-def _flat(entry: dict[str, Any]) -> dict[str, Any]:
+def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:
     """A line of evaluations with a column for each number."""
-    *weights, tau_a, tau_b = entry.pop("genome")
+    parameters = dict(zip(columns, entry.pop("genome"), strict=True))
     metrics = dict.fromkeys(_METRICS, math.nan) | entry.pop("metrics")
-    numbered = {f"weight_{i}": weight for i, weight in enumerate(weights, start=1)}
-    inches = {"distance_in": metrics["distance"] / INCH}
-    return entry | metrics | inches | numbered | {"tau_a_s": tau_a, "tau_b_s": tau_b}
+    return entry | metrics | {"distance_in": metrics["distance"] / INCH} | parameters

@@ -15,6 +15,7 @@ from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, MakeOpti
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, trial_folder
 from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
 _SHOW_PERIOD = 1.0  # s
@@ -73,13 +74,13 @@ class Trial:
     holds already it goes through at once."""
 
     def __init__(
-        self, number: int, name: str, *, space: ParameterSpace, optimizer: Optimizer, folder: Path
+        self, number: int, name: str, *, scenario: Scenario, optimizer: Optimizer, folder: Path
     ) -> None:
         self.status = TrialStatus(number, optimizer.evaluations_at_most)
         self.unevaluated: dict[int, Vector] = {}
         """What has to be evaluated before the optimiser can go on, by number; empty at the end."""
         self._name = name
-        self._space = space
+        self._scenario = scenario
         self._optimizer = optimizer
         self._record = TrialRecord(folder)
         self._results: dict[int, Evaluation] = {}
@@ -127,7 +128,8 @@ class Trial:
         if self._best is not None and self._best[0] != self._saved_best:
             self._saved_best, vector, _ = self._best
             name = f"{self._name}, evaluation {self._saved_best}"
-            self._record.save_best(self._space.gait(vector, name=name))
+            gait = ParameterSpace.of(self._scenario).gait(vector, name=name)
+            self._record.save_best(gait, self._scenario)
 
     def _complete(self, batch: Mapping[int, Vector]) -> None:
         """Tells the optimiser the results of an iteration, and records it."""
@@ -174,7 +176,7 @@ def run_trials(
         Trial(
             number,
             f"{scenario.name}, seed {seed}, trial {number}",
-            space=space,
+            scenario=scenario,
             optimizer=optimizer(space, scenario.evolution, np.random.default_rng(own_seed)),
             folder=trial_folder(record.directory, number),
         )

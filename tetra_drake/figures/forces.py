@@ -33,15 +33,14 @@ _MIRRORED = 0.01
 def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
     """Actuation signals and the tension of a cable that each drives (lbf) over time (s).
 
-    One panel per junction. A signal drives a left and a right cable, mirror images of each other
-    where the ground is; the left one is shown.
+    One panel per oscillator, with the first of the cables that it drives.
     """
     forces = trajectory[["signal", "tension"]] / POUND_FORCE
-    figure, panels = _panels_over_time(forces.junction.values)
-    for junction, panel in panels.items():
-        driven = np.flatnonzero(forces.cable_signal == junction)[0]
+    figure, panels = _panels_over_time(forces.oscillator.values)
+    for oscillator, panel in panels.items():
+        driven = np.flatnonzero(forces.cable_signal == oscillator)[0]
         panel.plot(forces.time, forces.tension[:, driven], **_FIRST)
-        panel.plot(forces.time, forces.signal.sel(junction=junction), **_SECOND)
+        panel.plot(forces.time, forces.signal.sel(oscillator=oscillator), **_SECOND)
     legend_below(figure, {"cable tension": _FIRST, "signal": _SECOND})
     swing = np.ptp(forces.signal.values, axis=0).max()
     figure.suptitle(

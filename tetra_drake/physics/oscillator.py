@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.lanes import Real, Table, maximum
+from tetra_drake.physics.lanes import Real, Table, Truth, maximum, select
 
 Array = np.ndarray
 
@@ -18,33 +19,34 @@ kernels note besides; and their number."""
 
 
 class Network(NamedTuple):
-    """The constants of a network of n oscillators."""
+    """The constants of a network, by neuron."""
 
     inhibition: Table
-    """(2n, 2n): see inhibition_matrix."""
-    tau_a: Real
-    tau_b: Real
-    """In s."""
-    self_inhibition_weight: Real
-    external_input: Real
+    """(2n, 2n): W[i, j], of neuron i by neuron j."""
+    per_tau_a: Table
+    """(2n,): 1 / tau_A and, next, 1 / tau_B, in 1/s."""
+    per_tau_b: Table
+    self_inhibition_weight: Table
+    """(2n,): beta."""
 
+    @classmethod
+    def of(
+        cls,
+        inhibition: npt.ArrayLike,
+        *,
+        tau_a: npt.ArrayLike,
+        tau_b: npt.ArrayLike,
+        self_inhibition_weight: npt.ArrayLike,
+    ) -> Self:
+        """A network with time constants (s) and beta for all neurons, or for each by itself.
 
-def inhibition_matrix(weights: Array, *, oscillators: int, partner_weight: float) -> Array:
-    """The (2n, 2n) matrix W of inhibition: W[i, j] of neuron i by neuron j.
-
-    `weights`, 2 n (n - 1) of them, come in the listing's order (B.2): onto each neuron in
-    turn, from the neurons of its own kind in turn. Partners inhibit each other by
-    `partner_weight`.
-    """
-    neurons = 2 * oscillators
-    matrix = np.zeros((neurons, neurons))
-    remaining = iter(np.asarray(weights, dtype=float))
-    for i in range(neurons):
-        matrix[i, i ^ 1] = partner_weight
-        for j in range(i % 2, neurons, 2):
-            if j != i:
-                matrix[i, j] = next(remaining)
-    return matrix
+        Raises ValueError for an inhibition that is not (2n, 2n).
+        """
+        matrix = np.array(inhibition, dtype=float)
+        if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] % 2:
+            raise ValueError(f"found inhibition of shape {matrix.shape}, expected (2n, 2n)")
+        constants = 1.0 / np.asarray(tau_a), 1.0 / np.asarray(tau_b), self_inhibition_weight
+        return cls(matrix, *(np.full(len(matrix), values, dtype=float) for values in constants))
 
 
 def make_neurons(state: Array) -> Array:
@@ -55,19 +57,21 @@ def make_neurons(state: Array) -> Array:
 
 
 @compiled
-def neuron_rates(network: Network, feedback: Table, neurons: Table) -> None:
-    """Writes the rates of u and v (Eq. 7; -u as in listing B.2); `feedback` is (2n,)."""
+def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
+    """Writes the rates of u and v (Eq. 7; -u as in listing B.2).
+
+    `inputs`, (2n,), are what comes from outside: the tonic input u0 and the feedback f.
+    """
     count = neurons.shape[0]
-    per_tau_a, per_tau_b = 1.0 / network.tau_a, 1.0 / network.tau_b
     for i in range(count):
         neurons[i, Y] = maximum(neurons[i, U], 0.0)
     for i in range(count):
         u, v, y = neurons[i, U], neurons[i, V], neurons[i, Y]
-        total = network.external_input + feedback[i] - u - network.self_inhibition_weight * v
+        total = inputs[i] - u - network.self_inhibition_weight[i] * v
         for j in range(count):
             total -= network.inhibition[i, j] * neurons[j, Y]
-        neurons[i, U_RATE] = total * per_tau_a
-        neurons[i, V_RATE] = (y - v) * per_tau_b
+        neurons[i, U_RATE] = total * network.per_tau_a[i]
+        neurons[i, V_RATE] = (y - v) * network.per_tau_b[i]
 
 
 @compiled
@@ -79,16 +83,16 @@ def oscillator_output(neurons: Table, output: Table) -> None:
 
 
 @compiled
-def euler_step(network: Network, feedback: Table, step: Real, neurons: Table) -> None:
+def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
     """A step (s) of the forward Euler method, as in listing B.1."""
-    neuron_rates(network, feedback, neurons)
+    neuron_rates(network, inputs, neurons)
     for i in range(neurons.shape[0]):
         neurons[i, U] += step * neurons[i, U_RATE]
         neurons[i, V] += step * neurons[i, V_RATE]
 
 
 @compiled
-def runge_kutta_step(network: Network, feedback: Table, step: Real, neurons: Table) -> None:
+def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
     """A step (s) of the classical Runge-Kutta method of order 4."""
     for i in range(neurons.shape[0]):
         neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
@@ -96,7 +100,7 @@ def runge_kutta_step(network: Network, feedback: Table, step: Real, neurons: Tab
     for stage in range(4):
         weight = (1.0 if stage == 0 or stage == 3 else 2.0) / 6.0
         reach = 1.0 if stage == 2 else 0.5  # where the next stage begins
-        neuron_rates(network, feedback, neurons)
+        neuron_rates(network, inputs, neurons)
         for i in range(neurons.shape[0]):
             neurons[i, U_SUM] += weight * neurons[i, U_RATE]
             neurons[i, V_SUM] += weight * neurons[i, V_RATE]
@@ -109,7 +113,7 @@ def runge_kutta_step(network: Network, feedback: Table, step: Real, neurons: Tab
 
 @compiled
 def next_output(
-    network: Network, feedback: Table, step: Real, listing: bool, neurons: Table, output: Table
+    network: Network, inputs: Table, step: Real, listing: bool, neurons: Table, output: Table
 ) -> None:
     """The next sample of the outputs (n,), a step (s) after the last.
 
@@ -118,17 +122,45 @@ def next_output(
     nothing.
     """
     if listing:
-        euler_step(network, feedback, step, neurons)
+        euler_step(network, inputs, step, neurons)
         oscillator_output(neurons, output)
     else:
         oscillator_output(neurons, output)
-        runge_kutta_step(network, feedback, step, neurons)
+        runge_kutta_step(network, inputs, step, neurons)
 
 
 @compiled
 def network_output(
-    network: Network, feedback: Array, step: float, listing: bool, neurons: Array, output: Array
+    network: Network, inputs: Array, step: float, listing: bool, neurons: Array, output: Array
 ) -> None:
-    """Writes `output`, (samples, n), the first samples of `next_output` without lanes."""
+    """Writes `output`, (samples, n), the first samples of `next_output` without lanes; `inputs`,
+    (some, 2n), are those of the first steps, and the last row of all that follow."""
+    last = inputs.shape[0] - 1
     for i in range(output.shape[0]):
-        next_output(network, feedback, step, listing, neurons, output[i])
+        next_output(network, inputs[min(i, last)], step, listing, neurons, output[i])
+
+
+@compiled
+def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
+    """The first half of Heun's method of order 2, a step (s) by Euler's; `inputs` of its start."""
+    neuron_rates(network, inputs, neurons)
+    for i in range(neurons.shape[0]):
+        neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
+        neurons[i, U_SUM], neurons[i, V_SUM] = neurons[i, U_RATE], neurons[i, V_RATE]
+        neurons[i, U] += step * neurons[i, U_RATE]
+        neurons[i, V] += step * neurons[i, V_RATE]
+
+
+@compiled
+def correct_neurons(
+    network: Network, inputs: Table, step: Real, accepted: Truth, neurons: Table
+) -> None:
+    """The second half, with the `inputs` of the step's end; back to its start if not accepted."""
+    neuron_rates(network, inputs, neurons)
+    half = 0.5 * step
+    for i in range(neurons.shape[0]):
+        u_rate = neurons[i, U_SUM] + neurons[i, U_RATE]
+        v_rate = neurons[i, V_SUM] + neurons[i, V_RATE]
+        u, v = neurons[i, U_START], neurons[i, V_START]
+        neurons[i, U] = select(accepted, u + half * u_rate, u)
+        neurons[i, V] = select(accepted, v + half * v_rate, v)

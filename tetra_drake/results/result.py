@@ -108,7 +108,7 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
         "engine": result.engine,
         "integrator": dataclasses.asdict(result.integrator),
         "versions": versions(result.engine),
-        "gait": gait.to_json(),
+        "gait": gait.to_json(scenario),
     }
     write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,9 +34,10 @@ def assemble_dataset(
 ) -> xarray.Dataset:
     """A trajectory from its columns, one row per sample; shapes are those of the diagram's ports.
 
-    Dimensions: time, tetrahedron, node, cable, contact, junction, axis, horizontal, quaternion.
+    Dimensions: time, tetrahedron, node, cable, contact, oscillator, axis, horizontal, quaternion.
     Every variable has a `units` attribute. Coordinates along `cable`: cable_junction, cable_role
-    (outer or inner) and cable_signal, the junction whose signal drives the cable ("" if none).
+    (outer or inner) and cable_signal, the oscillator that drives the cable ("" if none); along
+    `oscillator`: oscillator_junction.
     Forces and modes are those of the step in which, or at whose end, the sample lies.
     """
     import xarray
@@ -48,8 +48,8 @@ def assemble_dataset(
     positions = np.array([node_positions(structure, state) for state in states])
     velocities = np.array([node_velocities(structure, state) for state in states])
     q = states[:, : 7 * bodies].reshape(-1, bodies, 7)
-    junctions = [f"{a}-{b}" for a, b in itertools.pairwise(structure.bodies)]
-    driving = ["" if i == PASSIVE else junctions[i] for i in structure.cables["signal"]]
+    oscillators = structure.actuation.names
+    driving = ["" if i == PASSIVE else oscillators[i] for i in structure.cables["signal"]]
     slip = "0 sticks, +1 or -1 slips in that direction"
     horizontal = ("time", "contact", "horizontal")
     node_dims = ("time", "tetrahedron", "node", "axis")
@@ -61,7 +61,7 @@ def assemble_dataset(
         "q_WB": (("time", "tetrahedron", "quaternion"), q[..., :4], "1", "orientation of the body"),
         "tension": (("time", "cable"), tensions, "N", "cable tension"),
         "length": (("time", "cable"), lengths, "m", "cable length"),
-        "signal": (("time", "junction"), signals, "N", "actuation signal"),
+        "signal": (("time", "oscillator"), signals, "N", "actuation signal"),
         "normal_force": (
             ("time", "contact"),
             normal_forces,
@@ -87,7 +87,8 @@ def assemble_dataset(
             "cable_junction": ("cable", [name.split()[0] for name in structure.cable_names]),
             "cable_role": ("cable", [name.split()[1] for name in structure.cable_names]),
             "cable_signal": ("cable", driving),
-            "junction": junctions,
+            "oscillator": list(oscillators),
+            "oscillator_junction": ("oscillator", [name.split()[0] for name in oscillators]),
             "axis": ["x", "y", "z"],
             "horizontal": ["x", "y"],
             "quaternion": ["w", "x", "y", "z"],

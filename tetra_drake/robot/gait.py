@@ -1,6 +1,8 @@
 """A gait, its file, and the space of parameters that evolution searches."""
 
+import dataclasses
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -10,50 +12,68 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text, write_whole
+from tetra_drake.robot.actuation import Actuation
 from tetra_drake.scenario.fields import Check, setting
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import PATHWAYS, Scenario
 
-SCHEMA = 1
+SCHEMA = 2
 
 Vector = npt.NDArray[np.float64]
 """The parameters of one gait in the order of ParameterSpace.names."""
 
-TAU_B_PER_TAU_A = 2.0
-"""The thesis keeps tau_B = 2 tau_A, so that the output resembles a sine wave."""
-
 TAU_A, TAU_B = -2, -1
 """Indices of the time constants in a vector."""
 
+TAU_B_PER_TAU_A = 2.0
+"""The thesis keeps tau_B = 2 tau_A, so that the output resembles a sine wave."""
 
-def weight_count(oscillators: int) -> int:
-    """Number of inhibitory weights of n oscillators: 2 n (n - 1)."""
-    return 2 * oscillators * (oscillators - 1)
+
+@dataclass(frozen=True)
+class Gains:
+    """How strongly each pathway of physics.feedback acts, in units of the input u0."""
+
+    length: float = setting(default=0.0)
+    load: float = setting(default=0.0)
+    pitch: float = setting(default=0.0)
 
 
 @dataclass(frozen=True)
 class Gait:
-    """The parameters of the oscillator network: weights in the listing's order (B.2), time
-    constants in s."""
+    """The parameters of the oscillator network."""
 
     name: str
     weights: tuple[float, ...]
+    """In the order of Actuation.couplings, which is the listing's (B.2)."""
     tau_a: float
     tau_b: float
+    """In s."""
+    turn: float = 0.0
+    """From -1 to 1: the input of oscillators is u0 (1 + turn) on the left, u0 (1 - turn) on the
+    right."""
+    gains: Gains = Gains()
+    time_scales: tuple[float, ...] = ()
+    """Factors on both time constants, by junction; none if all are 1."""
 
-    def to_json(self) -> dict[str, Any]:
-        """The content of a gait file."""
-        taus = {"tau_a_s": self.tau_a, "tau_b_s": self.tau_b}
-        if self.tau_b == TAU_B_PER_TAU_A * self.tau_a:
-            del taus["tau_b_s"]
-        return {"schema": SCHEMA, "name": self.name, "weights": list(self.weights), **taus}
+    def to_json(self, scenario: Scenario) -> dict[str, Any]:
+        """The content of a gait file; `scenario` is one that the gait fits."""
+        names = Actuation.of(scenario).weight_names
+        content: dict[str, Any] = {"schema": SCHEMA, "name": self.name}
+        content["weights"] = dict(zip(names, self.weights, strict=True))
+        content["tau_a_s"] = self.tau_a
+        if self.tau_b != TAU_B_PER_TAU_A * self.tau_a:
+            content["tau_b_s"] = self.tau_b
+        others = {"turn": self.turn, "time_scales": list(self.time_scales)}
+        others["gains"] = {k: gain for k, gain in dataclasses.asdict(self.gains).items() if gain}
+        return content | {key: value for key, value in others.items() if value}
 
 
 @dataclass(frozen=True)
 class ParameterSpace:
-    """The parameters of a gait as one vector: weights in the listing's order, tau_A, tau_B (s)."""
+    """The parameters of a scenario's gaits as one vector: weights, factors on time constants and
+    feedback gains where the scenario has them, tau_A, tau_B (s)."""
 
     names: tuple[str, ...]
-    """As "weight 3->1 extensor" (from oscillator 3 onto oscillator 1), "tau_A", "tau_B"."""
+    """As "weight 3->1 extensor", "time scale T1-T2", "gain length", "tau_A", "tau_B"."""
     low: Vector
     high: Vector
     """Bounds of random gaits (Table 5)."""
@@ -63,39 +83,89 @@ class ParameterSpace:
     """A parameter reduced by mutation must stay above this (listing A.3.3, A.3.4)."""
     couples_tau_b: bool
     """Whether tau_B is kept at 2 tau_A."""
+    weights: npt.NDArray[np.int64]
+    """(weights of a gait,): the parameter that is each weight, or its mirror image."""
+    junctions: int
+    """How many time scales there are."""
+    pathways: tuple[str, ...]
+    """Those with a gain."""
+    turn: float
+    """That of all gaits."""
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
         """The space of a scenario.
 
-        With equal bounds of tau_A it is fixed. With `tau_mutation: listing` it does not mutate:
+        With equal bounds a parameter is fixed. With `tau_mutation: listing` tau_A does not mutate:
         the listing's index 26 is that of tau_B. An independent tau_B has twice tau_A's numbers.
         """
-        settings, bounds = scenario.evolution, scenario.gait_bounds
-        weights = weight_count(scenario.oscillators)
-        tau_step = 0.0 if bounds.tau_a_min == bounds.tau_a_max else settings.tau_mutation_range
+        settings, bounds, actuation = (
+            scenario.evolution,
+            scenario.gait_bounds,
+            Actuation.of(scenario),
+        )
+        own = np.arange(len(actuation.images))
+        pairs = np.minimum(own, actuation.images) if bounds.mirrored else own
+        chosen, places = np.unique(pairs, return_inverse=True)
+        tau, scale = (
+            (bounds.tau_a_min, bounds.tau_a_max),
+            (bounds.time_scale_min, bounds.time_scale_max),
+        )
+        gain, weight = (bounds.gain_min, bounds.gain_max), (bounds.weight_min, bounds.weight_max)
+        twice = TAU_B_PER_TAU_A * tau[0], TAU_B_PER_TAU_A * tau[1]
+        junctions = 0 if scale == (1.0, 1.0) else scenario.robot.tetrahedra - 1
+        tau_step = 0.0 if tau[0] == tau[1] else settings.tau_mutation_range
         tau_a_step = 0.0 if settings.tau_mutation == "listing" else tau_step
-
-        def vector(weight: float, tau_a: float, twice: float) -> Vector:
-            return np.array([weight] * weights + [tau_a, TAU_B_PER_TAU_A * twice])
-
+        scale_step = 0.0 if scale[0] == scale[1] else settings.time_scale_mutation
+        gain_step = 0.0 if gain[0] == gain[1] else settings.gain_mutation
+        rows = [
+            *(
+                (f"weight {actuation.weight_names[i]}", *weight, settings.weight_mutation, 0.0)
+                for i in chosen
+            ),
+            *(
+                (f"time scale T{i + 1}-T{i + 2}", *scale, scale_step, scale[0])
+                for i in range(junctions)
+            ),
+            *((f"gain {name}", *gain, gain_step, -math.inf) for name in scenario.cpg.feedback),
+            ("tau_A", *tau, tau_a_step, tau[0]),
+            ("tau_B", *twice, TAU_B_PER_TAU_A * tau_step, twice[0]),
+        ]
+        names, low, high, steps, floors = zip(*rows, strict=True)
         return cls(
-            names=(*_weight_names(scenario.oscillators), "tau_A", "tau_B"),
-            low=vector(bounds.weight_min, bounds.tau_a_min, bounds.tau_a_min),
-            high=vector(bounds.weight_max, bounds.tau_a_max, bounds.tau_a_max),
-            steps=vector(settings.weight_mutation, tau_a_step, tau_step),
-            floors=vector(0.0, bounds.tau_a_min, bounds.tau_a_min),
+            names=names,
+            low=np.array(low),
+            high=np.array(high),
+            steps=np.array(steps),
+            floors=np.array(floors),
             couples_tau_b=not settings.independent_tau_b,
+            weights=places,
+            junctions=junctions,
+            pathways=tuple(scenario.cpg.feedback),
+            turn=bounds.turn,
         )
 
     def gait(self, vector: Vector, *, name: str) -> Gait:
         """The gait of a vector."""
-        *weights, tau_a, tau_b = vector.tolist()
-        return Gait(name=name, weights=tuple(weights), tau_a=tau_a, tau_b=tau_b)
+        count = len(vector) + TAU_A - len(self.pathways)
+        scales, gains = vector[count - self.junctions : count], vector[count:TAU_A].tolist()
+        return Gait(
+            name=name,
+            weights=tuple(vector[self.weights].tolist()),
+            tau_a=float(vector[TAU_A]),
+            tau_b=float(vector[TAU_B]),
+            turn=self.turn,
+            gains=Gains(**dict(zip(self.pathways, gains, strict=True))),
+            time_scales=tuple(scales.tolist()),
+        )
 
     def vector(self, gait: Gait) -> Vector:
-        """The vector of a gait."""
-        return np.array([*gait.weights, gait.tau_a, gait.tau_b])
+        """The vector of a gait; of mirrored weights, the first ones count."""
+        _, first = np.unique(self.weights, return_index=True)
+        scales = (gait.time_scales or (1.0,) * self.junctions)[: self.junctions]
+        gains = [getattr(gait.gains, name) for name in self.pathways]
+        taus = gait.tau_a, gait.tau_b
+        return np.array([*np.array(gait.weights)[first], *scales, *gains, *taus])
 
     def random(self, generator: np.random.Generator) -> Vector:
         """A vector drawn uniformly within the bounds, with tau_B = 2 tau_A."""
@@ -110,18 +180,6 @@ class ParameterSpace:
         return repaired
 
 
-def _weight_names(oscillators: int) -> list[str]:
-    """Onto extensor 1 from all others, onto flexor 1, onto extensor 2 ... (the listing's order)."""
-    numbers = range(1, oscillators + 1)
-    return [
-        f"weight {source}->{target} {neuron}"
-        for target in numbers
-        for neuron in ("extensor", "flexor")
-        for source in numbers
-        if source != target
-    ]
-
-
 WALKING_SEED = 80
 """Seed of a random gait that walks forward on the thesis's scenario: the default gait."""
 
@@ -132,27 +190,60 @@ def seeded_gait(scenario: Scenario, seed: int = WALKING_SEED) -> Gait:
     return space.gait(space.random(np.random.default_rng(seed)), name=f"random gait {seed}")
 
 
-def save_gait(gait: Gait, path: str | Path) -> None:
+def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
     """Writes a gait file; it loads back to the same numbers."""
-    write_whole(path, json.dumps(gait.to_json(), indent=1) + "\n")
+    write_whole(path, json.dumps(gait.to_json(scenario), indent=1) + "\n")
 
 
-@dataclass
-class _GaitFile:
-    """The keys of a gait file."""
+@dataclass(kw_only=True)
+class GaitFile:
+    """What a gait file of the current schema holds; see Gait."""
 
-    weights: list[float] = setting(at_least=0)
-    tau_a_s: float = setting(above=0)
-    schema: int = setting(at_least=SCHEMA, at_most=SCHEMA)
-    tau_b_s: float | None = setting(default=None, above=0)
+    schema: int = setting(at_least=1, at_most=SCHEMA)
     name: str = setting(default="")
+    weights: dict[str, float] = setting(at_least=0)
+    """By Actuation.weight_names, in any order."""
+    tau_a_s: float = setting(above=0)
+    tau_b_s: float | None = setting(default=None, above=0)
+    turn: float = setting(default=0.0, at_least=-1, at_most=1)
+    gains: Gains = setting(default=Gains())
+    time_scales: list[float] = setting(default=[], above=0)
+
+
+@dataclass(kw_only=True)
+class OldGaitFile(GaitFile):
+    """What one of schema 1 holds: weights in the order of Actuation.couplings."""
+
+    weights: list[float] = setting(at_least=0)  # type: ignore[assignment]
 
 
 def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     """Reads a gait file, or the gait under `key` of a JSON file, for the scenario's robot.
 
-    Raises InputError, naming file and key, for whatever is wrong in the file.
+    Raises InputError, naming file and key, for whatever is wrong in the file or does not fit.
     """
+    file = read_gait_file(path, key=key)
+    actuation, weights = Actuation.of(scenario), file.weights
+    if isinstance(weights, dict):
+        names = actuation.weight_names
+        _check_names(weights, names, path, f"{key}.weights".strip("."))
+    gait = Gait(
+        name=file.name or Path(path).stem,
+        weights=tuple(weights[name] for name in names)
+        if isinstance(weights, dict)
+        else tuple(weights),
+        tau_a=file.tau_a_s,
+        tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
+        turn=file.turn,
+        gains=file.gains,
+        time_scales=tuple(file.time_scales),
+    )
+    check_gait(gait, scenario, actuation, source=path, key=key)
+    return gait
+
+
+def read_gait_file(path: str | Path, *, key: str = "") -> GaitFile:
+    """What a gait file holds, for whatever robot; raises InputError as load_gait() does."""
     text = read_text(path, "gait file")
     try:
         raw = json.loads(text, object_pairs_hook=_unique_keys)
@@ -160,17 +251,58 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
         raise InputError(path, "", f"is not JSON: {error}") from error
     if key and isinstance(raw, dict):
         raw = raw.get(key)
-    file: _GaitFile = Check(path, complete=True).value(_GaitFile, raw, key)
-    count, n = len(file.weights), scenario.oscillators
-    if count != weight_count(n):
-        problem = f"found {count} numbers, expected {weight_count(n)} for {n} oscillators"
-        raise InputError(path, f"{key}.weights".strip("."), problem)
-    return Gait(
-        name=file.name or Path(path).stem,
-        weights=tuple(file.weights),
-        tau_a=file.tau_a_s,
-        tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
+    is_new = isinstance(raw, dict) and raw.get("schema") == SCHEMA
+    file: GaitFile = Check(path, complete=True).value(GaitFile if is_new else OldGaitFile, raw, key)
+    return file
+
+
+def check_gait(
+    gait: Gait, scenario: Scenario, actuation: Actuation, *, source: object, key: str = ""
+) -> None:
+    """Raises InputError, naming source and key, for what does not fit the scenario."""
+    count, n, junctions = len(actuation.couplings), len(actuation.names), len(gait.time_scales)
+    gains = dataclasses.asdict(gait.gains)
+    gain = next(
+        (name for name in PATHWAYS if gains[name] and name not in scenario.cpg.feedback), ""
     )
+    for wrong, name, found, expected in (
+        (
+            len(gait.weights) != count,
+            "weights",
+            f"{len(gait.weights)} numbers",
+            f"{count} for {n} oscillators",
+        ),
+        (
+            gain,
+            f"gains.{gain}",
+            gains.get(gain),
+            f"0, as the scenario's cpg.feedback is {scenario.cpg.feedback}",
+        ),
+        (
+            gait.turn and not actuation.sides.any(),
+            "turn",
+            gait.turn,
+            "0, as no oscillator is on one side",
+        ),
+        (junctions not in (0, n - 1), "time_scales", f"{junctions} numbers", f"none or {n - 1}"),
+    ):
+        if wrong:
+            raise InputError(
+                source, f"{key}.{name}".strip("."), f"found {found}, expected {expected}"
+            )
+
+
+def _check_names(weights: dict[str, float], names: tuple[str, ...], path: object, key: str) -> None:
+    missing = [name for name in names if name not in weights]
+    unknown = [name for name in weights if name not in names]
+    if missing or unknown:
+        parts = [
+            f"{what} {len(some)} ('{some[0]}'{' ...' * (len(some) > 1)})"
+            for what, some in (("misses", missing), ("has in excess", unknown))
+            if some
+        ]
+        problem = f"of the {len(names)} weights of the scenario it {' and '.join(parts)}"
+        raise InputError(path, key, problem)
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

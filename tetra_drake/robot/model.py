@@ -6,15 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.errors import InputError
 from tetra_drake.physics.contact import Ground
 from tetra_drake.physics.lanes import Table
-from tetra_drake.physics.oscillator import Network, inhibition_matrix
 from tetra_drake.robot.bodies import tetrahedron_inertia
-from tetra_drake.robot.gait import Gait, weight_count
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.schema import CpgScenario, Scenario
+from tetra_drake.scenario.schema import Scenario
 
 JUNCTION_CABLES = 6
 """The cables between two neighbouring bodies."""
@@ -64,26 +61,3 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
         body=Body(*(np.array([number]) for number in body)),
         slack=scenario.cables.slack,
     )
-
-
-def make_network(cpg: CpgScenario, gait: Gait, *, oscillators: int) -> Network:
-    """The network of a gait; raises InputError where that is for another number of oscillators."""
-    weights, partner = np.array(gait.weights), cpg.partner_weight
-    if weights.size != weight_count(oscillators):
-        expected = f"{weight_count(oscillators)} for {oscillators + 1} tetrahedra"
-        problem = f"found {weights.size}, expected {expected}"
-        raise InputError(f"gait {gait.name}", "weights", problem)
-    return Network(
-        inhibition=inhibition_matrix(weights, oscillators=oscillators, partner_weight=partner),
-        tau_a=gait.tau_a,
-        tau_b=gait.tau_b,
-        self_inhibition_weight=cpg.self_inhibition_weight,
-        external_input=cpg.external_input,
-    )
-
-
-def initial_state(cpg: CpgScenario, oscillators: int) -> np.ndarray:
-    """(4n,): u, then v, of all neurons at t = 0 (Table 4)."""
-    u = np.full(2 * oscillators, cpg.inner_state)
-    v = np.tile([cpg.extensor_self_inhibition, cpg.flexor_self_inhibition], oscillators)
-    return np.concatenate([u, v])

@@ -6,15 +6,24 @@ and fed to the cables, as the thesis does.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
 import numpy as np
 
+from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
 from tetra_drake.physics.oscillator import make_neurons, network_output
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.model import initial_state, make_network
+from tetra_drake.robot.network import (
+    SteeringSignal,
+    initial_neurons,
+    make_network,
+    sample_turns,
+    tonic_input,
+)
+from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import POUND_FORCE
 
@@ -22,18 +31,29 @@ UNITS = {"lbf": POUND_FORCE, "N": 1.0}
 """Units of force that save_signals() writes, in N."""
 
 
-def raw_output(scenario: Scenario, gait: Gait) -> np.ndarray:
-    """y_extensor - y_flexor (samples, n) at 0, one `listing_step`, two ... from `cpg.signals`.
+def raw_output(
+    scenario: Scenario, gait: Gait, steering: SteeringSignal | None = None
+) -> np.ndarray:
+    """y_extensor - y_flexor (samples, m) at 0, one `listing_step`, two ... from `cpg.signals`.
 
     `listing`: forward Euler as in listing B, which stamps the state after i + 1 steps with the
     time of i steps; the last sample is one step before the end. `recorded` and `live`: the
-    classical Runge-Kutta method of order 4, whose error is 1e-5, to the end or beyond.
+    classical Runge-Kutta method of order 4, whose error is 1e-5, to the end or beyond. A steering
+    signal is constant within a step. Raises InputError for a gait that does not fit, or one with
+    feedback, whose signals depend on the robot.
     """
-    cpg, oscillators = scenario.cpg, scenario.oscillators
-    network = make_network(cpg, gait, oscillators=oscillators)
-    neurons = make_neurons(initial_state(cpg, oscillators))
-    output, listing = np.empty((sample_count(scenario), oscillators)), cpg.signals == "listing"
-    network_output(network, np.zeros(len(neurons)), cpg.listing_step, listing, neurons, output)
+    cpg, structure = scenario.cpg, MakeStructure(scenario)
+    if any(dataclasses.asdict(gait.gains).values()):
+        problem = "has feedback; its signals exist only while the robot is simulated"
+        raise InputError(f"gait {gait.name}", "gains", problem)
+    network = make_network(scenario, structure, gait)
+    inputs = tonic_input(scenario, structure, sample_turns(scenario, structure, gait, steering))
+    neurons = make_neurons(initial_neurons(cpg, structure.signals))
+    output, listing = (
+        np.empty((sample_count(scenario), structure.signals)),
+        cpg.signals == "listing",
+    )
+    network_output(network, inputs, cpg.listing_step, listing, neurons, output)
     return output
 
 
@@ -43,23 +63,30 @@ def sample_count(scenario: Scenario) -> int:
     return round(steps) if scenario.cpg.signals == "listing" else math.ceil(steps) + 1
 
 
-def signal_samples(scenario: Scenario, gait: Gait) -> np.ndarray:
-    """The signals (samples, n) in N at 0, one `cpg.listing_step`, two ... to beyond the duration.
+def signal_samples(
+    scenario: Scenario, gait: Gait, steering: SteeringSignal | None = None
+) -> np.ndarray:
+    """The signals (samples, m) in N at 0, one `cpg.listing_step`, two ... to beyond the duration.
 
     Between samples the signals are linear. Start-up is not applied.
     """
-    raw = raw_output(scenario, gait)
+    raw = raw_output(scenario, gait, steering)
     return scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
 
 
 def signals_at(
-    scenario: Scenario, gait: Gait, times: np.ndarray, *, raw: bool = False
+    scenario: Scenario,
+    gait: Gait,
+    times: np.ndarray,
+    *,
+    raw: bool = False,
+    steering: SteeringSignal | None = None,
 ) -> np.ndarray:
-    """The signals (times, n) in N that cables are fed at `times` (s), zero before the start-up.
+    """The signals (times, m) in N that cables are fed at `times` (s), zero before the start-up.
 
     With `raw`, y_extensor - y_flexor, with neither gain nor start-up applied.
     """
-    samples = signal_samples(scenario, gait) / (scenario.cpg.gain if raw else 1.0)
+    samples = signal_samples(scenario, gait, steering) / (scenario.cpg.gain if raw else 1.0)
     grid = scenario.cpg.listing_step * np.arange(len(samples))
     signals = np.column_stack([np.interp(times, grid, column) for column in samples.T])
     if not raw:
@@ -76,7 +103,7 @@ def save_signals(
     rate: float | None = None,
     raw: bool = False,
 ) -> None:
-    """Writes the signals that the cables of a gait are fed as CSV: time_s, signal_1 ... signal_n.
+    """Writes the signals that the cables of a gait are fed as CSV: time_s, signal_1 ... signal_m.
 
     The first lines, which begin with #, say what the columns are. `unit` is one of UNITS;
     `rate` (samples per second) defaults to one sample per `cpg.listing_step`. With `raw`, the
@@ -88,9 +115,14 @@ def save_signals(
     signals = signals_at(scenario, gait, times, raw=raw) / (1.0 if raw else UNITS[unit])
     names = [f"signal_{i + 1}" for i in range(scenario.oscillators)]
     kind = "y_extensor - y_flexor (no unit)" if raw else f"force in {unit} that shortens the cables"
-    drives = ", ".join(
-        f"{name}: junction T{i + 1}-T{i + 2}, outer bottom_left and bottom_right"
-        for i, name in enumerate(names)
+    structure = MakeStructure(scenario)
+    cables = [
+        [name for name, driver in zip(structure.cable_names, drivers, strict=True) if driver == i]
+        for drivers in [structure.actuation.drivers]
+        for i in range(len(names))
+    ]
+    drives = "; ".join(
+        f"{name}: {', '.join(driven)}" for name, driven in zip(names, cables, strict=True)
     )
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",

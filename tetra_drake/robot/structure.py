@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetra_drake.physics.cable import CABLE, PASSIVE
+from tetra_drake.physics.cable import CABLE
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN, move_nodes
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.robot.actuation import Actuation
+from tetra_drake.scenario.schema import CABLES, Scenario
 from tetra_drake.scenario.terrain import Incline
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
@@ -39,6 +40,7 @@ class Structure:
     """(6 (n - 1),) of dtype CABLE."""
     cable_names: tuple[str, ...]
     """Such as "T1-T2 outer bottom_left"."""
+    actuation: Actuation
     contacts: np.ndarray
     """(2 n + 1,) or (4 n,): the indices of the nodes that the ground can touch."""
     strut_radius: float
@@ -47,8 +49,8 @@ class Structure:
 
     @property
     def signals(self) -> int:
-        """Actuation signals: one per junction."""
-        return len(self.bodies) - 1
+        """Actuation signals: one per oscillator."""
+        return len(self.actuation.names)
 
     @property
     def node_names(self) -> tuple[str, ...]:
@@ -67,8 +69,8 @@ def MakeStructure(scenario: Scenario) -> Structure:
 
     Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0; the
     tips point forward (+x) into the next tetrahedron. Junction i joins T(i+1) and T(i+2)
-    by 3 outer cables (base node to base node), of which signal i drives the bottom two,
-    and 3 inner ones (tip to base nodes). On an incline without start, the robot is turned with
+    by 3 outer cables (base node to base node) and 3 inner ones (tip to base nodes); see
+    CABLES and Actuation. On an incline without start, the robot is turned with
     the slope, about World's y axis.
     """
     robot, cables = scenario.robot, scenario.cables
@@ -88,18 +90,17 @@ def MakeStructure(scenario: Scenario) -> Structure:
         slope = terrain.slope
     s, c = math.sin(slope), math.cos(slope)
     p_WB = p_WB @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    rows, names = [], []
+    actuation, names = Actuation.of(scenario), []
+    rows: list[tuple[float, ...]] = []
     for i in range(n - 1):
-        junction = f"{bodies[i]}-{bodies[i + 1]}"
-        for node in BASE:
-            a, b = 4 * i + node, 4 * (i + 1) + node
-            signal = PASSIVE if node == TOP else i
-            rows.append((a, b, signal, cables.outer_stiffness, cables.damping, cables.free_length))
-            names.append(f"{junction} outer {NODES[node]}")
-        for node in BASE:
-            a, b = 4 * i + TIP, 4 * (i + 1) + node
-            rows.append((a, b, PASSIVE, cables.inner_stiffness, cables.damping, cables.free_length))
-            names.append(f"{junction} inner {NODES[node]}")
+        for cable in CABLES:
+            role, node = cable.split()
+            outer, place = role == "outer", NODES.index(node)
+            a, b = 4 * i + (place if outer else TIP), 4 * (i + 1) + place
+            stiffness = cables.outer_stiffness if outer else cables.inner_stiffness
+            driver = actuation.drivers[len(rows)]
+            rows.append((a, b, driver, stiffness, cables.damping, cables.free_length))
+            names.append(f"{bodies[i]}-{bodies[i + 1]} {cable}")
     bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
     contacts = [*bottom, 4 * (n - 1) + TIP] if robot.contacts == "thesis" else range(4 * n)
     return Structure(
@@ -109,6 +110,7 @@ def MakeStructure(scenario: Scenario) -> Structure:
         q_WB=np.array([math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]),
         cables=np.array(rows, dtype=CABLE),
         cable_names=tuple(names),
+        actuation=actuation,
         contacts=np.array(contacts),
         strut_radius=robot.strut_diameter / 2,
         node_radius=robot.node_diameter / 2,

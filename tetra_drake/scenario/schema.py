@@ -23,6 +23,16 @@ SCHEMES = (
 )
 MUJOCO_INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
 
+CABLES = (
+    *("outer bottom_left", "outer bottom_right", "outer top"),
+    *("inner bottom_left", "inner bottom_right", "inner top"),
+)
+"""The cables of a junction, from one tetrahedron to the next: outer ones join base nodes of the
+same name, inner ones join the tip to base nodes."""
+
+PATHWAYS = ("length", "load", "pitch")
+"""What can be fed back to the oscillators; see physics.feedback."""
+
 
 @dataclass
 class RobotScenario:
@@ -45,6 +55,8 @@ class RobotScenario:
     """The nodes that the ground can touch: the thesis's, which are the two bottom nodes of every
     tetrahedron and the tip of the first in line, or all four of every tetrahedron. Only flat
     ground leaves the others untouched."""
+    actuation: list[list[str]] = setting(choices=CABLES, default=[[CABLES[0], CABLES[1]]])
+    """The groups of a junction's cables that share an oscillator, the same for every junction."""
 
 
 @dataclass
@@ -116,7 +128,7 @@ class CpgScenario:
 
     `signals`: the thesis's own `listing`, by forward Euler; `recorded`: the network integrated
     beforehand by a Runge-Kutta method of order 4; both in steps of `listing_step`. `live`: the
-    network as a system of the diagram.
+    network integrated with the robot, which feedback needs.
     """
 
     self_inhibition_weight: float = setting(at_least=0)  # beta
@@ -129,16 +141,28 @@ class CpgScenario:
     start_up: float = quantity("s", at_least=0)  # until then the cables are not actuated
     signals: str = setting(choices=("listing", "recorded", "live"))
     listing_step: float = quantity("s", above=0)
+    reach: int | None = setting(at_least=0, default=None)
+    """Oscillators of junctions at most so far apart inhibit each other; all if not given."""
+    feedback: list[str] = setting(choices=PATHWAYS, default=[])
+    """What is fed back, by gains that are parameters of the gait."""
 
 
 @dataclass
 class GaitBoundsScenario:
-    """Where random gaits are drawn from (Table 5). Equal bounds of tau_A fix it."""
+    """Where random gaits are drawn from (Table 5). Equal bounds fix a parameter."""
 
     weight_min: float = setting(at_least=0)
     weight_max: float = setting(at_least=0)
     tau_a_min: float = quantity("s", above=0)
     tau_a_max: float = quantity("s", above=0)
+    gain_min: float = setting(default=-1.0)  # of the scenario's feedback
+    gain_max: float = setting(default=1.0)
+    time_scale_min: float = setting(above=0, default=1.0)  # of both time constants, by junction
+    time_scale_max: float = setting(above=0, default=1.0)
+    turn: float = setting(at_least=-1, at_most=1, default=0.0)
+    """The turn of all gaits that are drawn or evolved."""
+    mirrored: bool = setting(default=False)
+    """Whether weights are drawn and evolved in pairs, left and right alike."""
 
 
 @dataclass
@@ -216,6 +240,8 @@ class EvolutionScenario:
     weight_mutation: float = setting(at_least=0)  # largest change of a weight in one mutation
     tau_mutation_range: float = quantity("s", at_least=0)  # largest change of tau_A
     tau_mutation: str = setting(choices=("intended", "listing"))
+    gain_mutation: float = setting(at_least=0, default=0.2)  # largest change of a feedback gain
+    time_scale_mutation: float = setting(at_least=0, default=0.05)
     stop_rise: float = setting(at_least=0)
     stop_window: int = setting(at_least=1)
     stop_after: int = setting(at_least=0)
@@ -265,8 +291,8 @@ class Scenario:
 
     @property
     def oscillators(self) -> int:
-        """One neural oscillator for each junction between tetrahedra."""
-        return self.robot.tetrahedra - 1
+        """One neural oscillator for each group of cables of each junction between tetrahedra."""
+        return len(self.robot.actuation) * (self.robot.tetrahedra - 1)
 
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
         """A checked copy with other values: {"robot.tetrahedra": 7, "cables.damping": "8 N*s/m"}.
@@ -318,16 +344,37 @@ def _balance(scenario: Scenario, source: object) -> None:
 def _check_relations(scenario: Scenario, source: object) -> None:
     """Checks values of a scenario against each other; raises InputError."""
     bounds, simulation, n = scenario.gait_bounds, scenario.simulation, scenario.robot.tetrahedra
-    weight, tau_a, offsets = bounds.weight_min, bounds.tau_a_min, len(scenario.robot.offsets)
+    offsets, groups = len(scenario.robot.offsets), scenario.robot.actuation
     start, end = simulation.steady_from, simulation.duration
-    law = scenario.friction
+    law, cpg = scenario.friction, scenario.cpg
     mu, most = (law.kinetic, law.static) if isinstance(law, Coulomb) else (0.0, 0.0)
+    cables = [cable for group in groups for cable in group]
+    twice = next((cable for cable in cables if cables.count(cable) > 1), None)
+    alone = next((g for g in groups if {*mirrored(g)} not in map(set, groups)), None)
+    unpaired, blind = bounds.mirrored and alone, cpg.feedback and cpg.signals != "live"
+    for name in ("weight", "tau_a", "gain", "time_scale"):
+        low, high = getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max")
+        if low > high:
+            problem = f"found {low}, expected at most {name}_max, {high}"
+            raise InputError(source, f"gait_bounds.{name}_min", problem)
     for wrong, key, found, expected in (
-        (weight > bounds.weight_max, "gait_bounds.weight_min", weight, "at most weight_max"),
-        (tau_a > bounds.tau_a_max, "gait_bounds.tau_a_min", f"{tau_a} s", "at most tau_a_max"),
         (start >= end, "simulation.steady_from", f"{start} s", f"less than the duration, {end} s"),
         (mu > most, "friction.kinetic", mu, f"at most static, {most}"),
         (offsets not in (0, n), "robot.offsets", f"{offsets} items", f"none or {n}, one each"),
+        (not all(groups) or not groups, "robot.actuation", groups, "groups of at least one cable"),
+        (twice, "robot.actuation", f"'{twice}' twice", "each cable once at most"),
+        (unpaired, "gait_bounds.mirrored", "true", f"false, as {alone} has no mirror image"),
+        (
+            "load" in cpg.feedback and scenario.robot.gravity == 0.0,
+            *("robot.gravity", "0 m/s^2", "weight for feedback of the load"),
+        ),
+        (blind, "cpg.signals", f"'{cpg.signals}'", f"'live' for feedback of {cpg.feedback}"),
     ):
         if wrong:
             raise InputError(source, key, f"found {found}, expected {expected}")
+
+
+def mirrored(cables: list[str]) -> list[str]:
+    """The cables of a junction on the other side of the robot, by their names in CABLES."""
+    swap = {"left": "right", "right": "left"}
+    return ["_".join(swap.get(part, part) for part in cable.split("_")) for cable in cables]

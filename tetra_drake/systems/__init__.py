@@ -1,8 +1,17 @@
 """The LeafSystems of the diagram: ports, state and events around the laws in `physics`."""
 
 from tetra_drake.systems.cable_network import CableNetwork
+from tetra_drake.systems.feedback import Feedback
 from tetra_drake.systems.ground_contact import GroundContact
 from tetra_drake.systems.matsuoka_cpg import MatsuokaCpg
 from tetra_drake.systems.start_up_gate import StartUpGate
+from tetra_drake.systems.steering import Steering
 
-__all__ = ["CableNetwork", "GroundContact", "MatsuokaCpg", "StartUpGate"]
+__all__ = [
+    "CableNetwork",
+    "Feedback",
+    "GroundContact",
+    "MatsuokaCpg",
+    "StartUpGate",
+    "Steering",
+]

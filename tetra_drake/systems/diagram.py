@@ -2,32 +2,57 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Diagram, DiagramBuilder, System
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.robot.bodies import AddTetrahedra
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.network import (
+    SteeringSignal,
+    initial_neurons,
+    make_network,
+    make_senses,
+    tonic_input,
+)
 from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.systems import CableNetwork, GroundContact, MatsuokaCpg, StartUpGate
+from tetra_drake.systems import (
+    CableNetwork,
+    Feedback,
+    GroundContact,
+    MatsuokaCpg,
+    StartUpGate,
+    Steering,
+)
 
 
-def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
+def MakeTensegrityDiagram(
+    scenario: Scenario, gait: Gait, *, steering: SteeringSignal | None = None
+) -> Diagram:
     """The robot walking by a gait; its default context is the scenario's start.
 
-        cpg ──→ start_up ──→ cables ──┬──→ forces ──→ plant ──┬──→ state
-                               ↑      │                       │
-                               │    ground                    │
-                               │      ↑                       │
-                               └──────┴───────────────────────┘
+        steering ──→ cpg ──→ start_up ──→ cables ──┬──→ forces ──→ plant ──┬──→ state
+                      ↑                     ↑  │   │                       │
+                      │                     │  │  ground                   │
+                      │                     │  ↓   │ ↑                     │
+                      └───── feedback ←─────┼──────┘ │                     │
+                                ↑           │        │                     │
+                                └───────────┴────────┴─────────────────────┘
 
-    Output ports: state (plant), signals (start_up), tensions and lengths (cables), normal_forces,
-    friction_forces and modes (ground); the systems' docstrings give shapes and units. There is
-    no SceneGraph: pictures are made from trajectories.
+    With `cpg.signals: live`, cpg is the network, else its signals, computed beforehand; feedback is
+    there if `cpg.feedback` is not empty. `steering` acts in place of the gait's turn.
+
+    Input port: turn (steering, of a live network). Output ports: state (plant), signals
+    (start_up), tensions and lengths (cables), normal_forces, friction_forces and modes (ground);
+    the systems' docstrings give shapes and units. There is no SceneGraph: pictures are made from
+    trajectories.
     """
     structure = MakeStructure(scenario)
     builder = DiagramBuilder()
@@ -38,8 +63,10 @@ def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
-    cpg = builder.AddNamedSystem("cpg", _make_cpg(scenario, gait))
-    gate = StartUpGate(scenario.oscillators, start_up=scenario.cpg.start_up)
+    live = scenario.cpg.signals == "live"
+    add = _AddNetwork if live else _AddSignals
+    ungated = add(builder, scenario, structure, gait, steering)
+    gate = StartUpGate(structure.signals, start_up=scenario.cpg.start_up)
     start_up = builder.AddNamedSystem("start_up", gate)
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
     witness = scenario.simulation.mode_changes == "witness"
@@ -48,13 +75,27 @@ def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
 
     state, signals = plant.get_state_output_port(), start_up.GetOutputPort("signals")
-    builder.Connect(cpg.get_output_port(0), start_up.GetInputPort("ungated"))
+    builder.Connect(ungated, start_up.GetInputPort("ungated"))
     builder.Connect(signals, cables.GetInputPort("signals"))
     builder.Connect(state, cables.GetInputPort("state"))
     builder.Connect(state, ground.GetInputPort("state"))
     builder.Connect(cables.GetOutputPort("generalized_force"), forces.get_input_port(0))
     builder.Connect(ground.GetOutputPort("generalized_force"), forces.get_input_port(1))
     builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
+    if scenario.cpg.feedback:
+        sensors = Feedback(
+            make_senses(scenario, structure),
+            gains=dataclasses.astuple(gait.gains),
+            bodies=len(structure.bodies),
+        )
+        feedback = builder.AddNamedSystem("feedback", sensors)
+        cpg = builder.GetSubsystemByName("cpg")
+        builder.Connect(state, feedback.GetInputPort("state"))
+        builder.Connect(cables.GetOutputPort("lengths"), feedback.GetInputPort("lengths"))
+        builder.Connect(
+            ground.GetOutputPort("normal_forces"), feedback.GetInputPort("normal_forces")
+        )
+        builder.Connect(feedback.get_output_port(), cpg.GetInputPort("feedback"))
 
     builder.ExportOutput(state, "state")
     builder.ExportOutput(signals, "signals")
@@ -67,10 +108,39 @@ def MakeTensegrityDiagram(scenario: Scenario, gait: Gait) -> Diagram:
     return diagram
 
 
-def _make_cpg(scenario: Scenario, gait: Gait) -> System:
-    """The oscillator network itself if `cpg.signals` is `live`, else its precomputed signals."""
-    if scenario.cpg.signals == "live":
-        return MatsuokaCpg(scenario.cpg, gait, oscillators=scenario.oscillators)
-    samples = signal_samples(scenario, gait)
+def _AddNetwork(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    structure: Structure,
+    gait: Gait,
+    steering: SteeringSignal | None,
+) -> OutputPort:
+    """Adds the network `cpg` and its `steering`; returns the port of the signals."""
+    network, cpg = make_network(scenario, structure, gait), scenario.cpg
+    tonic = functools.partial(tonic_input, scenario, structure)
+    turn = gait.turn if steering is None else steering
+    steers = builder.AddNamedSystem("steering", Steering(tonic, turn=turn))
+    neurons = MatsuokaCpg(
+        network,
+        tonic=cpg.external_input,
+        initial_state=initial_neurons(cpg, structure.signals),
+        gain=cpg.gain,
+    )
+    oscillators = builder.AddNamedSystem("cpg", neurons)
+    builder.Connect(steers.get_output_port(), oscillators.GetInputPort("tonic"))
+    builder.ExportInput(steers.GetInputPort("turn"), "turn")
+    return oscillators.GetOutputPort("signals")
+
+
+def _AddSignals(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    structure: Structure,
+    gait: Gait,
+    steering: SteeringSignal | None,
+) -> OutputPort:
+    """Adds the precomputed signals as the system `cpg`; returns its port."""
+    samples = signal_samples(scenario, gait, steering)
     times = scenario.cpg.listing_step * np.arange(len(samples))
-    return TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))
+    source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))
+    return builder.AddNamedSystem("cpg", source).get_output_port()

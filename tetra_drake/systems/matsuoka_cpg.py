@@ -3,53 +3,68 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
+import numpy.typing as npt
+from pydrake.systems.framework import BasicVector, Context, ContinuousState, InputPort, LeafSystem
 
 from tetra_drake.physics.oscillator import (
     U_RATE,
     V_RATE,
+    Network,
     U,
     make_neurons,
     neuron_rates,
     oscillator_output,
 )
-from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.model import initial_state, make_network
-from tetra_drake.scenario.schema import CpgScenario
 
 
 class MatsuokaCpg(LeafSystem):
-    """The network of n Matsuoka oscillators (thesis Eq. 7-9) of one gait.
+    """A network of n Matsuoka oscillators (thesis Eq. 7-9).
 
     | port     | shape | unit | meaning                                                      |
     |----------|-------|------|--------------------------------------------------------------|
+    | tonic    | (2n,) | 1    | u0 of Eq. 7, by neuron; if not connected, as constructed     |
     | feedback | (2n,) | 1    | f of Eq. 7, by neuron; zero where nothing is connected       |
     | signals  | (n,)  | N    | gain (y_extensor - y_flexor), by oscillator                  |
     | neurons  | (2n,) | 1    | y = max(0, u); neurons 2k, 2k+1: extensor, flexor of the k-th |
 
-    Continuous state: u (2n,), then v (2n,), the inner states and the self-inhibitions. It
-    starts at the scenario's initial values. The signals are those of the network from t = 0 on;
-    a StartUpGate keeps them from the cables at first.
+    Continuous state: u (2n,), then v (2n,), the inner states and the self-inhibitions. Outputs
+    depend on it alone, so what they drive may feed back without an algebraic loop. The signals are
+    those of the network from t = 0 on. The robot's network is made by `robot.network`.
     """
 
-    def __init__(self, cpg: CpgScenario, gait: Gait, *, oscillators: int) -> None:
+    def __init__(
+        self,
+        network: Network,
+        *,
+        tonic: npt.ArrayLike,
+        initial_state: npt.ArrayLike,
+        gain: float = 1.0,
+    ) -> None:
+        """`tonic` for all neurons or each, `initial_state` (4n,), `gain` per unit of y."""
         super().__init__()
-        neurons = 2 * oscillators
-        self._gain = cpg.gain
-        self._network = make_network(cpg, gait, oscillators=oscillators)
-        self._no_feedback = np.zeros(neurons)
+        neurons = len(network.inhibition)
+        self._network, self._gain = network, gain
+        self._default = np.full(neurons, tonic, dtype=float), np.zeros(neurons)
+        self._tonic = self.DeclareVectorInputPort("tonic", neurons)
         self._feedback = self.DeclareVectorInputPort("feedback", neurons)
-        self.DeclareContinuousState(BasicVector(initial_state(cpg, oscillators)))
+        state = np.array(initial_state, dtype=float)
+        if state.shape != (2 * neurons,):
+            expected = f"({2 * neurons},) for {neurons} neurons"
+            raise ValueError(f"found initial_state of shape {state.shape}, expected {expected}")
+        self.DeclareContinuousState(BasicVector(state))
         tickets = {self.xc_ticket()}
-        self.DeclareVectorOutputPort("signals", oscillators, self._calc_signals, tickets)
+        self.DeclareVectorOutputPort("signals", neurons // 2, self._calc_signals, tickets)
         self.DeclareVectorOutputPort("neurons", neurons, self._calc_neurons, tickets)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Eq. 7."""
-        neurons, feedback = self._neurons(context), self._no_feedback
-        if self._feedback.HasValue(context):
-            feedback = self._feedback.Eval(context)
-        neuron_rates(self._network, feedback, neurons)
+        neurons = self._neurons(context)
+        ports: tuple[InputPort, InputPort] = self._tonic, self._feedback
+        tonic, feedback = (
+            port.Eval(context) if port.HasValue(context) else default
+            for port, default in zip(ports, self._default, strict=True)
+        )
+        neuron_rates(self._network, tonic + feedback, neurons)
         derivatives.SetFromVector(neurons[:, U_RATE : V_RATE + 1].T.ravel())
 
     def _neurons(self, context: Context) -> np.ndarray:

@@ -24,6 +24,7 @@ from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -33,9 +34,11 @@ _ITERATIONS = 20_000
 """Iterations, some 70 ms, after which signals of the operating system are heard."""
 
 
-def simulate_compiled(*, scenario: Scenario, gait: Gait, record: bool) -> SimulationResult:
+def simulate_compiled(
+    *, scenario: Scenario, gait: Gait, record: bool, steering: SteeringSignal | None = None
+) -> SimulationResult:
     """Simulates a gait as simulate() does, without Drake. Other threads run meanwhile."""
-    walk = Walk.of(scenario, gait, record=record)
+    walk = Walk.of(scenario, gait, record=record, steering=steering)
     engine = LaneEngine(walk, width=1)
     engine.load(0, walk)
     while not (ended := engine.advance(_ITERATIONS)):

@@ -34,24 +34,28 @@ from tetra_drake.engines.compiled.walk import (
 )
 from tetra_drake.physics.cable import PULL_COLUMNS, Cables
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, Law
+from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.lanes import FieldArray, lane_table
-from tetra_drake.physics.oscillator import NEURON_COLUMNS, make_neurons
+from tetra_drake.physics.oscillator import NEURON_COLUMNS, Network, make_neurons
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import starting_modes
-from tetra_drake.robot.model import (
-    JUNCTION_CABLES,
-    Body,
-    Model,
-    initial_state,
-    make_model,
+from tetra_drake.robot.model import JUNCTION_CABLES, Body, Model, make_model
+from tetra_drake.robot.network import (
+    SteeringSignal,
+    initial_neurons,
     make_network,
+    make_senses,
+    sample_turns,
+    tonic_input,
 )
 from tetra_drake.robot.signals import sample_count
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
+
+_INDICES = 3  # the first fields of Senses, which lanes share
 
 
 @dataclass(frozen=True)
@@ -69,9 +73,19 @@ class Walk:
     """The times (s) of the samples to keep, the ends among them."""
     marks: np.ndarray
     """The times (s) at which steps end."""
+    steering: SteeringSignal | None
+    """In place of the gait's turn."""
+    senses: Senses
 
     @classmethod
-    def of(cls, scenario: Scenario, gait: Gait, *, record: bool) -> Walk:
+    def of(
+        cls,
+        scenario: Scenario,
+        gait: Gait,
+        *,
+        record: bool,
+        steering: SteeringSignal | None = None,
+    ) -> Walk:
         """Prepares a gait."""
         simulation, start_up = scenario.simulation, scenario.cpg.start_up
         structure = MakeStructure(scenario)
@@ -86,6 +100,8 @@ class Walk:
             ends,
             times=np.unique([*ends, *times]),
             marks=np.unique([*ends, *([start_up] if start_up <= simulation.duration else [])]),
+            steering=steering,
+            senses=make_senses(scenario, structure),
         )
 
     def with_gait(self, gait: Gait) -> Walk:
@@ -93,11 +109,18 @@ class Walk:
         return dataclasses.replace(self, gait=gait)
 
     @property
-    def kind(self) -> tuple[int, int, bool, bool, bool, bool]:
+    def kind(self) -> tuple[object, ...]:
         """What walks that share an engine must have in common."""
         scenario, ground = self.scenario, self.model.ground
         robot = scenario.robot.tetrahedra, len(ground.contacts), scenario.cables.slack
-        return *robot, scenario.cpg.signals == "listing", ground.flat, ground.coulomb
+        drivers = tuple(self.structure.actuation.drivers.tolist())
+        return *robot, drivers, *self.signals, ground.flat, ground.coulomb
+
+    @property
+    def signals(self) -> tuple[bool, bool]:
+        """Whether they are the listing's, and whether the network is live."""
+        kind = self.scenario.cpg.signals
+        return kind == "listing", kind == "live"
 
     @property
     def recent_signals(self) -> int:
@@ -143,9 +166,10 @@ class LaneEngine:
             modes=np.zeros((*shape, len(structure.contacts), MODE_COLUMNS)),
             signals=np.zeros((*shape, signals)),
             recent=np.zeros((width, first.recent_signals, signals)),
+            turns=np.zeros((width, len(_turns(first)))),
         )
         log = Log(*(FieldArray(array, any_size=True) for array in self._log))
-        self._arguments = self._walks, log, first.scenario.cpg.signals == "listing"
+        self._arguments = self._walks, log, *first.signals
         # Called without looking for the types of all these tables each time.
         kinds = tuple(typeof(each) for each in (*self._arguments, 0))
         self._advance = advance.compile(kinds)  # type: ignore[attr-defined]
@@ -173,15 +197,22 @@ class LaneEngine:
         scenario, model, start = each.scenario, each.model, each.structure.initial_state
         modes = starting_modes(each.structure, model.ground)
         cpg, simulation, compiled = scenario.cpg, scenario.simulation, scenario.compiled
-        numbers = make_network(cpg, each.gait, oscillators=scenario.oscillators)._asdict()
-        numbers |= dataclasses.asdict(compiled)
+        network = make_network(scenario, each.structure, each.gait)
+        senses, turns = each.senses, _turns(each)
+        numbers: dict[str, Any] = dataclasses.asdict(compiled)
         numbers |= {name: getattr(simulation, name) for name in ("max_speed", "max_evaluations")}
         numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
         numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
-        numbers["neurons"] = make_neurons(initial_state(cpg, scenario.oscillators))
+        numbers["neurons"] = make_neurons(initial_neurons(cpg, scenario.oscillators))
+        numbers["external_input"] = cpg.external_input
+        numbers["gains"] = dataclasses.astuple(each.gait.gains)
+        numbers["sides"] = np.repeat(each.structure.actuation.sides, 2)
+        numbers["tonic"] = tonic_input(scenario, each.structure, turns)[0]
         for name, values in numbers.items():
             getattr(self._walks, name).array[..., lane] = values
-        for table, values in zip(self._robot_tables, _numbers(model), strict=True):
+        tables = *self._robot_tables, *self._walks.network, *self._walks.senses[_INDICES:]
+        constants = *_numbers(model), *network, *senses[_INDICES:]
+        for table, values in zip(tables, constants, strict=True):
             table.array[..., lane] = values
         heights = self._heights[lane]
         heights[: model.ground.heights.size] = model.ground.heights
@@ -192,6 +223,7 @@ class LaneEngine:
         log.times[lane] = log.marks[lane] = math.inf
         log.times[lane, : len(each.times)] = each.times
         log.marks[lane, : len(each.marks)] = each.marks
+        log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
         log.states[lane, 0], log.modes[lane, 0], log.signals[lane, 0] = start, modes, 0.0
         log.kept[lane], log.passed[lane] = 1, 0
         clock[:, lane] = 0.0
@@ -253,6 +285,10 @@ def processor_features() -> str:
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
 
 
+def _turns(walk: Walk) -> np.ndarray:
+    return sample_turns(walk.scenario, walk.structure, walk.gait, walk.steering)
+
+
 def _numbers(model: Model) -> list[np.ndarray]:
     """The arrays of a model that differ between scenarios, in the order of its lane tables."""
     cables = [model.cables[name] for name in Cables._fields[3:]]
@@ -284,7 +320,7 @@ def _lane_model(model: Model, width: int) -> tuple[Model, list[FieldArray]]:
 
 def _tables(first: Walk, robot: Model, width: int) -> Walks:
     """The tables of walks like the first, zeros."""
-    structure = first.structure
+    structure, senses = first.structure, first.senses
     bodies, signals = len(structure.bodies), structure.signals
     contacts, size, neurons = len(structure.contacts), BLOCK * bodies, 2 * signals
 
@@ -296,9 +332,23 @@ def _tables(first: Walk, robot: Model, width: int) -> Walks:
     tables |= {name: table(signals) for name in ("output", "signals", "end_signals")}
     tables |= {
         "robot": robot,
-        "inhibition": lane_table((neurons, neurons), width, any_size=True),
+        "network": Network(
+            inhibition=lane_table((neurons, neurons), width, any_size=True),
+            per_tau_a=table(neurons),
+            per_tau_b=table(neurons),
+            self_inhibition_weight=table(neurons),
+        ),
+        "senses": Senses(
+            *(FieldArray(indices.copy()) for indices in senses[:_INDICES]),
+            *(table(len(numbers)) for numbers in senses[_INDICES:]),
+        ),
         "neurons": table(neurons, NEURON_COLUMNS),
-        "feedback": table(neurons),
+        "gains": table(3),
+        "sides": table(neurons),
+        "tonic": table(neurons),
+        "inputs": table(neurons),
+        "lengths": table(len(structure.cables)),
+        "normal_forces": table(contacts),
         "clock": table(CLOCK_ROWS),
         "modes": table(contacts, MODE_COLUMNS),
         "acceleration": table(size),

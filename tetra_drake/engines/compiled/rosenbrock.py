@@ -56,10 +56,11 @@ class Step(NamedTuple):
 
 @compiled
 def take_step(
-    robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, step: Real
+    robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, step: Real, keep: bool
 ) -> Real:
     """Writes the end of a step (s); `signals` are the end's. What is given of the state: `forces`,
-    whose nodes and frames are overwritten, and work.force.
+    whose nodes and frames are overwritten, and work.force. With `keep`, all `forces` become those
+    of the second stage, at the end of the step to order 1.
 
     Returns the difference to the first-order solution within: the largest of any body's
     velocity (m/s), of rotation that of its nodes; NaN if one is.
@@ -86,7 +87,7 @@ def take_step(
         end[first + i] = state[first + i] + step * k1[i]
     move_bodies(state, stage, step, end)
     move_robot(robot, end, forces)
-    compute_forces(robot, modes, signals, False, forces, work.end_force)
+    compute_forces(robot, modes, signals, keep, forces, work.end_force)
     for body in range(bodies):
         for j in range(BLOCK):
             i = BLOCK * body + j

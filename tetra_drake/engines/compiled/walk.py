@@ -2,6 +2,10 @@
 
 All lanes go through the same iteration: forces, prediction of the next mode change, signals, one
 step. A lane whose step is rejected repeats it with a shorter one in the next iteration.
+
+A network that does not depend on the robot runs ahead in steps of its own, and its signals are
+interpolated. A `live` one takes the robot's steps by Heun's method, which is explicit, as its rates
+are slow, and what ROS2 is without its matrix: both are of order 2 together.
 """
 
 from __future__ import annotations
@@ -15,12 +19,20 @@ import numpy as np
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
 from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
+from tetra_drake.physics.cable import LENGTH
 from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.feedback import Senses, sense
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.lanes import Real, Table, any_lane, by_lane, maximum, minimum, select
 from tetra_drake.physics.mode_change import time_to_mode_change
-from tetra_drake.physics.oscillator import Network, next_output
+from tetra_drake.physics.oscillator import (
+    Network,
+    correct_neurons,
+    next_output,
+    oscillator_output,
+    predict_neurons,
+)
 from tetra_drake.robot.model import Model
 
 Array = np.ndarray
@@ -58,12 +70,19 @@ class Walks(NamedTuple):
     look_ahead: Table
     max_speed: Table
     max_evaluations: Table
-    inhibition: Table
-    """(2n, 2n); this and the next four: the oscillators' constants, see physics.oscillator."""
-    tau_a: Table
-    tau_b: Table
-    self_inhibition_weight: Table
+    network: Network
     external_input: Table
+    sides: Table
+    """(2n,): by neuron, see Actuation; n oscillators."""
+    tonic: Table
+    """(2n,): the input without feedback; `inputs` with it."""
+    inputs: Table
+    senses: Senses
+    gains: Table
+    """(3,): of feedback."""
+    lengths: Table
+    """(cables,): what is sensed, as are `normal_forces`, (contacts,)."""
+    normal_forces: Table
     gain: Table
     """Force per unit of an oscillator's output."""
     period: Table
@@ -72,8 +91,6 @@ class Walks(NamedTuple):
     start_up: Table
     neurons: Table
     """(2n, NEURON_COLUMNS)."""
-    feedback: Table
-    """(2n,), zeros."""
     output: Table
     """(n,): the oscillators' latest outputs."""
     clock: Table
@@ -107,20 +124,23 @@ class Log(NamedTuple):
     """(W, samples, n), in N."""
     recent: Table
     """(W, RECENT, n): the latest samples of all signals; see row_of."""
+    turns: Table
+    """(W, turns): at 0, one `period` ...; the last one lasts. One alone is in `tonic` already."""
 
 
 @functools.partial(compiled, nogil=True)
-def advance(w: Walks, log: Log, listing: bool, iterations: int) -> None:
+def advance(w: Walks, log: Log, listing: bool, live: bool, iterations: int) -> None:
     """Lets the lanes walk until one of them ends, or for a number of iterations.
 
-    `listing`: see physics.oscillator.next_output.
+    `listing`: see physics.oscillator.next_output. `live`: whether the network walks along.
     """
     clock, robot, forces = w.clock, w.robot, w.forces
     state, end = w.step.state, w.step.end
     for _ in range(iterations):
         if any_lane((clock[STATUS] == WALKING) & (clock[TIME] >= clock[MARK])):
-            produce_signals(w, log, listing, clock[TIME])
-            if pass_marks(w, log):
+            if not live:
+                produce_signals(w, log, listing, clock[TIME])
+            if pass_marks(w, log, live):
                 return
         walks = clock[STATUS] == WALKING
         move_robot(robot, state, forces)
@@ -129,15 +149,24 @@ def advance(w: Walks, log: Log, listing: bool, iterations: int) -> None:
         step = select(walks, aim(w), 0.0)
         step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
         clock[STEP], clock[END] = step, step_end
-        produce_signals(w, log, listing, step_end)
-        for lane in range(log.kept.size):
-            interpolate(w, log, lane, by_lane(clock)[END, lane], by_lane(w.end_signals))
-        error = take_step(robot, w.step, w.modes, forces, w.end_signals, step)
+        if live:
+            feel(w, log, clock[TIME], state)
+            predict_neurons(w.network, w.inputs, step, w.neurons)
+            drive(w)
+        else:
+            produce_signals(w, log, listing, step_end)
+            for lane in range(log.kept.size):
+                interpolate(w, log, lane, by_lane(clock)[END, lane], by_lane(w.end_signals))
+        error = take_step(robot, w.step, w.modes, forces, w.end_signals, step, live)
 
         accepted = walks & (error <= w.tolerance[0])
+        if live:
+            feel(w, log, step_end, end)
+            correct_neurons(w.network, w.inputs, step, accepted, w.neurons)
+            drive(w)
         if any_lane(accepted & (clock[DUE] <= step_end)):
             clock[FLAG] = select(accepted, 1.0, 0.0)
-            keep_samples(w, log)
+            keep_samples(w, log, live)
         for i in range(state.size):
             state[i] = select(accepted, end[i], state[i])
         for k in range(w.signals.size):
@@ -201,14 +230,13 @@ def produce_signals(w: Walks, log: Log, listing: bool, until: Real) -> None:
     Others go along as far as there is room, so that few steps are taken for one lane alone.
     """
     clock, period, floats = w.clock, w.period[0], by_lane(w.clock)
-    taus, inputs = (w.tau_a[0], w.tau_b[0]), (w.self_inhibition_weight[0], w.external_input[0])
-    network = Network(w.inhibition, *taus, *inputs)
     needed, room = until / period + 1.0, clock[TIME] / period + (log.recent.shape[1] - 1.0)
     grows = clock[STATUS] == WALKING
     while any_lane(grows & (clock[SAMPLES] < w.samples[0]) & (clock[SAMPLES] <= needed)):
         goes = grows & (clock[SAMPLES] < w.samples[0]) & (clock[SAMPLES] < room)
         step = select(goes, period, 0.0)
-        next_output(network, w.feedback, step, listing, w.neurons, w.output)
+        steer(w, log, clock[SAMPLES])
+        next_output(w.network, w.tonic, step, listing, w.neurons, w.output)
         clock[FLAG] = select(goes, 1.0, 0.0)
         for lane in range(log.kept.size):
             if floats[FLAG, lane] != 0.0:
@@ -217,6 +245,41 @@ def produce_signals(w: Walks, log: Log, listing: bool, until: Real) -> None:
                     signal = by_lane(w.gain)[0, lane] * by_lane(w.output)[k, lane]
                     log.recent[lane, row, k] = signal
         clock[SAMPLES] += clock[FLAG]
+
+
+@compiled
+def feel(w: Walks, log: Log, time: Real, state: Table) -> None:
+    """Writes the inputs of a live network at a time (s), for a state and its forces."""
+    steer(w, log, time / w.period[0])
+    for i in range(w.lengths.size):
+        w.lengths[i] = w.forces.pulls[i, LENGTH]
+    for i in range(w.normal_forces.size):
+        w.normal_forces[i] = w.forces.pushes[i, 2]
+    sense(w.senses, w.gains, state, w.lengths, w.normal_forces, w.inputs)
+    for i in range(w.inputs.size):
+        w.inputs[i] += w.tonic[i]
+
+
+@compiled
+def steer(w: Walks, log: Log, sample: Real) -> None:
+    """Writes the tonic input at a sample of the turns where they change."""
+    turns, floats = log.turns.shape[1], by_lane(w.clock)
+    if turns == 1:
+        return
+    w.clock[FLAG] = sample
+    for lane in range(log.kept.size):
+        turn = log.turns[lane, min(int(floats[FLAG, lane]), turns - 1)]
+        for i in range(w.tonic.size):
+            side = by_lane(w.sides)[i, lane]
+            by_lane(w.tonic)[i, lane] = by_lane(w.external_input)[0, lane] * (1.0 + turn * side)
+
+
+@compiled
+def drive(w: Walks) -> None:
+    """Writes the signals at the end of the step, N, from a live network."""
+    oscillator_output(w.neurons, w.output)
+    for k in range(w.output.size):
+        w.end_signals[k] = select(w.clock[ACTIVE] != 0.0, w.gain[0] * w.output[k], 0.0)
 
 
 @compiled
@@ -241,9 +304,10 @@ def row_of(sample: int, log: Log) -> int:
 
 
 @compiled
-def pass_marks(w: Walks, log: Log) -> bool:
+def pass_marks(w: Walks, log: Log, live: bool) -> bool:
     """Sets the next mark where one is reached, and the signals there; whether a walk is done."""
-    clock, done = by_lane(w.clock), False
+    clock, signals, done = by_lane(w.clock), by_lane(w.signals), False
+    oscillator_output(w.neurons, w.output)
     for lane in range(log.kept.size):
         if clock[STATUS, lane] != WALKING or clock[TIME, lane] < clock[MARK, lane]:
             continue
@@ -253,12 +317,17 @@ def pass_marks(w: Walks, log: Log) -> bool:
             clock[STATUS, lane] = DONE
             done = True
         clock[ACTIVE, lane] = 1.0 if clock[TIME, lane] >= by_lane(w.start_up)[0, lane] else 0.0
-        interpolate(w, log, lane, clock[TIME, lane], by_lane(w.signals))
+        if not live:
+            interpolate(w, log, lane, clock[TIME, lane], signals)
+            continue
+        for k in range(w.output.size):
+            force = by_lane(w.gain)[0, lane] * by_lane(w.output)[k, lane]
+            signals[k, lane] = clock[ACTIVE, lane] * force
     return done
 
 
 @compiled
-def keep_samples(w: Walks, log: Log) -> None:
+def keep_samples(w: Walks, log: Log, live: bool) -> None:
     """Keeps the samples that are due in the accepted step of each flagged lane."""
     clock, modes, lanes = by_lane(w.clock), by_lane(w.modes), log.kept.size
     signals = np.empty((w.signals.size, lanes))
@@ -273,9 +342,12 @@ def keep_samples(w: Walks, log: Log) -> None:
             for k in range(modes.shape[0]):
                 for c in range(MODE_COLUMNS):
                     log.modes[lane, i, k, c] = modes[k, c, lane]
-            interpolate(w, log, lane, due, signals)
+            if not live:
+                interpolate(w, log, lane, due, signals)
             for k in range(signals.shape[0]):
-                log.signals[lane, i, k] = signals[k, lane]
+                first, last = by_lane(w.signals)[k, lane], by_lane(w.end_signals)[k, lane]
+                between = first + part * (last - first)
+                log.signals[lane, i, k] = between if live else signals[k, lane]
             log.kept[lane] = i + 1
             clock[DUE, lane] = log.times[lane, i + 1]
 

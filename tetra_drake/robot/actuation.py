@@ -1,0 +1,80 @@
+"""The oscillators of a robot: which cables each drives, and which of them inhibit each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.scenario.schema import CABLES, Scenario, mirrored
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """m oscillators, group by group of each junction, from the rear to the lead."""
+
+    names: tuple[str, ...]
+    """Such as "T1-T2", or "T1-T2 outer bottom_left" where a junction has several groups."""
+    drivers: np.ndarray
+    """(cables,): the oscillator that drives each cable of the robot, PASSIVE if none does."""
+    junctions: np.ndarray
+    """(m,): of each oscillator, 0 between T1 and T2."""
+    sides: np.ndarray
+    """(m,): 1.0 for a group on the left of the robot, -1.0 on the right, 0.0 for any other."""
+    couplings: np.ndarray
+    """(weights, 2): the neurons, inhibited and inhibiting, of each weight, in the order of listing
+    B.2: onto each neuron in turn, from the neurons of its own kind in turn."""
+    images: np.ndarray
+    """(weights,): the weight that is the mirror image of each; itself where there is none."""
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """The oscillators of a scenario: `robot.actuation` and `cpg.reach`."""
+        groups, count = scenario.robot.actuation, scenario.robot.tetrahedra - 1
+        junctions = np.repeat(np.arange(count), len(groups))
+        place = {cable: k for k, group in enumerate(groups) for cable in group}
+        own = np.array([place.get(cable, PASSIVE) for cable in CABLES])
+        drivers = [np.where(own == PASSIVE, own, own + len(groups) * i) for i in range(count)]
+        couplings = _couplings(junctions, scenario.cpg.reach)
+        sets = [set(group) for group in groups]
+        others = [set(mirrored(group)) for group in groups]
+        opposite = [sets.index(o) if o in sets else k for k, o in enumerate(others)]
+        oscillators = np.tile(opposite, count) + len(groups) * junctions
+        neurons = (2 * oscillators[:, np.newaxis] + [0, 1]).ravel()
+        index = {pair: i for i, pair in enumerate(map(tuple, couplings.tolist()))}
+        pairs = map(tuple, neurons[couplings].tolist())
+        return cls(
+            names=tuple(
+                f"T{i + 1}-T{i + 2}" + (f" {' + '.join(group)}" if len(groups) > 1 else "")
+                for i in range(count)
+                for group in groups
+            ),
+            drivers=np.concatenate(drivers),
+            junctions=junctions,
+            sides=np.tile([_side(group) for group in groups], count),
+            couplings=couplings,
+            images=np.array([index.get(pair, i) for i, pair in enumerate(pairs)], dtype=int),
+        )
+
+    @property
+    def weight_names(self) -> tuple[str, ...]:
+        """As "3->1 extensor": from oscillator 3 onto oscillator 1, counting from 1."""
+        kinds = "extensor", "flexor"
+        pairs = self.couplings.tolist()
+        return tuple(f"{j // 2 + 1}->{i // 2 + 1} {kinds[i % 2]}" for i, j in pairs)
+
+
+def _couplings(junctions: np.ndarray, reach: int | None) -> np.ndarray:
+    junction, kind = np.repeat(junctions, 2), np.arange(2 * len(junctions)) % 2
+    far = np.abs(junction[:, np.newaxis] - junction)
+    coupled = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
+    return np.argwhere(coupled if reach is None else coupled & (far <= reach))
+
+
+def _side(group: list[str]) -> float:
+    for side, name in ((1.0, "left"), (-1.0, "right")):
+        if all(cable.endswith(name) for cable in group):
+            return side
+    return 0.0

@@ -1,0 +1,93 @@
+"""The oscillator network of a gait and its feedback, as the kernels of every engine take them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.feedback import Senses
+from tetra_drake.physics.oscillator import Network
+from tetra_drake.robot.bodies import tetrahedron_inertia
+from tetra_drake.robot.gait import Gait, check_gait
+from tetra_drake.robot.structure import NODES, Structure
+from tetra_drake.scenario.schema import CpgScenario, Scenario
+
+SteeringSignal = Callable[[float], float]
+"""The turn, from -1 to 1, at a time in s."""
+
+
+def make_network(scenario: Scenario, structure: Structure, gait: Gait) -> Network:
+    """The network of a gait; raises InputError where the gait does not fit the scenario."""
+    actuation = structure.actuation
+    check_gait(gait, scenario, actuation, source=f"gait {gait.name}")
+    neurons = np.arange(2 * len(actuation.names))
+    inhibition = np.zeros((neurons.size, neurons.size))
+    inhibition[neurons, neurons ^ 1] = scenario.cpg.partner_weight
+    inhibition[tuple(actuation.couplings.T)] = gait.weights
+    scales = np.array(gait.time_scales or [1.0] * (len(structure.bodies) - 1))
+    scales = np.repeat(scales[actuation.junctions], 2)
+    return Network.of(
+        inhibition,
+        tau_a=gait.tau_a * scales,
+        tau_b=gait.tau_b * scales,
+        self_inhibition_weight=scenario.cpg.self_inhibition_weight,
+    )
+
+
+def initial_neurons(cpg: CpgScenario, oscillators: int) -> np.ndarray:
+    """(4n,): u, then v, of all neurons at t = 0 (Table 4)."""
+    u = np.full(2 * oscillators, cpg.inner_state)
+    v = np.tile([cpg.extensor_self_inhibition, cpg.flexor_self_inhibition], oscillators)
+    return np.concatenate([u, v])
+
+
+def tonic_input(scenario: Scenario, structure: Structure, turns: np.ndarray) -> np.ndarray:
+    """u0 (1 + turn) on the left, u0 (1 - turn) on the right: (..., 2m), by neuron, for turns (...).
+
+    After Matsuoka's snakes, which are steered so (arXiv 2207.04899).
+    """
+    sides = np.repeat(structure.actuation.sides, 2)
+    return scenario.cpg.external_input * (1.0 + turns[..., np.newaxis] * sides)
+
+
+def sample_turns(
+    scenario: Scenario, structure: Structure, gait: Gait, steering: SteeringSignal | None
+) -> np.ndarray:
+    """The turns at 0, one `cpg.listing_step`, two ... to the duration; one alone if constant.
+
+    Raises InputError if a turn is not a number from -1 to 1, or where nothing can be steered.
+    """
+    if steering is None:
+        return np.array([gait.turn])
+    if not structure.actuation.sides.any():
+        raise InputError("steering", "", "no oscillator is on one side of the robot")
+    step = scenario.cpg.listing_step
+    times = step * np.arange(round(scenario.simulation.duration / step) + 1)
+    turns = np.array([float(steering(time)) for time in times.tolist()])
+    wrong = ~(np.abs(turns) <= 1.0)
+    if wrong.any():
+        time, turn = times[wrong.argmax()], turns[wrong.argmax()]
+        raise InputError("steering", f"at {time:g} s", f"found {turn}, expected -1 to 1")
+    return turns
+
+
+def make_senses(scenario: Scenario, structure: Structure) -> Senses:
+    """What the oscillators can sense. Raises InputError if the robot finds no rest."""
+    drivers, pathways = structure.actuation.drivers, scenario.cpg.feedback
+    sizes = np.bincount(drivers[drivers != PASSIVE])[drivers]  # cables of each cable's group
+    if "length" in pathways:
+        from tetra_drake.robot.settling import settled_lengths
+    settled = settled_lengths(scenario) if "length" in pathways else np.ones(len(drivers))
+    weight = len(structure.bodies) * tetrahedron_inertia(structure).get_mass()
+    weight *= scenario.robot.gravity
+    return Senses(
+        drivers=drivers,
+        ahead=structure.actuation.junctions + 1,
+        carriers=structure.contacts // len(NODES),
+        settled=settled,
+        per_length=1.0 / (settled * sizes),
+        per_load=np.array([1.0 / weight if "load" in pathways else 0.0]),
+    )

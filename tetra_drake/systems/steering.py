@@ -1,0 +1,40 @@
+"""Steering as a system."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+
+class Steering(LeafSystem):
+    """The tonic input of the oscillators by the turn asked for; no state.
+
+    | port  | shape | unit | meaning                                                         |
+    |-------|-------|------|-----------------------------------------------------------------|
+    | turn  | (1,)  | 1    | from -1 to 1, how much stronger the left is; if not connected,  |
+    |       |       |      | as constructed                                                  |
+    | tonic | (2m,) | 1    | u0 of Eq. 7 for the neurons of m oscillators                    |
+    """
+
+    def __init__(
+        self,
+        tonic_input: Callable[[np.ndarray], np.ndarray],
+        *,
+        turn: float | Callable[[float], float],
+    ) -> None:
+        """`tonic_input` gives (2m,) for a turn, `turn` may depend on the time in s."""
+        super().__init__()
+        self._tonic_input, self._default = tonic_input, turn
+        self._turn = self.DeclareVectorInputPort("turn", 1)
+        size = len(tonic_input(np.array(0.0)))
+        self.DeclareVectorOutputPort("tonic", size, self._calc_tonic)
+
+    def _calc_tonic(self, context: Context, output: BasicVector) -> None:
+        turn = self._default
+        if self._turn.HasValue(context):
+            turn = self._turn.Eval(context)[0]
+        elif callable(turn):
+            turn = turn(context.get_time())
+        output.SetFromVector(self._tonic_input(np.array(turn)))
