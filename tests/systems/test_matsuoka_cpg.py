@@ -81,7 +81,7 @@ def test_takes_any_number_of_oscillators_and_a_matrix_of_ones_own(oscillators):
     inhibition += np.kron(1.5 * (1.0 - np.eye(oscillators)), np.eye(2))
     taus = {"tau_a": 0.3, "tau_b": 0.6}
     network = Network.of(inhibition, **taus, self_inhibition_weight=2.5)
-    start = np.repeat([0.3, 0.1, 0.5], [2 * oscillators, oscillators, oscillators])
+    start = np.append(np.full(2 * oscillators, 0.3), np.tile([0.1, 0.5], oscillators))
     simulator = Simulator(MatsuokaCpg(network, tonic=0.5, initial_state=start))
     simulator.AdvanceTo(1.0)
     signals = simulator.get_system().GetOutputPort("signals").Eval(simulator.get_context())

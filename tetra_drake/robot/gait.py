@@ -260,36 +260,24 @@ def check_gait(
     gait: Gait, scenario: Scenario, actuation: Actuation, *, source: object, key: str = ""
 ) -> None:
     """Raises InputError, naming source and key, for what does not fit the scenario."""
-    count, n, junctions = len(actuation.couplings), len(actuation.names), len(gait.time_scales)
-    gains = dataclasses.asdict(gait.gains)
-    gain = next(
-        (name for name in PATHWAYS if gains[name] and name not in scenario.cpg.feedback), ""
-    )
+    weights, count, n = len(gait.weights), len(actuation.couplings), len(actuation.names)
+    scales, junctions = len(gait.time_scales), scenario.robot.tetrahedra - 1
+    pathways, gains = scenario.cpg.feedback, dataclasses.asdict(gait.gains)
+    gain = next((name for name in PATHWAYS if gains[name] and name not in pathways), "")
     for wrong, name, found, expected in (
-        (
-            len(gait.weights) != count,
-            "weights",
-            f"{len(gait.weights)} numbers",
-            f"{count} for {n} oscillators",
-        ),
-        (
-            gain,
-            f"gains.{gain}",
-            gains.get(gain),
-            f"0, as the scenario's cpg.feedback is {scenario.cpg.feedback}",
-        ),
+        (weights != count, "weights", f"{weights} numbers", f"{count} for {n} oscillators"),
+        (gain, f"gains.{gain}", gains.get(gain), f"0, as cpg.feedback is {pathways}"),
         (
             gait.turn and not actuation.sides.any(),
             "turn",
             gait.turn,
-            "0, as no oscillator is on one side",
+            "0, as no oscillator has a side",
         ),
-        (junctions not in (0, n - 1), "time_scales", f"{junctions} numbers", f"none or {n - 1}"),
+        (scales not in (0, junctions), "time_scales", f"{scales} numbers", f"none or {junctions}"),
     ):
         if wrong:
-            raise InputError(
-                source, f"{key}.{name}".strip("."), f"found {found}, expected {expected}"
-            )
+            problem = f"found {found}, expected {expected}"
+            raise InputError(source, f"{key}.{name}".strip("."), problem)
 
 
 def _check_names(weights: dict[str, float], names: tuple[str, ...], path: object, key: str) -> None:
