@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.lanes import Real, Table
+from tetra_drake.physics.lanes import Real, Table, inverse_sqrt
 
 Array = np.ndarray
 
@@ -47,6 +47,34 @@ def move_nodes(state: Table, p_BN: Table, nodes: Table) -> None:
             nodes[node, V_WN + 1] = v_y + w_z * p_x - w_x * p_z
             nodes[node, V_WN + 2] = v_z + w_x * p_y - w_y * p_x
             nodes[node, FORCE], nodes[node, FORCE + 1], nodes[node, FORCE + 2] = 0.0, 0.0, 0.0
+
+
+@compiled
+def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> None:
+    """Writes the positions of a state (13 bodies,) whose bodies have `moved` for a time (s) at
+    velocities (6 bodies,); quaternions get the length 1."""
+    half = 0.5 * time
+    for body in range(velocities.size // 6):
+        q, v = 7 * body, 6 * body
+        # The rotation's quaternion, to fourth order in its angle (some thousandths per step).
+        x, y, z = half * velocities[v], half * velocities[v + 1], half * velocities[v + 2]
+        square = x * x + y * y + z * z
+        sine = 1.0 - square * (1.0 / 6.0)
+        w = 1.0 - 0.5 * square * (1.0 - square * (1.0 / 12.0))
+        x, y, z = sine * x, sine * y, sine * z
+        q_w, q_x, q_y, q_z = state[q], state[q + 1], state[q + 2], state[q + 3]
+        n_w = w * q_w - x * q_x - y * q_y - z * q_z
+        n_x = w * q_x + x * q_w + y * q_z - z * q_y
+        n_y = w * q_y + y * q_w + z * q_x - x * q_z
+        n_z = w * q_z + z * q_w + x * q_y - y * q_x
+        scale = inverse_sqrt(n_w * n_w + n_x * n_x + n_y * n_y + n_z * n_z)
+        moved[q] = scale * n_w
+        moved[q + 1] = scale * n_x
+        moved[q + 2] = scale * n_y
+        moved[q + 3] = scale * n_z
+        moved[q + 4] = state[q + 4] + time * velocities[v + 3]
+        moved[q + 5] = state[q + 5] + time * velocities[v + 4]
+        moved[q + 6] = state[q + 6] + time * velocities[v + 5]
 
 
 @compiled

@@ -9,12 +9,11 @@ from tetra_drake.engines.compiled.dynamics import (
     Forces,
     compute_forces,
     implicit_matrix,
-    move_bodies,
     move_robot,
 )
 from tetra_drake.physics.cable import PULL_COLUMNS
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
-from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.kinematics import NODE_COLUMNS, move_bodies
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.model import JUNCTION_CABLES, Model, make_model
@@ -141,12 +140,3 @@ def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
         expected = np.triu(-jacobian[place, place])
         # Turned levers change torques, too: by the force, k times 1 mm, that is 0.001 k.
         np.testing.assert_allclose(np.triu(stiffness[body]), expected, atol=0.003 * k)
-
-
-def test_bodies_turn_as_drakes_quaternions_do():
-    # A turn by angle w t about z: quaternion (cos(w t / 2), 0, 0, sin(w t / 2)).
-    state = np.append(1.0, np.zeros(12))
-    moved = np.empty(13)
-    move_bodies(state, np.array([0.0, 0.0, 3.0, 0.1, 0.2, 0.3]), 0.01, moved)
-    np.testing.assert_allclose(moved[:4], [np.cos(0.015), 0, 0, np.sin(0.015)], atol=1e-11)
-    np.testing.assert_allclose(moved[4:7], [1e-3, 2e-3, 3e-3], atol=1e-18)

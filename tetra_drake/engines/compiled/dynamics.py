@@ -22,7 +22,7 @@ from tetra_drake.physics.contact import (
 )
 from tetra_drake.physics.friction import STICK, coulomb_damping
 from tetra_drake.physics.kinematics import P_BN_W, gather_forces
-from tetra_drake.physics.lanes import Real, Table, any_lane, inverse_sqrt, select
+from tetra_drake.physics.lanes import Real, Table, any_lane, select
 from tetra_drake.physics.terrain import to_world
 from tetra_drake.robot.model import JUNCTION_CABLES, Model
 
@@ -66,34 +66,6 @@ def compute_forces(
 def inertia(robot: Model, j: int) -> Real:
     """The diagonal of a body's mass matrix: of rotation for j = 0, 1, 2, else of translation."""
     return robot.body.moment[0] if j < 3 else robot.body.mass[0]
-
-
-@compiled
-def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> None:
-    """Writes the positions of a state (13 bodies,) whose bodies have `moved` for a time (s) at
-    velocities (6 bodies,); quaternions get the length 1."""
-    half = 0.5 * time
-    for body in range(velocities.size // BLOCK):
-        q, v = 7 * body, BLOCK * body
-        # The rotation's quaternion, to fourth order in its angle (some thousandths per step).
-        x, y, z = half * velocities[v], half * velocities[v + 1], half * velocities[v + 2]
-        square = x * x + y * y + z * z
-        sine = 1.0 - square * (1.0 / 6.0)
-        w = 1.0 - 0.5 * square * (1.0 - square * (1.0 / 12.0))
-        x, y, z = sine * x, sine * y, sine * z
-        q_w, q_x, q_y, q_z = state[q], state[q + 1], state[q + 2], state[q + 3]
-        n_w = w * q_w - x * q_x - y * q_y - z * q_z
-        n_x = w * q_x + x * q_w + y * q_z - z * q_y
-        n_y = w * q_y + y * q_w + z * q_x - x * q_z
-        n_z = w * q_z + z * q_w + x * q_y - y * q_x
-        scale = inverse_sqrt(n_w * n_w + n_x * n_x + n_y * n_y + n_z * n_z)
-        moved[q] = scale * n_w
-        moved[q + 1] = scale * n_x
-        moved[q + 2] = scale * n_y
-        moved[q + 3] = scale * n_z
-        moved[q + 4] = state[q + 4] + time * velocities[v + 3]
-        moved[q + 5] = state[q + 5] + time * velocities[v + 4]
-        moved[q + 6] = state[q + 6] + time * velocities[v + 5]
 
 
 @compiled

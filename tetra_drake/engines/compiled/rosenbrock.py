@@ -26,10 +26,10 @@ from tetra_drake.engines.compiled.dynamics import (
     compute_forces,
     implicit_matrix,
     inertia,
-    move_bodies,
     move_robot,
 )
 from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.kinematics import move_bodies
 from tetra_drake.physics.lanes import Real, Table, select
 from tetra_drake.robot.model import Model
 
