@@ -125,8 +125,10 @@ def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.nda
     stiffness, held = stiffness_at_rest(robot, state), _free_motions(robot, state)
     hard, shift = robot.ground.law["stiffness"][0], 0.0
     stiffness = 0.5 * (stiffness + stiffness.T) + hard * held @ held.T
-    step = np.empty_like(force)
-    while not solve_definite(stiffness, shift, LEAST_STIFFNESS * hard, force, step):
+    step = np.full_like(force, np.nan)
+    while shift < np.inf and not solve_definite(
+        stiffness, shift, LEAST_STIFFNESS * hard, force, step
+    ):
         shift = max(10.0 * shift, LEAST_STIFFNESS * hard)
     return step
 
