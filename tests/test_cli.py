@@ -197,8 +197,12 @@ def test_the_result_holds_what_was_asked_for_and_done(simulated, result, scenari
     assert result["integrator"]["accuracy"] == scenario.simulation.accuracy
     assert 0 < result["integrator"]["steps"] < result["integrator"]["derivative_evaluations"]
     assert {"python", "drake", "numpy", "tetra_drake"} <= result["versions"].keys()
-    for name, metres in result["metrics"].items():
-        assert result[f"{name}_in"] == pytest.approx(metres / INCH)
+    inches = {key: value for key, value in result.items() if key.endswith("_in")}
+    assert inches.pop("path_radius_in") is None  # 0.3 s are one step of the path
+    assert len(inches) == 5
+    for name, length in inches.items():
+        assert length == pytest.approx(result["metrics"][name.removesuffix("_in")] / INCH)
+    assert result["path"]["time_s"] == [0.0, 0.3]
     # Eq. 10 with phi = (1, -10, 0, -1).
     expected = result["steady_distance_in"] - 10 * result["twist_in"] - result["lateral_drift_in"]
     assert result["fitness"] == pytest.approx(expected, abs=1e-12)

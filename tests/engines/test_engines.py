@@ -4,11 +4,13 @@ import pickle
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import Diverged, StepBudgetExceeded
+from tetra_drake.results.measures import path_of_centre
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
@@ -33,9 +35,24 @@ def test_recording_changes_nothing(scenario, engine, mode_changes):
     assert plain.engine == engine
     assert recorded.metrics == plain.metrics, "bit for bit"
     assert recorded.integrator == plain.integrator
+    for name, column in vars(plain.path).items():
+        np.testing.assert_array_equal(getattr(recorded.path, name), column)
     assert plain.trajectory is None and recorded.trajectory is not None
     x1 = recorded.trajectory.p_WN.sel(tetrahedron="T1", node="bottom_left", axis="x")
     assert float(x1[-1] - x1[0]) / INCH == recorded.metrics.distance_in
+
+
+@pytest.mark.parametrize("engine", ["drake", "compiled", MUJOCO])
+def test_the_path_is_that_of_the_trajectory(scenario, engine):
+    beside = [[0.0, y, 0.0] for y in (0.004, 0.0, -0.003, 0.001, 0.006)]
+    short = shortly(scenario, engine).with_changes({"robot.offsets": beside})
+    result = simulate(scenario=short, gait=seeded_gait(short), record=True)
+    path, whole = result.path, path_of_centre(result.trajectory)
+    assert path.times.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
+    np.testing.assert_allclose(path.centre, whole.centre[::25], atol=1e-9)
+    np.testing.assert_allclose(path.heading, whole.heading[::25], atol=1e-9)
+    assert abs(path.heading[-1]) > 1e-4
+    assert result.metrics.heading_change == path.heading[-1] - path.heading[0]
 
 
 @pytest.mark.parametrize("engine", ["compiled", MUJOCO])

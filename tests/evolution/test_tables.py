@@ -92,6 +92,13 @@ def test_a_line_that_is_no_entry_is_reported(run_small, refused, name, entry, ke
         load_run(run)
 
 
+def test_metrics_that_an_older_record_lacks_are_nan(tmp_path):
+    evaluations = load_run(write_run(tmp_path / "run", [[[(5.0, 0), (None, 1)]]])).evaluations
+    assert evaluations["distance"].notna().tolist() == [True, False]
+    for name in ("heading_change", "path_curvature"):
+        assert evaluations[name].dtype == float and evaluations[name].isna().all()
+
+
 # Best gaits, populations, states of trials
 
 

@@ -1,12 +1,31 @@
 """The metrics and the thesis's fitness (Eq. 10)."""
 
+import dataclasses
+import math
+
+import numpy as np
 import pytest
 
 from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
+from tetra_drake.results.path import CentrePath
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.schema import Scenario
 
 INCH = 0.0254
+
+CIRCLE = CentrePath(
+    np.linspace(0.0, 6.0, 25),
+    np.array([[math.cos(t), math.sin(t), t] for t in np.linspace(0.0, 6.0, 25)]),
+    np.linspace(0.5, -3.5, 25),
+)
+"""To the left, with a radius of 1 m, but turning to the right."""
+
+
+def metrics_of(structure: Structure, path: CentrePath, steady_from: float) -> Metrics:
+    """Those of a robot whose feet are at their start all the time."""
+    nodes = node_positions(structure, structure.initial_state)
+    kwargs = {"path": path, "steady_from": steady_from}
+    return compute_metrics(structure, start=nodes, steady=nodes, end=nodes, **kwargs)
 
 
 def test_metrics_are_the_displacements_of_figure_13(structure: Structure) -> None:
@@ -16,7 +35,9 @@ def test_metrics_are_the_displacements_of_figure_13(structure: Structure) -> Non
     end[0] += [0.5, -0.025, 0.0]  # x1, y1 at the end
     end[1, 0] += 0.45  # x2
     end[19, 0] += 0.6  # x3, the tip of T5
-    metrics = compute_metrics(structure, start=start, steady=steady, end=end)
+    metrics = compute_metrics(
+        structure, start=start, steady=steady, end=end, path=CIRCLE, steady_from=0.0
+    )
     assert metrics.distance == pytest.approx(0.5)
     assert metrics.steady_distance == pytest.approx(0.4)
     assert metrics.twist == pytest.approx(0.05)
@@ -28,11 +49,37 @@ def test_metrics_are_the_displacements_of_figure_13(structure: Structure) -> Non
     assert metrics.in_inches()["twist_in"] == pytest.approx(0.05 / INCH)
 
 
+def test_turning_and_bending_count_from_their_instants(structure: Structure) -> None:
+    metrics = metrics_of(structure, CIRCLE, 2.0)
+    assert metrics.heading_change == pytest.approx(-4.0)
+    assert metrics.path_curvature == pytest.approx(1.0, rel=1e-6)
+    assert metrics.path_radius == pytest.approx(1.0, rel=1e-6)
+    # Straight until 4 s, the bend after it is the steady stretch's.
+    late = CIRCLE.times > 4.0 - 1e-9
+    straight = np.where(late[:, None], CIRCLE.centre, CIRCLE.times[:, None] * [1.0, 2.0, 0.0])
+    partly = dataclasses.replace(CIRCLE, centre=straight)
+    assert metrics_of(structure, partly, 4.0).path_radius == pytest.approx(1.0, rel=1e-6)
+    line = dataclasses.replace(CIRCLE, centre=CIRCLE.times[:, None] * np.array([1.0, 2.0, 0.0]))
+    assert metrics_of(structure, line, 0.0).path_radius == math.inf
+
+
+def test_every_metric_has_a_unit_and_only_lengths_are_given_in_inches(
+    structure: Structure,
+) -> None:
+    units = {f.name: f.metadata["unit"] for f in dataclasses.fields(Metrics)}
+    assert (units["heading_change"], units["path_curvature"]) == ("rad", "1/m")
+    lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift"}
+    assert {name for name, unit in units.items() if unit == "m"} == lengths
+    inches = metrics_of(structure, CIRCLE, 0.0).in_inches()
+    assert inches.keys() == {f"{name}_in" for name in lengths}
+
+
 def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario) -> None:
     # In inches: 1 * 4 - 10 * 0.5 + 0 * 7 - 1 * 0.25
     inches = {"distance": 5.0, "steady_distance": 4.0, "twist": 0.5, "lead": 7.0}
     inches["lateral_drift"] = 0.25
-    metrics = Metrics(**{name: value * INCH for name, value in inches.items()})
+    lengths = {name: value * INCH for name, value in inches.items()}
+    metrics = Metrics(**lengths, heading_change=1.0, path_curvature=2.0)
     assert compute_fitness(metrics, scenario.fitness) == pytest.approx(-1.25)
     scenario.fitness.direction = 2.0
     assert compute_fitness(metrics, scenario.fitness) == pytest.approx(12.75)

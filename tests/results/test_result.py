@@ -1,11 +1,102 @@
 """What a result says of its simulation."""
 
+import json
+import math
+
+import numpy as np
 import pytest
 
-from tetra_drake.results.result import ground_text
+from tetra_drake.results.result import (
+    IntegratorWork,
+    SimulationResult,
+    ground_text,
+    make_result,
+    result_times,
+    save_result,
+    summary,
+)
+from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Coulomb
 from tetra_drake.scenario.terrain import HeightField, Rough
+from tetra_drake.scenario.units import INCH
+
+RADIUS = 0.3  # m
+
+
+def result_of(scenario, structure, states) -> SimulationResult:
+    """That of a robot which is in these states at the times that count."""
+    return make_result(
+        scenario,
+        structure,
+        times=result_times(scenario.simulation),
+        states=states,
+        wall_time=1.0,
+        integrator=IntegratorWork("none", 1.0, 1, 1),
+        trajectory=None,
+    )
+
+
+def on_a_circle(scenario, structure, *, per_second, radius=RADIUS) -> np.ndarray:
+    """States of a robot that is carried along a circle and turns by so many rad in each second: to
+    the left, forward if the radius is positive."""
+    times = result_times(scenario.simulation)
+    states = np.tile(structure.initial_state, (len(times), 1))
+    angles = per_second * times
+    c, s = np.cos(angles), np.sin(angles)
+    for i, (x, y, _) in enumerate(structure.p_WB - structure.p_WB.mean(axis=0)):
+        pose = states[:, 7 * i : 7 * i + 7]
+        pose[:, 0], pose[:, 3] = np.cos(angles / 2), np.sin(angles / 2)
+        pose[:, 4] = c * x - s * y + radius * s
+        pose[:, 5] = s * x + c * y + radius * (1.0 - c)
+    return states
+
+
+@pytest.mark.parametrize("radius", [RADIUS, -RADIUS], ids=["forward", "backward"])
+def test_a_robot_on_a_circle_has_turned_by_its_angle(scenario, structure, radius):
+    states = on_a_circle(scenario, structure, per_second=0.5, radius=radius)
+    result = result_of(scenario, structure, states)
+    assert result.metrics.heading_change == pytest.approx(7.5)  # in 15 s: more than one turn
+    assert result.metrics.path_curvature == pytest.approx(1.0 / RADIUS, rel=1e-4)
+    assert result.metrics.path_radius == pytest.approx(RADIUS, rel=1e-4)
+    np.testing.assert_allclose(np.diff(result.path.times), 0.25)
+    assert result.path.times[[0, -1]].tolist() == [0.0, 15.0]
+    np.testing.assert_allclose(result.path.heading, 0.5 * result.path.times, atol=1e-12)
+    np.testing.assert_allclose(result.path.centre[:, 2], structure.p_WB[0, 2])
+
+
+def test_mirrored_states_negate_turning_and_bending(scenario, structure):
+    states = on_a_circle(scenario, structure, per_second=0.3)
+    poses = states[:, :35].reshape(-1, 5, 7)
+    poses = poses + np.random.default_rng(1).normal(scale=0.02, size=poses.shape)
+    mirrored = states.copy()
+    states[:, :35] = poses.reshape(-1, 35)
+    mirrored[:, :35] = (poses * [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]).reshape(-1, 35)
+    left, right = (result_of(scenario, structure, each).metrics for each in (states, mirrored))
+    assert left.heading_change > 4.0 and left.path_curvature > 3.0
+    assert right.heading_change == pytest.approx(-left.heading_change, rel=1e-12)
+    assert right.path_curvature == pytest.approx(-left.path_curvature, rel=1e-9)
+
+
+def test_the_path_is_written_and_summed_up(scenario, structure, tmp_path):
+    gait = seeded_gait(scenario)
+    result = result_of(scenario, structure, on_a_circle(scenario, structure, per_second=-0.5))
+    save_result(tmp_path / "result.json", scenario, gait, result)
+    content = json.loads((tmp_path / "result.json").read_text())
+    assert content["path_radius_in"] == pytest.approx(RADIUS / INCH, rel=1e-4)
+    assert content["metrics"]["heading_change"] == pytest.approx(-7.5)
+    columns = (result.path.times, *result.path.centre[:, :2].T, result.path.heading)
+    assert list(content["path"].values()) == [column.tolist() for column in columns]
+    assert list(content["path"]) == ["time_s", "x_m", "y_m", "heading_rad"]
+    lines = {line[2:17].strip(): line for line in summary(scenario, gait, result).splitlines()}
+    assert lines["heading change"].split()[2] == f"{-math.degrees(7.5):.2f}"
+    assert lines["path radius"].split()[2] == f"{RADIUS / INCH:.2f}"
+    assert "right" in lines["path radius"] and "left" not in lines["path radius"]
+
+    standing = result_of(scenario, structure, on_a_circle(scenario, structure, per_second=0.0))
+    save_result(tmp_path / "result.json", scenario, gait, standing)
+    assert json.loads((tmp_path / "result.json").read_text())["path_radius_in"] is None
+    assert "straight" in summary(scenario, gait, standing)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context, Diagram
 from tetra_drake.engines.recorder import Recorder, Sample, make_dataset
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
-from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.network import SteeringSignal
@@ -45,7 +45,8 @@ def simulate_drake(
     integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
     work = _Work(integrator)
     aimer = _StepAimer(diagram, simulator, settings, work)
-    times = sample_times(settings.duration, settings.sample_period)
+    samples = sample_times(settings.duration, settings.sample_period) if record else np.empty(0)
+    times = np.union1d(result_times(settings), samples)
     recorder = Recorder(structure, times)
 
     def after_step(context: Context) -> None:
@@ -53,18 +54,15 @@ def simulate_drake(
         velocities = state.Eval(context)[7 * len(structure.bodies) :]
         _check(settings, context.get_time(), velocities, work)
         aimer.aim(context, velocities)
-        if record:
-            recorder.after_step(context)
+        recorder.after_step(context)
         if viewer is not None and viewer.wants(context.get_time()):
             viewer.show(make_dataset(diagram, structure, [Sample.of(context)]))
 
     simulator.set_monitor(after_step)
     started = time.perf_counter()
-    states = []
     try:
         for instant in (0.0, settings.steady_from, settings.duration):
             simulator.AdvanceTo(instant)
-            states.append(state.Eval(simulator.get_context()))
     except SimulationFailure:
         raise
     except RuntimeError as error:
@@ -73,11 +71,14 @@ def simulate_drake(
         raise Diverged(time=now, reason=reason.splitlines()[0]) from error
     wall_time = time.perf_counter() - started
 
+    kept = recorder.samples
+    chosen = [kept[i] for i in np.searchsorted(times, samples)]
     steps, derivative_evaluations, jacobian_evaluations = work.total()
     return make_result(
         scenario,
         structure,
-        states=states,
+        times=times,
+        states=np.array([each.continuous[: 13 * len(structure.bodies)] for each in kept]),
         wall_time=wall_time,
         integrator=IntegratorWork(
             scheme=settings.scheme,
@@ -86,7 +87,7 @@ def simulate_drake(
             derivative_evaluations=derivative_evaluations,
             jacobian_evaluations=jacobian_evaluations,
         ),
-        trajectory=make_dataset(diagram, structure, recorder.samples) if record else None,
+        trajectory=make_dataset(diagram, structure, chosen) if record else None,
     )
 
 

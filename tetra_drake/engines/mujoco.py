@@ -29,7 +29,7 @@ import numpy as np
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
 from tetra_drake.physics.contact import Ground
-from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import ground_axes, ground_heights
@@ -108,9 +108,9 @@ def simulate_in_rollouts(
     if steps > simulation.max_evaluations:
         reason = f"{steps} steps exceed the budget of {simulation.max_evaluations}"
         return [StepBudgetExceeded(time=0.0, reason=reason) for _ in gaits]
-    times = sample_times(simulation.duration, simulation.sample_period)
-    ends = (0.0, simulation.steady_from, simulation.duration)
-    instants = np.array([*ends, *(times if record else ())])
+    samples = sample_times(simulation.duration, simulation.sample_period)
+    times = np.union1d(result_times(simulation), samples if record else ())
+    recorded = np.searchsorted(times, samples)
     robot = _Robot(scenario)
     work = IntegratorWork(scenario.mujoco.integrator, step, steps, steps)
     outcomes: list[SimulationResult | SimulationFailure] = []
@@ -119,7 +119,7 @@ def simulate_in_rollouts(
         starts = step * np.arange(steps)
         signals = [signals_at(scenario, gait, starts, steering=steering) for gait in group]
         started = time.perf_counter()
-        walks = robot.walk(signals, np.rint(instants / step).astype(int), threads=threads)
+        walks = robot.walk(signals, np.rint(times / step).astype(int), threads=threads)
         wall_time = (time.perf_counter() - started) * min(threads, len(group)) / len(group)
         for gait, walk in zip(group, walks, strict=True):
             if isinstance(walk, Diverged):
@@ -129,14 +129,15 @@ def simulate_in_rollouts(
             result = make_result(
                 scenario,
                 robot.structure,
-                states=robot.states(walk[:3]),
+                times=times,
+                states=robot.states(walk),
                 wall_time=wall_time,
                 integrator=work,
                 trajectory=None,
             )
             if record:
-                driving = signals_at(scenario, gait, times, steering=steering)
-                trajectory = robot.dataset(times, walk[3:], driving)
+                driving = signals_at(scenario, gait, samples, steering=steering)
+                trajectory = robot.dataset(samples, walk[recorded], driving)
                 result = dataclasses.replace(result, trajectory=trajectory)
             outcomes.append(result)
     return outcomes

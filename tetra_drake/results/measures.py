@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tetra_drake.results.path import CentrePath, follow
 from tetra_drake.robot.structure import BOTTOM_LEFT
 
 if TYPE_CHECKING:
@@ -29,6 +30,12 @@ def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
     """(time, tetrahedron): x of each tetrahedron's centre of mass less that of T1, in m."""
     x = trajectory.p_WN.sel(axis="x").mean("node")
     return x - x.isel(tetrahedron=0)
+
+
+def path_of_centre(trajectory: xarray.Dataset) -> CentrePath:
+    """The path of the robot's centre at all samples."""
+    poses = np.concatenate([trajectory.q_WB.values, trajectory.p_WB.values], axis=2)
+    return follow(trajectory.time.values, poses)
 
 
 def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -17,10 +17,12 @@ import numpy as np
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed
 from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
+from tetra_drake.results.path import PERIOD, CentrePath, follow
+from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.fields import tree_of
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.schema import Coulomb, Scenario, SimulationScenario
 from tetra_drake.scenario.terrain import Flat
 from tetra_drake.scenario.units import INCH
 
@@ -56,33 +58,62 @@ class SimulationResult:
     integrator: IntegratorWork
     engine: str
     """That of the scenario."""
+    path: CentrePath = field(repr=False, compare=False)
+    """Of the robot's centre from start to end, in steps of results.path.PERIOD."""
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
     """See results.trajectory.assemble_dataset; None unless asked for."""
+
+
+def result_times(simulation: SimulationScenario) -> np.ndarray:
+    """The times (s), ascending, at which make_result() needs the states of a simulation."""
+    return np.unique([*_ends(simulation), *_path_times(simulation)])
+
+
+def _ends(simulation: SimulationScenario) -> tuple[float, float, float]:
+    return 0.0, simulation.steady_from, simulation.duration
+
+
+def _path_times(simulation: SimulationScenario) -> np.ndarray:
+    return sample_times(simulation.duration, PERIOD)
 
 
 def make_result(
     scenario: Scenario,
     structure: Structure,
     *,
-    states: Iterable[np.ndarray],
+    times: np.ndarray,
+    states: np.ndarray,
     wall_time: float,
     integrator: IntegratorWork,
     trajectory: xarray.Dataset | None,
 ) -> SimulationResult:
     """The result of a simulation on the scenario's engine.
 
-    `states` are [q; v] of the bodies at t = 0, at the start of the steady stretch, and at the end;
-    `wall_time` in s.
+    `times` (k,) in s, ascending, are those of result_times(), and maybe more; `states` (k, 13 n)
+    are [q; v] of the bodies then; `wall_time` in s.
     """
-    start, steady, end = (node_positions(structure, state) for state in states)
-    metrics = compute_metrics(structure, start=start, steady=steady, end=end)
+    simulation, bodies = scenario.simulation, len(structure.bodies)
+    ends = np.searchsorted(times, _ends(simulation))
+    start, steady, end = (node_positions(structure, states[i]) for i in ends)
+    instants = _path_times(simulation)
+    poses = states[np.searchsorted(times, instants), : 7 * bodies].reshape(-1, bodies, 7)
+    path = follow(instants, poses)
+    metrics = compute_metrics(
+        structure,
+        start=start,
+        steady=steady,
+        end=end,
+        path=path,
+        steady_from=simulation.steady_from,
+    )
     return SimulationResult(
         metrics=metrics,
         fitness=compute_fitness(metrics, scenario.fitness),
-        duration=scenario.simulation.duration,
+        duration=simulation.duration,
         wall_time=wall_time,
         integrator=integrator,
-        engine=scenario.simulation.engine,
+        engine=simulation.engine,
+        path=path,
         trajectory=trajectory,
     )
 
@@ -95,12 +126,15 @@ def versions(engine: str = "") -> dict[str, str]:
 
 
 def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult) -> None:
-    """Writes result.json: metrics in SI, lengths in inches beside them, times in s."""
+    """Writes result.json: metrics in SI, lengths in inches beside them, times in s, and the path of
+    the centre as columns."""
+    way, radius = result.path, result.metrics.path_radius
     content = {
         "schema": SCHEMA,
         "scenario": scenario.name,
         "metrics": dataclasses.asdict(result.metrics),
         **result.metrics.in_inches(),
+        "path_radius_in": radius / INCH if math.isfinite(radius) else None,
         "fitness": result.fitness,
         "duration_s": result.duration,
         "wall_time_s": result.wall_time,
@@ -109,6 +143,12 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
         "integrator": dataclasses.asdict(result.integrator),
         "versions": versions(result.engine),
         "gait": gait.to_json(scenario),
+        "path": {
+            "time_s": way.times.tolist(),
+            "x_m": way.centre[:, 0].tolist(),
+            "y_m": way.centre[:, 1].tolist(),
+            "heading_rad": way.heading.tolist(),
+        },
     }
     write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
@@ -148,18 +188,22 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     """Metrics, lengths in inches, and what the simulation took, as lines for the terminal."""
     metrics, work = result.metrics, result.integrator
     after = f"from {scenario.simulation.steady_from:g} s on"
+    side = "left" if metrics.path_curvature > 0.0 else "right"
     rows = [
-        ("distance", metrics.distance, ""),
-        ("steady distance", metrics.steady_distance, after),
-        ("twist", metrics.twist, "x1 - x2 at the end: turned about the vertical"),
-        ("lateral drift", metrics.lateral_drift, ""),
+        ("distance", metrics.distance / INCH, "in", ""),
+        ("steady distance", metrics.steady_distance / INCH, "in", after),
+        ("twist", metrics.twist / INCH, "in", "x1 - x2 at the end: turned about the vertical"),
+        ("lateral drift", metrics.lateral_drift / INCH, "in", ""),
+        ("heading change", math.degrees(metrics.heading_change), "deg", "positive to the left"),
+        ("path radius", metrics.path_radius / INCH, "in", f"bends to the {side}, {after}"),
     ]
     lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
     if ground := ground_text(scenario):
         lines.append(f"  ground: {ground}")
-    for name, metres, note in rows:
-        line = f"  {name:<16}{fixed(metres / INCH):>8} in   {f'({note})' if note else ''}"
-        lines.append(line.rstrip())
+    for name, value, unit, note in rows:
+        number = f"{fixed(value):>8} {unit:<4} {f'({note})' if note else ''}".rstrip()
+        text = number if math.isfinite(value) else "  straight"
+        lines.append(f"  {name:<16}{text}")
     lines.append(f"  {'fitness':<16}{fixed(result.fitness):>8}")
     reference = scenario.reference
     if reference is not None:

@@ -75,7 +75,8 @@ def make_outcome(walk: Walk, course: Course) -> SimulationResult:
     return make_result(
         scenario,
         structure,
-        states=course.states[np.searchsorted(course.times, walk.ends)],
+        times=course.times,
+        states=course.states,
         wall_time=course.wall_time,
         integrator=IntegratorWork("ros2", scenario.compiled.tolerance, steps, evaluations),
         trajectory=trajectory,

@@ -39,6 +39,7 @@ from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.lanes import FieldArray, lane_table
 from tetra_drake.physics.oscillator import NEURON_COLUMNS, Network, make_neurons
 from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.results.result import result_times
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import starting_modes
@@ -67,10 +68,8 @@ class Walk:
     record: bool
     structure: Structure
     model: Model
-    ends: tuple[float, float, float]
-    """The times (s) that metrics compare."""
     times: np.ndarray
-    """The times (s) of the samples to keep, the ends among them."""
+    """The times (s) of the samples to keep, those of result_times() among them."""
     marks: np.ndarray
     """The times (s) at which steps end."""
     steering: SteeringSignal | None
@@ -97,8 +96,7 @@ class Walk:
             record,
             structure,
             make_model(scenario, structure),
-            ends,
-            times=np.unique([*ends, *times]),
+            times=np.union1d(result_times(simulation), times),
             marks=np.unique([*ends, *([start_up] if start_up <= simulation.duration else [])]),
             steering=steering,
             senses=make_senses(scenario, structure),

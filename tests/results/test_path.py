@@ -1,0 +1,76 @@
+"""The path of the centre: its curvature and the heading along it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tetra_drake.results.path import curvature, follow
+
+RADIUS = 0.2  # m
+TURN = 2.0 * math.pi
+
+
+def circle(angles, radius=RADIUS):
+    """Points somewhere in the plane, passed in the order of angles in rad."""
+    return np.column_stack([1.0 + radius * np.cos(angles), radius * np.sin(angles) - 3.0])
+
+
+@pytest.mark.parametrize("turns", [0.15, 0.5, 1.0, 1.5, 4.0])
+def test_a_circle_has_its_curvature_positive_to_the_left(turns):
+    angles = 0.7 + np.linspace(0.0, turns * TURN, 50)
+    assert curvature(circle(angles)) == pytest.approx(1.0 / RADIUS, rel=1e-3)
+    assert curvature(circle(-angles)) == pytest.approx(-1.0 / RADIUS, rel=1e-3)
+    # The same points the other way round.
+    assert curvature(circle(angles)[::-1]) == pytest.approx(-1.0 / RADIUS, rel=1e-3)
+
+
+def test_swaying_along_or_across_the_circle_changes_little():
+    angles, phase = np.linspace(0.0, 0.4 * TURN, 50), np.arange(50) * 2.1
+    along = circle(angles + 0.1 * np.sin(phase))  # goes back at times
+    assert (np.diff(angles + 0.1 * np.sin(phase)) < 0.0).any()
+    assert curvature(along) == pytest.approx(1.0 / RADIUS, rel=1e-3)
+    across = circle(angles, RADIUS + 0.005 * np.sin(phase))
+    assert curvature(across) == pytest.approx(1.0 / RADIUS, rel=0.05)
+
+
+@pytest.mark.parametrize("direction", [0.0, 1.0, 0.5 * math.pi])
+def test_a_line_has_no_curvature_however_it_is_passed(direction):
+    way = np.arange(50.0) * 5e-3
+    for along in (way, -way, way + 0.03 * np.sin(way * 1e3), 0.1 * np.sin(way * 1e3), way[:2]):
+        points = np.outer(along, [math.cos(direction), math.sin(direction)])
+        assert curvature(points + 2.0) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_robot_that_stands_has_no_curvature():
+    assert curvature(np.full((50, 2), 0.1)) == 0.0
+    assert curvature(np.array([[0.3, 0.2]])) == 0.0
+    for size in (1e-12, 1e-9, 1e-7, 1e-5, 5e-5):
+        jitter = np.random.default_rng(0).normal(scale=size, size=(50, 2))
+        assert abs(curvature(jitter + 0.2)) < 0.01
+    assert abs(curvature(circle(np.linspace(0.0, 3 * TURN, 50), 1e-3))) < 0.01  # sways in circles
+
+
+def poses(headings, pitch=0.3, bodies=3):
+    """(k, bodies, 7): bodies a third of a metre apart along the heading, pitched differently."""
+    about_z = np.outer(headings, np.ones(bodies)) / 2.0
+    about_y = np.outer(np.ones(len(headings)), np.linspace(-pitch, pitch, bodies)) / 2.0
+    found = np.zeros((len(headings), bodies, 7))
+    found[..., 0] = np.cos(about_z) * np.cos(about_y)  # turned about z after pitching about y
+    found[..., 1] = -np.sin(about_z) * np.sin(about_y)
+    found[..., 2] = np.cos(about_z) * np.sin(about_y)
+    found[..., 3] = np.sin(about_z) * np.cos(about_y)
+    found[..., 4] = np.cos(headings)[:, None] * np.arange(bodies) / 3.0
+    found[..., 5] = np.sin(headings)[:, None] * np.arange(bodies) / 3.0
+    found[..., 6] = [0.0, 0.0, 0.3]
+    return found
+
+
+@pytest.mark.parametrize("turns", [1.7, -1.7])
+def test_the_heading_counts_whole_turns_and_the_centre_is_the_mean_of_the_origins(turns):
+    headings = np.linspace(0.4, 0.4 + turns * TURN, 30)
+    path = follow(np.arange(30.0), poses(headings))
+    np.testing.assert_allclose(path.heading, headings, atol=1e-12)
+    expected = [np.cos(headings) / 3.0, np.sin(headings) / 3.0, 0.1 + 0.0 * headings]
+    np.testing.assert_allclose(path.centre, np.transpose(expected), atol=1e-12)
+    np.testing.assert_array_equal(path.times, np.arange(30.0))
