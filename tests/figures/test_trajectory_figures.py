@@ -9,7 +9,13 @@ from matplotlib.colors import to_hex
 from matplotlib.text import Text
 
 from tetra_drake.figures.forces import ground_forces, signals_and_tensions
-from tetra_drake.figures.motion import before_and_after, one_step, relative_distances, time_lapse
+from tetra_drake.figures.motion import (
+    before_and_after,
+    one_step,
+    path_of_the_centre,
+    relative_distances,
+    time_lapse,
+)
 from tetra_drake.figures.style import OKABE_ITO, common_style, save_figure
 from tetra_drake.results.measures import last_step, lifted
 from tetra_drake.robot.ground import ground_heights, make_ground
@@ -19,7 +25,10 @@ from tetra_drake.scenario.schema import Coulomb, ReferenceScenario
 from tetra_drake.scenario.terrain import Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
-FIGURES = (relative_distances, time_lapse, one_step, signals_and_tensions, ground_forces)
+FIGURES = (
+    *(relative_distances, time_lapse, path_of_the_centre, one_step),
+    *(signals_and_tensions, ground_forces),
+)
 ON_GROUND = (one_step, ground_forces)
 
 
@@ -120,6 +129,34 @@ def test_the_time_lapse_shows_instants_from_start_to_end(walk):
     assert len({line.get_color() for line in lines[0]}) == 5
     numbers = [label.get_text().replace("in", "").split() for label in panel.get_yticklabels()]
     assert [float(way) for _, _, way in numbers] == [0.0, 1.18, 2.36, 3.54]
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.05])
+def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk, radius):
+    # Bodies on the way of T1, which goes on at SPEED, or along a circle as it turns.
+    angle = SPEED * walk.time.values / radius if radius else 0.0 * walk.time.values
+    q_WB, p_WB = np.zeros(walk.q_WB.shape), np.zeros(walk.p_WB.shape)
+    q_WB[..., 0], q_WB[..., 3] = np.cos(angle / 2)[:, None], np.sin(angle / 2)[:, None]
+    x, y = SPEED * walk.time.values, 0.0 * angle
+    if radius:
+        x, y = radius * np.sin(angle), radius * (1.0 - np.cos(angle))
+    p_WB[..., 0], p_WB[..., 1] = x[:, None], y[:, None]
+    turned = walk.assign(q_WB=(walk.q_WB.dims, q_WB), p_WB=(walk.p_WB.dims, p_WB))
+    figure = path_of_the_centre(turned, instants=4)
+    [panel] = figure.axes
+    assert panel.get_aspect() == 1.0
+    path, start, end = panel.lines
+    np.testing.assert_allclose(path.get_xydata() * INCH, np.column_stack([x, y]), atol=1e-12)
+    assert start.get_xydata().tolist() == path.get_xydata()[:1].tolist()
+    assert end.get_xydata().tolist() == path.get_xydata()[-1:].tolist()
+    [arrows] = panel.collections
+    headings = np.arctan2(arrows.V, arrows.U)
+    np.testing.assert_allclose(headings, angle[[0, 300, 600, 900]], atol=1e-9)
+    np.testing.assert_allclose(arrows.XY, path.get_xydata()[[0, 300, 600, 900]])
+    apart = [np.diff(axis.get_majorticklocs()) for axis in (panel.xaxis, panel.yaxis)]
+    assert np.ptp(np.concatenate(apart)) < 1e-9
+    for shown, drawn in ((panel.get_xlim(), x / INCH), (panel.get_ylim(), y / INCH)):
+        assert shown[0] < drawn.min() <= drawn.max() < shown[1]
 
 
 def test_distances_before_and_after_have_one_scale(walk):

@@ -5,7 +5,9 @@ from helpers.synthetic_run import write_run
 
 from tetra_drake.report.run_page import write_figures
 
-ONE_GAIT = "time_lapse relative_distances one_step signals_and_tensions ground_forces"
+ONE_GAIT = (
+    "time_lapse path_of_the_centre relative_distances one_step signals_and_tensions ground_forces"
+)
 OF_ONE_GAIT = set(ONE_GAIT.split())
 OF_A_RUN = OF_ONE_GAIT | {"fitness_of_trials", "initial_distances", "initial_fitness"}
 OF_A_RUN |= {"before_and_after"}

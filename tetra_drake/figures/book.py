@@ -31,6 +31,7 @@ def draw_trajectory(trajectory: xarray.Dataset, scenario: Scenario, folder: Path
     return _save(
         folder,
         (motion.time_lapse, trajectory),
+        (motion.path_of_the_centre, trajectory),
         (motion.relative_distances, trajectory),
         (motion.one_step, trajectory, ground),
         (forces.signals_and_tensions, trajectory),

@@ -12,6 +12,7 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from tetra_drake.figures.style import (
     OKABE_ITO,
@@ -50,10 +51,19 @@ _PATHS = 12
 _PROFILE_IN = 0.05
 """Distance between points of the ground's profile, in inches."""
 
+_ARROW = 0.08
+"""Length of an arrow over that of the path."""
+
+_PATH_ON_PAPER = 6.0, 5.0
+"""Width and height of the path of the centre on paper, in inches, at most."""
+
 _ON_GROUND: Any = {"color": "0.25", "linewidth": 0.8, "linestyle": "-"}
 _LIFTED: Any = {"color": OKABE_ITO["vermillion"], "linewidth": 1.6, "linestyle": "-"}
 _PATH: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.1, "linestyle": "-"}
 _GROUND: Any = {"color": "0.6", "linewidth": 0.7, "linestyle": "-"}
+_START: Any = {"color": "black", "marker": "o", "linestyle": "", "markerfacecolor": "white"}
+_END: Any = {"color": "black", "marker": "s", "linestyle": ""}
+_HEADING: Any = {"color": OKABE_ITO["vermillion"], "zorder": 2.5, "units": "inches", "width": 0.02}
 _FOOTPRINTS: Any = {"color": "0.45", "marker": "o", "linestyle": "", "markersize": 2.5}
 
 
@@ -119,6 +129,39 @@ def time_lapse(trajectory: xarray.Dataset, *, instants: int = 6) -> Figure:
     panel.axvline(inches[0, 0, BOTTOM_LEFT, X], color="0.45", linewidth=0.8)
     panel.set_ylabel("time, and distance $x_1$ walked by T1")
     figure.suptitle("Time lapse from above\ndots: T1's bottom nodes at each full second")
+    return figure
+
+
+@common_style()
+def path_of_the_centre(trajectory: xarray.Dataset, *, instants: int = 9) -> Figure:
+    """The path of the robot's centre from above, to scale.
+
+    Arrows: where the robot heads, at evenly spaced instants."""
+    path = measures.path_of_centre(trajectory)
+    points = path.centre[:, :2] / INCH
+    span = max(*np.ptp(points, axis=0), _MARGIN_IN)
+    samples = _nearest(trajectory, np.linspace(path.times[0], path.times[-1], instants))
+    heading = path.heading[samples]
+    arrows = _ARROW * span * np.column_stack([np.cos(heading), np.sin(heading)])
+    drawn = np.concatenate([points, points[samples] + arrows])
+    size = np.ptp(drawn, axis=0) + 2.0 * _ARROW * span
+    middle = (drawn.min(axis=0) + drawn.max(axis=0)) / 2.0
+    width, height = size * min(_PATH_ON_PAPER / size)
+    figure, [[panel]] = make_figure(width_in=max(width, 3.0) + 0.8, height_in=height + 1.5)
+    panel.plot(*points.T, **_PATH)
+    scale: Any = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
+    panel.quiver(*points[samples].T, *arrows.T, **scale, **_HEADING)
+    panel.plot(*points[0], **_START)
+    panel.plot(*points[-1], **_END)
+    (left, right), (low, high) = np.column_stack([middle - size / 2.0, middle + size / 2.0])
+    every = np.diff(MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, max(size)))[0]
+    panel.set(xlim=(left, right), ylim=(low, high), aspect="equal")
+    panel.set(xlabel=f"x (in), a tick every {every:.4g} in", ylabel="y (in)")
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(MultipleLocator(every))
+    end = f"end, after {path.times[-1]:.4g} s"
+    legend_below(figure, {"start": _START, end: _END})
+    figure.suptitle("Path of the centre from above\narrows: heading")
     return figure
 
 
