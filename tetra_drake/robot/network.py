@@ -12,6 +12,7 @@ from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.oscillator import Network
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import Gait, check_gait
+from tetra_drake.robot.settling import settled_lengths
 from tetra_drake.robot.structure import NODES, Structure
 from tetra_drake.scenario.schema import CpgScenario, Scenario
 
@@ -78,8 +79,6 @@ def make_senses(scenario: Scenario, structure: Structure) -> Senses:
     """What the oscillators can sense. Raises InputError if the robot finds no rest."""
     drivers, pathways = structure.actuation.drivers, scenario.cpg.feedback
     sizes = np.bincount(drivers[drivers != PASSIVE])[drivers]  # cables of each cable's group
-    if "length" in pathways:
-        from tetra_drake.robot.settling import settled_lengths
     settled = settled_lengths(scenario) if "length" in pathways else np.ones(len(drivers))
     weight = len(structure.bodies) * tetrahedron_inertia(structure).get_mass()
     weight *= scenario.robot.gravity
