@@ -3,6 +3,7 @@
 import shutil
 import sys
 
+import entrainment
 import pytest
 import robot
 import settling_node
@@ -21,6 +22,7 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
     ("script", "files"),
     [
         (single_oscillator, 3),
+        (entrainment, 2),
         (settling_node, 2),
         (sliding_tetrahedron, 2),
         (tetrahedron_on_incline, 2),

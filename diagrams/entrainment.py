@@ -1,0 +1,183 @@
+"""A Matsuoka oscillator that drives a mass on a spring and feels it: which of them sets the pace?
+
+    python diagrams/entrainment.py [--out DIR]
+
+The oscillator pushes the mass with its signal; the mass's displacement x excites the extensor by
+g x and the flexor by -g x. Theory is harmonic balance (K. Matsuoka, Analysis of a neural
+oscillator, Biological Cybernetics 104, 2011): the positive part of a neuron's state passes its
+swing with a factor 0 < K < 1. For the differences d and e of the two u and of the two v, with
+inhibition w between the neurons and h = 2 g gain / stiffness, a swing exp(i omega t) needs
+
+    (1 + i omega tau_A) d = w K d - beta e + h P K d,    (1 + i omega tau_B) e = K d,
+
+where P = 1 / (1 - r^2 + 2 i zeta r), r = omega / omega_0, is how the mass follows a force. So 1 / K
+is
+
+    R(omega) = (w - beta / (1 + i omega tau_B) + h P) / (1 + i omega tau_A),
+
+which must be real and greater than 1. Without feedback this gives the oscillator's own frequency,
+omega = sqrt(((tau_A + tau_B) beta - tau_A w) / (tau_A w)) / tau_B. With feedback there can be
+several solutions, and the start decides. Near resonance P lags by 90 degrees, and so does h P for
+g > 0, which slows the oscillator down: it can follow a mass slower than itself. For g < 0, h P
+leads, and it can follow a faster one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import LinearSystem, LogVectorOutput, MatrixGain
+
+from tetra_drake.figures.block_diagram import save_block_diagram
+from tetra_drake.figures.style import common_style, make_figure, save_figure
+from tetra_drake.physics.oscillator import Network
+from tetra_drake.results.measures import dominant_frequency
+from tetra_drake.systems import MatsuokaCpg
+
+TAU_A, TAU_B = 0.3, 0.6  # s
+WEIGHT, BETA, TONIC = 2.0, 2.5, 0.5
+GAIN, STIFFNESS, DAMPING_RATIO = 10.0, 1000.0, 0.07  # N, N/m
+FEEDBACK = 10.0  # 1/m, of either sign
+RATIOS = np.geomspace(0.4, 2.5, 14)  # of the mass's resonance to the oscillator's own frequency
+DURATION, TRANSIENT = 80.0, 50.0  # s
+STARTS = {"at rest": 0.0, "20 mm off": 0.02}  # of the mass, m
+
+
+def make_diagram(*, resonance: float, feedback: float) -> Diagram:
+    """The oscillator, a mass that resonates at a frequency in Hz, and feedback in 1/m."""
+    network = Network.of(
+        [[0.0, WEIGHT], [WEIGHT, 0.0]], tau_a=TAU_A, tau_b=TAU_B, self_inhibition_weight=BETA
+    )
+    neurons = MatsuokaCpg(network, tonic=TONIC, initial_state=[0.3, 0.3, 0.1, 0.5], gain=GAIN)
+    omega = 2.0 * math.pi * resonance
+    motion = np.array([[0.0, 1.0], [-(omega**2), -2.0 * DAMPING_RATIO * omega]])
+    force = np.array([[0.0], [omega**2 / STIFFNESS]])
+    spring = LinearSystem(A=motion, B=force, C=np.array([[1.0, 0.0]]), D=np.zeros((1, 1)))
+
+    builder = DiagramBuilder()
+    oscillator = builder.AddNamedSystem("oscillator", neurons)
+    mass = builder.AddNamedSystem("mass on a spring", spring)
+    sense = builder.AddNamedSystem("feedback", MatrixGain(feedback * np.array([[1.0], [-1.0]])))
+    builder.Connect(oscillator.GetOutputPort("signals"), mass.get_input_port())
+    builder.Connect(mass.get_output_port(), sense.get_input_port())
+    builder.Connect(sense.get_output_port(), oscillator.GetInputPort("feedback"))
+    LogVectorOutput(oscillator.GetOutputPort("signals"), builder).set_name("log")
+    diagram = builder.Build()
+    diagram.set_name("entrainment")
+    return diagram
+
+
+def simulated_frequency(*, resonance: float, feedback: float, start: float = 0.0) -> float:
+    """Frequency of the oscillator in Hz, long after a start of the mass at some x (m)."""
+    diagram = make_diagram(resonance=resonance, feedback=feedback)
+    simulator = Simulator(diagram)
+    context = simulator.get_context()
+    mass = diagram.GetSubsystemByName("mass on a spring")
+    mass.GetMyMutableContextFromRoot(context).SetContinuousState([start, 0.0])
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.05).set_target_accuracy(1e-3)
+    simulator.AdvanceTo(DURATION)
+    log = diagram.GetSubsystemByName("log").FindLog(context)
+    late = log.sample_times() > TRANSIENT
+    return dominant_frequency(log.sample_times()[late], log.data()[0, late])
+
+
+def own_frequency() -> float:
+    """That of the oscillator alone in Hz, by harmonic balance."""
+    square = ((TAU_A + TAU_B) * BETA - TAU_A * WEIGHT) / (TAU_A * WEIGHT)
+    return math.sqrt(square) / (2.0 * math.pi * TAU_B)
+
+
+def balanced_frequencies(*, resonance: float, feedback: float) -> np.ndarray:
+    """All frequencies in Hz at which the loop can oscillate by harmonic balance, ascending."""
+    frequency = np.linspace(0.1, 4.0, 50_001) * own_frequency()
+    s, r = 2j * math.pi * frequency, frequency / resonance
+    follows = 1.0 / (1.0 - r**2 + 2j * DAMPING_RATIO * r)
+    h = 2.0 * feedback * GAIN / STIFFNESS
+    per_k = (WEIGHT - BETA / (1.0 + s * TAU_B) + h * follows) / (1.0 + s * TAU_A)
+    balanced = (np.diff(np.sign(per_k.imag)) != 0) & (per_k.real[:-1] > 1.0)
+    return np.asarray(frequency[:-1][balanced])
+
+
+Points = tuple[np.ndarray, np.ndarray]
+"""Resonance and frequency of the loop, (points,) each, over the oscillator's own frequency."""
+
+
+def simulate_all(feedback: float, start: float) -> Points:
+    """What simulations give for RATIOS of resonance to own frequency."""
+    own = own_frequency()
+    frequencies = [
+        simulated_frequency(resonance=ratio * own, feedback=feedback, start=start) / own
+        for ratio in RATIOS
+    ]
+    return RATIOS, np.array(frequencies)
+
+
+def balance_all(feedback: float) -> Points:
+    """What harmonic balance gives, for ratios that lie closer."""
+    own, points = own_frequency(), []
+    for ratio in np.geomspace(RATIOS[0], RATIOS[-1], 200):
+        found = balanced_frequencies(resonance=ratio * own, feedback=feedback) / own
+        points += [(ratio, frequency) for frequency in found]
+    ratios, frequencies = np.array(points).T
+    return ratios, frequencies
+
+
+def followed(points: Points) -> str:
+    """At which ratios the loop oscillates nearer the mass's resonance than the own frequency."""
+    ratios, frequencies = points
+    follows = ratios[np.abs(frequencies - ratios) < np.abs(frequencies - 1.0)]
+    return f"{follows.min():.2f} to {follows.max():.2f}"
+
+
+@common_style()
+def draw(theory: dict[float, Points], simulated: dict[tuple[float, str], Points]) -> Figure:
+    """A panel for each feedback: frequency of the loop over the mass's resonance."""
+    figure, axes = make_figure(width_in=7, height_in=3.6, columns=len(theory), sharey=True)
+    for panel, (feedback, points) in zip(axes[0], theory.items(), strict=True):
+        panel.plot(RATIOS, RATIOS, color="0.6", linewidth=0.8, label="resonance")
+        panel.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--", label="oscillator alone")
+        panel.plot(*points, ".", color="0.2", markersize=1.5, label="harmonic balance")
+        for label, marker in zip(STARTS, "ox", strict=True):
+            ends = simulated[feedback, label]
+            panel.plot(*ends, marker, markersize=5, fillstyle="none", label=f"mass {label}")
+        panel.set_title(f"feedback {feedback:+g}/m")
+        panel.set_xlabel("resonance of the mass / own frequency")
+    axes[0, 0].set_ylabel("frequency of the loop / own frequency")
+    axes[0, 0].legend(fontsize="small")
+    return figure
+
+
+def main() -> None:
+    """Simulates the loops and writes the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(__file__).parent)
+    out = parser.parse_args().out
+
+    own = own_frequency()
+    save_block_diagram(make_diagram(resonance=own, feedback=FEEDBACK), out / "entrainment.svg")
+    alone = simulated_frequency(resonance=own, feedback=0.0)
+    print(f"Without feedback: {alone:.3f} Hz (harmonic balance {own:.3f} Hz)")
+
+    feedbacks = FEEDBACK, -FEEDBACK
+    theory = {feedback: balance_all(feedback) for feedback in feedbacks}
+    simulated = {
+        (feedback, label): simulate_all(feedback, start)
+        for feedback in feedbacks
+        for label, start in STARTS.items()
+    }
+    save_figure(draw(theory, simulated), out, "entrainment_frequencies", kinds=["svg"])
+    for feedback in feedbacks:
+        print(f"Feedback {feedback:+g}/m: follows a mass that resonates at the own frequency times")
+        for label in STARTS:
+            print(f"  {followed(simulated[feedback, label])}, the mass {label} at first")
+        print(f"  {followed(theory[feedback])} by harmonic balance")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""An oscillator that feels the mass it drives, against harmonic balance."""
+
+import pytest
+from entrainment import FEEDBACK, balanced_frequencies, own_frequency, simulated_frequency
+
+OWN = own_frequency()
+OFF = 0.02  # m, where the mass starts to find a rhythm that it does not find from rest
+
+
+def simulate(ratio: float, feedback: float, start: float = 0.0) -> float:
+    """Frequency of the loop for a resonance, both over the oscillator's own frequency."""
+    resonance = ratio * OWN
+    return simulated_frequency(resonance=resonance, feedback=feedback, start=start) / OWN
+
+
+def balance(ratio: float, feedback: float) -> list[float]:
+    """The same by harmonic balance: all frequencies."""
+    return [f / OWN for f in balanced_frequencies(resonance=ratio * OWN, feedback=feedback)]
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
+def test_without_feedback_the_oscillator_keeps_its_own_frequency(ratio):
+    assert balance(ratio, 0.0) == pytest.approx([1.0], rel=1e-4)
+    assert simulate(ratio, 0.0) == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "feedback", "near"),
+    [
+        (0.5, FEEDBACK, 0.1),
+        (0.65, FEEDBACK, 0.1),
+        (1.3, -FEEDBACK, 0.05),
+        (1.6, -FEEDBACK, 0.02),
+        (1.9, -FEEDBACK, 0.03),
+    ],
+)
+def test_it_follows_a_slower_mass_by_positive_and_a_faster_one_by_negative_feedback(
+    ratio, feedback, near
+):
+    locked = min(balance(ratio, feedback), key=lambda f: abs(f - ratio))
+    assert locked == pytest.approx(ratio, rel=near)
+    assert simulate(ratio, feedback, OFF) == pytest.approx(locked, rel=0.02)
+    alone = min(balance(ratio, -feedback), key=lambda f: abs(f - 1.0))
+    assert simulate(ratio, -feedback, OFF) == pytest.approx(alone, rel=0.02)
+
+
+@pytest.mark.parametrize(("ratio", "feedback"), [(0.5, FEEDBACK), (1.9, -FEEDBACK)])
+def test_at_the_end_of_the_range_the_start_decides(ratio, feedback):
+    own, locked = sorted(balance(ratio, feedback), key=lambda f: abs(f - 1.0))
+    assert simulate(ratio, feedback) == pytest.approx(own, rel=0.02)
+    assert simulate(ratio, feedback, OFF) == pytest.approx(locked, rel=0.02)
+
+
+@pytest.mark.parametrize(("ratio", "feedback"), [(0.35, FEEDBACK), (2.2, -FEEDBACK)])
+def test_a_mass_too_far_off_is_not_followed(ratio, feedback):
+    (only,) = balance(ratio, feedback)
+    assert abs(only - 1.0) < 0.15
+    assert simulate(ratio, feedback, OFF) == pytest.approx(only, rel=0.02)
