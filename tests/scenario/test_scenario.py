@@ -1,5 +1,6 @@
 """Scenario files: the thesis's numbers, files based on files, dumping, and bad files."""
 
+import itertools
 from dataclasses import replace
 from operator import attrgetter
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario, shipped_scenarios
-from tetra_drake.scenario.schema import Coulomb
+from tetra_drake.scenario.schema import CABLES, PATHWAYS, Coulomb
 from tetra_drake.scenario.terrain import Flat, Incline, Rough, Steps
 
 # Exact by definition.
@@ -76,7 +77,72 @@ def test_shipped_grounds_are_the_thesis_on_other_ground(name, scenario):
     assert loaded.reference is None
 
 
-@pytest.mark.parametrize("name", sorted({*shipped_scenarios()} - {*GROUNDS}))
+LEFT, RIGHT = ["outer bottom_left"], ["outer bottom_right"]
+UNDULATION = {
+    "robot.actuation": [LEFT, RIGHT],
+    "cpg.reach": 1,
+    "gait_bounds.weight_min": 0.0,
+    "gait_bounds.weight_max": 1.0,
+    "evolution.independent_tau_b": True,
+}
+NETWORKS = {
+    "undulation": ("thesis", UNDULATION),
+    "turning": (
+        "undulation",
+        {
+            "cpg.signals": "live",
+            "gait_bounds.mirrored": True,
+            "gait_bounds.turn": 1.0,
+            "simulation.duration": 30.0,
+        },
+    ),
+    "all-cables": (
+        "thesis",
+        {
+            "robot.actuation": [[cable] for cable in CABLES],
+            "cpg.reach": 1,
+            "gait_bounds.weight_min": 0.0,
+            "gait_bounds.weight_max": 0.7,
+            "gait_bounds.mirrored": True,
+        },
+    ),
+    "feedback": ("rough", {"cpg.signals": "live", "cpg.feedback": [*PATHWAYS]}),
+}
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_shipped_networks_differ_from_their_bases_in_the_network_only(name):
+    base, changes = NETWORKS[name]
+    assert load_scenario(name) == load_scenario(base).with_changes({"name": name} | changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "found"),
+    [
+        ({"robot.actuation": []}, "robot.actuation", "[]"),
+        ({"robot.actuation": [LEFT, []]}, "robot.actuation", "[]"),
+        ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
+        ({"robot.actuation": [["outer left"]]}, "robot.actuation[0][0]", "'outer left'"),
+        ({"robot.actuation": [LEFT], "gait_bounds.mirrored": True}, "gait_bounds.mirrored", "true"),
+        ({"cpg.reach": -1}, "cpg.reach", "-1"),
+        ({"cpg.feedback": ["sight"]}, "cpg.feedback[0]", "'sight'"),
+        ({"cpg.feedback": ["load"]}, "cpg.signals", "'listing'"),
+        (
+            {"cpg.feedback": ["load"], "cpg.signals": "live", "robot.gravity": 0.0},
+            *("robot.gravity", "0 m/s^2"),
+        ),
+        ({"gait_bounds.turn": 1.5}, "gait_bounds.turn", "1.5"),
+        ({"gait_bounds.gain_min": 2.0}, "gait_bounds.gain_min", "2"),
+        ({"gait_bounds.time_scale_min": 1.5}, "gait_bounds.time_scale_min", "1.5"),
+    ],
+    ids=itertools.count(),
+)
+def test_a_network_that_cannot_be_is_refused(scenario, refused, changes, key, found):
+    with refused("scenario thesis", key, found):
+        scenario.with_changes(changes)
+
+
+@pytest.mark.parametrize("name", sorted({*shipped_scenarios()} - {*GROUNDS, *NETWORKS}))
 def test_shipped_scenarios_load_and_keep_the_thesis_reference(name, scenario):
     loaded = load_scenario(name)
     assert (loaded.name, loaded.reference) == (name, scenario.reference)

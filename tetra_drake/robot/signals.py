@@ -38,16 +38,18 @@ def raw_output(
 
     `listing`: forward Euler as in listing B, which stamps the state after i + 1 steps with the
     time of i steps; the last sample is one step before the end. `recorded` and `live`: the
-    classical Runge-Kutta method of order 4, whose error is 1e-5, to the end or beyond. A steering
-    signal is constant within a step. Raises InputError for a gait that does not fit, or one with
-    feedback, whose signals depend on the robot.
+    classical Runge-Kutta method of order 4, whose error is 1e-5, to the end or beyond. Within a
+    step the turn is that of its middle. Raises InputError for a gait that does not fit, or one
+    with feedback, whose signals depend on the robot.
     """
     cpg, structure = scenario.cpg, MakeStructure(scenario)
     if any(dataclasses.asdict(gait.gains).values()):
         problem = "has feedback; its signals exist only while the robot is simulated"
         raise InputError(f"gait {gait.name}", "gains", problem)
     network = make_network(scenario, structure, gait)
-    inputs = tonic_input(scenario, structure, sample_turns(scenario, structure, gait, steering))
+    turns = sample_turns(scenario, structure, gait, steering)
+    midway = 0.5 * (turns[:-1] + turns[1:]) if turns.size > 1 else turns
+    inputs = tonic_input(scenario, structure, midway)
     neurons = make_neurons(initial_neurons(cpg, structure.signals))
     output, listing = (
         np.empty((sample_count(scenario), structure.signals)),

@@ -125,7 +125,8 @@ class Log(NamedTuple):
     recent: Table
     """(W, RECENT, n): the latest samples of all signals; see row_of."""
     turns: Table
-    """(W, turns): at 0, one `period` ...; the last one lasts. One alone is in `tonic` already."""
+    """(W, turns): at 0, one `period` ..., linear between them; the last one lasts. One alone is in
+    `tonic` already."""
 
 
 @functools.partial(compiled, nogil=True)
@@ -235,7 +236,7 @@ def produce_signals(w: Walks, log: Log, listing: bool, until: Real) -> None:
     while any_lane(grows & (clock[SAMPLES] < w.samples[0]) & (clock[SAMPLES] <= needed)):
         goes = grows & (clock[SAMPLES] < w.samples[0]) & (clock[SAMPLES] < room)
         step = select(goes, period, 0.0)
-        steer(w, log, clock[SAMPLES])
+        steer(w, log, clock[SAMPLES] + 0.5)
         next_output(w.network, w.tonic, step, listing, w.neurons, w.output)
         clock[FLAG] = select(goes, 1.0, 0.0)
         for lane in range(log.kept.size):
@@ -262,16 +263,18 @@ def feel(w: Walks, log: Log, time: Real, state: Table) -> None:
 
 @compiled
 def steer(w: Walks, log: Log, sample: Real) -> None:
-    """Writes the tonic input at a sample of the turns where they change."""
+    """Writes the tonic input where the turns change; `sample` is a place between two of them."""
     turns, floats = log.turns.shape[1], by_lane(w.clock)
     if turns == 1:
         return
     w.clock[FLAG] = sample
     for lane in range(log.kept.size):
-        turn = log.turns[lane, min(int(floats[FLAG, lane]), turns - 1)]
-        for i in range(w.tonic.size):
-            side = by_lane(w.sides)[i, lane]
-            by_lane(w.tonic)[i, lane] = by_lane(w.external_input)[0, lane] * (1.0 + turn * side)
+        i = min(int(floats[FLAG, lane]), turns - 2)
+        before, after = log.turns[lane, i], log.turns[lane, i + 1]
+        turn = before + (min(floats[FLAG, lane], turns - 1.0) - i) * (after - before)
+        for k in range(w.tonic.size):
+            side = by_lane(w.sides)[k, lane]
+            by_lane(w.tonic)[k, lane] = by_lane(w.external_input)[0, lane] * (1.0 + turn * side)
 
 
 @compiled

@@ -1,0 +1,191 @@
+"""Networks of any grouping, steering and feedback: symmetries and agreement of the engines."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import xarray
+from helpers.converged import FINE
+
+from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.robot.actuation import Actuation
+from tetra_drake.robot.gait import Gains, Gait, seeded_gait
+from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import PATHWAYS, Scenario
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+BOTH = pytest.mark.parametrize("engine", ["drake", "compiled"])
+SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
+LIVE = {"cpg.signals": "live", "cpg.start_up": 0.0}
+WITNESSED = {
+    "simulation.scheme": "runge_kutta3",
+    "simulation.accuracy": 1e-3,
+    "simulation.max_step": "2 ms",
+    "simulation.mode_changes": "witness",
+}
+"""Settings of the diagram within 0.03 in of converged distances."""
+
+
+def shortly(scenario: Scenario, duration: float, **changes: object) -> Scenario:
+    times = {"simulation.duration": duration, "simulation.steady_from": 0.5 * duration}
+    given = {key.replace("__", "."): value for key, value in changes.items()}
+    return scenario.with_changes({**times, "cpg.start_up": 0.0, **given})
+
+
+def walk(
+    scenario: Scenario, gait: Gait, engine: str, steering: SteeringSignal | None = None
+) -> xarray.Dataset:
+    on_engine = scenario.with_changes({"simulation.engine": engine})
+    result = simulate(scenario=on_engine, gait=gait, record=True, steering=steering)
+    assert result.trajectory is not None
+    return result.trajectory
+
+
+def mirrored(trajectory: xarray.Dataset) -> np.ndarray:
+    """p_WN of the walk's image in the plane y = 0: left nodes are right ones."""
+    p_WN = trajectory.p_WN.values[:, :, [1, 0, 2, 3]].copy()
+    p_WN[..., 1] *= -1.0
+    return p_WN
+
+
+def image(gait: Gait, scenario: Scenario) -> Gait:
+    """The gait whose oscillators have changed sides."""
+    images = Actuation.of(scenario).images
+    weights = tuple(np.array(gait.weights)[images].tolist())
+    return dataclasses.replace(gait, weights=weights, turn=-gait.turn)
+
+
+@BOTH
+def test_two_alike_oscillators_per_junction_walk_as_the_thesis_s_one(scenario, engine):
+    # Each of the pair is inhibited by both of another junction, so each by half of the weight,
+    # and not by the other of its own: then both sum to what the thesis's oscillator gets.
+    thesis = shortly(scenario, 2.0, cpg__signals="recorded")
+    pairs = thesis.with_changes(SIDES)
+    gait, sides = seeded_gait(thesis), Actuation.of(pairs)
+    weight = dict(zip(map(tuple, Actuation.of(thesis).couplings), gait.weights, strict=True))
+    neurons = 2 * (sides.couplings // 4) + sides.couplings % 2  # of the thesis's network
+    halves = [0.5 * weight.get((i, j), 0.0) for i, j in neurons.tolist()]
+    split = dataclasses.replace(gait, weights=tuple(halves))
+    one, two = walk(thesis, gait, engine), walk(pairs, split, engine)
+    np.testing.assert_allclose(two.signal.values, np.repeat(one.signal.values, 2, 1), atol=1e-12)
+    np.testing.assert_allclose(two.p_WN.values, one.p_WN.values, atol=1e-9)
+    assert np.ptp(one.signal.values) > 1.0, "it is driven"
+
+
+@BOTH
+@pytest.mark.parametrize("signals", ["recorded", "live"])
+def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
+    every = list(PATHWAYS) if signals == "live" else []
+    changes = {"cpg__signals": signals, "cpg__feedback": every, "robot__tetrahedra": 3}
+    scenario = shortly(load_scenario("undulation"), 1.0, **changes)
+    gait = dataclasses.replace(seeded_gait(scenario, 3), turn=0.4)
+    one, other = walk(scenario, gait, engine), walk(scenario, image(gait, scenario), engine)
+    np.testing.assert_allclose(mirrored(other), one.p_WN.values, atol=1e-8)
+    assert np.abs(one.p_WB.sel(axis="y")).max() > 1e-4, "it goes to a side"
+
+
+@BOTH
+def test_without_a_turn_a_mirrored_network_walks_straight_on(engine):
+    scenario = load_scenario("turning").with_changes({"gait_bounds.turn": 0.0})
+    scenario = shortly(scenario, 1.0, robot__tetrahedra=3)
+    walked = walk(scenario, seeded_gait(scenario), engine)
+    np.testing.assert_allclose(mirrored(walked), walked.p_WN.values, atol=1e-8)
+    assert np.ptp(walked.signal.values) > 1.0
+
+
+@BOTH
+def test_zero_gains_give_the_walk_without_feedback(scenario, engine):
+    blind = shortly(scenario, 1.0, cpg__signals="live")
+    senses = blind.with_changes({"cpg.feedback": list(PATHWAYS)})
+    gait = seeded_gait(blind)
+    one, other = walk(blind, gait, engine), walk(senses, gait, engine)
+    np.testing.assert_array_equal(other.signal.values, one.signal.values)
+    np.testing.assert_array_equal(other.p_WN.values, one.p_WN.values)
+
+
+@pytest.mark.parametrize("pathway", PATHWAYS)
+def test_engines_agree_with_each_feedback_and_it_matters(scenario, pathway):
+    short = shortly(scenario, 0.4, **{**FINE, **LIVE, "cpg.feedback": [pathway]})
+    gait = dataclasses.replace(seeded_gait(short), gains=Gains(**{pathway: 1.0}))
+    ours, theirs = (walk(short, gait, engine) for engine in ("compiled", "drake"))
+    np.testing.assert_allclose(ours.signal.values, theirs.signal.values, atol=2e-5)
+    np.testing.assert_allclose(ours.p_WN.values, theirs.p_WN.values, atol=1e-6)
+    none = walk(short, dataclasses.replace(gait, gains=Gains()), "compiled")
+    assert np.abs(none.signal - ours.signal).max() > 1e-3
+
+
+@pytest.mark.parametrize("signals", ["listing", "recorded", "live"])
+def test_engines_agree_on_a_steering_signal(signals):
+    scenario = load_scenario("turning").with_changes({"gait_bounds.turn": 0.0})
+    changes = FINE | {"cpg.signals": signals, "robot.tetrahedra": 3, "cpg.listing_step": 1e-4}
+    short = shortly(scenario, 0.4, **changes)
+    gait = seeded_gait(short)
+
+    def steering(time: float) -> float:
+        return 0.0 if time < 0.2 else 5.0 * (time - 0.2)
+
+    ours, theirs = (walk(short, gait, engine, steering) for engine in ("compiled", "drake"))
+    # From the second sample on: the listing's first signal is not zero, which is kept as zero.
+    np.testing.assert_allclose(ours.signal.values[1:], theirs.signal.values[1:], atol=2e-4)
+    left, right = ours.signal.values[:, 0], ours.signal.values[:, 1]
+    before = ours.time.values <= 0.2
+    np.testing.assert_allclose(left[before], right[before], atol=1e-12)
+    assert np.abs(left - right)[-1] > 0.01
+
+
+def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
+    scenario = load_scenario("turning").with_changes({"robot.tetrahedra": 3})
+    short = shortly(scenario, 0.2)
+    gait = seeded_gait(short)
+    states = []
+    for steering in (None, lambda time: -0.5):
+        diagram = MakeTensegrityDiagram(short, gait, steering=steering)
+        simulator = MakeSimulator(diagram, short.simulation)
+        if steering is None:
+            diagram.GetInputPort("turn").FixValue(simulator.get_mutable_context(), [-0.5])
+        simulator.AdvanceTo(0.2)
+        states.append(simulator.get_context().get_continuous_state_vector().CopyToVector())
+    np.testing.assert_array_equal(*states)
+
+
+def test_lanes_with_other_gains_turns_and_time_scales_keep_their_numbers(scenario):
+    wide = {"gait_bounds.time_scale_min": 0.5, "gait_bounds.time_scale_max": 2.0}
+    changes = {**LIVE, **SIDES, **wide, "cpg.feedback": list(PATHWAYS)}
+    changes |= {"simulation.engine": "compiled"}
+    short = shortly(scenario, 1.0, **changes)
+    gaits = [
+        dataclasses.replace(seeded_gait(short, seed), turn=0.2 * seed - 0.5) for seed in range(6)
+    ]
+    alone = [simulate(scenario=short, gait=gait).metrics for gait in gaits]
+    many = simulate_many(scenario=short, gaits=gaits, workers=1)
+    assert [each.metrics for each in many] == alone
+    assert len({metrics.distance for metrics in alone}) == len(gaits)
+
+
+def test_feedback_is_refused_where_signals_are_computed_beforehand(scenario, refused):
+    for signals in ("listing", "recorded"):
+        with refused("scenario thesis", "cpg.signals", "live"):
+            scenario.with_changes({"cpg.signals": signals, "cpg.feedback": ["load"]})
+    live = {"cpg.signals": "live", "cpg.feedback": ["load"]}
+    on_mujoco = scenario.with_changes({**live, "simulation.engine": "mujoco"})
+    pytest.importorskip("mujoco")
+    with refused("thesis", "cpg.feedback", "load"):
+        simulate(scenario=on_mujoco, gait=seeded_gait(on_mujoco))
+
+
+@pytest.mark.slow
+def test_random_gaits_with_feedback_end_where_the_diagrams_do(scenario):
+    live = scenario.with_changes({"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)})
+    gaits = [seeded_gait(live, seed) for seed in range(20)]
+    fine = {"simulation.engine": "compiled", "compiled.tolerance": "0.001 mm/s"}
+    fine |= {"compiled.max_step": "0.3 ms", "compiled.look_ahead": "0.001 ms"}
+    ours = simulate_many(scenario=live.with_changes(fine), gaits=gaits)
+    diagram = live.with_changes(WITNESSED)
+    errors = [
+        abs(one.metrics.distance_in - simulate(scenario=diagram, gait=gait).metrics.distance_in)
+        for one, gait in zip(ours, gaits, strict=True)
+    ]
+    assert np.median(errors) < 0.05
+    assert np.quantile(errors, 0.9) < 0.2
