@@ -74,6 +74,15 @@ def unchanged(work):
         # 2 n (n - 1) = 40 weights for the 5 oscillators of 6 tetrahedra.
         ("simulate --scenario six.yaml --gait good.json", "good.json", "weights 24 40"),
         ("cpg --out a.csv --gait key.json", "key.json", "tau: tau_b_s"),
+        ("gait key.json", "key.json", "tau: tau_b_s"),
+        ("gait missing.json", "missing.json", ""),
+        ("gait --scenario missing.yaml good.json", "missing.yaml", ""),
+        ("cpg --out a.csv --scenario feedback", "gait random gait 80", "gains:"),
+        (
+            "cpg --out a.csv --scenario feedback --signals listing",
+            "scenario feedback",
+            "cpg.signals: 'live'",
+        ),
         ("replay --out new/a.html short.yaml", "short.yaml", ""),
         ("replay --out new/a.html missing", "missing", ""),
         ("replay --out new/a.html --scenario six.yaml good.json", "good.json", "weights 24 40"),
@@ -136,7 +145,7 @@ def test_a_simulation_that_fails_says_when_and_why_with_status_1(unchanged, caps
 
 COMMANDS = (
     *("simulate", "evolve", "reevaluate", "replay", "figures"),
-    *("robustness", "benchmark", "cpg", "diagram"),
+    *("robustness", "benchmark", "gait", "cpg", "diagram"),
 )
 
 
@@ -231,6 +240,34 @@ def test_replay_makes_the_page_of_simulate_from_its_recording_and_from_the_gait(
         assert capsys.readouterr().out.splitlines()[-1].endswith("again.html")
 
 
+@pytest.mark.parametrize(
+    ("scenario", "file", "values"),
+    [
+        ("thesis", "good.json", ""),
+        ("undulation", "good.json", "weights: 24 64"),
+        ("six.yaml", "good.json", "weights: 24 40"),
+        ("undulation", "named.json", ""),
+        ("thesis", "named.json", "weights: 24 40 5->3"),
+        ("thesis", "23.json", "weights: 23 24"),
+    ],
+)
+def test_gait_prints_the_gait_then_whether_it_fits(work, scenario, file, values, capsys):
+    undulation = load_scenario("undulation")
+    save_gait(seeded_gait(undulation), "named.json", undulation)
+    assert main(["gait", file, "--scenario", scenario]) == (2 if values else 0)
+    captured = capsys.readouterr()
+    name, tau_a, *_, last = captured.out.splitlines()
+    assert name == json.loads(Path(file).read_text())["name"]
+    assert tau_a.split()[0] == "tau_A"
+    assert ("inhibition of the flexor" in captured.out) == (file != "23.json")
+    if not values:
+        assert (last, captured.err) == (f"fits scenario {scenario}", "")
+    else:
+        (line,) = captured.err.splitlines()
+        assert line.startswith(f"tetra-drake: {file}: ")
+        assert all(value in line for value in values.split()), line
+
+
 def test_cpg_writes_the_signals_that_its_options_ask_for(work):
     tables = []
     for options in ([], ["--raw"], ["--unit", "N", "--rate", "100"]):
@@ -241,6 +278,14 @@ def test_cpg_writes_the_signals_that_its_options_ask_for(work):
     assert pounds.shape == raw.shape == (601, 2)  # 0.3 s, two junctions
     assert raw[1:200].any() and not pounds[:200].any() and pounds[200:].any()  # starts at 0.1 s
     np.testing.assert_allclose(newtons, 4.4482216152605 * pounds[::20], atol=1e-9)
+
+
+def test_cpg_writes_a_column_for_each_oscillator_and_says_which_cables_it_drives(work):
+    (work / "short_undulation.yaml").write_text(SHORT.replace("thesis", "undulation"))
+    assert main(["cpg", "--scenario", "short_undulation.yaml", "--out", "a.csv"]) == 0
+    *comments, header, _ = (work / "a.csv").read_text().splitlines()[:5]
+    assert header.split(",") == ["time_s", *(f"signal_{i}" for i in range(1, 9))]
+    assert "signal_4: T2-T3 outer bottom_right;" in comments[-1]
 
 
 def test_diagram_writes_graphviz_source_that_names_the_subsystems(work):

@@ -8,6 +8,7 @@ import inspect
 import json
 import math
 import os
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
@@ -17,7 +18,7 @@ from typing import Any
 from tetra_drake.benchmark.settings import SETS
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import whole_file
-from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, seeded_gait
+from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, read_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import ENGINES, Scenario
 
@@ -103,7 +104,7 @@ def _simulate(options: Options) -> None:
     scenario = load_scenario(options.scenario)
     if options.engine:
         scenario = scenario.with_changes({"simulation.engine": options.engine})
-    gait = _gait(options, scenario)
+    gait = _chosen_gait(options, scenario)
     check_result_folder(options.out)
     prepare(scenario, say=_say)
     view = None
@@ -347,6 +348,27 @@ def _benchmark(options: Options) -> None:
             file.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
+def _gait_options(command: Command) -> None:
+    _add_path(command, "file", "FILE", "a gait file (JSON)")
+    _add_scenario(command)
+
+
+def _gait(options: Options) -> None:
+    """Print a gait as a table.
+
+    Prints the parameters of a gait file, the weights as a matrix for each kind of neuron, and
+    whether the gait fits a scenario, else what does not.
+    """
+    from tetra_drake.robot.gait_table import gait_table
+
+    scenario = load_scenario(options.scenario)
+    gait, names = read_gait(options.file)
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    _say(gait_table(gait, scenario, names=names, width=width) + "\n")
+    load_gait(options.file, scenario)
+    print(f"fits scenario {scenario.name}")
+
+
 def _cpg_options(command: Command) -> None:
     _add_scenario(command)
     _add_gait(command)
@@ -372,16 +394,16 @@ def _cpg(options: Options) -> None:
     """Write the oscillator signals of a gait to a CSV file.
 
     Writes the signals that the cables of a gait are fed: time_s, signal_1, signal_2 ..., a
-    column per junction, from 0 to the scenario's duration, zero before the start-up time. A
-    positive signal shortens the two bottom outer cables of its junction. The file's first
-    lines, which begin with #, say what each column is.
+    column per oscillator, from 0 to the scenario's duration, zero before the start-up time. A
+    positive signal shortens the cables that its oscillator drives. The file's first lines, which
+    begin with #, say what each column is. Feedback depends on the robot: gaits with it are refused.
     """
     from tetra_drake.robot.signals import save_signals
 
     scenario = load_scenario(options.scenario)
     if options.signals:
         scenario = scenario.with_changes({"cpg.signals": options.signals})
-    gait = _gait(options, scenario)
+    gait = _chosen_gait(options, scenario)
     save_signals(options.out, scenario, gait, unit=options.unit, rate=options.rate, raw=options.raw)
 
 
@@ -446,7 +468,7 @@ def _add_gait(command: Command) -> None:
     )
 
 
-def _gait(options: Options, scenario: Scenario) -> Gait:
+def _chosen_gait(options: Options, scenario: Scenario) -> Gait:
     if options.gait is not None:
         return load_gait(options.gait, scenario)
     return seeded_gait(scenario, options.seed)
@@ -481,6 +503,7 @@ _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ..
     (_figures, _figures_options),
     (_robustness, _robustness_options),
     (_benchmark, _benchmark_options),
+    (_gait, _gait_options),
     (_cpg, _cpg_options),
     (_diagram, _diagram_options),
 )

@@ -1,5 +1,6 @@
 """Gait files, random gaits, and the parameter space that evolution searches."""
 
+import dataclasses
 import itertools
 import json
 import math
@@ -11,12 +12,14 @@ import pytest
 from tetra_drake.robot.gait import (
     TAU_A,
     TAU_B,
+    Gains,
     Gait,
     ParameterSpace,
     load_gait,
     save_gait,
     seeded_gait,
 )
+from tetra_drake.scenario.load import load_scenario
 
 WEIGHTS = [1.0 + 0.1 * i for i in range(24)]
 
@@ -102,7 +105,15 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
         (gait_file(weights=WEIGHTS[:23]), "weights", "23"),
         (gait_file(weights=[*WEIGHTS, 1]), "weights", "25"),
         (gait_file(weights=1.5), "weights", "1.5"),
-        (gait_file(weights={"w1": 1}), "weights", "mapping"),
+        (gait_file(weights="1.5"), "weights", "1.5"),
+        (gait_file(weights={"1->2 flexor": -1}), "weights.1->2 flexor", "-1"),
+        (gait_file(turn=1.01), "turn", "1.01"),
+        (gait_file(gains={"lenght": 0.1}), "gains.lenght", "'length'"),
+        (gait_file(gains={"load": None}), "gains.load", "nothing"),
+        (gait_file(gains={"load": 0.5}), "gains.load", "0.5"),  # the thesis has no feedback
+        (gait_file(turn=0.5), "turn", "0.5"),  # its cables are driven in pairs, left and right
+        (gait_file(time_scales=[1, 1, 1]), "time_scales", "3"),
+        (gait_file(time_scales=[1, 1, 0, 1]), "time_scales[2]", "0"),
         *[(without(key), key, "") for key in ("schema", "weights", "tau_a_s")],
         (gait_file(tau_c_s=1), "tau_c_s", "tau_"),
         (gait_file(tau_a=0.3), "tau_a", "tau_a_s"),
@@ -132,7 +143,163 @@ def test_what_is_no_text_file_is_refused(tmp_path, scenario, refused, name):
         load_gait(tmp_path / name, scenario)
 
 
+SCALED = {"gait_bounds.time_scale_min": 0.5, "gait_bounds.time_scale_max": 2.0}
+SPACES = {
+    "thesis": {},
+    "undulation": {},
+    "all-cables": {},
+    "turning": SCALED,
+    "feedback": SCALED | {"evolution.independent_tau_b": True},
+}
+"""Shipped scenarios, with changes."""
+
+
+@pytest.fixture(params=SPACES)
+def shipped(request):
+    return load_scenario(request.param).with_changes(SPACES[request.param])
+
+
+def test_a_saved_gait_of_any_scenario_loads_back_with_its_names_in_any_order(tmp_path, shipped):
+    gait = seeded_gait(shipped, 5)
+    pathways = shipped.cpg.feedback
+    assert [getattr(gait.gains, name) != 0.0 for name in pathways] == [True] * len(pathways)
+    assert len(gait.time_scales) == (4 if shipped.gait_bounds.time_scale_max == 2.0 else 0)
+    assert gait.turn == (1.0 if shipped.name == "turning" else 0.0)
+    content = gait.to_json(shipped)
+    assert content["schema"] == 2 and len(content["weights"]) == len(gait.weights)
+    content["weights"] = dict(reversed(content["weights"].items()))
+    assert load_gait(write(tmp_path, content), shipped) == gait
+    save_gait(gait, tmp_path / "gait.json", shipped)
+    assert load_gait(tmp_path / "gait.json", shipped) == gait
+
+
+def test_a_weight_has_its_name_whatever_the_scenario_s_order(tmp_path, scenario):
+    near = scenario.with_changes({"cpg.reach": 1})
+    names = ParameterSpace.of(near).names[:-2]
+    # Each of four oscillators in a row inhibits the next and the one before: 3 pairs, both ways,
+    # of both kinds.
+    assert len(names) == 12
+    weights = {name.removeprefix("weight "): float(i) for i, name in enumerate(names)}
+    gait = load_gait(write(tmp_path, gait_file(schema=2, weights=weights)), near)
+    by_name = dict(zip(names, gait.weights, strict=True))
+    assert by_name["weight 4->3 flexor"] == weights["4->3 flexor"]
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        ({"2->1 extensor": None}, "misses 1 ('2->1 extensor')"),
+        ({"5->1 flexor": 1.0}, "has in excess 1 ('5->1 flexor')"),
+        ({"2->1 extensor": None, "2->1 Extensor": 1.0}, "did you mean '2->1 extensor'?"),
+        ({"2->1 extensor": None, "w1": 1.0}, "has in excess 1 ('w1')"),
+    ],
+)
+def test_missing_and_unknown_names_are_refused(tmp_path, scenario, refused, change, found):
+    names = [name.removeprefix("weight ") for name in ParameterSpace.of(scenario).names[:-2]]
+    named = dict(zip(names, WEIGHTS, strict=True)) | change
+    weights = {name: weight for name, weight in named.items() if weight is not None}
+    file = write(tmp_path, gait_file(schema=2, weights=weights))
+    with refused(file, "weights", found):
+        load_gait(file, scenario)
+    write(tmp_path, {"gait": gait_file(schema=2, weights=weights)})
+    with refused(file, "gait.weights", found):
+        load_gait(file, scenario, key="gait")
+
+
+def test_a_list_of_weights_fits_by_its_length(tmp_path, refused):
+    undulation = load_scenario("undulation")
+    # Two in each of 4 junctions inhibit each other, and those of 3 pairs of neighbours:
+    # 2 (4 * 2 + 3 * 2 * 4) weights of both kinds.
+    weights = [0.01 * i for i in range(64)]
+    file = write(tmp_path, gait_file(weights=weights))
+    assert load_gait(file, undulation).weights == tuple(weights)
+    with refused(file, "weights", "64"):
+        load_gait(file, undulation.with_changes({"cpg.reach": 2}))
+
+
 # Parameter space
+
+
+def test_a_vector_is_a_gait_in_every_scenario_and_back(shipped):
+    space = ParameterSpace.of(shipped)
+    assert len(space.names) == len(set(space.names))
+    for seed in range(3):
+        vector = space.random(np.random.default_rng(seed))
+        gait = space.gait(vector, name="any")
+        np.testing.assert_array_equal(space.vector(gait), vector)
+        assert space.gait(space.vector(gait), name="any") == gait
+        assert gait.turn == shipped.gait_bounds.turn
+
+
+def test_mirrored_weights_are_one_parameter_for_left_and_right():
+    turning = load_scenario("turning")
+    space, free = (ParameterSpace.of(turning.with_changes({"gait_bounds.mirrored": mirrored}))
+                   for mirrored in (True, False))  # fmt: skip
+    # None of the 64 weights of `undulation` is its own mirror image.
+    assert (len(space.names), len(free.names)) == (32 + 2, 64 + 2)
+    vector = np.arange(34.0) + 1.0
+    weights = space.gait(vector, name="any").weights
+    by_name = dict(zip(free.names, weights, strict=False))
+    # Oscillators 1, 3, 5, 7 are on the left, 2, 4, 6, 8 on the right of the same junctions.
+    for name, image in (
+        ("2->1 extensor", "1->2 extensor"),
+        ("5->4 flexor", "6->3 flexor"),
+        ("7->5 extensor", "8->6 extensor"),
+    ):
+        assert by_name[f"weight {name}"] == by_name[f"weight {image}"]
+    assert sorted(weights) == sorted([*vector[:32], *vector[:32]])
+
+
+def test_gains_and_time_scales_have_bounds_steps_and_floors():
+    changes = {
+        "gait_bounds.gain_min": -2.0,
+        "gait_bounds.gain_max": 3.0,
+        "gait_bounds.time_scale_min": 0.5,
+        "gait_bounds.time_scale_max": 2.0,
+        "evolution.gain_mutation": 0.7,
+        "evolution.time_scale_mutation": 0.03,
+    }
+    feedback = load_scenario("feedback")
+    space = ParameterSpace.of(feedback.with_changes(changes))
+    rows = dict(zip(space.names, zip(space.low, space.high, space.steps, space.floors, strict=True),
+                    strict=True))  # fmt: skip
+    assert space.names[24:] == (
+        *("time scale T1-T2", "time scale T2-T3", "time scale T3-T4", "time scale T4-T5"),
+        *("gain length", "gain load", "gain pitch", "tau_A", "tau_B"),
+    )
+    assert rows["time scale T3-T4"] == (0.5, 2.0, 0.03, 0.5)
+    # A gain may become negative by mutation, a time scale must stay above its least.
+    assert rows["gain load"] == (-2.0, 3.0, 0.7, -math.inf)
+    gait = space.gait(np.arange(33.0), name="any")
+    assert gait.time_scales == (24.0, 25.0, 26.0, 27.0)
+    assert gait.gains == Gains(length=28.0, load=29.0, pitch=30.0)
+    assert (gait.tau_a, gait.tau_b) == (31.0, 32.0)
+
+
+def test_equal_bounds_fix_gains_and_time_scales():
+    changes = {
+        **dict.fromkeys(("gait_bounds.gain_min", "gait_bounds.gain_max"), 0.4),
+        **dict.fromkeys(("gait_bounds.time_scale_min", "gait_bounds.time_scale_max"), 1.2),
+    }
+    space = ParameterSpace.of(load_scenario("feedback").with_changes(changes))
+    assert not space.steps[24:31].any()
+    gait = space.gait(space.random(np.random.default_rng(0)), name="any")
+    assert gait.time_scales == (1.2,) * 4 and gait.gains == Gains(length=0.4, load=0.4, pitch=0.4)
+    one = ParameterSpace.of(load_scenario("feedback").with_changes({"cpg.feedback": ["load"]}))
+    assert one.names[24:] == ("gain load", "tau_A", "tau_B")  # time scales of 1 are no parameters
+    gait = one.gait(np.arange(27.0), name="any")
+    assert (gait.gains, gait.time_scales) == (Gains(load=24.0), ())
+
+
+def test_a_turn_is_that_of_the_scenario_and_no_parameter(tmp_path):
+    half = load_scenario("turning").with_changes({"gait_bounds.turn": -0.5})
+    space = ParameterSpace.of(half)
+    assert not any("turn" in name for name in space.names)
+    gait = seeded_gait(half)
+    assert gait.turn == -0.5
+    # A gait's own turn counts when it is loaded, whatever those are that the scenario evolves.
+    content = dataclasses.replace(gait, turn=0.25).to_json(half)
+    assert load_gait(write(tmp_path, content), half).turn == 0.25
 
 
 @pytest.mark.parametrize("oscillators", [1, 2, 4, 8])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Self
 
@@ -10,6 +11,9 @@ import numpy as np
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.scenario.schema import CABLES, Scenario, mirrored
 
+KINDS = "extensor", "flexor"
+"""Of neurons, by their number modulo 2."""
+
 
 @dataclass(frozen=True)
 class Actuation:
@@ -17,6 +21,8 @@ class Actuation:
 
     names: tuple[str, ...]
     """Such as "T1-T2", or "T1-T2 outer bottom_left" where a junction has several groups."""
+    cables: tuple[str, ...]
+    """Those that each drives, such as "T1-T2 outer bottom_left + outer bottom_right"."""
     drivers: np.ndarray
     """(cables,): the oscillator that drives each cable of the robot, PASSIVE if none does."""
     junctions: np.ndarray
@@ -37,7 +43,7 @@ class Actuation:
         place = {cable: k for k, group in enumerate(groups) for cable in group}
         own = np.array([place.get(cable, PASSIVE) for cable in CABLES])
         drivers = [np.where(own == PASSIVE, own, own + len(groups) * i) for i in range(count)]
-        couplings = _couplings(junctions, scenario.cpg.reach)
+        couplings = couplings_within(junctions, scenario.cpg.reach)
         sets = [set(group) for group in groups]
         others = [set(mirrored(group)) for group in groups]
         opposite = [sets.index(o) if o in sets else k for k, o in enumerate(others)]
@@ -45,12 +51,10 @@ class Actuation:
         neurons = (2 * oscillators[:, np.newaxis] + [0, 1]).ravel()
         index = {pair: i for i, pair in enumerate(map(tuple, couplings.tolist()))}
         pairs = map(tuple, neurons[couplings].tolist())
+        cables = tuple(f"T{i + 1}-T{i + 2} {' + '.join(g)}" for i in range(count) for g in groups)
         return cls(
-            names=tuple(
-                f"T{i + 1}-T{i + 2}" + (f" {' + '.join(group)}" if len(groups) > 1 else "")
-                for i in range(count)
-                for group in groups
-            ),
+            names=cables if len(groups) > 1 else tuple(name.split()[0] for name in cables),
+            cables=cables,
             drivers=np.concatenate(drivers),
             junctions=junctions,
             sides=np.tile([_side(group) for group in groups], count),
@@ -60,17 +64,27 @@ class Actuation:
 
     @property
     def weight_names(self) -> tuple[str, ...]:
-        """As "3->1 extensor": from oscillator 3 onto oscillator 1, counting from 1."""
-        kinds = "extensor", "flexor"
-        pairs = self.couplings.tolist()
-        return tuple(f"{j // 2 + 1}->{i // 2 + 1} {kinds[i % 2]}" for i, j in pairs)
+        """Of `couplings`; see weight_names()."""
+        return weight_names(self.couplings)
 
 
-def _couplings(junctions: np.ndarray, reach: int | None) -> np.ndarray:
+def couplings_within(junctions: np.ndarray, reach: int | None) -> np.ndarray:
+    """The `couplings` of oscillators of these junctions; all if `reach` is None."""
     junction, kind = np.repeat(junctions, 2), np.arange(2 * len(junctions)) % 2
     far = np.abs(junction[:, np.newaxis] - junction)
     coupled = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
     return np.argwhere(coupled if reach is None else coupled & (far <= reach))
+
+
+def weight_names(couplings: np.ndarray) -> tuple[str, ...]:
+    """As "3->1 extensor": from oscillator 3 onto oscillator 1, counting from 1."""
+    return tuple(f"{j // 2 + 1}->{i // 2 + 1} {KINDS[i % 2]}" for i, j in couplings.tolist())
+
+
+def parse_weight_name(name: str) -> tuple[str, int, int] | None:
+    """("extensor", 1, 3) of "3->1 extensor"; None if it is no such name."""
+    found = re.fullmatch(rf"([1-9]\d{{0,3}})->([1-9]\d{{0,3}}) ({'|'.join(KINDS)})", name, re.ASCII)
+    return (found[3], int(found[2]), int(found[1])) if found else None
 
 
 def _side(group: list[str]) -> float:

@@ -1,6 +1,7 @@
 """A gait, its file, and the space of parameters that evolution searches."""
 
 import dataclasses
+import difflib
 import json
 import math
 from dataclasses import dataclass
@@ -197,12 +198,12 @@ def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
 
 @dataclass(kw_only=True)
 class GaitFile:
-    """What a gait file of the current schema holds; see Gait."""
+    """What a gait file holds; see Gait."""
 
     schema: int = setting(at_least=1, at_most=SCHEMA)
     name: str = setting(default="")
-    weights: dict[str, float] = setting(at_least=0)
-    """By Actuation.weight_names, in any order."""
+    weights: dict[str, float] | list[float] = setting(at_least=0)
+    """By Actuation.weight_names, in any order; a list, which schema 1 has, in their order."""
     tau_a_s: float = setting(above=0)
     tau_b_s: float | None = setting(default=None, above=0)
     turn: float = setting(default=0.0, at_least=-1, at_most=1)
@@ -210,40 +211,24 @@ class GaitFile:
     time_scales: list[float] = setting(default=[], above=0)
 
 
-@dataclass(kw_only=True)
-class OldGaitFile(GaitFile):
-    """What one of schema 1 holds: weights in the order of Actuation.couplings."""
-
-    weights: list[float] = setting(at_least=0)  # type: ignore[assignment]
-
-
 def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     """Reads a gait file, or the gait under `key` of a JSON file, for the scenario's robot.
 
     Raises InputError, naming file and key, for whatever is wrong in the file or does not fit.
     """
-    file = read_gait_file(path, key=key)
-    actuation, weights = Actuation.of(scenario), file.weights
-    if isinstance(weights, dict):
-        names = actuation.weight_names
-        _check_names(weights, names, path, f"{key}.weights".strip("."))
-    gait = Gait(
-        name=file.name or Path(path).stem,
-        weights=tuple(weights[name] for name in names)
-        if isinstance(weights, dict)
-        else tuple(weights),
-        tau_a=file.tau_a_s,
-        tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
-        turn=file.turn,
-        gains=file.gains,
-        time_scales=tuple(file.time_scales),
-    )
+    gait, names = read_gait(path, key=key)
+    actuation = Actuation.of(scenario)
+    if names:
+        wanted, weights = actuation.weight_names, dict(zip(names, gait.weights, strict=True))
+        _check_names(names, wanted, path, f"{key}.weights".strip("."))
+        gait = dataclasses.replace(gait, weights=tuple(weights[name] for name in wanted))
     check_gait(gait, scenario, actuation, source=path, key=key)
     return gait
 
 
-def read_gait_file(path: str | Path, *, key: str = "") -> GaitFile:
-    """What a gait file holds, for whatever robot; raises InputError as load_gait() does."""
+def read_gait(path: str | Path, *, key: str = "") -> tuple[Gait, tuple[str, ...]]:
+    """The gait of a file, for whatever robot: its weights as they stand there, and their names, if
+    they have any. Raises InputError as load_gait() does."""
     text = read_text(path, "gait file")
     try:
         raw = json.loads(text, object_pairs_hook=_unique_keys)
@@ -251,9 +236,18 @@ def read_gait_file(path: str | Path, *, key: str = "") -> GaitFile:
         raise InputError(path, "", f"is not JSON: {error}") from error
     if key and isinstance(raw, dict):
         raw = raw.get(key)
-    is_new = isinstance(raw, dict) and raw.get("schema") == SCHEMA
-    file: GaitFile = Check(path, complete=True).value(GaitFile if is_new else OldGaitFile, raw, key)
-    return file
+    file: GaitFile = Check(path, complete=True).value(GaitFile, raw, key)
+    weights = file.weights
+    gait = Gait(
+        name=file.name or Path(path).stem,
+        weights=tuple(weights.values() if isinstance(weights, dict) else weights),
+        tau_a=file.tau_a_s,
+        tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
+        turn=file.turn,
+        gains=file.gains,
+        time_scales=tuple(file.time_scales),
+    )
+    return gait, tuple(weights) if isinstance(weights, dict) else ()
 
 
 def check_gait(
@@ -280,17 +274,20 @@ def check_gait(
             raise InputError(source, f"{key}.{name}".strip("."), problem)
 
 
-def _check_names(weights: dict[str, float], names: tuple[str, ...], path: object, key: str) -> None:
-    missing = [name for name in names if name not in weights]
-    unknown = [name for name in weights if name not in names]
-    if missing or unknown:
-        parts = [
-            f"{what} {len(some)} ('{some[0]}'{' ...' * (len(some) > 1)})"
-            for what, some in (("misses", missing), ("has in excess", unknown))
-            if some
-        ]
-        problem = f"of the {len(names)} weights of the scenario it {' and '.join(parts)}"
-        raise InputError(path, key, problem)
+def _check_names(found: tuple[str, ...], wanted: tuple[str, ...], source: object, key: str) -> None:
+    given, known = set(found), set(wanted)
+    missing = [name for name in wanted if name not in given]
+    unknown = [name for name in found if name not in known]
+    close = difflib.get_close_matches(unknown[0], missing, n=1) if unknown else []
+    hint = f"; did you mean '{close[0]}'?" if close else ""
+    parts = [
+        f"{what} {len(some)} ('{some[0]}'{' ...' * (len(some) > 1)})"
+        for what, some in (("misses", missing), ("has in excess", unknown))
+        if some
+    ]
+    if parts:
+        problem = f"of the {len(wanted)} weights of the scenario it {' and '.join(parts)}{hint}"
+        raise InputError(source, key, problem)
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

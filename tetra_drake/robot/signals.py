@@ -15,6 +15,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
 from tetra_drake.physics.oscillator import make_neurons, network_output
+from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.network import (
     SteeringSignal,
@@ -117,15 +118,8 @@ def save_signals(
     signals = signals_at(scenario, gait, times, raw=raw) / (1.0 if raw else UNITS[unit])
     names = [f"signal_{i + 1}" for i in range(scenario.oscillators)]
     kind = "y_extensor - y_flexor (no unit)" if raw else f"force in {unit} that shortens the cables"
-    structure = MakeStructure(scenario)
-    cables = [
-        [name for name, driver in zip(structure.cable_names, drivers, strict=True) if driver == i]
-        for drivers in [structure.actuation.drivers]
-        for i in range(len(names))
-    ]
-    drives = "; ".join(
-        f"{name}: {', '.join(driven)}" for name, driven in zip(names, cables, strict=True)
-    )
+    cables = zip(names, Actuation.of(scenario).cables, strict=True)
+    drives = "; ".join(f"{name}: {driven}" for name, driven in cables)
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",
         f"# time_s: time in s; signal_i: {kind}",

@@ -16,7 +16,7 @@ class CableNetwork(LeafSystem):
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|
     | state             | (13 n,)        | SI     | [q; v] of n free bodies, from the plant  |
-    | signals           | (n - 1,)       | N      | actuation, one per junction              |
+    | signals           | (m,)           | N      | actuation, one per oscillator            |
     | generalized_force | (6 n,)         | N m, N | [t_W; f_W] at each body's origin         |
     | tensions          | (6 (n - 1),)   | N      | tension of each cable                    |
     | lengths           | (6 (n - 1),)   | m      | length of each cable                     |
