@@ -86,6 +86,26 @@ def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
     return float(frequencies[spectrum.argmax()])
 
 
+def junction_signals(trajectory: xarray.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """(samples, n - 1) each, in N: the signals at each junction, summed, and left less right."""
+    names, signals = trajectory.oscillator_junction.values, trajectory.signal.values
+    at = names[:, np.newaxis] == list(dict.fromkeys(names))
+    return signals @ at, (signals * trajectory.oscillator_side.values) @ at
+
+
+def travelling_index(waves: np.ndarray) -> float:
+    """How far a wave (samples, places) travels along the places: 0 if it stands, 1 if it travels.
+
+    Of the strongest complex orthogonal mode, the ratio of the singular values of its real and
+    imaginary parts (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Evenly sampled.
+    """
+    spectrum = np.fft.fft(waves - waves.mean(axis=0), axis=0)
+    spectrum[len(waves) // 2 :] = 0.0  # without negative frequencies: the analytic signal
+    mode = np.linalg.svd(np.fft.ifft(spectrum, axis=0), full_matrices=False)[2][0]
+    values = np.linalg.svd(np.array([mode.real, mode.imag]), compute_uv=False)
+    return float(values[1] / values[0]) if len(mode) > 1 else 0.0
+
+
 def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:
     """Start and end (s) of one period of the signals, late in the trajectory.
 

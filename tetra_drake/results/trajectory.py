@@ -37,7 +37,7 @@ def assemble_dataset(
     Dimensions: time, tetrahedron, node, cable, contact, oscillator, axis, horizontal, quaternion.
     Every variable has a `units` attribute. Coordinates along `cable`: cable_junction, cable_role
     (outer or inner) and cable_signal, the oscillator that drives the cable ("" if none); along
-    `oscillator`: oscillator_junction.
+    `oscillator`: oscillator_junction and oscillator_side (1 left, -1 right, else 0).
     Forces and modes are those of the step in which, or at whose end, the sample lies.
     """
     import xarray
@@ -88,6 +88,7 @@ def assemble_dataset(
             "cable_role": ("cable", [name.split()[1] for name in structure.cable_names]),
             "cable_signal": ("cable", driving),
             "oscillator": list(oscillators),
+            "oscillator_side": ("oscillator", structure.actuation.sides),
             "oscillator_junction": ("oscillator", [name.split()[0] for name in oscillators]),
             "axis": ["x", "y", "z"],
             "horizontal": ["x", "y"],
