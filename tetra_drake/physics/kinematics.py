@@ -148,9 +148,9 @@ def interpolate_state(before: Array, after: Array, step: float, part: float) -> 
     from_before = (1.0 + 2.0 * part) * rest * rest
     rate_before = step * part * rest * rest
     rate_after = -step * part * part * rest
+    q_rates = np.empty((2, 7))
     for body in range(bodies):
         q, v = 7 * body, 7 * bodies + 6 * body
-        q_rates = np.zeros((2, 7))
         for end, state in enumerate((before, after)):
             w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
             w_x, w_y, w_z = 0.5 * state[v], 0.5 * state[v + 1], 0.5 * state[v + 2]
@@ -158,7 +158,8 @@ def interpolate_state(before: Array, after: Array, step: float, part: float) -> 
             q_rates[end, 1] = w_x * w + w_y * z - w_z * y
             q_rates[end, 2] = w_y * w + w_z * x - w_x * z
             q_rates[end, 3] = w_z * w + w_x * y - w_y * x
-            q_rates[end, 4:] = state[v + 3 : v + 6]
+            for k in range(3):
+                q_rates[end, 4 + k] = state[v + 3 + k]
         for k in range(7):
             between[q + k] = (
                 from_before * before[q + k]
@@ -166,6 +167,9 @@ def interpolate_state(before: Array, after: Array, step: float, part: float) -> 
                 + rate_before * q_rates[0, k]
                 + rate_after * q_rates[1, k]
             )
-        between[q : q + 4] /= np.sqrt((between[q : q + 4] ** 2).sum())
-        between[v : v + 6] = rest * before[v : v + 6] + part * after[v : v + 6]
+        norm = np.sqrt((between[q : q + 4] ** 2).sum())
+        for k in range(4):
+            between[q + k] /= norm
+        for k in range(6):
+            between[v + k] = rest * before[v + k] + part * after[v + k]
     return between

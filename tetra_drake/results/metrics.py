@@ -87,7 +87,7 @@ def compute_metrics(
     """The metrics from node positions p_WN (nodes, 3) in m at three instants, and from the path of
     the centre; the steady stretch begins at `steady_from` (s)."""
     tip = 4 * (len(structure.bodies) - 1) + TIP
-    steady_path = path.centre[path.times >= steady_from, :2]
+    steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
     x1, x2, x3 = end[BOTTOM_LEFT, 0], end[BOTTOM_RIGHT, 0], end[tip, 0]
     return Metrics(
         distance=float(x1 - start[BOTTOM_LEFT, 0]),

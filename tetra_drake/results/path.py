@@ -39,7 +39,7 @@ def follow(times: np.ndarray, poses: np.ndarray) -> CentrePath:
     heading = np.arctan2(left, ahead)
     # As np.unwrap() would, in a fraction of its time.
     heading[1:] -= math.tau * np.round((heading[1:] - heading[:-1]) / math.tau).cumsum()
-    return CentrePath(times, columns[4:].mean(axis=1).T, heading)
+    return CentrePath(times, columns[4:].sum(axis=1).T / poses.shape[1], heading)
 
 
 def curvature(points: np.ndarray) -> float:
@@ -51,18 +51,19 @@ def curvature(points: np.ndarray) -> float:
     mean square of this least. Added to it is what lets a bend count little on a path hardly larger
     than the sway; on one of 10 cm, it changes nothing that matters.
     """
-    across, up = points.T
-    x, y = across - across.mean(), up - up.mean()
+    (x, y), count = points.T, len(points)
+    x, y = x - x.sum() / count, y - y.sum() / count
     square = x * x + y * y
-    size = math.sqrt(square.mean())
+    size = math.sqrt(square.sum() / count)
     if size < 1e-3 * _SWAY:
         return 0.0
     table = np.array([(square - size * size) / (2.0 * size), x, y])
-    moments = table @ table.T / len(points)
+    moments = table @ table.T / count
     moments[0, 0] += (_SWAY * _SWAY / size) ** 2
-    bend, normal_x, normal_y = np.linalg.eigh(moments)[1][:, 0]  # of the smallest eigenvalue
+    # The eigenvector of the smallest eigenvalue.
+    bend, normal_x, normal_y = np.linalg.eigh(moments)[1][:, 0].tolist()
     bend /= size
-    # The way from the circle's centre, times +-1 / radius, and the area that it sweeps.
-    out_x, out_y = bend * x[1:] + normal_x, bend * y[1:] + normal_y
-    swept = out_x @ (y[1:] - y[:-1]) - out_y @ (x[1:] - x[:-1])
-    return float(bend * np.sign(swept))
+    # Twice the area that the ray from the circle's centre sweeps, times +-1 / radius.
+    swept = bend * (x[:-1] @ y[1:] - y[:-1] @ x[1:])
+    swept += normal_x * (y[-1] - y[0]) - normal_y * (x[-1] - x[0])
+    return math.copysign(bend, bend * swept)
