@@ -1,10 +1,12 @@
-"""The README: its snippets run, its links lead somewhere."""
+"""The README and the page about scenarios: their snippets run, their links lead somewhere."""
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +15,7 @@ from tetra_drake.cli import main
 
 CHECKOUT = Path(__file__).parents[1]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
+SCENARIOS = (CHECKOUT / "tetra_drake/scenario/README.md").read_text(encoding="utf-8")
 
 QUICK = """\
 base: thesis
@@ -23,8 +26,8 @@ evolution: {population: 4, tournament: 2, trials: 1, max_iterations: 1}
 """Takes the place of the shipped scenario of this name."""
 
 
-def snippets(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+def snippets(language: str, page: str = README) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
 
 
 @pytest.fixture
@@ -48,8 +51,9 @@ def test_the_commands_run(work: Path) -> None:
         assert (work / page).is_file()
 
 
-def test_the_python_runs(work: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (snippet,) = snippets("python")
+@pytest.fixture
+def shortened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All scenarios end after a second."""
     loaded = td.load_scenario
     monkeypatch.setattr(
         td,
@@ -59,8 +63,27 @@ def test_the_python_runs(work: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ),
         raising=False,
     )
+
+
+def test_the_python_runs(work: Path, shortened: None) -> None:
+    (snippet,) = snippets("python")
     exec(compile(snippet, "README.md", "exec"), {})
     assert len(td.load_run("runs/python").evaluations) == 20
+
+
+def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: None) -> None:
+    (snippet,) = snippets("python", SCENARIOS)
+    names: dict[str, Any] = {}
+    exec(compile(snippet, "scenario/README.md", "exec"), names)
+    assert names["result"].duration == names["simulator"].get_context().get_time() == 1.0
+    tonic = names["diagram"].GetSubsystemByName("steering").get_output_port()
+    context = (
+        names["diagram"]
+        .GetSubsystemByName("steering")
+        .GetMyContextFromRoot(names["simulator"].get_context())
+    )
+    # u0 (1 + 0.8) for extensor and flexor on the left, u0 (1 - 0.8) on the right.
+    assert tonic.Eval(context)[:4] == pytest.approx([0.9, 0.9, 0.1, 0.1], rel=1e-12)
 
 
 def test_the_scenario_loads(work: Path) -> None:
@@ -70,6 +93,18 @@ def test_the_scenario_loads(work: Path) -> None:
     assert scenario.robot.tetrahedra == 7
     assert scenario.cables.outer_stiffness == 45.0
     assert scenario.robot.spacing != td.load_scenario("thesis").robot.spacing, "balanced"
+
+
+def test_the_scenarios_and_the_gait_of_their_page_load(work: Path) -> None:
+    files = snippets("yaml", SCENARIOS)
+    for i, file in enumerate(files):
+        (work / f"{i}.yaml").write_text(file)
+        assert td.load_scenario(f"{i}.yaml").name == re.findall(r"^name: (.*)$", file, re.M)[0]
+    assert td.load_scenario("1.yaml").oscillators == 12  # three groups at four junctions
+    (gait,) = snippets("json", SCENARIOS)
+    (work / "gait.json").write_text(gait)
+    small = td.load_scenario("feedback").with_changes({"robot.tetrahedra": 3})
+    assert td.load_gait("gait.json", small).gains.length == json.loads(gait)["gains"]["length"]
 
 
 FOLDERS = ("diagrams", "runs", "tetra_drake/engines", "tetra_drake/scenario")
