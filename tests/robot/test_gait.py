@@ -233,10 +233,11 @@ def test_a_vector_is_a_gait_in_every_scenario_and_back(shipped):
 
 def test_mirrored_weights_are_one_parameter_for_left_and_right():
     turning = load_scenario("turning")
-    space, free = (ParameterSpace.of(turning.with_changes({"gait_bounds.mirrored": mirrored}))
-                   for mirrored in (True, False))  # fmt: skip
+    space = ParameterSpace.of(turning)
+    free = ParameterSpace.of(turning.with_changes({"gait_bounds.mirrored": False}))
     # None of the 64 weights of `undulation` is its own mirror image.
     assert (len(space.names), len(free.names)) == (32 + 2, 64 + 2)
+    assert space.names[0] == free.names[0] == "weight 2->1 extensor", "named by the first"
     vector = np.arange(34.0) + 1.0
     weights = space.gait(vector, name="any").weights
     by_name = dict(zip(free.names, weights, strict=False))
@@ -261,8 +262,8 @@ def test_gains_and_time_scales_have_bounds_steps_and_floors():
     }
     feedback = load_scenario("feedback")
     space = ParameterSpace.of(feedback.with_changes(changes))
-    rows = dict(zip(space.names, zip(space.low, space.high, space.steps, space.floors, strict=True),
-                    strict=True))  # fmt: skip
+    columns = zip(space.low, space.high, space.steps, space.floors, strict=True)
+    rows = dict(zip(space.names, columns, strict=True))
     assert space.names[24:] == (
         *("time scale T1-T2", "time scale T2-T3", "time scale T3-T4", "time scale T4-T5"),
         *("gain length", "gain load", "gain pitch", "tau_A", "tau_B"),
