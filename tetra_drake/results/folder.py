@@ -3,7 +3,7 @@
 scenario.yaml     the scenario in full, for `--scenario`
 trajectory.nc     motion and forces over time, for xarray
 replay.html       a page that plays the motion
-result.json       the numbers and the gait
+result.json       the numbers, the gait, and the path of the centre
 """
 
 from __future__ import annotations

@@ -188,22 +188,22 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     """Metrics, lengths in inches, and what the simulation took, as lines for the terminal."""
     metrics, work = result.metrics, result.integrator
     after = f"from {scenario.simulation.steady_from:g} s on"
-    side = "left" if metrics.path_curvature > 0.0 else "right"
+    side = "to the left" if metrics.path_curvature > 0.0 else "to the right"
+    bends = "straight" if math.isinf(metrics.path_radius) else side
     rows = [
         ("distance", metrics.distance / INCH, "in", ""),
         ("steady distance", metrics.steady_distance / INCH, "in", after),
         ("twist", metrics.twist / INCH, "in", "x1 - x2 at the end: turned about the vertical"),
         ("lateral drift", metrics.lateral_drift / INCH, "in", ""),
         ("heading change", math.degrees(metrics.heading_change), "deg", "positive to the left"),
-        ("path radius", metrics.path_radius / INCH, "in", f"bends to the {side}, {after}"),
+        ("path radius", metrics.path_radius / INCH, "in", f"{bends}, {after}"),
     ]
     lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
     if ground := ground_text(scenario):
         lines.append(f"  ground: {ground}")
     for name, value, unit, note in rows:
-        number = f"{fixed(value):>8} {unit:<4} {f'({note})' if note else ''}".rstrip()
-        text = number if math.isfinite(value) else "  straight"
-        lines.append(f"  {name:<16}{text}")
+        line = f"  {name:<16}{fixed(value):>8} {unit:<4} {f'({note})' if note else ''}"
+        lines.append(line.rstrip())
     lines.append(f"  {'fitness':<16}{fixed(result.fitness):>8}")
     reference = scenario.reference
     if reference is not None:
