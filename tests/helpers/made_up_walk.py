@@ -13,11 +13,14 @@ HEIGHT = 0.02  # m, to which a tetrahedron is lifted
 LOAD = 0.2  # N, on a contact node that stands
 
 
-def make_walk(*, bodies: int = 5, duration: float = 9.0) -> xarray.Dataset:
+def make_walk(
+    *, bodies: int = 5, duration: float = 9.0, actuation: list[list[str]] | None = None
+) -> xarray.Dataset:
     """Tetrahedra that move on at SPEED; T1, T3 ... are lifted in the first half of each PERIOD
     and T2, T4 ... in the second. The tip of the lead never touches the ground."""
     scenario = load_scenario("thesis")
     scenario.robot.tetrahedra = bodies
+    scenario.robot.actuation = actuation or scenario.robot.actuation
     structure = MakeStructure(scenario)
     times = np.linspace(0.0, duration, round(duration / 0.01) + 1)
     phase = 2.0 * np.pi * times / PERIOD
@@ -32,7 +35,7 @@ def make_walk(*, bodies: int = 5, duration: float = 9.0) -> xarray.Dataset:
     names = np.array(structure.node_names)[structure.contacts]
     stands = (lift[:, structure.contacts // 4] == 0.0) & (names != f"T{bodies} tip")
     normal = np.where(stands, LOAD, 0.0)
-    signals = 2.0 * np.sin(phase[:, np.newaxis] - np.arange(bodies - 1))
+    signals = 2.0 * np.sin(phase[:, np.newaxis] - np.arange(structure.signals))
     driver = structure.cables["signal"]
     return assemble_dataset(
         structure,

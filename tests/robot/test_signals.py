@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
 from tetra_drake.robot.network import initial_neurons, make_network
 from tetra_drake.robot.signals import raw_output, save_signals, signal_samples
 from tetra_drake.systems import MatsuokaCpg
@@ -72,6 +72,21 @@ def read_csv(path: Path) -> tuple[list[str], np.ndarray]:
     header = next(line for line in lines if not line.startswith("#"))
     table = np.loadtxt(path, delimiter=",", skiprows=lines.index(header) + 1)
     return header.split(","), table
+
+
+def test_the_csv_names_the_cables_of_each_signal(scenario, tmp_path):
+    groups = [["outer top", "inner top"], ["outer bottom_left"]]
+    scenario = scenario.with_changes({"robot.tetrahedra": 3, "robot.actuation": groups})
+    save_signals(tmp_path / "lbf.csv", scenario, seeded_gait(scenario), rate=10.0)
+    header, _ = read_csv(tmp_path / "lbf.csv")
+    lines = (tmp_path / "lbf.csv").read_text().splitlines()
+    assert header[1:] == [f"signal_{i}" for i in (1, 2, 3, 4)]
+    assert lines[2:6] == [
+        "# signal_1: T1-T2 outer top + inner top",
+        "# signal_2: T1-T2 outer bottom_left",
+        "# signal_3: T2-T3 outer top + inner top",
+        "# signal_4: T2-T3 outer bottom_left",
+    ]
 
 
 def test_the_csv_holds_what_the_cables_are_fed(scenario, gait, tmp_path):

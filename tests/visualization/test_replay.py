@@ -12,14 +12,16 @@ from pydrake.math import RotationMatrix
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import CABLES
 from tetra_drake.visualization.replay import (
     FRAMES_PER_SECOND,
+    LEGEND,
     frame_samples,
     pack_page,
     replay_title,
     save_replay,
 )
-from tetra_drake.visualization.scene import ARROW_LENGTH, CABLE_RADIUS, HIDDEN
+from tetra_drake.visualization.scene import ARROW_LENGTH, CABLE_KINDS, CABLE_RADIUS, HIDDEN
 
 TITLE = '<script>bad()</script> & \\1 "gait": 4.36 in'
 
@@ -171,6 +173,16 @@ def test_a_long_replay_stays_small(scenario, trajectory, page, tmp_path):
     per_frame = (len(page) - len(read_page(tmp_path / "half.html"))) / (0.1 * FRAMES_PER_SECOND)
     assert per_frame > 0 and len(page) + 15.0 * FRAMES_PER_SECOND * per_frame < 8e6
     assert len(pack_page(page, title="any")) < 0.5 * len(page), "as a file"
+
+
+def test_the_legend_names_kinds_of_cables_that_the_robot_has(scenario, page, tmp_path):
+    kinds = {name: LEGEND[name] for name in CABLE_KINDS}
+    assert all(meaning in page for meaning in kinds.values())
+    groups = [[cable] for cable in CABLES]
+    driven = scenario.with_changes({"robot.actuation": groups, "simulation.engine": "compiled"})
+    save_replay(tmp_path / "all.html", scenario=driven, trajectory=recorded(driven), title="all")
+    shown = read_page(tmp_path / "all.html")
+    assert [name for name, meaning in kinds.items() if meaning in shown] == ["actuated"]
 
 
 def test_another_robot_and_a_slice_of_a_recording_replay_too(scenario, tmp_path):

@@ -36,7 +36,8 @@ def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
     One panel per oscillator, with the first of the cables that it drives.
     """
     forces = trajectory[["signal", "tension"]] / POUND_FORCE
-    figure, panels = _panels_over_time(forces.oscillator.values)
+    groups = forces.sizes["oscillator"] // len(np.unique(forces.oscillator_junction))
+    figure, panels = _panels_over_time(forces.oscillator.values, groups=groups)
     for oscillator, panel in panels.items():
         driven = np.flatnonzero(forces.cable_signal == oscillator)[0]
         panel.plot(forces.time, forces.tension[:, driven], **_FIRST)
@@ -60,9 +61,11 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
     """
     end = trajectory.sel(time=slice(trajectory.time[-1] - seconds, None))
     forces = end[["normal_force", "friction_force"]] / POUND_FORCE
-    shown = _contacts_to_show(end, ground)
+    shown = _contacts_to_show(end)
     along = "along x" if ground.flat else "along the forward tangent"
-    figure, panels = _panels_over_time(shown)
+    right = sum(name.endswith(NODES[BOTTOM_RIGHT]) for name in shown)
+    both = right == trajectory.sizes["tetrahedron"]
+    figure, panels = _panels_over_time(shown, groups=2 if both else 1)
     for contact, panel in panels.items():
         node, off = forces.sel(contact=contact), off_ground(end.sel(contact=contact))
         for interval in intervals(off.time.values, off.values):
@@ -77,9 +80,9 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
     return figure
 
 
-def _contacts_to_show(trajectory: xarray.Dataset, ground: Ground) -> list[str]:
-    """The bottom left nodes, those right ones that bear something else, which they do on uneven
-    ground only, the lead's tip where the tips of others cannot touch, and other nodes that do."""
+def _contacts_to_show(trajectory: xarray.Dataset) -> list[str]:
+    """The bottom left nodes, those right ones that bear something else, the lead's tip where the
+    tips of others cannot touch, and other nodes that do."""
     shown, normal = [], trajectory.normal_force
     thesis = not trajectory.contact.str.endswith(" top").any()
     for name in trajectory.contact.values:
@@ -88,15 +91,18 @@ def _contacts_to_show(trajectory: xarray.Dataset, ground: Ground) -> list[str]:
         show = thesis or node == NODES[BOTTOM_LEFT] or bool((force > 0.0).any())
         if node == NODES[BOTTOM_RIGHT]:
             left = normal.sel(contact=f"{body} {NODES[BOTTOM_LEFT]}")
-            show = not ground.flat and bool(abs(force - left).mean() > _MIRRORED * left.mean())
+            show = bool(abs(force - left).mean() > _MIRRORED * left.mean())
         if show:
             shown.append(name)
     return shown
 
 
-def _panels_over_time(names: Sequence[str]) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with one panel of forces per name."""
-    columns = min(math.ceil(len(names) / _ROWS), _COLUMNS)
+def _panels_over_time(names: Sequence[str], *, groups: int = 1) -> tuple[Figure, dict[str, Axes]]:
+    """A figure with one panel of forces per name, so that a column shows the same part of each
+    group of so many."""
+    wanted = min(max(math.ceil(len(names) / _ROWS), min(groups, 2)), _COLUMNS)
+    whole = [c for c in range(1, _COLUMNS + 1) if c % groups == 0 or groups % c == 0]
+    columns = next((c for c in whole if c >= wanted), whole[-1])
     rows = math.ceil(len(names) / columns)
     size = (7.5 if columns == 1 else 9.0), 1.1 + rows * max(min(1.4, 10.0 / rows), 0.75)
     figure = Figure(figsize=size)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -81,7 +82,7 @@ def add_grid(figure: Figure | SubFigure, names: Sequence[str], *, columns: int) 
     for lowest in panels[: len(names)][-columns:]:
         lowest.tick_params(labelbottom=True)
     for name, panel in zip(names, panels, strict=False):
-        panel.set_title(name.replace("_", " "), loc="left")
+        panel.set_title(textwrap.fill(name.replace("_", " "), 110 // columns), loc="left")
     return dict(zip(names, panels, strict=False))
 
 

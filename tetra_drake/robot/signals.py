@@ -119,11 +119,10 @@ def save_signals(
     names = [f"signal_{i + 1}" for i in range(scenario.oscillators)]
     kind = "y_extensor - y_flexor (no unit)" if raw else f"force in {unit} that shortens the cables"
     cables = zip(names, Actuation.of(scenario).cables, strict=True)
-    drives = "; ".join(f"{name}: {driven}" for name, driven in cables)
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",
         f"# time_s: time in s; signal_i: {kind}",
-        f"# {drives}",
+        *(f"# {name}: {driven}" for name, driven in cables),
         ",".join(["time_s", *names]),
     ]
     with whole_file(path) as temporary:

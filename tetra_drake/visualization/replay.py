@@ -7,6 +7,7 @@ import gzip
 import html
 import logging
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,9 +24,11 @@ from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.scene import (
     ASPECT,
+    CABLE_KINDS,
     COLOURS,
     Motion,
     add_robot,
+    cable_kind,
     motions,
     rgba,
     set_surroundings,
@@ -67,9 +70,13 @@ def save_replay(
     Raises InputError if `path` cannot be written.
     """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
-    add_robot(meshcat, MakeStructure(scenario))
+    structure = MakeStructure(scenario)
+    add_robot(meshcat, structure)
     show_replay(meshcat, scenario=scenario, trajectory=trajectory)
-    write_whole(path, pack_page(_with_overlay(meshcat.StaticHtml(), title), title=title))
+    absent = set(CABLE_KINDS) - {cable_kind(cable) for cable in structure.cables}
+    legend = {name: meaning for name, meaning in LEGEND.items() if name not in absent}
+    page = _with_overlay(meshcat.StaticHtml(), title, legend)
+    write_whole(path, pack_page(page, title=title))
 
 
 def replay_title(gait: str, trajectory: xarray.Dataset) -> str:
@@ -164,10 +171,10 @@ def pack_page(page: str, *, title: str) -> str:
     return render("visualization/packed_page.html.jinja", title=title, packed=packed)
 
 
-def _with_overlay(page: str, title: str) -> str:
+def _with_overlay(page: str, title: str, legend: Mapping[str, str]) -> str:
     """Meshcat's page with a title, and over the scene a heading, a legend and a clock."""
-    legend = [(COLOURS[name], meaning) for name, meaning in LEGEND.items()]
-    overlay = render("visualization/overlay.html.jinja", title=title, legend=legend, aspect=ASPECT)
+    lines = [(COLOURS[name], meaning) for name, meaning in legend.items()]
+    overlay = render("visualization/overlay.html.jinja", title=title, legend=lines, aspect=ASPECT)
     # Functions, as backslashes in a replacement text would mean something.
     named = f"<title>{html.escape(title)}</title>"
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)

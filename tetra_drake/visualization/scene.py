@@ -42,6 +42,9 @@ COLOURS = {
 people); neighbouring tetrahedra alternate between odd and even. Uneven ground goes from low to
 high."""
 
+CABLE_KINDS = "actuated", "outer", "inner"
+"""Colours of cables; outer and inner ones are those that no oscillator drives."""
+
 CABLE_RADIUS, HAIRLINE = 0.0003, 0.0001
 """Drawn radius of a cable: m per N of tension, and the least, in m."""
 
@@ -109,8 +112,8 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
     for i, body in enumerate(structure.bodies):
         _add_tetrahedron(meshcat, structure, f"/robot/{body}", rgba("even" if i % 2 else "odd"))
     for cable, name in zip(structure.cables, structure.cable_names, strict=True):
-        path = _cable_path(cable, name)
-        meshcat.SetObject(path, Cylinder(1.0, 1.0), rgba(path.split("/")[2]))
+        kind = cable_kind(cable)
+        meshcat.SetObject(_cable_path(cable, name), Cylinder(1.0, 1.0), rgba(kind))
     for node in structure.contacts:
         for kind in ("normal", "friction"):
             path = f"/forces/{kind}/{structure.node_names[node]}"
@@ -225,13 +228,16 @@ def _add_tetrahedron(meshcat: Meshcat, structure: Structure, path: str, colour: 
         meshcat.SetTransform(f"{path}/{name}", RigidTransform(p_BNi))
 
 
+def cable_kind(cable: np.void) -> str:
+    """One of CABLE_KINDS."""
+    if cable["signal"] != PASSIVE:
+        return "actuated"
+    return "inner" if cable["node_a"] % len(NODES) == TIP else "outer"
+
+
 def _cable_path(cable: np.void, name: str) -> str:
     """Path of a cable in the scene, in one folder per kind."""
-    if cable["signal"] != PASSIVE:
-        kind = "actuated"
-    else:
-        kind = "inner" if cable["node_a"] % len(NODES) == TIP else "outer"
-    return f"/cables/{kind}/{name}"
+    return f"/cables/{cable_kind(cable)}/{name}"
 
 
 def _add_unit_arrow(meshcat: Meshcat, path: str, colour: Rgba) -> None:
