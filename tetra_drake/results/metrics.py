@@ -102,7 +102,7 @@ def compute_metrics(
 
 def compute_fitness(metrics: Metrics | Mapping[str, float], phi: FitnessScenario) -> float:
     """Eq. 10: phi1 dx1 + phi2 abs(x1 - x2) + phi3 (x3 - x1) + phi4 abs(y1), lengths in inches."""
-    values = dataclasses.asdict(metrics) if isinstance(metrics, Metrics) else metrics
+    values = vars(metrics) if isinstance(metrics, Metrics) else metrics
     return sum(
         getattr(phi, term) * (values[metric] / INCH) for term, metric in FITNESS_TERMS.items()
     )
