@@ -21,6 +21,9 @@ kernels note besides; and their number."""
 class Network(NamedTuple):
     """The constants of a network, by neuron."""
 
+    first: Table
+    """(2n,): the first of the neurons that inhibit each, and next, the one after the last."""
+    beyond: Table
     inhibition: Table
     """(2n, 2n): W[i, j], of neuron i by neuron j."""
     per_tau_a: Table
@@ -45,8 +48,12 @@ class Network(NamedTuple):
         matrix = np.array(inhibition, dtype=float)
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] % 2:
             raise ValueError(f"found inhibition of shape {matrix.shape}, expected (2n, 2n)")
+        inhibits = matrix != 0.0
+        first = inhibits.argmax(axis=1)
+        beyond = np.where(inhibits.any(axis=1), len(matrix) - inhibits[:, ::-1].argmax(axis=1), 0)
         constants = 1.0 / np.asarray(tau_a), 1.0 / np.asarray(tau_b), self_inhibition_weight
-        return cls(matrix, *(np.full(len(matrix), values, dtype=float) for values in constants))
+        by_neuron = (np.full(len(matrix), values, dtype=float) for values in constants)
+        return cls(first, beyond, matrix, *by_neuron)
 
 
 def make_neurons(state: Array) -> Array:
@@ -68,7 +75,7 @@ def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
     for i in range(count):
         u, v, y = neurons[i, U], neurons[i, V], neurons[i, Y]
         total = inputs[i] - u - network.self_inhibition_weight[i] * v
-        for j in range(count):
+        for j in range(network.first[i], network.beyond[i]):
             total -= network.inhibition[i, j] * neurons[j, Y]
         neurons[i, U_RATE] = total * network.per_tau_a[i]
         neurons[i, V_RATE] = (y - v) * network.per_tau_b[i]

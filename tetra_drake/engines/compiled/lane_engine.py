@@ -208,8 +208,11 @@ class LaneEngine:
         numbers["tonic"] = tonic_input(scenario, each.structure, turns)[0]
         for name, values in numbers.items():
             getattr(self._walks, name).array[..., lane] = values
-        tables = *self._robot_tables, *self._walks.network, *self._walks.senses[_INDICES:]
-        constants = *_numbers(model), *network, *senses[_INDICES:]
+        first, beyond, *tables = self._walks.network
+        first.array[:] = np.minimum(first.array, network.first)  # so that they hold for all lanes
+        beyond.array[:] = np.maximum(beyond.array, network.beyond)
+        tables += [*self._robot_tables, *self._walks.senses[_INDICES:]]
+        constants = *network[2:], *_numbers(model), *senses[_INDICES:]
         for table, values in zip(tables, constants, strict=True):
             table.array[..., lane] = values
         heights = self._heights[lane]
@@ -331,6 +334,8 @@ def _tables(first: Walk, robot: Model, width: int) -> Walks:
     tables |= {
         "robot": robot,
         "network": Network(
+            first=FieldArray(np.full(neurons, neurons)),
+            beyond=FieldArray(np.zeros(neurons, dtype=np.int64)),
             inhibition=lane_table((neurons, neurons), width, any_size=True),
             per_tau_a=table(neurons),
             per_tau_b=table(neurons),
