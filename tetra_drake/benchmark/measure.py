@@ -161,7 +161,7 @@ def measure(
 
     Raises InputError if MuJoCo is asked for by its set and cannot simulate the scenario.
     """
-    left_out = "mujoco" not in sets and (scenario.cables.slack or not installed())
+    left_out = "mujoco" not in sets and not _mujoco_can(scenario)
     settings = [changes for name in sets for changes in settings_of(name)]
     rows = [row for row in _rows(scenario, settings) if not (left_out and row.engine == "mujoco")]
     engines = {row.engine for row in rows}
@@ -235,6 +235,10 @@ def ground_speed(name: str, alone: Batch, many: Batch, diagram: Batch) -> dict[s
     columns = {"compiled": alone, "compiled_many": many, "drake": diagram}
     factors = {key: statistics.median(batch.factors) for key, batch in columns.items()}
     return {"ground": name, "steps": many.steps / GROUND_BATCH} | factors
+
+
+def _mujoco_can(scenario: Scenario) -> bool:
+    return installed() and not scenario.cables.slack and not scenario.cpg.feedback
 
 
 def _grounds(scenario: Scenario) -> Iterator[tuple[str, list[Batch]]]:

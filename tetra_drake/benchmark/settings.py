@@ -16,7 +16,8 @@ SETS = ("default", "integrators", "compiled", "mujoco")
 
 def grounds() -> dict[str, Changes]:
     """Grounds to compare the speed on: the scenario's, and with what the shipped scenario `rough`
-    has other than the thesis."""
+    has other than the thesis. On the first, a network that is computed beforehand and a live one.
+    """
     shipped = load_scenario("rough")
     rough = {"terrain": shipped.terrain, "robot.contacts": shipped.robot.contacts}
     coulomb = {
@@ -25,6 +26,11 @@ def grounds() -> dict[str, Changes]:
     }
     return {
         "the scenario's": {},
+        "the scenario's, signals computed beforehand": {
+            "cpg.signals": "recorded",
+            "cpg.feedback": [],
+        },
+        "the scenario's, live network": {"cpg.signals": "live"},
         "with Coulomb friction": coulomb,
         "rough": rough,
         "rough, with Coulomb friction": rough | coulomb,

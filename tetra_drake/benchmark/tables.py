@@ -62,7 +62,10 @@ def to_markdown(found: dict[str, Any]) -> str:
             f"ground differs, and its distances differ by {apart} in (median) from ours."
         )
     elif mujoco["left_out"]:
-        parts.append(f"Without MuJoCo: it is not installed ({INSTALL}), or cables may go slack.")
+        parts.append(
+            f"Without MuJoCo: it is not installed ({INSTALL}), or cables may go slack, or there is "
+            "feedback."
+        )
     if found["batches"]:
         parts.append(_table(found["batches"], BATCHES))
         parts.append(
