@@ -61,8 +61,8 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     np.testing.assert_allclose(walk.length[-1], settled_lengths(scenario), rtol=1e-6)
 
 
-@pytest.mark.parametrize("tetrahedra", [2, 3, 5, 7, 12, 40])
 @pytest.mark.parametrize("contacts", ["thesis", "all"])
+@pytest.mark.parametrize("tetrahedra", [2, 3, 5, 12])
 def test_the_ground_bears_the_weight_whatever_the_stiffnesses(scenario, tetrahedra, contacts):
     scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra, "robot.contacts": contacts})
     cables, ground, factors = scenario.cables, scenario.ground, (0.5, 1.0, 1.5)

@@ -100,50 +100,24 @@ class ParameterSpace:
         With equal bounds a parameter is fixed. With `tau_mutation: listing` tau_A does not mutate:
         the listing's index 26 is that of tau_B. An independent tau_B has twice tau_A's numbers.
         """
-        settings, bounds, actuation = (
-            scenario.evolution,
-            scenario.gait_bounds,
-            Actuation.of(scenario),
-        )
-        own = np.arange(len(actuation.images))
-        pairs = np.minimum(own, actuation.images) if bounds.mirrored else own
-        chosen, places = np.unique(pairs, return_inverse=True)
-        tau, scale = (
-            (bounds.tau_a_min, bounds.tau_a_max),
-            (bounds.time_scale_min, bounds.time_scale_max),
-        )
-        gain, weight = (bounds.gain_min, bounds.gain_max), (bounds.weight_min, bounds.weight_max)
-        twice = TAU_B_PER_TAU_A * tau[0], TAU_B_PER_TAU_A * tau[1]
-        junctions = 0 if scale == (1.0, 1.0) else scenario.robot.tetrahedra - 1
-        tau_step = 0.0 if tau[0] == tau[1] else settings.tau_mutation_range
-        tau_a_step = 0.0 if settings.tau_mutation == "listing" else tau_step
-        scale_step = 0.0 if scale[0] == scale[1] else settings.time_scale_mutation
-        gain_step = 0.0 if gain[0] == gain[1] else settings.gain_mutation
-        rows = [
-            *(
-                (f"weight {actuation.weight_names[i]}", *weight, settings.weight_mutation, 0.0)
-                for i in chosen
-            ),
-            *(
-                (f"time scale T{i + 1}-T{i + 2}", *scale, scale_step, scale[0])
-                for i in range(junctions)
-            ),
-            *((f"gain {name}", *gain, gain_step, -math.inf) for name in scenario.cpg.feedback),
-            ("tau_A", *tau, tau_a_step, tau[0]),
-            ("tau_B", *twice, TAU_B_PER_TAU_A * tau_step, twice[0]),
-        ]
-        names, low, high, steps, floors = zip(*rows, strict=True)
+        actuation = Actuation.of(scenario)
+        images = np.arange(len(actuation.images))
+        if scenario.gait_bounds.mirrored:
+            images = np.minimum(images, actuation.images)
+        chosen, places = np.unique(images, return_inverse=True)
+        weights = [actuation.weight_names[i] for i in chosen]
+        names, low, high, steps, floors = zip(*_parameters(scenario, weights), strict=True)
         return cls(
             names=names,
             low=np.array(low),
             high=np.array(high),
             steps=np.array(steps),
             floors=np.array(floors),
-            couples_tau_b=not settings.independent_tau_b,
+            couples_tau_b=not scenario.evolution.independent_tau_b,
             weights=places,
-            junctions=junctions,
+            junctions=sum(name.startswith("time scale") for name in names),
             pathways=tuple(scenario.cpg.feedback),
-            turn=bounds.turn,
+            turn=scenario.gait_bounds.turn,
         )
 
     def gait(self, vector: Vector, *, name: str) -> Gait:
@@ -179,6 +153,30 @@ class ParameterSpace:
         if self.couples_tau_b:
             repaired[TAU_B] = TAU_B_PER_TAU_A * vector[TAU_A]
         return repaired
+
+
+def _parameters(scenario: Scenario, weights: list[str]) -> list[tuple[str, *tuple[float, ...]]]:
+    """Name, lower and upper bound, step and floor of each parameter."""
+    bounds, settings, junctions = scenario.gait_bounds, scenario.evolution, []
+    if (bounds.time_scale_min, bounds.time_scale_max) != (1.0, 1.0):
+        junctions = [f"T{i + 1}-T{i + 2}" for i in range(scenario.robot.tetrahedra - 1)]
+
+    def kind(name: str, step: float, floor: float) -> tuple[float, float, float, float]:
+        low, high = getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max")
+        return low, high, 0.0 if low == high and name != "weight" else step, floor
+
+    weight = kind("weight", settings.weight_mutation, 0.0)
+    scale = kind("time_scale", settings.time_scale_mutation, bounds.time_scale_min)
+    gain = kind("gain", settings.gain_mutation, -math.inf)
+    low, high, step, floor = kind("tau_a", settings.tau_mutation_range, bounds.tau_a_min)
+    tau_b = (TAU_B_PER_TAU_A * number for number in (low, high, step, floor))
+    return [
+        *((f"weight {name}", *weight) for name in weights),
+        *((f"time scale {name}", *scale) for name in junctions),
+        *((f"gain {name}", *gain) for name in scenario.cpg.feedback),
+        ("tau_A", low, high, 0.0 if settings.tau_mutation == "listing" else step, floor),
+        ("tau_B", *tau_b),
+    ]
 
 
 WALKING_SEED = 80

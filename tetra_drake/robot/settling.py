@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from typing import NamedTuple
 
@@ -125,12 +126,13 @@ def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.nda
     stiffness, held = stiffness_at_rest(robot, state), _free_motions(robot, state)
     hard, shift = robot.ground.law["stiffness"][0], 0.0
     stiffness = 0.5 * (stiffness + stiffness.T) + hard * held @ held.T
-    step = np.full_like(force, np.nan)
-    while shift < np.inf and not solve_definite(
-        stiffness, shift, LEAST_STIFFNESS * hard, force, step
-    ):
+    while shift < np.inf:
+        shifted = stiffness + shift * np.eye(len(force))
+        with contextlib.suppress(np.linalg.LinAlgError):  # not positive definite
+            if np.linalg.cholesky(shifted).diagonal().min() ** 2 > LEAST_STIFFNESS * hard:
+                return np.linalg.solve(shifted, force)
         shift = max(10.0 * shift, LEAST_STIFFNESS * hard)
-    return step
+    return np.full_like(force, np.nan)
 
 
 def _free_motions(robot: Resting, state: np.ndarray) -> np.ndarray:
@@ -182,36 +184,3 @@ def stiffness_at_rest(robot: Resting, state: Table) -> Table:
         motion[j] = 0.0
         stiffness[:, j] = (behind - ahead) / (2.0 * half)
     return stiffness
-
-
-@compiled
-def solve_definite(
-    matrix: Table, shift: float, least_pivot: float, right_side: Table, solution: Table
-) -> bool:
-    """Whether a symmetric matrix with `shift` on its diagonal is positive definite; if so, solves
-    for the `solution`, by Cholesky.
-
-    NumPy's solvers start threads, which takes long where others use the cores.
-    """
-    count, factor = right_side.size, np.empty_like(matrix)
-    for i in range(count):
-        for j in range(i + 1):
-            total = matrix[i, j]
-            for k in range(j):
-                total -= factor[i, k] * factor[j, k]
-            if j < i:
-                factor[i, j] = total / factor[j, j]
-        if not total + shift > least_pivot:
-            return False
-        factor[i, i] = np.sqrt(total + shift)
-    for i in range(count):
-        total = right_side[i]
-        for k in range(i):
-            total -= factor[i, k] * solution[k]
-        solution[i] = total / factor[i, i]
-    for i in range(count - 1, -1, -1):
-        total = solution[i]
-        for k in range(i + 1, count):
-            total -= factor[k, i] * solution[k]
-        solution[i] = total / factor[i, i]
-    return True
