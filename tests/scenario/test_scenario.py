@@ -86,7 +86,7 @@ UNDULATION = {
     "evolution.independent_tau_b": True,
 }
 NETWORKS = {
-    "undulation": ("thesis", UNDULATION),
+    "undulation": ("coulomb", UNDULATION),
     "turning": (
         "undulation",
         {
