@@ -1,6 +1,7 @@
 """Networks of any grouping, steering and feedback: symmetries and agreement of the engines."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ from helpers.converged import FINE
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.robot.actuation import Actuation
-from tetra_drake.robot.gait import Gains, Gait, seeded_gait
+from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import PATHWAYS, Scenario
+from tetra_drake.scenario.units import INCH
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 BOTH = pytest.mark.parametrize("engine", ["drake", "compiled"])
@@ -148,6 +150,20 @@ def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
         simulator.AdvanceTo(0.2)
         states.append(simulator.get_context().get_continuous_state_vector().CopyToVector())
     np.testing.assert_array_equal(*states)
+
+
+def test_one_gait_walks_straight_on_and_turns_either_way(data):
+    scenario = load_scenario("turning").with_changes({"simulation.engine": "compiled"})
+    gait = load_gait(data / "gait_turning.json", scenario)
+    left, straight, right = (
+        simulate(scenario=scenario, gait=dataclasses.replace(gait, turn=turn)).metrics
+        for turn in (1.0, 0.0, -1.0)
+    )
+    # It turned twice around in 30 s when it was evolved; another processor may round otherwise.
+    assert left.heading_change > math.radians(45.0)
+    assert right.heading_change == pytest.approx(-left.heading_change, rel=0.05)
+    assert abs(straight.heading_change) < math.radians(1.0)
+    assert straight.distance < -10.0 * INCH  # tips last
 
 
 def test_lanes_with_other_gains_turns_and_time_scales_keep_their_numbers(scenario):
