@@ -83,6 +83,8 @@ UNDULATION = {
     "cpg.reach": 1,
     "gait_bounds.weight_min": 0.0,
     "gait_bounds.weight_max": 1.0,
+    "fitness.twist": -1.0,
+    "fitness.direction": 1.0,
     "evolution.independent_tau_b": True,
 }
 NETWORKS = {
