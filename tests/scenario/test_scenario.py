@@ -123,7 +123,7 @@ def test_shipped_networks_differ_from_their_bases_in_the_network_only(name):
     [
         ({"robot.actuation": []}, "robot.actuation", "[]"),
         ({"robot.actuation": [LEFT, []]}, "robot.actuation", "[]"),
-        ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
+        ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "['outer bottom_left'] twice"),
         ({"robot.actuation": [["outer left"]]}, "robot.actuation[0][0]", "'outer left'"),
         ({"robot.actuation": [LEFT], "gait_bounds.mirrored": True}, "gait_bounds.mirrored", "true"),
         ({"cpg.reach": -1}, "cpg.reach", "-1"),
@@ -134,6 +134,7 @@ def test_shipped_networks_differ_from_their_bases_in_the_network_only(name):
             *("robot.gravity", "0 m/s^2"),
         ),
         ({"gait_bounds.turn": 1.5}, "gait_bounds.turn", "1.5"),
+        ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
         ({"gait_bounds.gain_min": 2.0}, "gait_bounds.gain_min", "2"),
         ({"gait_bounds.time_scale_min": 1.5}, "gait_bounds.time_scale_min", "1.5"),
     ],

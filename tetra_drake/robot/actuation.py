@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.scenario.schema import CABLES, Scenario, mirrored
+from tetra_drake.scenario.schema import CABLES, SIDES, Scenario, mirrored
 
 KINDS = "extensor", "flexor"
 """Of neurons, by their number modulo 2."""
@@ -88,7 +88,7 @@ def parse_weight_name(name: str) -> tuple[str, int, int] | None:
 
 
 def _side(group: list[str]) -> float:
-    for side, name in ((1.0, "left"), (-1.0, "right")):
+    for side, name in zip((1.0, -1.0), SIDES, strict=True):
         if all(cable.endswith(name) for cable in group):
             return side
     return 0.0

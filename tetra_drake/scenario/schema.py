@@ -30,6 +30,9 @@ CABLES = (
 """The cables of a junction, from one tetrahedron to the next: outer ones join base nodes of the
 same name, inner ones join the tip to base nodes."""
 
+SIDES = ("left", "right")
+"""How the names of cables on one side of the robot end."""
+
 PATHWAYS = ("length", "load", "pitch")
 """What can be fed back to the oscillators; see physics.feedback."""
 
@@ -344,37 +347,56 @@ def _balance(scenario: Scenario, source: object) -> None:
 def _check_relations(scenario: Scenario, source: object) -> None:
     """Checks values of a scenario against each other; raises InputError."""
     bounds, simulation, n = scenario.gait_bounds, scenario.simulation, scenario.robot.tetrahedra
-    offsets, groups = len(scenario.robot.offsets), scenario.robot.actuation
-    start, end = simulation.steady_from, simulation.duration
-    law, cpg = scenario.friction, scenario.cpg
+    offsets, start, end = len(scenario.robot.offsets), simulation.steady_from, simulation.duration
+    law = scenario.friction
     mu, most = (law.kinetic, law.static) if isinstance(law, Coulomb) else (0.0, 0.0)
-    cables = [cable for group in groups for cable in group]
-    twice = next((cable for cable in cables if cables.count(cable) > 1), None)
-    alone = next((g for g in groups if {*mirrored(g)} not in map(set, groups)), None)
-    unpaired, blind = bounds.mirrored and alone, cpg.feedback and cpg.signals != "live"
-    for name in ("weight", "tau_a", "gain", "time_scale"):
-        low, high = getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max")
-        if low > high:
-            problem = f"found {low}, expected at most {name}_max, {high}"
-            raise InputError(source, f"gait_bounds.{name}_min", problem)
+    ranges = {
+        name: (getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max"))
+        for name in ("weight", "tau_a", "gain", "time_scale")
+    }
     for wrong, key, found, expected in (
+        *(
+            (low > high, f"gait_bounds.{name}_min", low, f"at most {name}_max, {high}")
+            for name, (low, high) in ranges.items()
+        ),
         (start >= end, "simulation.steady_from", f"{start} s", f"less than the duration, {end} s"),
         (mu > most, "friction.kinetic", mu, f"at most static, {most}"),
         (offsets not in (0, n), "robot.offsets", f"{offsets} items", f"none or {n}, one each"),
-        (not all(groups) or not groups, "robot.actuation", groups, "groups of at least one cable"),
-        (twice, "robot.actuation", f"'{twice}' twice", "each cable once at most"),
-        (unpaired, "gait_bounds.mirrored", "true", f"false, as {alone} has no mirror image"),
-        (
-            "load" in cpg.feedback and scenario.robot.gravity == 0.0,
-            *("robot.gravity", "0 m/s^2", "weight for feedback of the load"),
-        ),
-        (blind, "cpg.signals", f"'{cpg.signals}'", f"'live' for feedback of {cpg.feedback}"),
+        *_network_relations(scenario),
     ):
         if wrong:
             raise InputError(source, key, f"found {found}, expected {expected}")
 
 
+def _network_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:
+    """What may be wrong with groups, steering and feedback: whether it is, key, found, expected."""
+    groups, bounds, cpg = scenario.robot.actuation, scenario.gait_bounds, scenario.cpg
+    cables = [cable for group in groups for cable in group]
+    twice = [cable for cable in cables if cables.count(cable) > 1][:1]
+    alone = [group for group in groups if {*mirrored(group)} not in map(set, groups)][:1]
+    sided = any(all(cable.endswith(side) for cable in g) for g in groups for side in SIDES)
+    needs_live, weightless = bool(cpg.feedback), scenario.robot.gravity == 0.0
+    actuation, turn, live = "robot.actuation", "gait_bounds.turn", "'live' for feedback of"
+    return [
+        (not groups or not all(groups), actuation, groups, "groups of at least one cable"),
+        (bool(twice), actuation, f"{twice} twice", "each cable once at most"),
+        (bounds.turn != 0.0 and not sided, turn, bounds.turn, "0, as no group is on one side"),
+        (
+            bounds.mirrored and bool(alone),
+            *("gait_bounds.mirrored", "true", f"false, as {alone} has no mirror image"),
+        ),
+        (
+            "load" in cpg.feedback and weightless,
+            *("robot.gravity", "0 m/s^2", "a weight, for feedback of the load"),
+        ),
+        (
+            needs_live and cpg.signals != "live",
+            *("cpg.signals", f"'{cpg.signals}'", f"{live} {cpg.feedback}"),
+        ),
+    ]
+
+
 def mirrored(cables: list[str]) -> list[str]:
     """The cables of a junction on the other side of the robot, by their names in CABLES."""
-    swap = {"left": "right", "right": "left"}
+    swap = dict(zip(SIDES, reversed(SIDES), strict=True))
     return ["_".join(swap.get(part, part) for part in cable.split("_")) for cable in cables]
