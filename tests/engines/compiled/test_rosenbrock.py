@@ -65,7 +65,8 @@ class Stepper:
             signals = 1e2 * PULL * i * h
             compute_forces(self.robot, self.modes, signals, True, self.forces, work.force)
             signals = 1e2 * PULL * (i + 1) * h
-            estimates.append(take_step(self.robot, work, self.modes, self.forces, signals, h))
+            robot, modes, forces = self.robot, self.modes, self.forces
+            estimates.append(take_step(robot, work, modes, forces, signals, h, False))
             work.state[:] = work.end
         return work.state.copy(), estimates[0]
 
