@@ -127,6 +127,12 @@ class Walk:
         within = self.scenario.compiled.max_step / self.scenario.cpg.listing_step
         return 1 << math.ceil(math.log2(2.0 * within + 32.0))
 
+    @property
+    def turn_samples(self) -> int:
+        """How many samples of the turn an engine has to hold."""
+        steps = self.scenario.simulation.duration / self.scenario.cpg.listing_step
+        return 1 if self.steering is None else round(steps) + 1
+
 
 class Course(NamedTuple):
     """How a walk went."""
@@ -164,7 +170,7 @@ class LaneEngine:
             modes=np.zeros((*shape, len(structure.contacts), MODE_COLUMNS)),
             signals=np.zeros((*shape, signals)),
             recent=np.zeros((width, first.recent_signals, signals)),
-            turns=np.zeros((width, len(_turns(first)))),
+            turns=np.zeros((width, first.turn_samples)),
         )
         log = Log(*(FieldArray(array, any_size=True) for array in self._log))
         self._arguments = self._walks, log, *first.signals
@@ -181,8 +187,9 @@ class LaneEngine:
         """Whether a walk can be simulated: one like the first in structure and kind of signals,
         and with no more to keep."""
         log, heights = self._log, self._heights.shape[1]
-        room = log.times.shape[1] - 1, log.recent.shape[1], heights
-        needs = len(each.times), each.recent_signals, each.model.ground.heights.size
+        room = log.times.shape[1] - 1, log.recent.shape[1], log.turns.shape[1], heights
+        needs = len(each.times), each.recent_signals, each.turn_samples
+        needs = *needs, each.model.ground.heights.size
         return each.kind == self._kind and all(map(operator.le, needs, room))
 
     @property
@@ -196,7 +203,8 @@ class LaneEngine:
         modes = starting_modes(each.structure, model.ground)
         cpg, simulation, compiled = scenario.cpg, scenario.simulation, scenario.compiled
         network = make_network(scenario, each.structure, each.gait)
-        senses, turns = each.senses, _turns(each)
+        senses = each.senses
+        turns = sample_turns(scenario, each.structure, each.gait, each.steering)
         numbers: dict[str, Any] = dataclasses.asdict(compiled)
         numbers |= {name: getattr(simulation, name) for name in ("max_speed", "max_evaluations")}
         numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
@@ -284,10 +292,6 @@ def lanes_for(walks: float) -> int:
 def processor_features() -> str:
     """The instructions that numba compiles for, such as +avx2: its settings', or the machine's."""
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
-
-
-def _turns(walk: Walk) -> np.ndarray:
-    return sample_turns(walk.scenario, walk.structure, walk.gait, walk.steering)
 
 
 def _numbers(model: Model) -> list[np.ndarray]:

@@ -269,7 +269,7 @@ def steer(w: Walks, log: Log, sample: Real) -> None:
         return
     w.clock[FLAG] = sample
     for lane in range(log.kept.size):
-        i = min(int(floats[FLAG, lane]), turns - 2)
+        i = max(0, min(int(floats[FLAG, lane]), turns - 2))
         before, after = log.turns[lane, i], log.turns[lane, i + 1]
         turn = before + (min(floats[FLAG, lane], turns - 1.0) - i) * (after - before)
         for k in range(w.tonic.size):
