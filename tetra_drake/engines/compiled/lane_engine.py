@@ -188,8 +188,8 @@ class LaneEngine:
         and with no more to keep."""
         log, heights = self._log, self._heights.shape[1]
         room = log.times.shape[1] - 1, log.recent.shape[1], log.turns.shape[1], heights
-        needs = len(each.times), each.recent_signals, each.turn_samples
-        needs = *needs, each.model.ground.heights.size
+        own = each.model.ground.heights.size
+        needs = len(each.times), each.recent_signals, each.turn_samples, own
         return each.kind == self._kind and all(map(operator.le, needs, room))
 
     @property
