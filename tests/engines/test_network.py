@@ -80,7 +80,7 @@ def test_two_alike_oscillators_per_junction_walk_as_the_thesis_s_one(scenario, e
 @pytest.mark.parametrize("signals", ["recorded", "live"])
 def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
     every = list(PATHWAYS) if signals == "live" else []
-    changes = {"cpg__signals": signals, "cpg__feedback": every, "robot__tetrahedra": 3}
+    changes = {"cpg__signals": signals, "cpg__feedback": every}
     scenario = shortly(load_scenario("undulation"), 1.0, **changes)
     gait = dataclasses.replace(seeded_gait(scenario, 3), turn=0.4)
     one, other = walk(scenario, gait, engine), walk(scenario, image(gait, scenario), engine)
@@ -91,7 +91,7 @@ def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
 @BOTH
 def test_without_a_turn_a_mirrored_network_walks_straight_on(engine):
     scenario = load_scenario("turning").with_changes({"gait_bounds.turn": 0.0})
-    scenario = shortly(scenario, 1.0, robot__tetrahedra=3)
+    scenario = shortly(scenario, 1.0)
     walked = walk(scenario, seeded_gait(scenario), engine)
     np.testing.assert_allclose(mirrored(walked), walked.p_WN.values, atol=1e-8)
     assert np.ptp(walked.signal.values) > 1.0
@@ -121,7 +121,7 @@ def test_engines_agree_with_each_feedback_and_it_matters(scenario, pathway):
 @pytest.mark.parametrize("signals", ["listing", "recorded", "live"])
 def test_engines_agree_on_a_steering_signal(signals):
     scenario = load_scenario("turning").with_changes({"gait_bounds.turn": 0.0})
-    changes = FINE | {"cpg.signals": signals, "robot.tetrahedra": 3, "cpg.listing_step": 1e-4}
+    changes = FINE | {"cpg.signals": signals, "cpg.listing_step": 1e-4}
     short = shortly(scenario, 0.4, **changes)
     gait = seeded_gait(short)
 
@@ -138,7 +138,7 @@ def test_engines_agree_on_a_steering_signal(signals):
 
 
 def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
-    scenario = load_scenario("turning").with_changes({"robot.tetrahedra": 3})
+    scenario = load_scenario("turning")
     short = shortly(scenario, 0.2)
     gait = seeded_gait(short)
     states = []
