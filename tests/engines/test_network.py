@@ -14,7 +14,7 @@ from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import PATHWAYS, Scenario
+from tetra_drake.scenario.schema import PATHWAYS, Coulomb, Scenario
 from tetra_drake.scenario.units import INCH
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -109,13 +109,15 @@ def test_zero_gains_give_the_walk_without_feedback(scenario, engine):
 
 @pytest.mark.parametrize("pathway", PATHWAYS)
 def test_engines_agree_with_each_feedback_and_it_matters(scenario, pathway):
-    short = shortly(scenario, 0.4, **{**FINE, **LIVE, "cpg.feedback": [pathway]})
+    # On Coulomb friction: the reset integrator's modes change 1e5 times while the robot lands.
+    changes = {**FINE, **LIVE, "cpg.feedback": [pathway], "friction": Coulomb()}
+    short = shortly(scenario, 0.3, **changes)
     gait = dataclasses.replace(seeded_gait(short), gains=Gains(**{pathway: 1.0}))
     ours, theirs = (walk(short, gait, engine) for engine in ("compiled", "drake"))
     np.testing.assert_allclose(ours.signal.values, theirs.signal.values, atol=2e-5)
     np.testing.assert_allclose(ours.p_WN.values, theirs.p_WN.values, atol=1e-6)
     none = walk(short, dataclasses.replace(gait, gains=Gains()), "compiled")
-    assert np.abs(none.signal - ours.signal).max() > 1e-3
+    assert np.abs(none.signal - ours.signal).max() > 1e-3, "ten times what engines may differ by"
 
 
 @pytest.mark.parametrize("signals", ["listing", "recorded", "live"])
