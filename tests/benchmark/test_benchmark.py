@@ -38,8 +38,7 @@ def short(scenario: Scenario) -> Scenario:
 @pytest.fixture
 def no_mujoco(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine without MuJoCo."""
-    for module in (mujoco_engine, benchmark):
-        monkeypatch.setattr(module, "installed", lambda: False)
+    monkeypatch.setattr(mujoco_engine, "installed", lambda: False)
 
 
 @pytest.fixture(autouse=True)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray
-from helpers.converged import FINE
+from helpers.converged import FINE, shortly
 from helpers.states import body_velocities
 from pydrake.systems.analysis import Simulator
 
@@ -39,11 +39,9 @@ TERRAINS: dict[str, Terrain] = {
 }
 
 
-def shortly(scenario: Scenario, duration: float, **changes: object) -> Scenario:
+def converged(scenario: Scenario, duration: float, **changes: object) -> Scenario:
     """A short converged simulation, driven from the start."""
-    times = {"simulation.duration": duration, "simulation.steady_from": 0.5 * duration}
-    given = {key.replace("__", "."): value for key, value in changes.items()}
-    return scenario.with_changes({**times, **FINE, **given})
+    return shortly(scenario, duration, **{**FINE, **changes})
 
 
 def trajectory(scenario: Scenario, engine: str) -> xarray.Dataset:
@@ -67,7 +65,7 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, heigh
     friction = scenario.friction if friction == "reset" else friction
     surface = TERRAINS.get(terrain, height_field)
     changes = {"terrain": surface, "friction": friction, "robot__contacts": "all"}
-    short = shortly(scenario, 0.15, **changes)
+    short = converged(scenario, 0.15, **changes)
     ours, drakes = (trajectory(short, engine)["p_WN"].values for engine in ("compiled", "drake"))
     # As in test_compiled_simulation: with the reset integrator 1.75e-6 m/s per mode change, for
     # 0.15 s, and some forty of them. Coulomb friction hardly jumps.
@@ -80,7 +78,7 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, heigh
 @pytest.mark.parametrize("engine", ["compiled", "drake"])
 def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction, engine):
     slope, friction = np.radians(8.0), scenario.friction if friction == "reset" else friction
-    short = shortly(scenario, 0.3, friction=friction)
+    short = converged(scenario, 0.3, friction=friction)
     inclined = short.with_changes({"terrain": Incline(slope)})
     up_the_slope = trajectory(inclined, engine)["p_WN"].values[-1].reshape(-1, 3)
 
@@ -103,7 +101,7 @@ def test_contact_never_gives_energy(scenario, friction):
     friction = scenario.friction if friction == "reset" else friction
     fall = {"robot__offsets": [[0.0, 0.0, 0.005]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
     rough = Rough(0.25 * INCH, 4.0 * INCH, seed=5)
-    falling = shortly(scenario, 0.6, terrain=rough, friction=friction, **fall)
+    falling = converged(scenario, 0.6, terrain=rough, friction=friction, **fall)
     structure, gravity = MakeStructure(falling), falling.robot.gravity
     body = make_model(falling, structure).body
     walk = trajectory(falling.with_changes({"simulation.sample_period": 2e-3}), "compiled")

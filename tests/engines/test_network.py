@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray
-from helpers.converged import FINE
+from helpers.converged import FINE, shortly
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -28,12 +28,6 @@ WITNESSED = {
     "simulation.mode_changes": "witness",
 }
 """Settings of the diagram within 0.03 in of converged distances."""
-
-
-def shortly(scenario: Scenario, duration: float, **changes: object) -> Scenario:
-    times = {"simulation.duration": duration, "simulation.steady_from": 0.5 * duration}
-    given = {key.replace("__", "."): value for key, value in changes.items()}
-    return scenario.with_changes({**times, "cpg.start_up": 0.0, **given})
 
 
 def walk(
@@ -137,6 +131,14 @@ def test_engines_agree_on_a_steering_signal(signals):
     before = ours.time.values < 0.199  # the listing is one step ahead
     np.testing.assert_allclose(left[before], right[before], atol=1e-12)
     assert np.abs(left - right)[-1] > 0.01
+
+
+@BOTH
+@pytest.mark.parametrize("signals", ["recorded", "live"])
+def test_a_turn_beyond_1_is_refused_on_both_engines(engine, signals, refused):
+    scenario = shortly(load_scenario("turning"), 0.2, cpg__signals=signals)
+    with refused("steering", "at 0.1 s", "1.5"):
+        walk(scenario, seeded_gait(scenario), engine, lambda t: 1.5 if t > 0.0999 else 0.0)
 
 
 def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():

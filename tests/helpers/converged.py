@@ -1,4 +1,6 @@
-"""Settings at which the diagram and the compiled engine agree to micrometres."""
+"""Short walks, and settings at which the diagram and the compiled engine agree to micrometres."""
+
+from tetra_drake.scenario.schema import Scenario
 
 FINE = {
     "cpg.start_up": 0.0,
@@ -13,3 +15,10 @@ FINE = {
 }
 """Settings at which both engines have converged, mode changes placed to 1e-8 s, for short walks
 that are driven from the start."""
+
+
+def shortly(scenario: Scenario, duration: float, **changes: object) -> Scenario:
+    """A short simulation, driven from the start; `cpg__reach=1` changes cpg.reach."""
+    times = {"simulation.duration": duration, "simulation.steady_from": 0.5 * duration}
+    given = {key.replace("__", "."): value for key, value in changes.items()}
+    return scenario.with_changes({**times, "cpg.start_up": 0.0, **given})

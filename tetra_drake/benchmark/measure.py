@@ -21,9 +21,9 @@ from tetra_drake.benchmark.settings import (
     own,
     settings_of,
 )
-from tetra_drake.engines.mujoco import installed
+from tetra_drake.engines.mujoco import check_mujoco
 from tetra_drake.engines.simulate import available_cores, simulate, simulate_many
-from tetra_drake.errors import SimulationFailure
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult, versions
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.scenario.schema import Scenario
@@ -238,7 +238,11 @@ def ground_speed(name: str, alone: Batch, many: Batch, diagram: Batch) -> dict[s
 
 
 def _mujoco_can(scenario: Scenario) -> bool:
-    return installed() and not scenario.cables.slack and not scenario.cpg.feedback
+    try:
+        check_mujoco(scenario)
+    except InputError:
+        return False
+    return True
 
 
 def _grounds(scenario: Scenario) -> Iterator[tuple[str, list[Batch]]]:

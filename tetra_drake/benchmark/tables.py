@@ -63,8 +63,7 @@ def to_markdown(found: dict[str, Any]) -> str:
         )
     elif mujoco["left_out"]:
         parts.append(
-            f"Without MuJoCo: it is not installed ({INSTALL}), or cables may go slack, or there is "
-            "feedback."
+            f"Without MuJoCo: it is not installed ({INSTALL}), or cannot simulate the scenario."
         )
     if found["batches"]:
         parts.append(_table(found["batches"], BATCHES))

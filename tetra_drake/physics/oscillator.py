@@ -64,6 +64,13 @@ def make_neurons(state: Array) -> Array:
 
 
 @compiled
+def steered_input(external_input: Real, turn: Table, side: Table) -> Table:
+    """The tonic input by the turn, for neurons on the left (side 1), on the right (-1) or neither
+    (0), as Matsuoka's snakes are steered (arXiv 2207.04899); numbers or arrays."""
+    return external_input * (1.0 + turn * side)
+
+
+@compiled
 def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
     """Writes the rates of u and v (Eq. 7; -u as in listing B.2).
 

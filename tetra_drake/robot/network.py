@@ -9,7 +9,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.feedback import Senses
-from tetra_drake.physics.oscillator import Network
+from tetra_drake.physics.oscillator import Network, steered_input
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.settling import settled_lengths
@@ -46,12 +46,10 @@ def initial_neurons(cpg: CpgScenario, oscillators: int) -> np.ndarray:
 
 
 def tonic_input(scenario: Scenario, structure: Structure, turns: np.ndarray) -> np.ndarray:
-    """u0 (1 + turn) on the left, u0 (1 - turn) on the right: (..., 2m), by neuron, for turns (...).
-
-    After Matsuoka's snakes, which are steered so (arXiv 2207.04899).
-    """
+    """(..., 2m): u0 by neuron for turns (...); see physics.oscillator.steered_input."""
     sides = np.repeat(structure.actuation.sides, 2)
-    return scenario.cpg.external_input * (1.0 + turns[..., np.newaxis] * sides)
+    steered: np.ndarray = steered_input(scenario.cpg.external_input, turns[..., np.newaxis], sides)
+    return steered
 
 
 def sample_turns(

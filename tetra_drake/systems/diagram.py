@@ -7,7 +7,7 @@ import functools
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import Adder, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
@@ -18,6 +18,7 @@ from tetra_drake.robot.network import (
     initial_neurons,
     make_network,
     make_senses,
+    sample_turns,
     tonic_input,
 )
 from tetra_drake.robot.signals import signal_samples
@@ -63,9 +64,7 @@ def MakeTensegrityDiagram(
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
-    live = scenario.cpg.signals == "live"
-    add = _AddNetwork if live else _AddSignals
-    ungated = add(builder, scenario, structure, gait, steering)
+    cpg = _AddCpg(builder, scenario, structure, gait, steering)
     gate = StartUpGate(structure.signals, start_up=scenario.cpg.start_up)
     start_up = builder.AddNamedSystem("start_up", gate)
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
@@ -75,7 +74,7 @@ def MakeTensegrityDiagram(
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
 
     state, signals = plant.get_state_output_port(), start_up.GetOutputPort("signals")
-    builder.Connect(ungated, start_up.GetInputPort("ungated"))
+    builder.Connect(cpg.get_output_port(0), start_up.GetInputPort("ungated"))
     builder.Connect(signals, cables.GetInputPort("signals"))
     builder.Connect(state, cables.GetInputPort("state"))
     builder.Connect(state, ground.GetInputPort("state"))
@@ -89,7 +88,6 @@ def MakeTensegrityDiagram(
             bodies=len(structure.bodies),
         )
         feedback = builder.AddNamedSystem("feedback", sensors)
-        cpg = builder.GetSubsystemByName("cpg")
         builder.Connect(state, feedback.GetInputPort("state"))
         builder.Connect(cables.GetOutputPort("lengths"), feedback.GetInputPort("lengths"))
         builder.Connect(
@@ -108,39 +106,32 @@ def MakeTensegrityDiagram(
     return diagram
 
 
-def _AddNetwork(
+def _AddCpg(
     builder: DiagramBuilder,
     scenario: Scenario,
     structure: Structure,
     gait: Gait,
     steering: SteeringSignal | None,
-) -> OutputPort:
-    """Adds the network `cpg` and its `steering`; returns the port of the signals."""
-    network, cpg = make_network(scenario, structure, gait), scenario.cpg
-    tonic = functools.partial(tonic_input, scenario, structure)
-    turn = gait.turn if steering is None else steering
-    steers = builder.AddNamedSystem("steering", Steering(tonic, turn=turn))
+) -> System:
+    """Adds `cpg`, whose first output port has the signals: a live network with its `steering`, or
+    the signals computed beforehand."""
+    cpg = scenario.cpg
+    if cpg.signals != "live":
+        samples = signal_samples(scenario, gait, steering)
+        times = cpg.listing_step * np.arange(len(samples))
+        source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))
+        return builder.AddNamedSystem("cpg", source)
+    sample_turns(scenario, structure, gait, steering)  # raises InputError for a wrong turn
     neurons = MatsuokaCpg(
-        network,
+        make_network(scenario, structure, gait),
         tonic=cpg.external_input,
         initial_state=initial_neurons(cpg, structure.signals),
         gain=cpg.gain,
     )
     oscillators = builder.AddNamedSystem("cpg", neurons)
+    tonic = functools.partial(tonic_input, scenario, structure)
+    turn = gait.turn if steering is None else steering
+    steers = builder.AddNamedSystem("steering", Steering(tonic, turn=turn))
     builder.Connect(steers.get_output_port(), oscillators.GetInputPort("tonic"))
     builder.ExportInput(steers.GetInputPort("turn"), "turn")
-    return oscillators.GetOutputPort("signals")
-
-
-def _AddSignals(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    structure: Structure,
-    gait: Gait,
-    steering: SteeringSignal | None,
-) -> OutputPort:
-    """Adds the precomputed signals as the system `cpg`; returns its port."""
-    samples = signal_samples(scenario, gait, steering)
-    times = scenario.cpg.listing_step * np.arange(len(samples))
-    source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))
-    return builder.AddNamedSystem("cpg", source).get_output_port()
+    return oscillators

@@ -32,6 +32,7 @@ from tetra_drake.physics.oscillator import (
     next_output,
     oscillator_output,
     predict_neurons,
+    steered_input,
 )
 from tetra_drake.robot.model import Model
 
@@ -273,8 +274,8 @@ def steer(w: Walks, log: Log, sample: Real) -> None:
         before, after = log.turns[lane, i], log.turns[lane, i + 1]
         turn = before + (min(floats[FLAG, lane], turns - 1.0) - i) * (after - before)
         for k in range(w.tonic.size):
-            side = by_lane(w.sides)[k, lane]
-            by_lane(w.tonic)[k, lane] = by_lane(w.external_input)[0, lane] * (1.0 + turn * side)
+            external, side = by_lane(w.external_input)[0, lane], by_lane(w.sides)[k, lane]
+            by_lane(w.tonic)[k, lane] = steered_input(external, turn, side)
 
 
 @compiled
