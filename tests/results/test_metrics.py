@@ -6,9 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
+from tetra_drake.results.metrics import compute_fitness, compute_metrics
 from tetra_drake.results.path import CentrePath
 from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.scenario.metrics import METRICS, Metrics, inverse
 from tetra_drake.scenario.schema import Scenario
 
 INCH = 0.0254
@@ -66,10 +67,9 @@ def test_turning_and_bending_count_from_their_instants(structure: Structure) -> 
 def test_every_metric_has_a_unit_and_only_lengths_are_given_in_inches(
     structure: Structure,
 ) -> None:
-    units = {f.name: f.metadata["unit"] for f in dataclasses.fields(Metrics)}
-    assert (units["heading_change"], units["path_curvature"]) == ("rad", "1/m")
+    assert (METRICS["heading_change"], METRICS["path_curvature"]) == ("rad", "1/m")
     lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift"}
-    assert {name for name, unit in units.items() if unit == "m"} == lengths
+    assert {name for name, unit in METRICS.items() if unit == "m"} == lengths
     inches = metrics_of(structure, CIRCLE, 0.0).in_inches()
     assert inches.keys() == {f"{name}_in" for name in lengths}
 
@@ -79,7 +79,20 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
     inches = {"distance": 5.0, "steady_distance": 4.0, "twist": 0.5, "lead": 7.0}
     inches["lateral_drift"] = 0.25
     lengths = {name: value * INCH for name, value in inches.items()}
-    metrics = Metrics(**lengths, heading_change=1.0, path_curvature=2.0)
-    assert compute_fitness(metrics, scenario.fitness) == pytest.approx(-1.25)
-    scenario.fitness.direction = 2.0
-    assert compute_fitness(metrics, scenario.fitness) == pytest.approx(12.75)
+    metrics = Metrics(**dict.fromkeys(METRICS, 1.0) | lengths)
+    assert compute_fitness(metrics, scenario.objective) == pytest.approx(-1.25)
+    lead = scenario.with_changes({"objective.lead": "2 /in", "objective.speed": "3 s/m"})
+    assert compute_fitness(metrics, lead.objective) == pytest.approx(12.75 + 3.0)
+
+
+def test_the_constants_of_equation_10_are_those_of_the_thesis_to_the_last_digit(
+    scenario: Scenario,
+) -> None:
+    for name, phi in (("steady_distance", 1.0), ("twist", -10.0), ("lateral_drift", -1.0)):
+        metrics = Metrics(**dict.fromkeys(METRICS, 0.0) | {name: 0.1234567})
+        assert compute_fitness(metrics, scenario.objective) == phi * (0.1234567 / INCH)
+
+
+def test_the_inverse_of_a_unit_times_the_unit_is_one() -> None:
+    units = {"": "", "m": "1/m", "m/s": "s/m", "1/m": "m", "N/s": "s/N"}
+    assert {unit: inverse(unit) for unit in units} == units

@@ -39,7 +39,6 @@ THESIS: list[tuple[str, str, tuple[float, ...]]] = [
     ("evolution", "crossover_probability mutation_probability", (0.2, 0.7)),
     ("evolution", "weight_mutation tau_mutation_range", (0.2, 0.05)),
     ("evolution", "stop_rise stop_window stop_after", (0.03, 100, 200)),
-    ("fitness", "distance twist direction drift", (1, -10, 0, -1)),  # Table 7
 ]
 
 
@@ -54,6 +53,15 @@ def write(folder: Path, text: str, name: str = "mine.yaml") -> Path:
 def test_thesis_scenario_holds_the_numbers_of_the_thesis(scenario, section, names, values):
     held = attrgetter(*names.split())(getattr(scenario, section))
     assert held == pytest.approx(values, rel=1e-12)
+
+
+# Table 7, for lengths in inches; phi_3, of the lead, is 0
+EQUATION_10 = {"steady_distance": 1.0 / IN, "twist": -10.0 / IN, "lateral_drift": -1.0 / IN}
+
+
+def test_the_thesis_objective_is_equation_10(scenario):
+    assert scenario.objective == pytest.approx(EQUATION_10, rel=1e-15)
+    assert (scenario.require, scenario.disturbances) == ({}, None)
 
 
 GROUNDS = {
@@ -83,8 +91,7 @@ UNDULATION = {
     "cpg.reach": 1,
     "gait_bounds.weight_min": 0.0,
     "gait_bounds.weight_max": 1.0,
-    "fitness.twist": -1.0,
-    "fitness.direction": 1.0,
+    "objective": {"speed": "12 s/in", "lead": "1 /in", "lateral_drift": "-1 /in"},
     "evolution.independent_tau_b": True,
 }
 NETWORKS = {
@@ -96,6 +103,7 @@ NETWORKS = {
             "gait_bounds.mirrored": True,
             "gait_bounds.turn": 1.0,
             "simulation.duration": 30.0,
+            "objective": {"heading_change": 1.0},
         },
     ),
     "all-cables": (
@@ -172,7 +180,12 @@ def test_a_file_of_schema_1_means_what_it_meant(data, scenario):
         ("simulation.fresh_steps", "false"),
     ]
     assert (loaded.reference, loaded.robot.offsets) == (None, [])
-    assert dump_scenario(loaded) == file.read_text()
+    # All but the constants of Eq. 10, which are the objective now.
+    before, _, rest = file.read_text().partition("fitness:")
+    dumped = dump_scenario(loaded)
+    assert dumped.startswith(before)
+    assert dumped.endswith(rest.partition("evolution:")[2])
+    assert loaded.objective == scenario.objective
 
 
 # Files based on files

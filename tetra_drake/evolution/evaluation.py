@@ -54,7 +54,7 @@ class GaitEvaluation:
             found, cost = Evaluation.failed(f"{_KINDS[type(error)]}: {error}"), error.wall_time
         else:
             fitness = result.fitness if self.objective is None else float(self.objective(result))
-            found, cost = Evaluation(fitness, dataclasses.asdict(result.metrics)), result.wall_time
+            found, cost = Evaluation(fitness, result.metrics.to_json()), result.wall_time
             if not math.isfinite(fitness):
                 found = Evaluation.failed("diverged: the fitness is not finite")
         wall_time = time.perf_counter() - started if self.lanes is None else cost

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from dataclasses import dataclass
@@ -23,8 +22,8 @@ from tetra_drake.evolution.record import (
     trial_folder,
 )
 from tetra_drake.evolution.trials import TrialStatus
-from tetra_drake.results.metrics import Metrics
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
+from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
@@ -33,8 +32,7 @@ if TYPE_CHECKING:
 
 _EMPTY = ["trial", "index", "iteration", "fitness", "failure", "wall_time_s", "distance_in"]
 """Columns of an empty table."""
-_METRICS = [f.name for f in dataclasses.fields(Metrics)]
-_NUMBERS = [*_METRICS, "distance_in"]
+_NUMBERS = [*METRICS, "distance_in"]
 
 
 @dataclass(frozen=True)
@@ -166,5 +164,5 @@ def _table(directory: Path, trials: int, name: str, columns: list[str]) -> panda
 def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:
     """A line of evaluations with a column for each number."""
     parameters = dict(zip(columns, entry.pop("genome"), strict=True))
-    metrics = dict.fromkeys(_METRICS, math.nan) | entry.pop("metrics")
+    metrics = dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
     return entry | metrics | {"distance_in": metrics["distance"] / INCH} | parameters

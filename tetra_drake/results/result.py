@@ -16,12 +16,13 @@ import numpy as np
 
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed
-from tetra_drake.results.metrics import Metrics, compute_fitness, compute_metrics
+from tetra_drake.results.metrics import compute_fitness, compute_metrics
 from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.fields import tree_of
+from tetra_drake.scenario.metrics import Metrics
 from tetra_drake.scenario.schema import Coulomb, Scenario, SimulationScenario
 from tetra_drake.scenario.terrain import Flat
 from tetra_drake.scenario.units import INCH
@@ -108,7 +109,7 @@ def make_result(
     )
     return SimulationResult(
         metrics=metrics,
-        fitness=compute_fitness(metrics, scenario.fitness),
+        fitness=compute_fitness(metrics, scenario.objective),
         duration=simulation.duration,
         wall_time=wall_time,
         integrator=integrator,
@@ -132,7 +133,7 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
     content = {
         "schema": SCHEMA,
         "scenario": scenario.name,
-        "metrics": dataclasses.asdict(result.metrics),
+        "metrics": result.metrics.to_json(),
         **result.metrics.in_inches(),
         "path_radius_in": radius / INCH if math.isfinite(radius) else None,
         "fitness": result.fitness,

@@ -51,7 +51,8 @@ def setting(*, default: Any = dataclasses.MISSING, **limits: Any) -> Any:
     """A field of any type, required in a file or its bases if it has no default.
 
     Numbers may be limited by above, at_least, at_most; innermost lists by `length`; texts by
-    `choices`, which a number may have besides.
+    `choices`, which a number may have besides; the names in a dict by `units`, the SI unit of each
+    one's number, "" for none.
     """
     if default is dataclasses.MISSING:
         return dataclasses.field(metadata=limits)
@@ -99,7 +100,7 @@ class Check:
         if len(kinds) > 1:
             tag = _tag(value, kinds) if isinstance(value, dict) else ""
             if tag not in kinds:
-                raise ValueError(f"found {tag or _describe(value)}; {_hint(tag, kinds)}")
+                raise ValueError(f"found {tag or _describe(value)}; {hint(tag, kinds)}")
             section = self._section(kinds[tag], value, key)
             return section if self.complete else {TAG: tag} | section
         (kind,) = kinds.values()
@@ -116,7 +117,14 @@ class Check:
         if container is dict:
             if not isinstance(value, dict) or any(not isinstance(name, str) for name in value):
                 raise ValueError(f"found {_describe(value)}, expected a mapping with texts as keys")
-            return {k: self.value(items[-1], v, f"{key}.{k}", limits) for k, v in value.items()}
+            units = limits.get("units", dict.fromkeys(value, limits.get("unit")))
+            for name in value:
+                if name not in units:
+                    raise InputError(
+                        self.source, f"{key}.{name}", f"unknown name; {hint(name, units)}"
+                    )
+            own = {k: {**limits, "unit": units[k]} for k in value}
+            return {k: self.value(items[-1], v, f"{key}.{k}", own[k]) for k, v in value.items()}
         return self._scalar(kind, value, limits)
 
     def _section(self, schema: Any, raw: Any, key: str) -> Any:
@@ -127,7 +135,7 @@ class Check:
         path = {name: f"{key}.{name}" if key else str(name) for name in (*raw, *fields)}
         for name in raw:
             if name not in fields and name != TAG:
-                raise InputError(self.source, path[name], f"unknown key; {_hint(name, fields)}")
+                raise InputError(self.source, path[name], f"unknown key; {hint(name, fields)}")
         tree: Tree = {}
         for name, f in fields.items():
             required = self.complete and f.default_factory is dataclasses.MISSING
@@ -169,22 +177,25 @@ def tree_of(node: Any, show: Show | None = None, *, sparse: bool = False) -> Tre
     If `sparse`, values that are their fields' defaults, and tags of first kinds, are left out.
     """
     return {
-        f.name: _tree(f.type, value, f.metadata.get("unit"), show, sparse)
+        f.name: _tree(f.type, value, f.metadata, show, sparse)
         for f, value in ((f, getattr(node, f.name)) for f in dataclasses.fields(node))
         if not (sparse and callable(f.default_factory) and value == f.default_factory())
     }
 
 
-def _tree(kind: Any, value: Any, unit: str | None, show: Show | None, sparse: bool) -> Any:
+def _tree(kind: Any, value: Any, limits: Limits, show: Show | None, sparse: bool) -> Any:
     kind, *others = _kinds(kind)
     if dataclasses.is_dataclass(value):
         untagged = not others or (sparse and type(value) is kind)
         tag = {} if untagged else {TAG: f"!{type(value).__name__}"}
         return tag | tree_of(value, show, sparse=sparse)
     if isinstance(value, list):
-        return [_tree(typing.get_args(kind)[0], v, unit, show, sparse) for v in value]
+        return [_tree(typing.get_args(kind)[0], v, limits, show, sparse) for v in value]
     if isinstance(value, dict):
-        return {k: _tree(typing.get_args(kind)[1], v, unit, show, sparse) for k, v in value.items()}
+        item, units = typing.get_args(kind)[1], limits.get("units", {})
+        own = {k: {**limits, "unit": units.get(k, limits.get("unit"))} for k in value}
+        return {k: _tree(item, v, own[k], show, sparse) for k, v in value.items()}
+    unit = limits.get("unit")
     return show(value, unit) if show and unit and isinstance(value, float) else value
 
 
@@ -275,7 +286,8 @@ def _describe(value: Any) -> str:
     return kinds.get(type(value), f"'{value}'" if isinstance(value, str) else str(value)[:40])
 
 
-def _hint(name: Any, known: Iterable[str]) -> str:
+def hint(name: Any, known: Iterable[str]) -> str:
+    """What a misspelt name may have been meant for."""
     close = difflib.get_close_matches(str(name), list(known), n=1)
     if close:
         return f"did you mean '{close[0]}'?"

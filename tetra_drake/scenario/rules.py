@@ -9,6 +9,9 @@ from tetra_drake.scenario.fields import Tree, merge
 BALANCED = "balanced"
 """Written as robot.spacing: the spacing at which the cables of a junction balance."""
 
+WHOLE = ("objective", "require")
+"""The sections that a file gives as a whole."""
+
 
 def on_base(base: Tree, given: Tree) -> Tree:
     """The tree of a base with what a file gives, which may decide on spacing and reference.
@@ -21,7 +24,7 @@ def on_base(base: Tree, given: Tree) -> Tree:
         values = tree.get("robot", {}) | tree.get("cables", {})
         return [values.get(name) for name in names]
 
-    tree: Tree = merge(base, given)
+    tree: Tree = merge(base, given) | {k: given[k] for k in WHOLE if k in given}
     if "spacing" not in given.get("robot", {}) and decisive(tree) != decisive(base):
         tree["robot"] = tree.get("robot", {}) | {"spacing": BALANCED}
     if not same_experiment(tree, base):

@@ -5,6 +5,7 @@ SI unit, its limits and, if a file may leave it out, its default, which means wh
 field existed.
 """
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +13,9 @@ from typing import Any, Self
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario import rules
-from tetra_drake.scenario.fields import Check, quantity, setting, tree_of, with_values
+from tetra_drake.scenario.disturbances import key_groups
+from tetra_drake.scenario.fields import Check, hint, quantity, setting, tree_of, with_values
+from tetra_drake.scenario.metrics import METRICS, inverse
 from tetra_drake.scenario.terrain import Flat, Terrain
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -216,13 +219,26 @@ class MujocoScenario:
 
 
 @dataclass
-class FitnessScenario:
-    """The constants phi_1 to phi_4 of the fitness (Table 7, Eq. 10), for lengths in inches."""
+class DisturbancesScenario:
+    """The changes of robot and surroundings among which evolution looks for gaits.
 
-    distance: float = setting()
-    twist: float = setting()
-    direction: float = setting()
-    drift: float = setting()
+    Every gait is simulated once for each of `draws` draws; those of an iteration are the same for
+    all its gaits. The fitness is the mean over the worst share of the draws: all of them (`mean`),
+    the worst one (`worst`), or `tail` (`cvar`, the conditional value at risk). With `mean_to_tail`,
+    selection goes from the mean, in the first iteration, to `tail`, in the last one.
+    """
+
+    draws: int = setting(at_least=1)
+    spreads: dict[str, float] = setting(above=0, at_most=0.5, default={})
+    """By scenario keys: each draw multiplies the number by 1 + up to +-spread, uniformly. Keys
+    joined by commas get the same factor."""
+    start: float = setting(at_least=0, at_most=0.5, default=0.0)
+    """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing, forward or
+    back, sideways, and up."""
+    terrain: bool = setting(default=False)
+    """Whether each draw has another seed of the terrain."""
+    aggregation: str = setting(choices=("mean", "worst", "cvar", "mean_to_tail"), default="mean")
+    tail: float = setting(above=0, at_most=1, default=0.25)
 
 
 @dataclass
@@ -288,7 +304,12 @@ class Scenario:
     simulation: SimulationScenario
     compiled: CompiledScenario
     mujoco: MujocoScenario = setting(default=MujocoScenario())
-    fitness: FitnessScenario
+    objective: dict[str, float] = setting(units={k: inverse(u) for k, u in METRICS.items()})
+    """What evolution maximises: the sum of metrics times these weights, such as `speed: 2 s/in`.
+    Lengths count in inches. A file replaces its base's objective as a whole."""
+    require: dict[str, float] = setting(units=METRICS, default={})
+    """The least values of metrics: a gait with less counts as failed. Replaced as a whole."""
+    disturbances: DisturbancesScenario | None = setting(default=None)
     evolution: EvolutionScenario
     reference: ReferenceScenario | None = setting(default=None)
 
@@ -317,6 +338,9 @@ class Scenario:
         scenario: Self = Check(source, complete=True).value(cls, tree)
         _balance(scenario, source)
         _check_relations(scenario, source)
+        if not scenario.objective:
+            raise InputError(source, "objective", "found no metric, expected one at least")
+        _check_disturbances(scenario, tree, source)
         return scenario
 
 
@@ -366,6 +390,38 @@ def _check_relations(scenario: Scenario, source: object) -> None:
     ):
         if wrong:
             raise InputError(source, key, f"found {found}, expected {expected}")
+
+
+def _check_disturbances(scenario: Scenario, tree: dict[str, Any], source: object) -> None:
+    """Checks that every number a draw may change can be changed that far; raises InputError."""
+    settings = scenario.disturbances
+    if settings is None:
+        return
+    key = "disturbances.terrain"
+    if settings.terrain and not hasattr(scenario.terrain, "seed"):
+        kind = type(scenario.terrain).__name__
+        raise InputError(source, key, f"found true, expected false: !{kind} has no seed")
+    tree = tree | {"disturbances": None}
+    for joined, keys in key_groups(settings.spreads):
+        key, spread = f"disturbances.spreads.{joined}", settings.spreads[joined]
+        numbers = {name: _number(scenario, name, key, source) for name in keys}
+        for factor in (1.0 - spread, 1.0 + spread):
+            changed = {name: factor * number for name, number in numbers.items()}
+            try:
+                Scenario.from_tree(with_values(tree, changed, str(source)), source)
+            except InputError as error:
+                problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
+                raise InputError(source, key, problem) from error
+
+
+def _number(scenario: Scenario, name: str, key: str, source: object) -> float:
+    """The number at a dotted key, which `disturbances` changes at `key`."""
+    section, _, rest = name.partition(".")
+    sections = {k: vars(v) for k, v in vars(scenario).items() if dataclasses.is_dataclass(v)}
+    known = [f"{k}.{n}" for k, v in sections.items() for n, x in v.items() if type(x) is float]
+    if name not in known:
+        raise InputError(source, key, f"'{name}' is no number of the scenario; {hint(name, known)}")
+    return float(sections[section][rest])
 
 
 def _network_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:

@@ -9,11 +9,12 @@ POUND_FORCE = 4.4482216152605  # N, exact
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
-_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*({_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*)\s*")
+_FACTORS = rf"{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*"
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*")
 
 
 def quantity_to_si(text: str, unit: str) -> float:
-    """Reads a quantity such as "25 lbf/in" as a number in the SI unit `unit` ("N/m").
+    """Reads a quantity such as "25 lbf/in", or "1 /in", as a number in the SI unit `unit` ("N/m").
 
     Raises ValueError if the text is no quantity, or has another dimension.
     """
@@ -24,7 +25,8 @@ def quantity_to_si(text: str, unit: str) -> float:
     if match is None:
         raise ValueError(f"found '{text}', which is not a quantity; {example}")
     try:
-        return float(pint.Quantity(float(match[1]), match[2]).to(unit).magnitude)
+        given = f"1/{match[3]}" if match[2] else match[3]
+        return float(pint.Quantity(float(match[1]), given).to(unit).magnitude)
     except pint.DimensionalityError as error:
         raise ValueError(f"found '{text}', {example}") from error
     except Exception as error:  # pint raises tokenizer, syntax and type errors of many kinds

@@ -1,0 +1,149 @@
+"""The objective, requirements and disturbances of a scenario, as files give them."""
+
+import numpy as np
+import pytest
+from pytest import approx
+
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+
+IN, LBF = 0.0254, 4.4482216152605
+
+
+def loaded(tmp_path, text, name="mine.yaml"):
+    (tmp_path / name).write_text(f"base: thesis\n{text}\n")
+    return load_scenario(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "objective", "require"),
+    [
+        ("objective: {speed: 2 s/in, twist: -1 1/in}", {"speed": 2 / IN, "twist": -1 / IN}, {}),
+        ("objective: {path_curvature: 3 in}", {"path_curvature": 3 * IN}, {}),
+        ("objective: {heading_change: 90 /deg}", {"heading_change": 90 * 180 / np.pi}, {}),
+        (
+            "objective: {lead: 1 /m}\nrequire: {twist: 0.5 in, speed: -1 mm/s}",
+            {"lead": 1.0},
+            {"twist": 0.5 * IN, "speed": -1e-3},
+        ),
+    ],
+)
+def test_objective_and_requirements_have_units_and_replace_the_base(
+    tmp_path, text, objective, require
+):
+    scenario = loaded(tmp_path, text)
+    assert scenario.objective == approx(objective, rel=1e-14)
+    assert scenario.require == approx(require, rel=1e-14)
+    (tmp_path / "full.yaml").write_text(dump_scenario(scenario))
+    assert load_scenario(tmp_path / "full.yaml") == scenario
+
+
+def test_an_older_fitness_is_the_objective_it_was(tmp_path, scenario):
+    full = "fitness: {distance: 1, twist: -10, direction: 0, drift: -1}"
+    assert loaded(tmp_path, full).objective == scenario.objective
+    partly = loaded(tmp_path, "fitness: {direction: 2, drift: 0}").objective
+    expected = {"steady_distance": 1 / IN, "twist": -10 / IN, "lead": 2 / IN}
+    assert partly == approx(expected, rel=1e-15)
+
+
+SPREADS = """
+disturbances:
+  draws: 4
+  spreads: {cables.damping: 0.1, "friction.stiction_range, friction.stiction_damping": 0.05}
+  start: 0.02
+"""
+
+
+def test_a_draw_changes_what_it_names_within_its_spread(tmp_path):
+    scenario = loaded(tmp_path, SPREADS)
+    draws = [draw_disturbances(scenario, (7, k)) for k in range(200)]
+    joined = "friction.stiction_range, friction.stiction_damping"
+    for key, spread in (("cables.damping", 0.1), (joined, 0.05)):
+        factors = np.array([draw.factors[key] for draw in draws])
+        assert np.abs(factors - 1.0).max() <= spread
+        # Uniform: the extremes of 200 miss the ends by 1 % of the width on average.
+        assert np.ptp(factors) > 1.9 * spread
+    draw, changed = draws[0], disturbed(scenario, draws[0])
+    ours, theirs = changed.friction, scenario.friction
+    assert changed.cables.damping == draw.factors["cables.damping"] * scenario.cables.damping
+    ratio = draw.factors[joined]
+    assert ours.stiction_range == approx(ratio * theirs.stiction_range, rel=1e-15)
+    assert ours.stiction_damping == approx(ratio * theirs.stiction_damping, rel=1e-15)
+    assert ours.stiction_switch == theirs.stiction_switch
+    moves = np.array([draw.moves for draw in draws]) / scenario.robot.spacing
+    assert moves.shape == (200, 5, 3)
+    assert 0.0195 < np.abs(moves).max() <= 0.02
+    assert moves[..., :2].min() < -0.0195
+    assert moves[..., 2].min() >= 0.0
+    assert np.allclose(changed.robot.offsets, draw.moves)
+    assert changed.disturbances is None
+
+
+def test_a_draw_is_that_of_its_seed_and_leaves_the_scenario_as_it_is(tmp_path):
+    scenario, same = loaded(tmp_path, SPREADS), loaded(tmp_path, SPREADS)
+    first, again, other = (draw_disturbances(scenario, (1, k)) for k in (2, 2, 3))
+    assert first.factors == again.factors != other.factors
+    disturbed(scenario, first)
+    assert scenario == same
+
+
+def test_displaced_starts_add_to_the_offsets_of_the_scenario(tmp_path):
+    offsets = [[0.0, 0.0, 0.01 * i] for i in range(5)]
+    scenario = loaded(tmp_path, SPREADS).with_changes({"robot.offsets": offsets})
+    draw = draw_disturbances(scenario, (1,))
+    assert np.allclose(disturbed(scenario, draw).robot.offsets, draw.moves + offsets, atol=1e-15)
+
+
+def test_every_draw_may_have_another_terrain(tmp_path):
+    text = "terrain: !Rough {amplitude: 0.1 in, wavelength: 2 in}\ndisturbances: {draws: 2"
+    scenario = loaded(tmp_path, text + ", terrain: true}")
+    seeds = {disturbed(scenario, draw_disturbances(scenario, (k,))).terrain.seed for k in range(9)}
+    assert len(seeds) == 9
+    assert scenario.terrain.seed == 0
+    same = loaded(tmp_path, text + "}")
+    assert disturbed(same, draw_disturbances(same, (3,))).terrain == same.terrain
+
+
+BAD = [
+    ("objective: {sped: 1 s/in}", "objective.sped", "'speed'"),
+    ("objective: {speed: 1 /in}", "objective.speed", "'1 /in'"),
+    ("objective: {speed: 1}", "objective.speed", "1 without a unit"),
+    ("objective: {}", "objective", "no metric"),
+    ("require: {twits: 1 in}", "require.twits", "'twist'"),
+    ("require: {twist: 1 lbf}", "require.twist", "'1 lbf'"),
+    ("fitness: {twits: 1}", "fitness.twits", "'twist'"),
+    ("disturbances: {draws: 0}", "disturbances.draws", "0"),
+    ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
+    ("disturbances: {draws: 2, aggregation: best}", "disturbances.aggregation", "'best'"),
+    ("disturbances: {draws: 2, tail: 0}", "disturbances.tail", "0"),
+    ("disturbances: {draws: 2, terrain: true}", "disturbances.terrain", "!Flat"),
+    (
+        "disturbances: {draws: 2, spreads: {cables.dampin: 0.1}}",
+        *("disturbances.spreads.cables.dampin", "'cables.damping'"),
+    ),
+    (
+        "disturbances: {draws: 2, spreads: {robot.tetrahedra: 0.1}}",
+        *("disturbances.spreads.robot.tetrahedra", "no number"),
+    ),
+    (
+        "disturbances: {draws: 2, spreads: {cables.damping: 0.7}}",
+        *("disturbances.spreads.cables.damping", "0.7"),
+    ),
+    (
+        "disturbances: {draws: 2, spreads: {ground.restitution: 0.2}}",
+        *("disturbances.spreads.ground.restitution", "at most 1"),
+    ),
+    (
+        "friction: !Coulomb\ndisturbances: {draws: 2, spreads: {friction.kinetic: 0.1}}",
+        *("disturbances.spreads.friction.kinetic", "at most static"),
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "key", "found"), BAD)
+def test_what_cannot_be_asked_for_is_refused(tmp_path, text, key, found):
+    with pytest.raises(InputError) as refusal:
+        loaded(tmp_path, text)
+    assert refusal.value.key == key
+    assert found in refusal.value.problem

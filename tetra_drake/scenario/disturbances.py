@@ -1,0 +1,78 @@
+"""Draws of a scenario's disturbances, and the scenario changed by one."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from tetra_drake.scenario.schema import Scenario
+
+
+@dataclass(frozen=True)
+class Draw:
+    """What one draw changes."""
+
+    factors: Mapping[str, float]
+    """By the keys of `disturbances.spreads`."""
+    moves: np.ndarray | None = None
+    """(n, 3): the displacement of each tetrahedron at t = 0, in m."""
+    terrain_seed: int | None = None
+
+
+def key_groups(spreads: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
+    """Each key of `disturbances.spreads` with the scenario keys that it joins by commas."""
+    for joined in spreads:
+        yield joined, [key.strip() for key in joined.split(",")]
+
+
+def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
+    """The draw of a seed; none of its numbers depends on the scenario's values."""
+    settings, generator = scenario.disturbances, np.random.default_rng(list(seed))
+    if settings is None:
+        return Draw({})
+    # All that can be drawn is drawn, so that no change of one setting changes another's numbers.
+    moves = generator.uniform(-1.0, 1.0, (scenario.robot.tetrahedra, 3))
+    terrain_seed = int(generator.integers(2**31))
+    moves[:, 2] = np.abs(moves[:, 2])  # not into the ground
+    reach = settings.start * scenario.robot.spacing
+    sizes = {key: generator.uniform(-size, size) for key, size in settings.spreads.items()}
+    return Draw(
+        factors={key: 1.0 + size for key, size in sizes.items()},
+        moves=reach * moves if reach else None,
+        terrain_seed=terrain_seed if settings.terrain else None,
+    )
+
+
+def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
+    """A copy of the scenario changed by a draw, without disturbances of its own.
+
+    Its values are not checked again: those of the largest changes are when a scenario is loaded.
+    """
+    changed = dataclasses.replace(scenario, disturbances=None, reference=None)
+    for section in ("robot", *sorted({key.split(".")[0] for key in _keys(draw)})):
+        setattr(changed, section, copy.copy(getattr(scenario, section)))
+    for joined, keys in key_groups(draw.factors):
+        for key in keys:
+            section, _, name = key.partition(".")
+            setattr(
+                getattr(changed, section), name, draw.factors[joined] * attrgetter(key)(scenario)
+            )
+    if draw.moves is not None:
+        offsets = scenario.robot.offsets or np.zeros_like(draw.moves)
+        changed.robot.offsets = (draw.moves + offsets).tolist()
+    if draw.terrain_seed is not None:
+        changed.terrain = copy.copy(scenario.terrain)
+        setattr(changed.terrain, "seed", draw.terrain_seed)  # noqa: B010 (kinds with a seed only)
+    return changed
+
+
+def _keys(draw: Draw) -> Iterator[str]:
+    for _, keys in key_groups(draw.factors):
+        yield from keys
