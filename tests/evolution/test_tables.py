@@ -59,6 +59,14 @@ def test_a_run_in_progress_loads_and_is_left_alone(run_small):
         empty.fittest()
 
 
+def test_each_tetrahedrons_lifted_share_is_a_column(tmp_path):
+    shares = {4.0: {"lifted_shares": [0.25, 0.0, 0.5]}}
+    run = load_run(write_run(tmp_path / "run", [[[(None, 0), (4.0, 1)]]], metrics=shares))
+    columns = ["lifted_T1", "lifted_T2", "lifted_T3"]
+    np.testing.assert_array_equal(run.evaluations[columns], [[math.nan] * 3, [0.25, 0.0, 0.5]])
+    assert run.gait(0, 1)
+
+
 def test_a_compressed_record_reads_alike_and_is_not_added_to(run_small, refused):
     run = run_small()
     plain = load_run(run)

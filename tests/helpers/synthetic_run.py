@@ -2,8 +2,9 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,11 +35,13 @@ def write_run(
     *,
     scenario: Scenario | None = None,
     unfinished: Sequence[int] = (),
+    metrics: Mapping[float, Mapping[str, Any]] | None = None,
 ) -> Path:
     """A run of which each trial is given as its iterations, each as its children.
 
     The mean fitness follows from who took whose place. Genomes are random, and the same
-    wherever the same fitness is given. `unfinished` trials have not ended.
+    wherever the same fitness is given. `unfinished` trials have not ended. `metrics`: more of them,
+    in SI, by fitness.
     """
     scenario = scenario or tiny_scenario()
     scenario.evolution.trials = len(trials)
@@ -50,6 +53,7 @@ def write_run(
                 begin = len(entries)
                 for fitness, placed in children:
                     entry = _entry(len(entries), iteration, fitness, scenario)
+                    entry["metrics"] |= (metrics or {}).get(fitness, {})
                     entries.append(entry | {"placed": placed})
                     population |= {} if placed is None else {placed: fitness}
                 finite = [fitness for fitness in population.values() if fitness is not None]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tetra_drake.scenario.units import INCH, POUND_FORCE, quantity_to_si
+from tetra_drake.scenario.units import INCH, POUND_FORCE, customary, quantity_to_si, shown
 
 # Exact by definition: the international inch, the avoirdupois pound (0.45359237 kg) and
 # standard gravity (9.80665 m/s^2), whose product is the pound-force.
@@ -40,6 +40,25 @@ def test_quantities_convert_by_the_exact_definitions(text, unit, expected):
 )
 def test_an_si_number_written_with_its_unit_reads_back_to_the_last_bit(value):
     assert quantity_to_si(f"{value!r} N*s/m^2", "N*s/m^2") == value
+
+
+@pytest.mark.parametrize(
+    ("unit", "read"),
+    [
+        *(("m", "in"), ("N", "lbf"), ("rad", "deg"), ("m/s", "in/s"), ("N/s", "lbf/s")),
+        *(("N*s/m", "lbf*s/in"), ("1/m", "/in"), ("s/m", "s/in"), ("1/rad", "/deg")),
+        *(("s", "s"), ("J", "J"), ("kg/m", "kg/m")),
+    ],
+)
+def test_people_read_inches_pounds_force_and_degrees_of_the_same_size(unit, read):
+    size, name = customary(unit)
+    assert name == read
+    assert size == pytest.approx(quantity_to_si(f"1 {name}", unit), rel=1e-14)
+    assert shown(2.5 * size, unit) == f"2.5 {read}"
+
+
+def test_numbers_without_a_unit_stay_bare():
+    assert (customary(""), shown(0.25, "")) == ((1.0, ""), "0.25")
 
 
 DIMENSION = ["6 lbf", "3 in^2", "25 lb/in", "27 lbf*s/in"]

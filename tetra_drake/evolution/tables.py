@@ -45,8 +45,9 @@ class Run:
     evaluations: pandas.DataFrame
     """One row per evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
     wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
-    have one), the metrics (distance ...), distance_in, and the parameters: weight_1 ... in the
-    listing's order, time_scale_T1-T2 ..., gain_length ..., tau_a_s, tau_b_s."""
+    have one), the metrics (distance ...), lifted_T1 ... (Metrics.lifted_shares), distance_in, and
+    the parameters: weight_1 ... in the listing's order, time_scale_T1-T2 ..., gain_length ...,
+    tau_a_s, tau_b_s."""
     iterations: pandas.DataFrame
     """One row per iteration, 0 being the initial one: trial, iteration, evaluations so far,
     best_fitness, best_evaluation (its index), best_distance_in (that gait's), stop, and the
@@ -165,4 +166,6 @@ def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:
     """A line of evaluations with a column for each number."""
     parameters = dict(zip(columns, entry.pop("genome"), strict=True))
     metrics = dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
+    shares = enumerate(metrics.pop("lifted_shares", []), start=1)
+    metrics |= {f"lifted_T{number}": share for number, share in shares}
     return entry | metrics | {"distance_in": metrics["distance"] / INCH} | parameters

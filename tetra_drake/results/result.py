@@ -25,7 +25,7 @@ from tetra_drake.scenario.fields import tree_of
 from tetra_drake.scenario.metrics import Metrics
 from tetra_drake.scenario.schema import Coulomb, Scenario, SimulationScenario
 from tetra_drake.scenario.terrain import Flat
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.units import INCH, shown
 
 if TYPE_CHECKING:
     import xarray
@@ -163,21 +163,15 @@ def ground_text(scenario: Scenario) -> str:
     terrain, law = scenario.terrain, scenario.friction
     if isinstance(law, Coulomb):
         numbers = {"static": law.static, "kinetic": law.kinetic}
-        friction = f"Coulomb friction ({_listed(numbers | tree_of(law, _shown, sparse=True))})"
+        friction = f"Coulomb friction ({_listed(numbers | tree_of(law, shown, sparse=True))})"
     elif scenario.simulation.engine == "mujoco":
         friction = f"MuJoCo's friction (coefficient {scenario.mujoco.friction:g})"
     elif isinstance(terrain, Flat):
         return ""
     else:
         friction = "the thesis's friction"
-    sizes = _listed(tree_of(terrain, _shown, sparse=True))
+    sizes = _listed(tree_of(terrain, shown, sparse=True))
     return f"{type(terrain).__name__.lower()}{f' ({sizes})' if sizes else ''}, {friction}"
-
-
-def _shown(number: float, unit: str) -> str:
-    """A quantity as people read it; `unit` is SI."""
-    factor, name = {"m": (INCH, "in"), "rad": (math.pi / 180.0, "deg")}.get(unit, (1.0, unit))
-    return f"{number / factor:.4g} {name}"
 
 
 def _listed(values: Mapping[str, Any]) -> str:

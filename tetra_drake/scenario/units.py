@@ -1,11 +1,15 @@
-"""Text with units to SI numbers, and the two units shown to people: inches and pounds-force."""
+"""Text with units to SI numbers, and SI numbers in the units that people read."""
 
 from __future__ import annotations
 
+import math
 import re
 
 INCH = 0.0254  # m, exact
 POUND_FORCE = 4.4482216152605  # N, exact
+
+_READ = {"m": (INCH, "in"), "N": (POUND_FORCE, "lbf"), "rad": (math.pi / 180.0, "deg")}
+"""Size in SI and name of what people read instead of an SI unit."""
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
@@ -31,3 +35,22 @@ def quantity_to_si(text: str, unit: str) -> float:
         raise ValueError(f"found '{text}', {example}") from error
     except Exception as error:  # pint raises tokenizer, syntax and type errors of many kinds
         raise ValueError(f"found '{text}', whose unit is unknown; {example}") from error
+
+
+def customary(unit: str) -> tuple[float, str]:
+    """The unit in which people read numbers of an SI unit, such as "lbf/in" for "N/m": its size in
+    SI, and its name. Units with others than lengths, forces, angles and times stay as they are."""
+    above, _, below = unit.partition("/")
+    factors, divisors = above.split("*"), below.split("*")
+    if not {*factors, *divisors} <= {*_READ, "s", "1", ""}:
+        return 1.0, unit
+    size = math.prod(_READ.get(name, (1.0, ""))[0] for name in factors)
+    size /= math.prod(_READ.get(name, (1.0, ""))[0] for name in divisors)
+    name = re.sub(r"[A-Za-z]+", lambda word: _READ.get(word[0], (1.0, word[0]))[1], unit)
+    return size, name.removeprefix("1")
+
+
+def shown(number: float, unit: str) -> str:
+    """A number of an SI unit as people read it, such as "25 lbf/in"."""
+    size, name = customary(unit)
+    return f"{number / size:.4g} {name}".rstrip()
