@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from tetra_drake.results.metrics import compute_fitness, compute_metrics
+from tetra_drake.results.metrics import compute_fitness, compute_metrics, unmet_requirements
 from tetra_drake.results.path import CentrePath
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.metrics import METRICS, Metrics, inverse
@@ -96,3 +96,19 @@ def test_the_constants_of_equation_10_are_those_of_the_thesis_to_the_last_digit(
 def test_the_inverse_of_a_unit_times_the_unit_is_one() -> None:
     units = {"": "", "m": "1/m", "m/s": "s/m", "1/m": "m", "N/s": "s/N"}
     assert {unit: inverse(unit) for unit in units} == units
+
+
+@pytest.mark.parametrize(
+    ("twist", "texts"),
+    [
+        (0.0126, ["twist is 0.4961 in, less than 0.5 in"]),
+        (0.0127, []),  # 0.5 in
+        (math.inf, []),
+        (math.nan, ["twist is nan in, less than 0.5 in"]),
+    ],
+)
+def test_a_metric_below_its_least_value_or_nan_is_unmet(
+    structure: Structure, twist: float, texts: list[str]
+) -> None:
+    metrics = dataclasses.replace(metrics_of(structure, CIRCLE, 0.0), twist=twist)
+    assert unmet_requirements(metrics, {"twist": 0.5 * INCH, "distance": 0.0}) == texts

@@ -92,6 +92,10 @@ def test_the_path_is_written_and_summed_up(scenario, structure, tmp_path):
     assert lines["heading change"].split()[2] == f"{-math.degrees(7.5):.2f}"
     assert lines["path radius"].split()[2] == f"{RADIUS / INCH:.2f}"
     assert "right" in lines["path radius"] and "left" not in lines["path radius"]
+    assert "requirement" not in summary(scenario, gait, result)
+    strict = scenario.with_changes({"require": {"distance": "4000 in", "twist": "0 in"}})
+    (line,) = [line for line in summary(strict, gait, result).splitlines() if "requir" in line]
+    assert line.split()[0] == "distance" and "4000 in" in line
 
     standing = result_of(scenario, structure, on_a_circle(scenario, structure, per_second=0.0))
     save_result(tmp_path / "result.json", scenario, gait, standing)

@@ -9,7 +9,7 @@ import numpy as np
 from tetra_drake.results.path import CentrePath, curvature
 from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, Structure
 from tetra_drake.scenario.metrics import METRICS, Metrics
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.units import INCH, shown
 
 
 def compute_metrics(
@@ -47,3 +47,14 @@ def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:
         unit = INCH if METRICS[name] == "m" else 1.0
         total += (weight * unit) * (getattr(metrics, name) / unit)
     return total
+
+
+def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:
+    """Of each metric that is less than its required SI value, or NaN: name, value and limit, as
+    "clearance is 0.05 in, less than 0.125 in"."""
+    found = {name: (getattr(metrics, name), least) for name, least in require.items()}
+    return [
+        f"{name} is {shown(value, METRICS[name])}, less than {shown(least, METRICS[name])}"
+        for name, (value, least) in found.items()
+        if not value >= least
+    ]

@@ -16,7 +16,7 @@ import numpy as np
 
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed
-from tetra_drake.results.metrics import compute_fitness, compute_metrics
+from tetra_drake.results.metrics import compute_fitness, compute_metrics, unmet_requirements
 from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
@@ -200,6 +200,8 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
         line = f"  {name:<16}{fixed(value):>8} {unit:<4} {f'({note})' if note else ''}"
         lines.append(line.rstrip())
     lines.append(f"  {'fitness':<16}{fixed(result.fitness):>8}")
+    unmet = unmet_requirements(metrics, scenario.require)
+    lines += [f"  {text} (requirement not met)" for text in unmet]
     reference = scenario.reference
     if reference is not None:
         best = {"random": reference.best_initial_distance, "evolved": reference.best_distance}
