@@ -18,11 +18,12 @@ from tetra_drake.figures.evolution import two_best
 from tetra_drake.figures.study import study_run
 from tetra_drake.report.run_page import render_report, write_report
 from tetra_drake.results.result import ground_text
+from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.terrain import Flat, Incline
 from tetra_drake.scenario.units import INCH
 
-from .conftest import TRIALS
+from .conftest import COSTS, TRIALS
 
 EVIL = """<script>alert(1)</script> & "quoted" 'name'"""
 
@@ -32,7 +33,7 @@ class Page(HTMLParser):
 
     def __init__(self, source):
         super().__init__()
-        self.open, self.tags, self.texts = [], [], {}
+        self.open, self.tags, self.texts, self.table = [], [], {}, []
         self.feed(source)
         self.close()
         assert self.open == []
@@ -41,6 +42,10 @@ class Page(HTMLParser):
         assert len(dict(attributes)) == len(attributes)
         self.tags.append((tag, dict(attributes)))
         self.texts.setdefault(tag, [])
+        if tag == "tr":
+            self.table.append([])
+        elif tag in ("td", "th"):
+            self.table[-1].append("")
         if tag not in ("meta", "img", "br"):
             self.open.append(tag)
             self.texts[tag].append("")
@@ -51,6 +56,12 @@ class Page(HTMLParser):
     def handle_data(self, data):
         for tag in set(self.open):
             self.texts[tag][-1] += data
+            if tag in ("td", "th"):
+                self.table[-1][-1] += data
+
+    def row(self, heading):
+        """The cells of the last row that begins so."""
+        return {cells[0]: cells[1:] for cells in self.table}.get(heading)
 
     def attributes(self, name):
         return [values[name] for _, values in self.tags if name in values]
@@ -60,7 +71,9 @@ class Page(HTMLParser):
 def run(tmp_path_factory):
     """A run with its report; its gaits were made up, so they do not move as recorded."""
     directory = tmp_path_factory.mktemp("runs") / "run"
-    write_run(directory, TRIALS, scenario=tiny_scenario(name=EVIL))
+    metrics = {fitness: {"cost_of_transport": cost} for fitness, cost in COSTS.items()}
+    metrics[4.0] |= {"lifted_shares": [0.25, 0.0, 0.5]}
+    write_run(directory, TRIALS, scenario=tiny_scenario(name=EVIL), metrics=metrics)
     names = [path.name for path in write_report(directory)]
     assert names == ["figures", "replay.html", "report.html"]
     return directory
@@ -129,10 +142,9 @@ def test_each_trial_and_each_setting_that_differs_from_the_thesis_has_a_row(page
     ):
         place = cells.index(row[0])
         assert cells[place : place + len(row)] == row
-    facts = dict(zip(page.texts["th"], cells, strict=False))
-    assert facts["robot.tetrahedra"] == "3"
-    assert facts["simulation.duration"] == "0.3 s"
-    assert "cables.damping" not in facts
+    assert page.row("robot.tetrahedra") == ["3"]
+    assert page.row("simulation.duration") == ["0.3 s"]
+    assert page.row("cables.damping") is None
 
 
 def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page):
@@ -141,11 +153,41 @@ def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page)
         assert name in headings
         assert all(f"{value:.4f}" in cells for value in row)
     # As recorded; simulated again, this gait moves elsewhere, which a note says.
-    assert "4.00" in cells
     assert "2.00 inches" in page.texts["h1"][0]
     best, initial = "trial 1, evaluation 4", "trial 1, evaluation 0"
     assert (study.best.label, study.initial.label) == (best, initial)
     assert any(f"{best}: 2 in" in text for text in page.texts["p"])
+
+
+def test_metrics_of_the_best_gait_stand_beside_the_initial_ones_and_the_champions(page):
+    columns = ["fittest initial", "fittest, farthest", "cheapest"]
+    gaits = ["trial 1, evaluation 0", "trial 1, evaluation 4", "trial 0, evaluation 0"]
+    assert ["", *map("".join, zip(columns, gaits, strict=True)), ""] in page.table
+    for row in (
+        ["fitness", "1.500", "4.000", "2.000", ""],
+        ["distance", "0.750", "2.000", "1.000", "in"],
+        ["cost of transport", "0.100", "0.900", "0.250", ""],
+        ["lifted, T1 to T3", "- - -", "25 0 50", "- - -", "%"],
+    ):
+        assert row in page.table
+    assert page.row("heading change") is None  # which no gait has
+
+
+def test_champions_are_gait_files_of_the_run(run, page):
+    loaded = load_run(run)
+    for name, (trial, index) in {"farthest": (1, 4), "cheapest": (0, 0)}.items():
+        gait = load_gait(run / "champions" / f"{name}.json", loaded.manifest.scenario)
+        assert gait == loaded.gait(trial, index)
+        assert f"champions/{name}.json" in page.attributes("href")
+
+
+def test_objective_and_requirements_are_those_of_the_scenario(tmp_path):
+    terms = {"speed": "2 s/in", "twist": "-10 /in"}
+    scenario = tiny_scenario().with_changes({"objective": terms, "require": {"lead": "0.5 in"}})
+    study = study_run(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
+    page = render(study)
+    assert page.row("objective") == ["speed: 2 s/in, twist: -10 /in"]
+    assert page.row("required") == ["lead: 0.5 in"]
 
 
 def test_many_parameters_are_folded(tmp_path, study):

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from tetra_drake.engines.simulate import available_cores
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.reevaluation import best_distances
-from tetra_drake.evolution.tables import Run
+from tetra_drake.evolution.tables import Run, gait_label
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.formatting import duration, fixed
+from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.units import INCH, customary
+
+if TYPE_CHECKING:
+    import pandas
 
 
 class Comparison(NamedTuple):
@@ -24,6 +28,28 @@ class Comparison(NamedTuple):
     name: str
     ours: str
     reference: str
+
+
+class MetricRow(NamedTuple):
+    """A metric of some gaits as people read it."""
+
+    name: str
+    unit: str
+    values: list[str]
+
+
+def metric_rows(gaits: Sequence[pandas.Series]) -> list[MetricRow]:
+    """Fitness and metrics of gaits, rows of `Run.evaluations`; what none of them has, as in older
+    records, is left out. In the end, the share of time that each tetrahedron is lifted, in %."""
+    rows = [MetricRow("fitness", "", [fixed(gait["fitness"], 3) for gait in gaits])]
+    for name, unit in METRICS.items():
+        size, read = customary(unit)
+        values = [fixed(gait[name] / size, 3) for gait in gaits]
+        rows.append(MetricRow(name.replace("_", " "), read, values))
+    shares = [[gait[n] for n in gait.index if n.startswith("lifted_T")] for gait in gaits]
+    percents = [" ".join(fixed(100.0 * share, 0) for share in each) for each in shares]
+    rows.append(MetricRow(f"lifted, T1 to T{len(shares[0])}", "%", percents))
+    return [row for row in rows if any(value.strip("- ") for value in row.values)]
 
 
 def summary(run: Run) -> str:
@@ -36,10 +62,26 @@ def summary(run: Run) -> str:
     source = reference.source if reference else ""
     rows = [Comparison("", "this run", source), *comparisons(run)]
     lines += [f"{name:<32}{ours:>10}   {theirs}".rstrip() for name, ours, theirs in rows]
+    lines += _metrics_of_the_best(run)
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
         lines.append(f"open {replay} in a browser to see the best gait walk, {report} for more")
     return "\n".join(lines)
+
+
+def _metrics_of_the_best(run: Run) -> list[str]:
+    """The metrics of the fittest gait beside those of its trial's best initial one."""
+    if run.best().empty:
+        return []
+    trial, best = run.fittest()
+    gaits = [run.evaluation(trial, index) for index in (run.initial_best(trial), best)]
+    rows = [MetricRow("", "", ["initial", "fittest"]), *metric_rows(gaits)]
+    widths = [max(len(row.values[i]) for row in rows) for i in range(2)]
+    lines = [f"fittest gait, {gait_label(gaits[1])}, beside its trial's fittest initial one:"]
+    for name, unit, values in rows:
+        cells = [value.rjust(width) for value, width in zip(values, widths, strict=True)]
+        lines.append(f"{name:<24}{'  '.join(cells)} {unit}".rstrip())
+    return lines
 
 
 def _trial(status: TrialStatus) -> str:

@@ -76,6 +76,16 @@ class Run:
         row = best.loc[best["fitness"].idxmax()]
         return int(row["trial"]), int(row["index"])
 
+    def initial_best(self, trial: int) -> int:
+        """Index of the fittest gait of a trial's first iteration in which not all failed."""
+        rows = self.evaluations.query("trial == @trial").dropna(subset="fitness")
+        first = rows[rows["iteration"] == rows["iteration"].min()].set_index("index")
+        return int(first["fitness"].idxmax())
+
+    def evaluation(self, trial: int, index: int) -> pandas.Series:
+        """A row of `evaluations`."""
+        return self.evaluations.query("trial == @trial and index == @index").iloc[0]
+
     def initial(self) -> pandas.DataFrame:
         """The evaluations of iteration 0."""
         return self.evaluations[self.evaluations["iteration"] == 0]
@@ -113,6 +123,11 @@ class Run:
         for line in lines.iloc[[0, -1]].to_dict("records") if len(lines) else ():
             status.complete(line, best_distance_in=line.pop("best_distance_in"))
         return status
+
+
+def gait_label(row: pandas.Series) -> str:
+    """Trial and number of an evaluation, one of `Run.evaluations`."""
+    return f"trial {row['trial']}, evaluation {row['index']}"
 
 
 def load_run(path: str | Path) -> Run:

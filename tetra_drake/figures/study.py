@@ -8,7 +8,7 @@ import pandas
 import xarray
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.tables import Run
+from tetra_drake.evolution.tables import Run, gait_label
 from tetra_drake.results.measures import distance_walked
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.units import INCH
@@ -26,7 +26,7 @@ class Walk:
     @property
     def label(self) -> str:
         """Trial and number of the evaluation."""
-        return f"trial {self.recorded['trial']}, evaluation {self.recorded['index']}"
+        return gait_label(self.recorded)
 
     @property
     def deviation_in(self) -> float:
@@ -55,8 +55,7 @@ def study_run(run: Run) -> Study:
     than the run's make such a gait fail.
     """
     trial, index = run.fittest()
-    rows = run.evaluations.query("trial == @trial").dropna(subset="fitness").set_index("index")
-    first = int(rows[rows["iteration"] == rows["iteration"].min()]["fitness"].idxmax())
+    first = run.initial_best(trial)
     walks = {i: _walk(run, trial, i) for i in {first, index}}
     return Study(run=run, trial=trial, initial=walks[first], best=walks[index])
 
@@ -65,5 +64,4 @@ def _walk(run: Run, trial: int, index: int) -> Walk:
     gait = run.gait(trial, index)
     trajectory = simulate(scenario=run.manifest.scenario, gait=gait, record=True).trajectory
     assert trajectory is not None
-    recorded = run.evaluations.query("trial == @trial and index == @index").iloc[0]
-    return Walk(gait=gait, recorded=recorded, trajectory=trajectory)
+    return Walk(gait=gait, recorded=run.evaluation(trial, index), trajectory=trajectory)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from urllib.parse import quote
 
 import pandas
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.pareto import NEAREST, by_gait, champions
 from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.evolution.reevaluation import best_distances
-from tetra_drake.evolution.summary import comparisons
-from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.summary import comparisons, metric_rows
+from tetra_drake.evolution.tables import gait_label, load_run
 from tetra_drake.figures.book import TWO_BEST, draw_run, draw_trajectory
 from tetra_drake.figures.evolution import two_best
 from tetra_drake.figures.study import Study, study_run
@@ -21,12 +22,14 @@ from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import render
 from tetra_drake.results.folder import RESULT, RUN_MANIFEST, load_result_folder
 from tetra_drake.results.result import ground_text, versions
-from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.gait import ParameterSpace, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.metrics import METRICS, inverse
+from tetra_drake.scenario.units import shown
 from tetra_drake.visualization.replay import replay_title, save_replay
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
+CHAMPIONS = "champions"
 
 
 def write_figures(source: Path, out: Path | None = None) -> list[Path]:
@@ -52,7 +55,8 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
 
 
 def write_report(directory: Path) -> list[Path]:
-    """Writes figures/, replay.html and report.html into a run's directory; returns their paths.
+    """Writes figures/, champions/, replay.html and report.html into a run's directory; returns the
+    paths of all but the champions, of which older records have none.
 
     Works for an unfinished run, too. Raises InputError if `directory` holds no run, a damaged
     one, or one without any fitness, or cannot be written to.
@@ -61,15 +65,26 @@ def write_report(directory: Path) -> list[Path]:
     study = study_run(load_run(directory))
     scenario, trajectory = study.run.manifest.scenario, study.best.trajectory
     captions = draw_run(study, figures)
+    for name, row in champions(study.run).items():
+        gait = study.run.gait(row["trial"], row["index"])
+        save_gait(gait, directory / _champion(name), scenario)
     title = replay_title(study.best.gait.name, trajectory)
     save_replay(replay, scenario=scenario, trajectory=trajectory, title=title)
     write_whole(report, render_report(study, captions, folder=figures))
     return [figures, replay, report]
 
 
+def _champion(name: str) -> Path:
+    """The file of a champion in a run's directory."""
+    return Path(CHAMPIONS) / f"{name}.json"
+
+
 def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) -> str:
     """The page, with the pictures in `folder` by name and caption in it; its links are relative."""
     run, manifest = study.run, study.run.manifest
+    best_gait, best_of = trial_folder(Path(), study.trial) / BEST_GAIT, champions(run)
+    named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded} | best_of
+    gaits = by_gait(named)
     walks = {walk.label: walk.deviation_in for walk in (study.best, study.initial)}
     return render(
         "report/report.html.jinja",
@@ -83,13 +98,24 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         differences=differences(manifest.scenario, load_scenario("thesis")),
         comparisons=comparisons(run),
         on_diagram={trial: distance for trial, _, distance in best_distances(run)},
-        inch=INCH,
+        objective=_terms(manifest.scenario.objective, inverse),
+        require=_terms(manifest.scenario.require, str),
+        gaits=[(names, gait_label(gait)) for names, gait in gaits],
+        links={name: _champion(name) for name in best_of} | {"fittest": best_gait},
+        nearest=NEAREST,
+        metrics=metric_rows([gait for _, gait in gaits]),
         parameters=_parameters(study),
         pictures=[(_embedded(folder / f"{name}.svg"), captions[name]) for name in captions],
-        gait=trial_folder(Path(), study.trial) / BEST_GAIT,
+        gait=best_gait,
         files={"scenario": SCENARIO, "replay": REPLAY, "figures": FIGURES, "two_best": TWO_BEST},
         settings=dump_scenario(manifest.scenario),
     )
+
+
+def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str]) -> str:
+    """Numbers by names of metrics as a scenario has them, each in what `unit_of` makes of that
+    metric's unit."""
+    return ", ".join(f"{n}: {shown(x, unit_of(METRICS[n]))}" for n, x in weights.items())
 
 
 def _parameters(study: Study) -> pandas.DataFrame:
