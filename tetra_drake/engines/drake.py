@@ -8,12 +8,14 @@ import numpy as np
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram
 
-from tetra_drake.engines.recorder import Recorder, Sample, make_dataset
+from tetra_drake.engines.observer import Observer
+from tetra_drake.engines.recorder import Recorder, Sample, evaluate_ports, make_dataset
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.model import make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario, SimulationScenario
@@ -41,8 +43,10 @@ def simulate_drake(
     settings = scenario.simulation
     diagram = MakeTensegrityDiagram(scenario, gait, steering=steering)
     structure = MakeStructure(scenario)
+    model = make_model(scenario, structure)
     simulator = MakeSimulator(diagram, settings)
     integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
+    signals, observer = diagram.GetOutputPort("signals"), Observer(scenario, structure, model)
     work = _Work(integrator)
     aimer = _StepAimer(diagram, simulator, settings, work)
     samples = sample_times(settings.duration, settings.sample_period) if record else np.empty(0)
@@ -51,11 +55,13 @@ def simulate_drake(
 
     def after_step(context: Context) -> None:
         # What is done here must not depend on whether somebody records or watches.
-        velocities = state.Eval(context)[7 * len(structure.bodies) :]
-        _check(settings, context.get_time(), velocities, work)
+        bodies, now = state.Eval(context), context.get_time()
+        velocities = bodies[7 * len(structure.bodies) :]
+        _check(settings, now, velocities, work)
         aimer.aim(context, velocities)
         recorder.after_step(context)
-        if viewer is not None and viewer.wants(context.get_time()):
+        observer.add(now, bodies, signals.Eval(context))
+        if viewer is not None and viewer.wants(now):
             viewer.show(make_dataset(diagram, structure, [Sample.of(context)]))
 
     simulator.set_monitor(after_step)
@@ -79,6 +85,9 @@ def simulate_drake(
         structure,
         times=times,
         states=np.array([each.continuous[: 13 * len(structure.bodies)] for each in kept]),
+        signals=evaluate_ports(diagram, kept, ["signals"])["signals"],
+        totals=observer.totals(),
+        mass=float(model.body.mass[0]),
         wall_time=wall_time,
         integrator=IntegratorWork(
             scheme=settings.scheme,

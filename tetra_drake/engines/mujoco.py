@@ -26,6 +26,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
+from tetra_drake.engines.observer import Observer
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
 from tetra_drake.physics.contact import Ground
@@ -68,6 +69,8 @@ _BASE = 0.1  # m of solid below the lowest point of a height field
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs of `contact` touch each other
 
 _STRETCH = 5000  # steps between two checks of whether a simulation is still stable
+
+_OBSERVED = 8  # steps from one observation to the next: with the default step, 1 ms
 
 _GAITS = 8  # for each thread at a time; each takes some 10 MB, mostly for a stretch of states
 
@@ -119,9 +122,11 @@ def simulate_in_rollouts(
         starts = step * np.arange(steps)
         signals = [signals_at(scenario, gait, starts, steering=steering) for gait in group]
         started = time.perf_counter()
-        walks = robot.walk(signals, np.rint(times / step).astype(int), threads=threads)
+        observers = [robot.observer() for _ in group]
+        wanted = np.rint(times / step).astype(int)
+        walks = robot.walk(signals, wanted, observers, threads=threads)
         wall_time = (time.perf_counter() - started) * min(threads, len(group)) / len(group)
-        for gait, walk in zip(group, walks, strict=True):
+        for gait, walk, observer in zip(group, walks, observers, strict=True):
             if isinstance(walk, Diverged):
                 walk.wall_time = wall_time
                 outcomes.append(walk)
@@ -131,6 +136,9 @@ def simulate_in_rollouts(
                 robot.structure,
                 times=times,
                 states=robot.states(walk),
+                signals=signals_at(scenario, gait, times, steering=steering),
+                totals=observer.totals(),
+                mass=robot.mass,
                 wall_time=wall_time,
                 integrator=work,
                 trajectory=None,
@@ -178,18 +186,27 @@ class _Robot:
         self._mujoco: Any = mujoco
         self._scenario = scenario
         self.structure = MakeStructure(scenario)
-        robot = make_model(scenario, self.structure)
-        self._ground = robot.ground
+        self._robot = robot = make_model(scenario, self.structure)
+        self.mass = float(robot.body.mass[0])
         self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario, self.structure, robot))
         self._max_speed = min(scenario.simulation.max_speed, _MAX_SPEED)
         driven = self.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # the signal of each motor
 
+    def observer(self) -> Observer:
+        """A new observer of this robot, which takes normal forces for those of our law."""
+        return Observer(self._scenario, self.structure, self._robot)
+
     def walk(
-        self, signals: Sequence[Array], wanted: Array, *, threads: int
+        self,
+        signals: Sequence[Array],
+        wanted: Array,
+        observers: Sequence[Observer],
+        *,
+        threads: int,
     ) -> list[Array | Diverged]:
         """Simulates gaits by their signals (steps, n); MuJoCo's states (time, qpos, qvel) after
-        each of the `wanted` steps, or how a gait failed."""
+        each of the `wanted` steps, or how a gait failed. Each gait has its observer."""
         from mujoco.rollout import Rollout
 
         data = [self._mujoco.MjData(self._model) for _ in range(threads)]
@@ -197,6 +214,8 @@ class _Robot:
         start = np.empty(self._mujoco.mj_stateSize(self._model, kind))
         self._mujoco.mj_getState(self._model, data[0], start, kind)
         found = np.tile(start, (len(signals), len(wanted), 1))
+        for own, observer in zip(signals, observers, strict=True):
+            observer.add(0.0, self.states(start[np.newaxis])[0], own[0])
         latest = dict.fromkeys(range(len(signals)), start)  # of gaits that have not failed
         failures: dict[int, Diverged] = {}
         with Rollout(nthread=threads if threads > 1 else 0) as rollout:
@@ -210,10 +229,19 @@ class _Robot:
                 for i, states in zip(list(latest), stretches, strict=True):
                     found[i, here] = states[wanted[here] - first - 1]
                     latest[i] = states[-1]
+                    self._observe(observers[i], states, signals[i], first)
                     if failure := self._failure(states, first):
                         failures[i] = failure
                         del latest[i]
         return [failures.get(i, states) for i, states in enumerate(found)]
+
+    def _observe(self, observer: Observer, states: Array, signals: Array, first: int) -> None:
+        """Shows an observer every _OBSERVED-th of the states after step `first` and the next."""
+        chosen = np.arange(_OBSERVED - 1, len(states), _OBSERVED)
+        steps = np.minimum(first + chosen + 1, len(signals) - 1)
+        step = self._scenario.mujoco.step
+        for k, (at, state) in enumerate(zip(steps, self.states(states[chosen]), strict=True)):
+            observer.add(step * (first + chosen[k] + 1), state, signals[at])
 
     def _failure(self, states: Array, first: int) -> Diverged | None:
         """How the states after step `first` and the next ones tell that a simulation failed."""
@@ -276,7 +304,7 @@ class _Robot:
             mujoco.mj_contactForce(model, data, i, wrench)
             # The floor is geom 0; those of the contact nodes follow in their order.
             forces[contact.geom[1] - 1] += contact.frame.reshape(3, 3).T @ wrench[:3]
-        axes = ground_axes(data.site_xpos[self.structure.contacts], self._ground)
+        axes = ground_axes(data.site_xpos[self.structure.contacts], self._robot.ground)
         return (axes @ forces[:, :, None])[:, :, 0]
 
 

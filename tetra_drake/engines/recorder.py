@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -70,6 +71,15 @@ class Recorder:
 def make_dataset(diagram: Diagram, structure: Structure, samples: list[Sample]) -> xarray.Dataset:
     """The samples with all that the diagram's output ports say of them; see assemble_dataset."""
     ports = ("state", "signals", "tensions", "lengths", "normal_forces", "friction_forces", "modes")
+    table = evaluate_ports(diagram, samples, ports)
+    times = np.array([sample.time for sample in samples])
+    return assemble_dataset(structure, times=times, states=table.pop("state"), **table)
+
+
+def evaluate_ports(
+    diagram: Diagram, samples: Sequence[Sample], ports: Sequence[str]
+) -> dict[str, np.ndarray]:
+    """The values (samples, size) of output ports of the diagram, by their names."""
     columns: dict[str, list[np.ndarray]] = {port: [] for port in ports}
     context = diagram.CreateDefaultContext()
     for sample in samples:
@@ -79,6 +89,4 @@ def make_dataset(diagram: Diagram, structure: Structure, samples: list[Sample]) 
             context.SetDiscreteState(group, values)
         for port in ports:
             columns[port].append(diagram.GetOutputPort(port).Eval(context))
-    table = {port: np.array(rows) for port, rows in columns.items()}
-    times = np.array([sample.time for sample in samples])
-    return assemble_dataset(structure, times=times, states=table.pop("state"), **table)
+    return {port: np.array(rows) for port, rows in columns.items()}

@@ -94,16 +94,18 @@ def junction_signals(trajectory: xarray.Dataset) -> tuple[np.ndarray, np.ndarray
 
 
 def travelling_index(waves: np.ndarray) -> float:
-    """How far a wave (samples, places) travels along the places: 0 if it stands, 1 if it travels.
+    """How far waves (samples, places) travel along the places: 0 if they stand, 1 if they travel.
 
     Of the strongest complex orthogonal mode, the ratio of the singular values of its real and
     imaginary parts (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Evenly sampled.
     """
-    spectrum = np.fft.fft(waves - waves.mean(axis=0), axis=0)
-    spectrum[len(waves) // 2 :] = 0.0  # without negative frequencies: the analytic signal
-    mode = np.linalg.svd(np.fft.ifft(spectrum, axis=0), full_matrices=False)[2][0]
-    values = np.linalg.svd(np.array([mode.real, mode.imag]), compute_uv=False)
-    return float(values[1] / values[0]) if len(mode) > 1 else 0.0
+    # The mode is that of the analytic signals, whose spectrum has no negative frequencies.
+    spectrum = np.fft.rfft(waves, axis=0)[1:]
+    mode = np.linalg.eigh(spectrum.T @ spectrum.conj())[1][:, -1]
+    # Its parts have the Gram matrix [[a, c], [c, b]], a + b = 1.
+    a, c = float(mode.real @ mode.real), float(mode.real @ mode.imag)
+    spread = math.hypot(2.0 * a - 1.0, 2.0 * c)
+    return math.sqrt(max(0.0, 1.0 - spread) / (1.0 + spread)) if len(mode) > 1 else 0.0
 
 
 def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:

@@ -2,14 +2,52 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from tetra_drake.physics.tally import Tally
+from tetra_drake.results.measures import travelling_index
 from tetra_drake.results.path import CentrePath, curvature
 from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, Structure
-from tetra_drake.scenario.metrics import METRICS, Metrics
+from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, Metrics
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
+
+
+@dataclass(frozen=True)
+class Totals:
+    """What a tally holds at the end of a walk; SI units."""
+
+    time: float
+    """That of the steady stretch, to which the next three belong."""
+    work: float
+    roughness: float
+    lifted: np.ndarray
+    tension: float
+    clearance: float
+    """The distance, not its square."""
+
+    @classmethod
+    def of(cls, tally: Tally) -> Self:
+        """The totals of a tally of plain arrays."""
+        return cls(
+            time=max(0.0, tally.time[0] - tally.begins[0]),
+            work=float(tally.work[0]),
+            roughness=float(tally.roughness[0]),
+            lifted=tally.lifted.copy(),
+            tension=float(tally.tension[0]),
+            clearance=math.sqrt(tally.clearance[0]),
+        )
+
+
+def empty_tally(scenario: Scenario) -> Tally:
+    """The tally of a walk that begins; each table as an array or its one value."""
+    begins = max(scenario.simulation.steady_from, scenario.cpg.start_up)
+    return Tally(begins, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, tension=math.inf, clearance=math.inf)
 
 
 def compute_metrics(
@@ -20,22 +58,36 @@ def compute_metrics(
     end: np.ndarray,
     path: CentrePath,
     steady_from: float,
+    totals: Totals,
+    signals: np.ndarray,
+    weight: float,
 ) -> Metrics:
-    """The metrics from node positions p_WN (nodes, 3) in m at three instants, and from the path of
-    the centre; the steady stretch begins at `steady_from` (s)."""
+    """The metrics from node positions p_WN (nodes, 3) in m at three instants, from the path of the
+    centre, the totals, and the signals (k, m) in N at evenly spaced times of the steady stretch,
+    which begins at `steady_from` (s); `weight` of the robot in N."""
     tip = 4 * (len(structure.bodies) - 1) + TIP
     steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
-    way = end.mean(axis=0) - steady.mean(axis=0)  # of the centre
+    x_way, y_way, _ = (end.mean(axis=0) - steady.mean(axis=0)).tolist()  # of the centre
     x1, x2, x3 = end[BOTTOM_LEFT, 0], end[BOTTOM_RIGHT, 0], end[tip, 0]
+    carried, per_time = weight * max(math.hypot(x_way, y_way), LEAST_WAY), 1.0 / (totals.time or 1)
+    lifted = (per_time * totals.lifted).tolist()
     return Metrics(
         distance=float(x1 - start[BOTTOM_LEFT, 0]),
         steady_distance=float(x1 - steady[BOTTOM_LEFT, 0]),
-        speed=float(way[0] / (path.times[-1] - steady_from)),
+        speed=float(x_way / (path.times[-1] - steady_from)),
         twist=float(abs(x1 - x2)),
         lead=float(x3 - x1),
         lateral_drift=float(abs(end[BOTTOM_LEFT, 1] - start[BOTTOM_LEFT, 1])),
         heading_change=float(path.heading[-1] - path.heading[0]),
         path_curvature=curvature(steady_path),
+        actuator_work=totals.work,
+        cost_of_transport=totals.work / carried if carried else math.inf,
+        signal_rate=math.sqrt(per_time * totals.roughness / structure.signals),
+        lifted=sum(lifted) / len(lifted),
+        clearance=totals.clearance,
+        tension=totals.tension,
+        travelling_index=travelling_index(signals),
+        lifted_shares=tuple(lifted),
     )
 
 

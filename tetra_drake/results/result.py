@@ -16,7 +16,12 @@ import numpy as np
 
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed
-from tetra_drake.results.metrics import compute_fitness, compute_metrics, unmet_requirements
+from tetra_drake.results.metrics import (
+    Totals,
+    compute_fitness,
+    compute_metrics,
+    unmet_requirements,
+)
 from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
@@ -84,6 +89,9 @@ def make_result(
     *,
     times: np.ndarray,
     states: np.ndarray,
+    signals: np.ndarray,
+    totals: Totals,
+    mass: float,
     wall_time: float,
     integrator: IntegratorWork,
     trajectory: xarray.Dataset | None,
@@ -91,13 +99,15 @@ def make_result(
     """The result of a simulation on the scenario's engine.
 
     `times` (k,) in s, ascending, are those of result_times(), and maybe more; `states` (k, 13 n)
-    are [q; v] of the bodies then; `wall_time` in s.
+    are [q; v] of the bodies and `signals` (k, m) those of the oscillators, in N, then; `totals` are
+    of the whole simulation; `mass` of a tetrahedron in kg, `wall_time` in s.
     """
     simulation, bodies = scenario.simulation, len(structure.bodies)
     ends = np.searchsorted(times, _ends(simulation))
     start, steady, end = (node_positions(structure, states[i]) for i in ends)
     instants = _path_times(simulation)
-    poses = states[np.searchsorted(times, instants), : 7 * bodies].reshape(-1, bodies, 7)
+    rows = np.searchsorted(times, instants)
+    poses = states[rows, : 7 * bodies].reshape(-1, bodies, 7)
     path = follow(instants, poses)
     metrics = compute_metrics(
         structure,
@@ -106,6 +116,9 @@ def make_result(
         end=end,
         path=path,
         steady_from=simulation.steady_from,
+        totals=totals,
+        signals=signals[rows[instants >= simulation.steady_from]],
+        weight=bodies * mass * scenario.robot.gravity,
     )
     return SimulationResult(
         metrics=metrics,

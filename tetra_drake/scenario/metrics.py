@@ -13,6 +13,9 @@ STRAIGHT = 0.01
 """Curvature (1/m) below which a path counts as straight: over the thesis's fifteen inches, it bends
 by a fifth of a millimetre."""
 
+LEAST_WAY = 1e-3
+"""m: a robot that goes less far counts as gone so far in its cost of transport."""
+
 
 def _metric(unit: str) -> Any:
     """A field of Metrics in the SI unit `unit`, "" for none."""
@@ -46,6 +49,28 @@ class Metrics:
     path_curvature: float = _metric("1/m")
     """Curvature of the path of the centre from `simulation.steady_from` on, positive to the left of
     the direction in which it moves, be that backward; 0 if it is straight. See results.path."""
+    actuator_work: float = _metric("J")
+    """The integral of max(0, -S dl/dt) over the steady stretch, summed over the driven cables, of
+    length l and signal S: the work of actuators that cannot take any back."""
+    cost_of_transport: float = _metric("")
+    """actuator_work / (weight of the robot * way of the centre over the ground in the steady
+    stretch); the way counts as LEAST_WAY at least. Infinite without gravity."""
+    signal_rate: float = _metric("N/s")
+    """Root mean square of dS/dt over the steady stretch and the oscillators' signals S: the less,
+    the smoother the drive."""
+    lifted: float = _metric("")
+    """Share of the steady stretch in which no contact node of a tetrahedron bears a normal force:
+    mean of the tetrahedra."""
+    clearance: float = _metric("m")
+    """Least distance between the axes of two struts of different tetrahedra, of all times. Struts
+    overlap where it is less than their diameter: nothing in the model keeps them apart."""
+    tension: float = _metric("N")
+    """Least tension of a cable, of all times: a cable that would have to push is below 0."""
+    travelling_index: float = _metric("")
+    """How far the signals travel along the robot in the steady stretch: 0 if they stand, 1 if they
+    travel. See results.measures."""
+    lifted_shares: tuple[float, ...] = ()
+    """The share of `lifted` of each tetrahedron, from T1 on."""
 
     @property
     def distance_in(self) -> float:
@@ -66,7 +91,7 @@ class Metrics:
         """The metrics by name, as JSON holds them: None for an infinite one."""
         numbers = {name: getattr(self, name) for name in METRICS}
         finite = {n: value if math.isfinite(value) else None for n, value in numbers.items()}
-        return finite
+        return finite | {"lifted_shares": list(self.lifted_shares)}
 
 
 METRICS: dict[str, str] = {

@@ -22,6 +22,7 @@ from tetra_drake.engines.compiled.walk import (
     EVALUATIONS,
     IDLE,
     MARK,
+    ROUND,
     STATUS,
     STEP,
     TAKEN,
@@ -38,7 +39,9 @@ from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.lanes import FieldArray, lane_table
 from tetra_drake.physics.oscillator import NEURON_COLUMNS, Network, make_neurons
+from tetra_drake.physics.tally import Tally
 from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.results.metrics import Totals, empty_tally
 from tetra_drake.results.result import result_times
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
@@ -146,6 +149,7 @@ class Course(NamedTuple):
     states: np.ndarray
     modes: np.ndarray
     signals: np.ndarray
+    totals: Totals
     wall_time: float
     """What it cost, in s: shared with the other walks on the same core."""
 
@@ -216,6 +220,8 @@ class LaneEngine:
         numbers["tonic"] = tonic_input(scenario, each.structure, turns)[0]
         for name, values in numbers.items():
             getattr(self._walks, name).array[..., lane] = values
+        for table, value in zip(self._walks.tally, empty_tally(scenario), strict=True):
+            table.array[..., lane] = value
         first, beyond, *tables = self._walks.network
         first.array[:] = np.minimum(first.array, network.first)  # so that they hold for all lanes
         beyond.array[:] = np.maximum(beyond.array, network.beyond)
@@ -247,10 +253,10 @@ class LaneEngine:
         return self._wall_times[lane]
 
     def advance(self, iterations: int) -> list[tuple[int, Walk, Course]]:
-        """Lets the lanes walk until one of them ends, or for a number of iterations; returns lanes
-        and walks that have ended, which are idle then. Other threads run meanwhile."""
+        """Lets the lanes walk until one of them ends, or for about a number of iterations; returns
+        lanes and walks that have ended, which are idle then. Other threads run meanwhile."""
         started = time.perf_counter()
-        self._advance(*self._arguments, iterations)
+        self._advance(*self._arguments, max(1, iterations // ROUND))
         walks = [(lane, each) for lane, each in enumerate(self._in_lane) if each is not None]
         share = (time.perf_counter() - started) / max(len(walks), 1)
         ended = []
@@ -273,6 +279,7 @@ class LaneEngine:
             states=log.states[lane, kept].copy(),
             modes=log.modes[lane, kept].copy(),
             signals=log.signals[lane, kept].copy(),
+            totals=Totals.of(Tally(*(t.array[..., lane] for t in self._walks.tally))),
             wall_time=self._wall_times[lane],
         )
 
@@ -371,6 +378,17 @@ def _tables(first: Walk, robot: Model, width: int) -> Walks:
             frames=table(contacts, FRAME_COLUMNS),
             pulls=table(len(structure.cables), PULL_COLUMNS),
             pushes=table(contacts, 3),
+        ),
+        "tally": Tally(
+            begins=table(1),
+            time=table(1),
+            signals=table(signals),
+            lengths=table(len(structure.cables)),
+            work=table(1),
+            roughness=table(1),
+            lifted=table(bodies),
+            tension=table(1),
+            clearance=table(1),
         ),
     }
     return Walks(**tables)

@@ -34,6 +34,7 @@ from tetra_drake.physics.oscillator import (
     predict_neurons,
     steered_input,
 )
+from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.robot.model import Model
 
 Array = np.ndarray
@@ -51,6 +52,9 @@ the settings' `look_ahead`."""
 
 EVALUATIONS = 3
 """Force evaluations of an attempted step."""
+
+ROUND = 16
+"""Iterations, some 20 ms of a walk, after which the distances of struts are looked at."""
 
 STATUS, TIME, STEP, END, MARK, DUE, ACTIVE, SAMPLES, FLAG, TRIED, TAKEN, CLOCK_ROWS = range(12)
 """Rows of `clock`, (CLOCK_ROWS,): status, time, length of the step tried and its end, times of the
@@ -104,6 +108,7 @@ class Walks(NamedTuple):
     signals: Table
     """(n,), at the walk's time; `end_signals` at the end of its step."""
     end_signals: Table
+    tally: Tally
 
 
 class Log(NamedTuple):
@@ -131,56 +136,70 @@ class Log(NamedTuple):
 
 
 @functools.partial(compiled, nogil=True)
-def advance(w: Walks, log: Log, listing: bool, live: bool, iterations: int) -> None:
-    """Lets the lanes walk until one of them ends, or for a number of iterations.
+def advance(w: Walks, log: Log, listing: bool, live: bool, rounds: int) -> None:
+    """Lets the lanes walk to the end of the round in which one of them ends, or for a number of
+    rounds: so each walk's begin with its own, and lanes may be filled again in between.
 
     `listing`: see physics.oscillator.next_output. `live`: whether the network walks along.
     """
-    clock, robot, forces = w.clock, w.robot, w.forces
-    state, end = w.step.state, w.step.end
-    for _ in range(iterations):
-        if any_lane((clock[STATUS] == WALKING) & (clock[TIME] >= clock[MARK])):
-            if not live:
-                produce_signals(w, log, listing, clock[TIME])
-            if pass_marks(w, log, live):
-                return
-        walks = clock[STATUS] == WALKING
-        move_robot(robot, state, forces)
-        update_modes(state, forces.nodes, robot.ground, forces.frames, w.modes)
-        compute_forces(robot, w.modes, w.signals, True, forces, w.step.force)
-        step = select(walks, aim(w), 0.0)
-        step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
-        clock[STEP], clock[END] = step, step_end
-        if live:
-            feel(w, log, clock[TIME], state)
-            predict_neurons(w.network, w.inputs, step, w.neurons)
-            drive(w)
-        else:
-            produce_signals(w, log, listing, step_end)
-            for lane in range(log.kept.size):
-                interpolate(w, log, lane, by_lane(clock)[END, lane], by_lane(w.end_signals))
-        error = take_step(robot, w.step, w.modes, forces, w.end_signals, step, live)
-
-        accepted = walks & (error <= w.tolerance[0])
-        if live:
-            feel(w, log, step_end, end)
-            correct_neurons(w.network, w.inputs, step, accepted, w.neurons)
-            drive(w)
-        if any_lane(accepted & (clock[DUE] <= step_end)):
-            clock[FLAG] = select(accepted, 1.0, 0.0)
-            keep_samples(w, log, live)
-        for i in range(state.size):
-            state[i] = select(accepted, end[i], state[i])
-        for k in range(w.signals.size):
-            w.signals[k] = select(accepted, w.end_signals[k], w.signals[k])
-        clock[TIME] = select(accepted, step_end, clock[TIME])
-        clock[TRIED] += select(walks, 1.0, 0.0)
-        clock[TAKEN] += select(accepted, 1.0, 0.0)
-        clock[STEP] = next_step(error, step, w.tolerance[0], w.max_step[0])
-        status = fate(w)
-        if any_lane(walks & (status != WALKING)):
-            clock[STATUS] = select(walks, status, clock[STATUS])
+    for _ in range(rounds):
+        ended = False
+        for _ in range(ROUND):
+            ended |= iterate(w, log, listing, live)
+        move_robot(w.robot, w.step.state, w.forces)
+        look(w.tally, w.forces.nodes)
+        if ended:
             return
+
+
+@compiled
+def iterate(w: Walks, log: Log, listing: bool, live: bool) -> bool:
+    """Tries a step in all lanes; whether a walk has ended."""
+    clock, robot, forces = w.clock, w.robot, w.forces
+    state, end, ended = w.step.state, w.step.end, False
+    if any_lane((clock[STATUS] == WALKING) & (clock[TIME] >= clock[MARK])):
+        if not live:
+            produce_signals(w, log, listing, clock[TIME])
+        ended = pass_marks(w, log, live)
+    walks = clock[STATUS] == WALKING
+    move_robot(robot, state, forces)
+    update_modes(state, forces.nodes, robot.ground, forces.frames, w.modes)
+    compute_forces(robot, w.modes, w.signals, True, forces, w.step.force)
+    known = robot.cables, robot.ground.contacts, clock[TIME], w.signals
+    observe(w.tally, *known, forces.pulls, forces.pushes)
+    step = select(walks, aim(w), 0.0)
+    step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
+    clock[STEP], clock[END] = step, step_end
+    if live:
+        feel(w, log, clock[TIME], state)
+        predict_neurons(w.network, w.inputs, step, w.neurons)
+        drive(w)
+    else:
+        produce_signals(w, log, listing, step_end)
+        for lane in range(log.kept.size):
+            interpolate(w, log, lane, by_lane(clock)[END, lane], by_lane(w.end_signals))
+    error = take_step(robot, w.step, w.modes, forces, w.end_signals, step, live)
+
+    accepted = walks & (error <= w.tolerance[0])
+    if live:
+        feel(w, log, step_end, end)
+        correct_neurons(w.network, w.inputs, step, accepted, w.neurons)
+        drive(w)
+    if any_lane(accepted & (clock[DUE] <= step_end)):
+        clock[FLAG] = select(accepted, 1.0, 0.0)
+        keep_samples(w, log, live)
+    for i in range(state.size):
+        state[i] = select(accepted, end[i], state[i])
+    for k in range(w.signals.size):
+        w.signals[k] = select(accepted, w.end_signals[k], w.signals[k])
+    clock[TIME] = select(accepted, step_end, clock[TIME])
+    clock[TRIED] += select(walks, 1.0, 0.0)
+    clock[TAKEN] += select(accepted, 1.0, 0.0)
+    clock[STEP] = next_step(error, step, w.tolerance[0], w.max_step[0])
+    status = select(walks, fate(w), clock[STATUS])
+    ended |= any_lane(status != clock[STATUS])
+    clock[STATUS] = status
+    return ended
 
 
 @compiled

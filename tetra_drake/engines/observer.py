@@ -1,0 +1,83 @@
+"""The observer of a simulation: its tally from states, for engines that keep none as they run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
+from tetra_drake.physics.cable import PULL_COLUMNS
+from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.lanes import Table
+from tetra_drake.physics.tally import Tally, look, observe
+from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.results.metrics import Totals, empty_tally
+from tetra_drake.robot.model import Model
+from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario.schema import Scenario
+
+_TOGETHER = 1000  # observations, as calls of kernels with many tables are slow
+
+
+class Observer:
+    """Tallies a walk from its states in the order of time, the first at t = 0.
+
+    It only reads states, so observing cannot change the simulation.
+    """
+
+    def __init__(self, scenario: Scenario, structure: Structure, model: Model) -> None:
+        bodies, cables = len(structure.bodies), len(structure.cables)
+        contacts, sizes = len(structure.contacts), dict.fromkeys(Tally._fields, 1)
+        sizes |= {"signals": structure.signals, "lengths": cables, "lifted": bodies}
+        values = empty_tally(scenario)
+        columns = (np.full(sizes[name], value) for name, value in values._asdict().items())
+        self._model, self._tally = model, Tally(*columns)
+        self._modes = np.zeros((contacts, MODE_COLUMNS))
+        self._forces = Forces(
+            nodes=np.empty((len(structure.node_names), NODE_COLUMNS)),
+            frames=np.empty((contacts, FRAME_COLUMNS)),
+            pulls=np.empty((cables, PULL_COLUMNS)),
+            pushes=np.empty((contacts, 3)),
+        )
+        self._waiting: list[tuple[float, np.ndarray, np.ndarray]] = []
+
+    def add(self, time: float, state: np.ndarray, signals: np.ndarray) -> None:
+        """Adds a state (13 bodies,) and the signals (m,) in N at a time (s)."""
+        self._waiting.append((time, state, signals))
+        if len(self._waiting) == _TOGETHER:
+            self._flush()
+
+    def totals(self) -> Totals:
+        """The totals of all that has been added."""
+        self._flush()
+        return Totals.of(self._tally)
+
+    def _flush(self) -> None:
+        if self._waiting:
+            columns = (np.array(column) for column in zip(*self._waiting, strict=True))
+            observe_states(self._model, self._tally, self._forces, self._modes, *columns)
+            self._waiting = []
+
+
+@compiled
+def observe_states(
+    robot: Model,
+    tally: Tally,
+    forces: Forces,
+    modes: Table,
+    times: Table,
+    states: Table,
+    signals: Table,
+) -> None:
+    """Observes states (k, 13 bodies) and signals (k, m) at times (k,); `modes`, (contacts,
+    MODE_COLUMNS), is room. What is tallied does not depend on whether contacts stick."""
+    generalized = np.empty(6 * tally.lifted.size)
+    for k in range(times.size):
+        modes[:] = 0.0
+        move_robot(robot, states[k], forces)
+        update_modes(states[k], forces.nodes, robot.ground, forces.frames, modes)
+        compute_forces(robot, modes, signals[k], True, forces, generalized)
+        known = robot.cables, robot.ground.contacts, times[k], signals[k]
+        observe(tally, *known, forces.pulls, forces.pushes)
+        look(tally, forces.nodes)

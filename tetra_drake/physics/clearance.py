@@ -1,0 +1,104 @@
+"""The clearance of struts: the least distance between the axes of those of different bodies."""
+
+from __future__ import annotations
+
+from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.kinematics import P_WN
+from tetra_drake.physics.lanes import Real, Table, any_lane, maximum, minimum
+
+CORNERS = 4
+"""The nodes of a tetrahedron: three of the base, then the tip."""
+
+_MARGIN = 1.0 + 1e-9
+"""So that what is rounded decides nothing where a bound equals a distance."""
+
+_PARALLEL = 1e-12
+"""Square of the sine of an angle that is none."""
+
+
+@compiled
+def least_strut_distance(nodes: Table, least: Real) -> Real:
+    """Square of the least distance (m²) between struts of different tetrahedra, or `least` if that
+    is less; `nodes` of physics.kinematics.
+
+    A pair of tetrahedra is split into tip and base struts of the first with all struts of the
+    second. Where a plane across the line between their centres has the two on its sides, with more
+    room than `least`, no distance is computed.
+    """
+    for first in range(0, nodes.shape[0], CORNERS):
+        for second in range(first + CORNERS, nodes.shape[0], CORNERS):
+            base, tip, square = room_between(nodes, first, second)
+            bound = _MARGIN * least * square
+            if any_lane((tip <= 0.0) | (tip * tip <= bound)):
+                for a in range(first, first + 3):
+                    least = minimum(least, nearest_strut(nodes, a, first + 3, second))
+            if any_lane((base <= 0.0) | (base * base <= bound)):
+                for k in range(3):
+                    a, b = first + k, first + (k + 1) % 3
+                    least = minimum(least, nearest_strut(nodes, a, b, second))
+    return least
+
+
+@compiled
+def room_between(nodes: Table, first: int, second: int) -> tuple[Real, Real, Real]:
+    """How far the second tetrahedron begins behind the base, and behind all nodes, of the first
+    along the vector between their centres, times its length; and its square."""
+    u_x = u_y = u_z = 0.0
+    for k in range(CORNERS):
+        u_x += nodes[second + k, P_WN] - nodes[first + k, P_WN]
+        u_y += nodes[second + k, P_WN + 1] - nodes[first + k, P_WN + 1]
+        u_z += nodes[second + k, P_WN + 2] - nodes[first + k, P_WN + 2]
+    begin = along(nodes, second, u_x, u_y, u_z)
+    end = along(nodes, first, u_x, u_y, u_z)
+    for k in range(1, 3):
+        begin = minimum(begin, along(nodes, second + k, u_x, u_y, u_z))
+        end = maximum(end, along(nodes, first + k, u_x, u_y, u_z))
+    begin = minimum(begin, along(nodes, second + 3, u_x, u_y, u_z))
+    tip = maximum(end, along(nodes, first + 3, u_x, u_y, u_z))
+    return begin - end, begin - tip, u_x * u_x + u_y * u_y + u_z * u_z
+
+
+@compiled
+def along(nodes: Table, node: int, x: Real, y: Real, z: Real) -> Real:
+    """The product of a node's position and a vector."""
+    return x * nodes[node, P_WN] + y * nodes[node, P_WN + 1] + z * nodes[node, P_WN + 2]
+
+
+@compiled
+def nearest_strut(nodes: Table, a: int, b: int, second: int) -> Real:
+    """Square of the least distance (m²) of the strut from node a to b to those of the tetrahedron
+    that begins with node `second`."""
+    least = segment_distance(nodes, a, b, second, second + 1)
+    for c in range(second, second + 2):
+        for d in range(second + 2, second + 4):
+            least = minimum(least, segment_distance(nodes, a, b, c, d))
+    return minimum(least, segment_distance(nodes, a, b, second + 2, second + 3))
+
+
+@compiled
+def segment_distance(nodes: Table, a: int, b: int, c: int, d: int) -> Real:
+    """Square of the distance (m²) between the segments from node a to b and from c to d.
+
+    The nearest points of the lines; where one is beyond its segment, the end there, and what is
+    nearest to that (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9).
+    """
+    u_x, v_x = nodes[b, P_WN] - nodes[a, P_WN], nodes[d, P_WN] - nodes[c, P_WN]
+    u_y, v_y = nodes[b, P_WN + 1] - nodes[a, P_WN + 1], nodes[d, P_WN + 1] - nodes[c, P_WN + 1]
+    u_z, v_z = nodes[b, P_WN + 2] - nodes[a, P_WN + 2], nodes[d, P_WN + 2] - nodes[c, P_WN + 2]
+    r_x = nodes[a, P_WN] - nodes[c, P_WN]
+    r_y = nodes[a, P_WN + 1] - nodes[c, P_WN + 1]
+    r_z = nodes[a, P_WN + 2] - nodes[c, P_WN + 2]
+    uu, vv = u_x * u_x + u_y * u_y + u_z * u_z, v_x * v_x + v_y * v_y + v_z * v_z
+    uv, ur = u_x * v_x + u_y * v_y + u_z * v_z, u_x * r_x + u_y * r_y + u_z * r_z
+    vr = v_x * r_x + v_y * r_y + v_z * r_z
+    s = share((uv * vr - ur * vv) / maximum(uu * vv - uv * uv, _PARALLEL * (uu * vv)))
+    t = share((uv * s + vr) / vv)
+    s = share((uv * t - ur) / uu)
+    x, y, z = r_x + s * u_x - t * v_x, r_y + s * u_y - t * v_y, r_z + s * u_z - t * v_z
+    return x * x + y * y + z * z
+
+
+@compiled
+def share(x: Real) -> Real:
+    """The nearest number from 0 to 1."""
+    return minimum(maximum(x, 0.0), 1.0)

@@ -1,0 +1,84 @@
+"""The tally of a walk: sums and least values that its metrics need of every step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION, Cables
+from tetra_drake.physics.clearance import CORNERS, least_strut_distance
+from tetra_drake.physics.compiling import compiled
+from tetra_drake.physics.lanes import Real, Table, maximum, minimum, select
+
+
+class Tally(NamedTuple):
+    """Sums over the steps that begin at `begins` or later, and least values of all; SI units."""
+
+    begins: Table
+    """(1,): in s."""
+    time: Table
+    """(1,): that of the latest observation, in s; so are the next two."""
+    signals: Table
+    """(signals,)."""
+    lengths: Table
+    """(cables,)."""
+    work: Table
+    """(1,): the integral of max(0, -S dl/dt) of the driven cables, in J."""
+    roughness: Table
+    """(1,): the integral of (dS/dt)² of all signals, in N²/s."""
+    lifted: Table
+    """(bodies,): the time in which no contact node of a body bears a normal force, in s."""
+    tension: Table
+    """(1,): the least of a cable, in N."""
+    clearance: Table
+    """(1,): the square of the least distance between struts, in m²; see physics.clearance."""
+
+
+@compiled
+def observe(
+    tally: Tally,
+    cables: Cables,
+    contacts: Table,
+    time: Real,
+    signals: Table,
+    pulls: Table,
+    pushes: Table,
+) -> None:
+    """Adds the step that ends at a time (s), with the forces there, as cables and ground write
+    them. At the time of the latest observation it adds nothing."""
+    passed = time - tally.time[0]
+    counts = (passed > 0.0) & (tally.time[0] >= tally.begins[0])
+    work, roughness, tension = 0.0 * passed, 0.0 * passed, tally.tension[0]
+    for i in range(tally.lengths.size):
+        length, driver = pulls[i, LENGTH], cables.signal[i]
+        if driver != PASSIVE:
+            force = 0.5 * (tally.signals[driver] + signals[driver])
+            work += maximum(force * (tally.lengths[i] - length), 0.0)
+        tally.lengths[i] = length
+        tension = minimum(tension, pulls[i, TENSION])
+    tally.tension[0] = tension
+    for k in range(tally.signals.size):
+        change = signals[k] - tally.signals[k]
+        roughness += change * change
+        tally.signals[k] = signals[k]
+    tally.work[0] += select(counts, work, 0.0)
+    tally.roughness[0] += select(counts, roughness / passed, 0.0)
+    add_lifted(tally, contacts, select(counts, passed, 0.0), pushes)
+    tally.time[0] = time
+
+
+@compiled
+def add_lifted(tally: Tally, contacts: Table, passed: Real, pushes: Table) -> None:
+    """Adds the time (s) to that of lifted bodies; contact nodes are in the order of bodies."""
+    i = 0
+    for body in range(tally.lifted.size):
+        load = 0.0 * passed
+        while i < contacts.size and contacts[i] < CORNERS * (body + 1):
+            load += pushes[i, 2]
+            i += 1
+        tally.lifted[body] += select(load == 0.0, passed, 0.0)
+
+
+@compiled
+def look(tally: Tally, nodes: Table) -> None:
+    """Takes note of the distances between struts; `nodes` of physics.kinematics."""
+    tally.clearance[0] = least_strut_distance(nodes, tally.clearance[0])
