@@ -7,12 +7,11 @@ import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.rules import key_groups
+from tetra_drake.scenario.schema import Scenario
 
 
 @dataclass(frozen=True)
@@ -24,12 +23,6 @@ class Draw:
     moves: np.ndarray | None = None
     """(n, 3): the displacement of each tetrahedron at t = 0, in m."""
     terrain_seed: int | None = None
-
-
-def key_groups(spreads: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
-    """Each key of `disturbances.spreads` with the scenario keys that it joins by commas."""
-    for joined in spreads:
-        yield joined, [key.strip() for key in joined.split(",")]
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:

@@ -1,7 +1,8 @@
-"""What a file inherits from its base: spacing and reference only where they still hold."""
+"""What a file inherits from its base, and which keys of disturbances belong together."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from tetra_drake.scenario.fields import Tree, merge
@@ -42,3 +43,9 @@ def same_experiment(tree: Tree, base: Tree) -> bool:
         return [rest, simulation.get("duration"), simulation.get("steady_from")]
 
     return relevant(tree) == relevant(base)
+
+
+def key_groups(spreads: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
+    """Each key of `disturbances.spreads` with the scenario keys that it joins by commas."""
+    for joined in spreads:
+        yield joined, [key.strip() for key in joined.split(",")]

@@ -13,7 +13,6 @@ from typing import Any, Self
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario import rules
-from tetra_drake.scenario.disturbances import key_groups
 from tetra_drake.scenario.fields import Check, hint, quantity, setting, tree_of, with_values
 from tetra_drake.scenario.metrics import METRICS, inverse
 from tetra_drake.scenario.terrain import Flat, Terrain
@@ -402,7 +401,7 @@ def _check_disturbances(scenario: Scenario, tree: dict[str, Any], source: object
         kind = type(scenario.terrain).__name__
         raise InputError(source, key, f"found true, expected false: !{kind} has no seed")
     tree = tree | {"disturbances": None}
-    for joined, keys in key_groups(settings.spreads):
+    for joined, keys in rules.key_groups(settings.spreads):
         key, spread = f"disturbances.spreads.{joined}", settings.spreads[joined]
         numbers = {name: _number(scenario, name, key, source) for name in keys}
         for factor in (1.0 - spread, 1.0 + spread):
