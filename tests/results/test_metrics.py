@@ -2,14 +2,16 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
+from helpers.totals import make_totals
 
 from tetra_drake.results.metrics import compute_fitness, compute_metrics, unmet_requirements
 from tetra_drake.results.path import CentrePath
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.metrics import METRICS, Metrics, inverse
+from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, Metrics, inverse
 from tetra_drake.scenario.schema import Scenario
 
 INCH = 0.0254
@@ -22,10 +24,13 @@ CIRCLE = CentrePath(
 """To the left, with a radius of 1 m, but turning to the right."""
 
 
+STEADY = {"totals": make_totals(), "signals": np.zeros((49, 4)), "weight": 0.5}
+
+
 def metrics_of(structure: Structure, path: CentrePath, steady_from: float) -> Metrics:
     """Those of a robot whose feet are at their start all the time."""
     nodes = node_positions(structure, structure.initial_state)
-    kwargs = {"path": path, "steady_from": steady_from}
+    kwargs = {"path": path, "steady_from": steady_from, **STEADY}
     return compute_metrics(structure, start=nodes, steady=nodes, end=nodes, **kwargs)
 
 
@@ -37,7 +42,7 @@ def test_metrics_are_the_displacements_of_figure_13(structure: Structure) -> Non
     end[1, 0] += 0.45  # x2
     end[19, 0] += 0.6  # x3, the tip of T5
     metrics = compute_metrics(
-        structure, start=start, steady=steady, end=end, path=CIRCLE, steady_from=0.0
+        structure, start=start, steady=steady, end=end, path=CIRCLE, steady_from=0.0, **STEADY
     )
     assert metrics.distance == pytest.approx(0.5)
     assert metrics.steady_distance == pytest.approx(0.4)
@@ -64,11 +69,46 @@ def test_turning_and_bending_count_from_their_instants(structure: Structure) -> 
     assert metrics_of(structure, line, 0.0).path_radius == math.inf
 
 
+def walked(structure: Structure, way: float, **given: Any) -> Metrics:
+    """Those of a robot all of whose nodes have moved forward by a way (m) in 12 steady seconds."""
+    start = node_positions(structure, structure.initial_state)
+    end = start + np.array([way, 0.0, 0.0])
+    path = CentrePath(np.linspace(0.0, 15.0, 61), np.zeros((61, 3)), np.zeros(61))
+    known = {"path": path, "steady_from": 3.0} | STEADY | given
+    return compute_metrics(structure, start=start, steady=start, end=end, **known)
+
+
+def test_totals_become_metrics(structure: Structure) -> None:
+    metrics = walked(structure, 0.24)
+    assert metrics.speed == pytest.approx(0.24 / 12.0)
+    assert metrics.actuator_work == 0.3
+    assert metrics.cost_of_transport == pytest.approx(0.3 / (0.5 * 0.24))
+    # Four signals: the mean square is 48 N²/s in 12 s and four signals, 1 N²/s².
+    assert metrics.signal_rate == pytest.approx(1.0)
+    assert metrics.lifted_shares == pytest.approx(np.arange(5) / 12.0)
+    assert metrics.lifted == pytest.approx(2.0 / 12.0)
+    assert (metrics.clearance, metrics.tension) == (0.01, 1.0)
+    assert metrics.travelling_index == 0.0
+    phases = 0.5 * np.pi * (np.arange(48)[:, None] / 4.0 - np.arange(4.0))
+    travelling = walked(structure, 0.24, signals=np.sin(phases))
+    assert travelling.travelling_index == pytest.approx(1.0)
+
+
+def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(structure: Structure) -> None:
+    backward, standing = walked(structure, -0.24), walked(structure, 0.0)
+    assert backward.cost_of_transport == pytest.approx(0.3 / (0.5 * 0.24))
+    assert standing.cost_of_transport == pytest.approx(0.3 / (0.5 * LEAST_WAY))
+    weightless = walked(structure, 0.24, weight=0.0)
+    assert weightless.cost_of_transport == math.inf
+    assert weightless.to_json()["cost_of_transport"] is None
+    assert weightless.to_json()["actuator_work"] == 0.3
+
+
 def test_every_metric_has_a_unit_and_only_lengths_are_given_in_inches(
     structure: Structure,
 ) -> None:
     assert (METRICS["heading_change"], METRICS["path_curvature"]) == ("rad", "1/m")
-    lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift"}
+    lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift", "clearance"}
     assert {name for name, unit in METRICS.items() if unit == "m"} == lengths
     inches = metrics_of(structure, CIRCLE, 0.0).in_inches()
     assert inches.keys() == {f"{name}_in" for name in lengths}

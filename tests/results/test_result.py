@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.totals import make_totals
 
 from tetra_drake.results.result import (
     IntegratorWork,
@@ -31,6 +32,9 @@ def result_of(scenario, structure, states) -> SimulationResult:
         structure,
         times=result_times(scenario.simulation),
         states=states,
+        signals=np.zeros((len(states), structure.signals)),
+        totals=make_totals(),
+        mass=0.02,
         wall_time=1.0,
         integrator=IntegratorWork("none", 1.0, 1, 1),
         trajectory=None,

@@ -30,7 +30,7 @@ from tetra_drake.scenario.fields import tree_of
 from tetra_drake.scenario.metrics import Metrics
 from tetra_drake.scenario.schema import Coulomb, Scenario, SimulationScenario
 from tetra_drake.scenario.terrain import Flat
-from tetra_drake.scenario.units import INCH, shown
+from tetra_drake.scenario.units import INCH, POUND_FORCE, shown
 
 if TYPE_CHECKING:
     import xarray
@@ -197,6 +197,8 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     metrics, work = result.metrics, result.integrator
     after = f"from {scenario.simulation.steady_from:g} s on"
     side = "to the left" if metrics.path_curvature > 0.0 else "to the right"
+    diameter = shown(scenario.robot.strut_diameter, "m")
+    clearance = f"least, between the axes of struts, which overlap below {diameter}"
     bends = "straight" if math.isinf(metrics.path_radius) else side
     rows = [
         ("distance", metrics.distance / INCH, "in", ""),
@@ -205,12 +207,19 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
         ("lateral drift", metrics.lateral_drift / INCH, "in", ""),
         ("heading change", math.degrees(metrics.heading_change), "deg", "positive to the left"),
         ("path radius", metrics.path_radius / INCH, "in", f"{bends}, {after}"),
+        ("actuator work", metrics.actuator_work, "J", after),
+        ("transport cost", metrics.cost_of_transport, "", "work over weight and way"),
+        ("signal rate", metrics.signal_rate / POUND_FORCE, "lbf/s", "root mean square"),
+        ("lifted", 100.0 * metrics.lifted, "%", "of the time, mean of the tetrahedra"),
+        ("clearance", metrics.clearance / INCH, "in", clearance),
+        ("tension", metrics.tension / POUND_FORCE, "lbf", "least of a cable"),
+        ("travelling", metrics.travelling_index, "", "index of the signals: 0 stand, 1 travel"),
     ]
     lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
     if ground := ground_text(scenario):
         lines.append(f"  ground: {ground}")
     for name, value, unit, note in rows:
-        line = f"  {name:<16}{fixed(value):>8} {unit:<4} {f'({note})' if note else ''}"
+        line = f"  {name:<16}{fixed(value):>8} {unit:<5} {f'({note})' if note else ''}"
         lines.append(line.rstrip())
     lines.append(f"  {'fitness':<16}{fixed(result.fitness):>8}")
     unmet = unmet_requirements(metrics, scenario.require)

@@ -1,0 +1,79 @@
+"""The metrics of every engine, against each other and against what a trajectory says."""
+
+import numpy as np
+import pytest
+
+from tetra_drake.engines.mujoco import installed
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.clearance import least_strut_distance
+from tetra_drake.results.measures import lifted, travelling_index
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.structure import MakeStructure, moved_nodes
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.metrics import METRICS
+
+
+@pytest.fixture(scope="module")
+def short():
+    """Three tetrahedra on Coulomb friction, where small errors stay small."""
+    changes = {"robot.tetrahedra": 3, "simulation.duration": 2.0, "simulation.steady_from": 0.5}
+    changes |= {"cpg.start_up": 0.2, "simulation.sample_period": 1e-3, "cpg.gain": "3 lbf"}
+    return load_scenario("coulomb").with_changes(changes | {"simulation.engine": "compiled"})
+
+
+@pytest.fixture(scope="module")
+def walk(short):
+    return simulate(scenario=short, gait=seeded_gait(short, 3), record=True)
+
+
+def test_tallied_metrics_are_those_of_the_trajectory(short, walk):
+    structure, metrics = MakeStructure(short), walk.metrics
+    steady = walk.trajectory.sel(time=slice(0.5, None))
+    driven = structure.cables["signal"] != PASSIVE
+    driver = structure.cables["signal"][driven]
+    force, length = steady.signal.values[:, driver], steady.length.values[:, driven]
+    shortening = -np.diff(length, axis=0)
+    work = np.maximum(0.0, 0.5 * (force[1:] + force[:-1]) * shortening).sum()
+    assert metrics.actuator_work == pytest.approx(work, rel=1e-3)
+    way = steady.p_WB.mean("tetrahedron").isel(time=[0, -1]).diff("time").values[0, :2]
+    # Six rods and four balls of aluminium.
+    rod = np.pi / 4 * 0.003175**2 * 0.1524 * 2700.0
+    ball = np.pi / 6 * 0.00508**3 * 2700.0
+    weight = 3 * (6 * rod + 4 * ball) * 9.80665
+    expected = work / (weight * np.linalg.norm(way))
+    assert metrics.cost_of_transport == pytest.approx(expected, rel=2e-3)
+    rate = np.diff(steady.signal.values, axis=0) / 1e-3
+    assert metrics.signal_rate == pytest.approx(np.sqrt((rate**2).mean()), rel=1e-3)
+    # A foot may touch and leave within a sample.
+    shares = lifted(steady).mean("time").values
+    assert metrics.lifted_shares == pytest.approx(shares, abs=5e-3)
+    assert metrics.tension == pytest.approx(walk.trajectory.tension.values.min(), rel=1e-3)
+    states = np.hstack(
+        [
+            np.concatenate([walk.trajectory.q_WB, walk.trajectory.p_WB], axis=2).reshape(2001, -1),
+            np.zeros((2001, 18)),
+        ]
+    )
+    squares = [least_strut_distance(moved_nodes(structure, s), np.inf) for s in states]
+    # Looked at every 20 ms or so, in which nodes move by some millimetres.
+    assert metrics.clearance == pytest.approx(np.sqrt(min(squares)), abs=1e-4)
+    assert metrics.clearance >= np.sqrt(min(squares)) - 1e-9
+    coarse = steady.signal.sel(time=walk.path.times[walk.path.times >= 0.5]).values
+    assert metrics.travelling_index == pytest.approx(travelling_index(coarse), rel=1e-6)
+
+
+@pytest.mark.parametrize("engine", ["drake", "mujoco"])
+def test_engines_agree_in_all_metrics(short, walk, engine):
+    if engine == "mujoco" and not installed():
+        pytest.skip("mujoco is not installed")
+    other = short.with_changes({"simulation.engine": engine, "simulation.accuracy": 1e-3})
+    found = simulate(scenario=other, gait=seeded_gait(short, 3)).metrics
+    for name, unit in METRICS.items():
+        if engine == "mujoco" and name in ("lifted", "path_curvature"):
+            continue  # its feet chatter: they leave the ground for a step every few
+        ours, theirs = getattr(walk.metrics, name), getattr(found, name)
+        # On MuJoCo's ground with constant damping, the robot settles and slides a little otherwise.
+        absolute = {"m": 1e-5, "1/m": 1e-2}.get(unit, 1e-3) * (50 if engine == "mujoco" else 1)
+        relative = 0.03 if engine == "mujoco" else 2e-3
+        assert theirs == pytest.approx(ours, rel=relative, abs=absolute), name
