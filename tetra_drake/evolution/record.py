@@ -65,7 +65,9 @@ _EVALUATION_KEYS = {
     "failure": str | None,
     "wall_time_s": float | int,
     "engine": str,
+    "draws": dict | None,
 }
+_OPTIONAL = {"draws": None}
 _FIRST_METRICS = {
     "distance_in": "distance",
     "steady_distance_in": "steady_distance",
@@ -204,7 +206,7 @@ class TrialRecord:
             self._refuse(name, row, "the genome is not the one that scenario and seed lead to")
         fitness = -math.inf if entry["fitness"] is None else entry["fitness"]
         rest = [entry[key] for key in ("metrics", "failure", "wall_time_s", "engine")]
-        return Evaluation(fitness, *rest)
+        return dataclasses.replace(Evaluation(fitness, *rest), draws=entry.get("draws"))
 
     def keep(self, entry: dict[str, Any]) -> None:
         """Saves an evaluation whose iteration is not complete yet."""
@@ -244,6 +246,7 @@ def evaluation_entry(
     index: int, iteration: int, vector: Vector, evaluation: Evaluation
 ) -> dict[str, Any]:
     """An evaluation as a line of the record; the fitness of a failure is null."""
+    draws = {} if evaluation.draws is None else {"draws": dict(evaluation.draws)}
     return {
         "index": index,
         "iteration": iteration,
@@ -253,6 +256,7 @@ def evaluation_entry(
         "failure": evaluation.failure,
         "wall_time_s": round(evaluation.wall_time, 4),
         "engine": evaluation.engine,
+        **draws,
     }
 
 
@@ -263,7 +267,7 @@ def read_entries(path: Path) -> list[dict[str, Any]]:
     entries = read_lines(path)
     for line, entry in enumerate(entries, start=1):
         for key, kind in keys.items():
-            if not isinstance(entry.get(key, NotImplemented), kind):
+            if not isinstance(entry.get(key, _OPTIONAL.get(key, NotImplemented)), kind):
                 raise InputError(path, f"line {line}", f"is damaged: {key} is missing or invalid")
         entry.pop("best_distance_in", None)
         if "distance_in" in entry.get("metrics", {}):

@@ -9,6 +9,7 @@ import dataclasses
 import math
 from pathlib import Path
 
+from tetra_drake.evolution.draws import task_of
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import MakeExecutor, evaluate_all, process_executor
 from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
@@ -53,7 +54,11 @@ def reevaluate(
     title = f"{'initial' if initial else 'best'} gaits on the Drake diagram"
     progress.stage(title, 0, len(missing))
     evaluate = evaluate or GaitEvaluation(scenario, objective)
-    results = evaluate_all(evaluate, vectors, workers=workers, executor=executor)
+    tasks = [
+        task_of(scenario, vector, (run.manifest.seed, trial, iteration))
+        for vector, (trial, _, iteration) in zip(vectors, missing, strict=True)
+    ]
+    results = evaluate_all(evaluate, tasks, workers=workers, executor=executor)
     for finished, (i, evaluation) in enumerate(results, start=1):
         trial, index, iteration = missing[i]
         entry = evaluation_entry(index, iteration, vectors[i], evaluation)

@@ -47,7 +47,8 @@ class Run:
     wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
     have one), the metrics (distance ...), lifted_T1 ... (Metrics.lifted_shares), distance_in, and
     the parameters: weight_1 ... in the listing's order, time_scale_T1-T2 ..., gain_length ...,
-    tau_a_s, tau_b_s."""
+    tau_a_s, tau_b_s. Among disturbances, also draws_fitness and draws_distance (m), lists with a
+    number for each draw (missing if it failed), and worst_distance_in."""
     iterations: pandas.DataFrame
     """One row per iteration, 0 being the initial one: trial, iteration, evaluations so far,
     best_fitness, best_evaluation (its index), best_distance_in (that gait's), stop, and the
@@ -173,7 +174,8 @@ def _table(directory: Path, trials: int, name: str, columns: list[str]) -> panda
     ]
     table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
     kinds = dict.fromkeys(("placed", "best_evaluation"), "Int64")
-    kinds |= {column: "float" for column in table if column in _NUMBERS or "fitness" in column}
+    numbers = {column for column in table if column in _NUMBERS or column.endswith("fitness")}
+    kinds |= dict.fromkeys(numbers - {"draws_fitness"}, "float")
     return table.astype({column: kind for column, kind in kinds.items() if column in table})
 
 
@@ -183,4 +185,8 @@ def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:
     metrics = dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
     shares = enumerate(metrics.pop("lifted_shares", []), start=1)
     metrics |= {f"lifted_T{number}": share for number, share in shares}
-    return entry | metrics | {"distance_in": metrics["distance"] / INCH} | parameters
+    metrics["distance_in"] = metrics["distance"] / INCH
+    if draws := entry.pop("draws", None):
+        metrics |= {f"draws_{name}": numbers for name, numbers in draws.items()}
+        metrics["worst_distance_in"] = min(draws["distance"]) / INCH
+    return entry | metrics | parameters

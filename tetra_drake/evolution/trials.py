@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,8 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from tetra_drake.evolution.draws import SeededVector, score_at, task_of, worst_share
 from tetra_drake.evolution.executors import EvaluationPool, MakeExecutor, process_executor
-from tetra_drake.evolution.optimizers.base import Evaluate, Evaluation, MakeOptimizer, Optimizer
+from tetra_drake.evolution.optimizers.base import (
+    Evaluate,
+    Evaluation,
+    MakeOptimizer,
+    Optimizer,
+    Rescoring,
+)
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, trial_folder
 from tetra_drake.robot.gait import ParameterSpace, Vector
@@ -74,13 +82,14 @@ class Trial:
     holds already it goes through at once."""
 
     def __init__(
-        self, number: int, name: str, *, scenario: Scenario, optimizer: Optimizer, folder: Path
+        self, number: int, *, scenario: Scenario, seed: int, optimizer: Optimizer, folder: Path
     ) -> None:
+        """`seed` is the run's."""
         self.status = TrialStatus(number, optimizer.evaluations_at_most)
         self.unevaluated: dict[int, Vector] = {}
         """What has to be evaluated before the optimiser can go on, by number; empty at the end."""
-        self._name = name
         self._scenario = scenario
+        self._seed = seed
         self._optimizer = optimizer
         self._record = TrialRecord(folder)
         self._results: dict[int, Evaluation] = {}
@@ -89,6 +98,12 @@ class Trial:
         self._saved_best: int | None = None
         self._course = self._iterate()
         next(self._course, None)
+
+    @property
+    def tasks(self) -> dict[int, Vector | SeededVector]:
+        """What the evaluations of `unevaluated` are given."""
+        seed = self._seed, self.status.number, self.status.iteration + 1
+        return {i: task_of(self._scenario, v, seed) for i, v in self.unevaluated.items()}
 
     def take(self, index: int, evaluation: Evaluation) -> bool:
         """Takes an evaluation; True if that was the last of its iteration."""
@@ -104,6 +119,7 @@ class Trial:
     def _iterate(self) -> Iterator[None]:
         """Goes from iteration to iteration; yields to wait for evaluations."""
         while self.status.stop is None:
+            self._rescore()
             batch = dict(enumerate(self._optimizer.ask(), start=self.status.evaluations))
             self._results = {}
             for index, vector in batch.items():
@@ -119,6 +135,14 @@ class Trial:
         self._record.finish(self.status.evaluations)
         self._save_best()
 
+    def _rescore(self) -> None:
+        """Where the score goes from mean to tail, tells the optimiser that of the iteration."""
+        scenario, iteration = self._scenario, self.status.iteration + 1
+        changes = worst_share(scenario, 0.0) != worst_share(scenario, 1.0)
+        if changes and isinstance(self._optimizer, Rescoring):
+            share = worst_share(scenario, min(1.0, iteration / scenario.evolution.max_iterations))
+            self._optimizer.rescore(functools.partial(score_at, share))
+
     def _add(self, index: int, evaluation: Evaluation) -> None:
         self._results[index] = evaluation
         failed = evaluation.failure is not None
@@ -127,7 +151,8 @@ class Trial:
     def _save_best(self) -> None:
         if self._best is not None and self._best[0] != self._saved_best:
             self._saved_best, vector, _ = self._best
-            name = f"{self._name}, evaluation {self._saved_best}"
+            trial = f"{self._scenario.name}, seed {self._seed}, trial {self.status.number}"
+            name = f"{trial}, evaluation {self._saved_best}"
             gait = ParameterSpace.of(self._scenario).gait(vector, name=name)
             self._record.save_best(gait, self._scenario)
 
@@ -175,8 +200,8 @@ def run_trials(
     trials = [
         Trial(
             number,
-            f"{scenario.name}, seed {seed}, trial {number}",
             scenario=scenario,
+            seed=seed,
             optimizer=optimizer(space, scenario.evolution, np.random.default_rng(own_seed)),
             folder=trial_folder(record.directory, number),
         )
@@ -190,8 +215,8 @@ def run_trials(
     with EvaluationPool[tuple[Trial, int]](evaluate, workers=workers, executor=executor) as pool:
         while waiting or pool.busy:
             for trial in waiting:
-                for index, vector in trial.unevaluated.items():
-                    pool.submit((trial, index), vector)
+                for index, task in trial.tasks.items():
+                    pool.submit((trial, index), task)
             done = pool.wait(_SHOW_PERIOD)
             waiting = [trial for (trial, index), found in done if trial.take(index, found)]
             show(statuses)

@@ -75,6 +75,11 @@ class LanePool:
         Also raises TimeBudgetExceeded if a simulation is not done after `time_budget` (s).
         """
         (future,) = self.submit([(scenario, gait)], record=record, time_budget=time_budget)
+        return self.result(future)
+
+    @staticmethod
+    def result(future: Future[tuple[Walk, Course]]) -> SimulationResult:
+        """Waits for a walk of submit(); raises as simulate() does."""
         return make_outcome(*future.result())
 
     def submit(
@@ -84,7 +89,7 @@ class LanePool:
         record: bool = False,
         time_budget: float = math.inf,
     ) -> list[Future[tuple[Walk, Course]]]:
-        """Puts gaits, each with its scenario, in the queue; make_outcome() makes their results."""
+        """Puts gaits, each with its scenario, in the queue; result() waits for one."""
         jobs = [_Job(*walk, record, time_budget) for walk in walks]
         with self._changed:
             self._waiting.extend(jobs)
@@ -203,7 +208,7 @@ def simulate_in_lanes(
     with LanePool(threads, say=say) as pool:
         for future in pool.submit(walks, record=record):
             try:
-                found.append(make_outcome(*future.result()))
+                found.append(pool.result(future))
             except SimulationFailure as failure:
                 found.append(failure)
     return found

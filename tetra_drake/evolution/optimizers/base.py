@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -15,15 +15,17 @@ from tetra_drake.scenario.schema import EvolutionScenario
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The outcome of one vector. A failed one has fitness -inf and no metrics."""
+    """The outcome of one vector. A failed one has fitness -inf, and metrics only if it walked."""
 
     fitness: float
-    metrics: Mapping[str, float] = field(default_factory=dict)
-    """As the fields of results.metrics.Metrics, SI."""
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+    """As Metrics.to_json() gives them."""
     failure: str | None = None
     wall_time: float = 0.0
     """What it cost, in s; of simulations side by side on a core, its share of that core's time."""
     engine: str = ""
+    draws: Mapping[str, Sequence[float]] | None = None
+    """Among disturbances, fitness and distance (m) of each draw."""
 
     @classmethod
     def failed(cls, reason: str) -> Evaluation:
@@ -31,8 +33,12 @@ class Evaluation:
         return cls(fitness=-math.inf, failure=reason)
 
 
-Evaluate = Callable[[Vector], Evaluation]
-"""A pure function; it must pickle to run in worker processes."""
+Evaluate = Callable[[Any], Evaluation]
+"""A pure function of a vector, or among disturbances of an evolution.draws.SeededVector; it must
+pickle to run in worker processes."""
+
+Score = Callable[[Evaluation], float]
+"""By what evaluations are compared; greater is better."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,15 @@ class Optimizer(Protocol):
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes the evaluations in the order in which the vectors were asked for."""
+
+
+@runtime_checkable
+class Rescoring(Protocol):
+    """An Optimizer that can be told to compare evaluations by other numbers than their fitness."""
+
+    def rescore(self, score: Score) -> None:
+        """Takes the score that counts from now on, for evaluations told before and for new ones.
+        What is reported of fitnesses stays so."""
 
 
 MakeOptimizer = Callable[[ParameterSpace, EvolutionScenario, np.random.Generator], Optimizer]

@@ -1,0 +1,98 @@
+"""Evaluating a gait among disturbances: the seeds of its draws, and one evaluation of many."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.robot.gait import Vector
+from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.schema import Scenario
+
+LEAST = ("clearance", "tension")
+"""Metrics of which the least of all draws is recorded, in place of their mean."""
+
+Seed = tuple[int, int, int]
+"""Of a run, number of a trial and of an iteration, whose vectors all have the same draws."""
+
+
+class SeededVector(NamedTuple):
+    """A vector and the seed of the draws among which to evaluate it; draw k adds k to the seed."""
+
+    vector: Vector
+    seed: Seed
+
+
+def task_of(scenario: Scenario, vector: Vector, seed: Seed) -> Vector | SeededVector:
+    """What a vector's evaluation is given: the seed, too, if there are disturbances to draw."""
+    return vector if scenario.disturbances is None else SeededVector(vector, seed)
+
+
+def draws_of(scenario: Scenario, seed: Sequence[int]) -> list[Scenario]:
+    """The scenario's draws of the seed of a SeededVector."""
+    count = scenario.disturbances.draws if scenario.disturbances else 1
+    seeds = [(*seed, k) for k in range(count)]
+    return [disturbed(scenario, draw_disturbances(scenario, each)) for each in seeds]
+
+
+def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
+    """The evaluation of a gait from those of its draws, of which the worst share counts. It fails
+    if one of them does."""
+    wall_time = sum(draw.wall_time for draw in draws)
+    failures = [f"draw {k}: {e.failure}" for k, e in enumerate(draws) if e.failure is not None]
+    metrics = combine_metrics([draw.metrics for draw in draws])
+    if failures:
+        return Evaluation(-math.inf, metrics, failures[0], wall_time)
+    fitnesses = [draw.fitness for draw in draws]
+    distances = [draw.metrics["distance"] for draw in draws]
+    lists = {"fitness": fitnesses, "distance": distances}
+    fitness = worst_mean(fitnesses, share)
+    return Evaluation(fitness, metrics, wall_time=wall_time, draws=lists)
+
+
+def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Means, or the least of LEAST, of each metric; none if a draw has none."""
+    if not all(draws):
+        return {}
+    return {name: _combined(name, [draw[name] for draw in draws]) for name in draws[0]}
+
+
+def _combined(name: str, values: Sequence[Any]) -> Any:
+    if None in values:  # infinite
+        return None
+    if name in LEAST:
+        return min(values)
+    return np.mean(values, axis=0).tolist()
+
+
+def worst_share(scenario: Scenario, progress: float = 1.0) -> float:
+    """The share of the draws, the worst, that counts when a run has come so far, from 0 to 1."""
+    settings = scenario.disturbances
+    if settings is None:
+        return 1.0
+    shares = {
+        "mean": 1.0,
+        "worst": 1.0 / settings.draws,
+        "cvar": settings.tail,
+        "mean_to_tail": settings.tail + (1.0 - progress) * (1.0 - settings.tail),
+    }
+    return shares[settings.aggregation]
+
+
+def worst_mean(fitnesses: Sequence[float], share: float) -> float:
+    """Mean over the worst share, above 0, of the fitnesses: as many as that are, the last one by
+    the fraction of it that is left; the least alone if they are less than one."""
+    ranked, count = sorted(fitnesses), max(1.0, share * len(fitnesses))
+    weights = [min(1.0, max(0.0, count - i)) for i in range(len(ranked))]
+    return math.fsum(w * f for w, f in zip(weights, ranked, strict=True)) / count
+
+
+def score_at(share: float, evaluation: Evaluation) -> float:
+    """The fitness that an evaluation would have if this worst share of its draws counted."""
+    if evaluation.draws is None:
+        return evaluation.fitness
+    return worst_mean(evaluation.draws["fitness"], share)
