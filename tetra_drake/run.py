@@ -58,7 +58,7 @@ def evolve(
         threads simulate the candidates of all trials side by side; see simulate_many.
     progress: shown none by default; see evolution.progress.
     reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another.
-    report: in the end, writes report.html, replay.html and figures/.
+    report: in the end, writes report.html, replay.html, figures/ and champions/.
 
     Raises InputError for what cannot be used, EvaluationImpossible if no evaluation can run.
     """

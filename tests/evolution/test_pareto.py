@@ -1,12 +1,20 @@
 """Fronts of what distance is traded against, and their champions."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 from helpers.synthetic_run import PER_DISTANCE, write_run
 
-from tetra_drake.evolution.pareto import by_gait, champions, forward_gaits, pareto_front, trades
+from tetra_drake.evolution.pareto import (
+    STEADINESS,
+    by_gait,
+    champions,
+    forward_gaits,
+    pareto_front,
+    trades,
+)
 from tetra_drake.evolution.tables import load_run
 
 NAN = math.nan
@@ -47,6 +55,19 @@ def test_champions_walk_forward_and_at_least_half_as_far_as_the_farthest(tmp_pat
     assert best["cheapest"]["distance_in"] == pytest.approx(10.0 / PER_DISTANCE)
     again = {"fittest": best["farthest"]} | best
     assert [names for names, _ in by_gait(again)] == [["fittest", "farthest"], ["cheapest"]]
+
+
+def test_steadiness_is_the_worst_draws_share_of_the_mean_distance(tmp_path):
+    trial = [[(20.0, 0), (16.0, 1), (12.0, 2), (8.0, 3), (-4.0, 4)]]
+    run = load_run(write_run(tmp_path / "run", [trial]))
+    worst = [2.0, 6.0, 4.8, 3.9, -2.0]  # of means 10, 8, 6, 4 and -2 in
+    run = dataclasses.replace(run, evaluations=run.evaluations.assign(worst_distance_in=worst))
+    gaits = forward_gaits(run)
+    assert trades(gaits) == [STEADINESS]
+    np.testing.assert_allclose(STEADINESS.of(gaits), [0.2, 0.75, 0.8, 0.975], rtol=1e-12)
+    # The last one walks less than half as far as the farthest.
+    found = {name: gait["index"] for name, gait in champions(run).items()}
+    assert found == {"farthest": 0, "steadiest": 2}
 
 
 @pytest.mark.parametrize("metrics", [{}, {-1.0: {"cost_of_transport": 1.0}}])

@@ -20,17 +20,29 @@ is easily cheap."""
 class Trade:
     """A number of a gait that is wanted beside its distance."""
 
-    column: str
-    """In forward_gaits()."""
     name: str
     champion: str
     """What the gait is called that is best in it."""
+    column: str
+    """Of `Run.evaluations`."""
+    per_inch: bool
+    """Whether it is the column's share of the distance, both in inches."""
     wanted: float
     """1 if it is to be great, -1 if small."""
 
+    def of(self, gaits: Any) -> Any:
+        """The number of each row of evaluations, or of one."""
+        return gaits[self.column] / gaits["distance_in"] if self.per_inch else gaits[self.column]
 
-COST = Trade("cost_of_transport", "cost of transport", "cheapest", -1.0)
-TRADES = (COST,)
+
+COST = Trade("cost of transport", "cheapest", "cost_of_transport", per_inch=False, wanted=-1.0)
+STEADINESS = Trade(
+    "steadiness (worst draw / mean)", "steadiest", "worst_distance_in", per_inch=True, wanted=1.0
+)
+"""The distance in a gait's worst draw as a share of its mean distance. Gaits of different
+iterations met different draws, and luck is chosen, too: fresh draws tell what is robust."""
+
+TRADES = (COST, STEADINESS)
 
 
 def pareto_front(points: np.ndarray) -> np.ndarray:
@@ -61,7 +73,7 @@ def trades(gaits: pandas.DataFrame) -> list[Trade]:
 
 def front_of(gaits: pandas.DataFrame, trade: Trade) -> pandas.DataFrame:
     """The gaits whose trade of distance no other one dominates, the farthest first."""
-    points = np.column_stack([gaits["distance"], trade.wanted * gaits[trade.column]])
+    points = np.column_stack([gaits["distance"], trade.wanted * trade.of(gaits)])
     return gaits[pareto_front(points)].sort_values("distance", ascending=False, kind="stable")
 
 

@@ -46,6 +46,9 @@ def metric_rows(gaits: Sequence[pandas.Series]) -> list[MetricRow]:
         size, read = customary(unit)
         values = [fixed(gait[name] / size, 3) for gait in gaits]
         rows.append(MetricRow(name.replace("_", " "), read, values))
+        if name == "distance":
+            worst = [fixed(gait.get("worst_distance_in", math.nan), 3) for gait in gaits]
+            rows.append(MetricRow("distance, worst draw", "in", worst))
     shares = [[gait[n] for n in gait.index if n.startswith("lifted_T")] for gait in gaits]
     percents = [" ".join(fixed(100.0 * share, 0) for share in each) for each in shares]
     rows.append(MetricRow(f"lifted, T1 to T{len(shares[0])}", "%", percents))

@@ -51,7 +51,7 @@ def pareto(run: Run) -> Figure:
     The line is the front: no gait of the run goes farther and is better in the other number, too.
     The cheapest and the steadiest gait are found among those that walk at least half as far as the
     farthest, above the dotted line. Steadiness is the distance in a gait's worst draw as a share of
-    its mean distance."""
+    its mean distance, by the draws of its own iteration."""
     gaits = forward_gaits(run)
     fittest = run.evaluation(*run.fittest())
     marked = by_gait({"fittest": fittest} | champions(run))
@@ -60,7 +60,7 @@ def pareto(run: Run) -> Figure:
     for axes, trade in zip(row, panels, strict=True):
         _draw(axes, gaits, trade)
         for names, gait in marked:
-            axes.plot(gait[trade.column], gait["distance_in"], **_MARKS[names[0]])
+            axes.plot(trade.of(gait), gait["distance_in"], **_MARKS[names[0]])
     farthest = gaits["distance_in"].max()
     row[0].set(
         ylabel=f"distance in {run.manifest.scenario.simulation.duration:g} s (in)",
@@ -77,15 +77,15 @@ def pareto(run: Run) -> Figure:
 
 def _draw(axes: Axes, gaits: pandas.DataFrame, trade: Trade) -> None:
     """Draws gaits and front in the plane of a trade."""
-    front, numbers = front_of(gaits, trade), gaits[trade.column]
+    front, numbers = front_of(gaits, trade), trade.of(gaits)
     # One picture within the SVG, as there are tens of thousands.
     faint: Any = {"color": "0.5", "alpha": 0.3, "markersize": 3.0, "rasterized": True}
     axes.plot(numbers, gaits["distance_in"], ".", markeredgewidth=0.0, **faint)
     axes.axhline(NEAREST * gaits["distance_in"].max(), **_NEAREST)
     # What is a little worse than one gait of the front goes as far as that gait.
-    axes.step(front[trade.column], front["distance_in"], where="pre", **_FRONT)
+    axes.step(trade.of(front), front["distance_in"], where="pre", **_FRONT)
     worst = numbers.quantile(_SHOWN if trade.wanted < 0.0 else 1.0 - _SHOWN)
-    shown = [*front[trade.column], worst]
+    shown = [*trade.of(front), worst]
     low, high = min(shown), max(shown)
     if low > 0.0 and high > _WIDE * low:
         margin = (high / low) ** 0.04

@@ -10,7 +10,7 @@ from urllib.parse import quote
 import pandas
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.pareto import NEAREST, by_gait, champions
+from tetra_drake.evolution.pareto import NEAREST, TRADES, by_gait, champions
 from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.summary import comparisons, metric_rows
@@ -35,8 +35,8 @@ CHAMPIONS = "champions"
 def write_figures(source: Path, out: Path | None = None) -> list[Path]:
     """Writes the figures of a run or of a result folder into `out`; returns what was written.
 
-    Without `out`, they go to figures/ in the source, and a run's report and replay are written
-    anew, too. Raises InputError.
+    Without `out`, they go to figures/ in the source, and a run's report, replay and champions are
+    written anew, too. Raises InputError.
     """
     folder = out or source / FIGURES
     if (source / RUN_MANIFEST).exists():
@@ -103,6 +103,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         gaits=[(names, gait_label(gait)) for names, gait in gaits],
         links={name: _champion(name) for name in best_of} | {"fittest": best_gait},
         nearest=NEAREST,
+        trades=[f"the {trade.champion}" for trade in TRADES if trade.champion in best_of],
         metrics=metric_rows([gait for _, gait in gaits]),
         parameters=_parameters(study),
         pictures=[(_embedded(folder / f"{name}.svg"), captions[name]) for name in captions],
