@@ -166,6 +166,7 @@ def test_metrics_of_the_best_gait_stand_beside_the_initial_ones_and_the_champion
     for row in (
         ["fitness", "1.500", "4.000", "2.000", ""],
         ["distance", "0.750", "2.000", "1.000", "in"],
+        ["cost of transport", "0.100", "0.900", "0.250", ""],
         ["lifted, T1 to T3", "- - -", "25 0 50", "- - -", "%"],
     ):
         assert row in page.table
