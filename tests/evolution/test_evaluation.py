@@ -1,6 +1,5 @@
 """Evaluating vectors by simulation: objectives, failures, and the same numbers in any process."""
 
-import dataclasses
 import math
 import time
 
@@ -38,7 +37,7 @@ def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vect
         gait = ParameterSpace.of(tiny).gait(vector, name="any")
         result = simulate(scenario=tiny, gait=gait, record=True)
         assert here[index].fitness == there[index].fitness == result.fitness
-        assert here[index].metrics == there[index].metrics == dataclasses.asdict(result.metrics)
+        assert here[index].metrics == there[index].metrics == result.metrics.to_json()
         assert there[index].engine == "drake"
         assert there[index].wall_time > 0.0
     assert here[0].fitness != here[1].fitness

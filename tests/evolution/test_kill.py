@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.analytic import Bowl, read_record, small_scenario
+from helpers.analytic import DrawnBowl, drawn_scenario, read_record
 
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.trials import run_trials
@@ -51,9 +51,9 @@ def wait_until_gone(session):
 @pytest.fixture
 def uninterrupted(tmp_path):
     with RunRecord.create(
-        tmp_path / "whole", scenario=small_scenario(iterations=150), seed=9
+        tmp_path / "whole", scenario=drawn_scenario(iterations=150), seed=9
     ) as record:
-        run_trials(record, evaluate=Bowl(), workers=2, executor=ThreadPoolExecutor)
+        run_trials(record, evaluate=DrawnBowl(), workers=2, executor=ThreadPoolExecutor)
     return read_record(tmp_path / "whole")
 
 

@@ -10,9 +10,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from tetra_drake.evolution.draws import combine
 from tetra_drake.evolution.optimizers.base import Evaluation, Iteration
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import DisturbancesScenario, Scenario
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,21 @@ class Bowl:
             return Evaluation.failed("fell off the table")
         fitness = -float(((genome[:-2] - 2.0) ** 2).sum())
         return Evaluation(fitness, {"distance": 10.0 + fitness}, wall_time=self.delay)
+
+
+TAIL = 0.3
+
+
+@dataclass(frozen=True)
+class DrawnBowl:
+    """Bowl among three draws, each of which moves it in all directions, for drawn_scenario()."""
+
+    delay: float = 0.0
+
+    def __call__(self, task):
+        generators = [np.random.default_rng([*task.seed, k]) for k in range(3)]
+        moved = [task.vector + generator.normal(size=task.vector.size) for generator in generators]
+        return combine([Bowl(self.delay / 3, fails_every=15)(each) for each in moved], TAIL)
 
 
 @dataclass(frozen=True)
@@ -59,6 +77,12 @@ def small_scenario(
             "evolution.trials": trials,
         }
     )
+
+
+def drawn_scenario(**options) -> Scenario:
+    """small_scenario() among draws, selected by their mean at first, by their tail at last."""
+    settings = DisturbancesScenario(draws=3, aggregation="mean_to_tail", tail=TAIL)
+    return small_scenario(**options).with_changes({"disturbances": settings})
 
 
 def read_record(directory: Path) -> dict[str, object]:

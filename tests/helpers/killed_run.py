@@ -5,7 +5,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from helpers.analytic import Bowl, small_scenario
+from helpers.analytic import DrawnBowl, drawn_scenario
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.record import MANIFEST, RunRecord
 from tetra_drake.evolution.trials import run_trials
@@ -16,12 +16,12 @@ if __name__ == "__main__":
     if (directory / MANIFEST).exists():
         opened = RunRecord.resume(directory)
     else:
-        opened = RunRecord.create(directory, scenario=small_scenario(iterations=150), seed=9)
+        opened = RunRecord.create(directory, scenario=drawn_scenario(iterations=150), seed=9)
     with opened as record:
         print("begun", flush=True)
         run_trials(
             record,
-            evaluate=Bowl(delay=float(sys.argv[3])),
+            evaluate=DrawnBowl(delay=float(sys.argv[3])),
             workers=2,
             executor=process_executor if sys.argv[2] == "processes" else ThreadPoolExecutor,
         )

@@ -1,0 +1,295 @@
+"""Gaits evaluated among draws of disturbances, and requirements."""
+
+import dataclasses
+import json
+import math
+import re
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from helpers.analytic import (
+    TAIL,
+    DrawnBowl,
+    RandomSearch,
+    drawn_scenario,
+    read_record,
+    small_scenario,
+)
+from pytest import approx
+
+from tetra_drake import evolve
+from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mean, worst_share
+from tetra_drake.evolution.evaluation import GaitEvaluation
+from tetra_drake.evolution.executors import process_executor
+from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.evolution.optimizers.steady_state import SteadyState
+from tetra_drake.evolution.record import RunRecord
+from tetra_drake.evolution.reevaluation import reevaluate
+from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.trials import run_trials
+from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.schema import DisturbancesScenario
+from tetra_drake.scenario.terrain import Steps
+
+STIFFNESS = {"cables.outer_stiffness": 0.05}
+SEED = (5, 0, 3)
+
+
+@pytest.fixture(scope="module")
+def tiny():
+    """0.3 s of three tetrahedra, actuated at once, on the compiled engine, among three draws."""
+    return small_scenario(oscillators=2, population=4, iterations=2, trials=2).with_changes(
+        {
+            "simulation.engine": "compiled",
+            "simulation.duration": 0.3,
+            "simulation.steady_from": 0.1,
+            "cpg.start_up": 0.0,
+            "disturbances": DisturbancesScenario(draws=3, spreads=STIFFNESS, start=0.02),
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def vector(tiny):
+    return ParameterSpace.of(tiny).random(np.random.default_rng(1))
+
+
+def by_hand(scenario, vector):
+    """The results of the draws of SEED, as simulate() gives them."""
+    gait = ParameterSpace.of(scenario).gait(vector, name="any")
+    draws = [draw_disturbances(scenario, (*SEED, k)) for k in range(3)]
+    return [simulate(scenario=disturbed(scenario, draw), gait=gait) for draw in draws]
+
+
+# Evaluations
+
+
+def test_a_gait_is_simulated_in_each_of_its_draws(tiny, vector):
+    found, results = GaitEvaluation(tiny)(SeededVector(vector, SEED)), by_hand(tiny, vector)
+    fitnesses = [result.fitness for result in results]
+    assert len(set(fitnesses)) == 3
+    assert found.draws["fitness"] == fitnesses
+    assert found.draws["distance"] == [result.metrics.distance for result in results]
+    assert found.fitness == approx(np.mean(fitnesses), rel=1e-14)
+    assert found.metrics["twist"] == approx(np.mean([r.metrics.twist for r in results]), rel=1e-14)
+    other = GaitEvaluation(tiny)(SeededVector(vector, (5, 0, 4)))
+    assert other.draws["fitness"] != fitnesses
+
+
+def test_without_a_seed_a_gait_is_evaluated_undisturbed(tiny, vector):
+    found = GaitEvaluation(tiny)(vector)
+    assert found == dataclasses.replace(
+        GaitEvaluation(tiny.with_changes({"disturbances": None}))(vector), wall_time=found.wall_time
+    )
+    assert found.draws is None
+
+
+def test_an_objective_is_that_of_each_draw(tiny, vector):
+    objective = lambda result: -abs(result.metrics.distance)  # noqa: E731
+    found = GaitEvaluation(tiny, objective)(SeededVector(vector, SEED))
+    assert found.draws["fitness"] == [-abs(distance) for distance in found.draws["distance"]]
+
+
+@pytest.mark.parametrize(
+    ("aggregation", "ours"),
+    # Of three: the mean; the least; the worst half is one and a half of them.
+    [("mean", lambda a, b, c: (a + b + c) / 3), ("worst", lambda a, b, c: a)]
+    + [(kind, lambda a, b, c: (a + b / 2) / 1.5) for kind in ("cvar", "mean_to_tail")],
+)
+def test_the_fitness_is_what_the_run_aims_for(tiny, vector, aggregation, ours):
+    changes = {"disturbances.aggregation": aggregation, "disturbances.tail": 0.5}
+    found = GaitEvaluation(tiny.with_changes(changes))(SeededVector(vector, SEED))
+    assert found.fitness == approx(ours(*sorted(found.draws["fitness"])), rel=1e-14)
+
+
+def test_the_mean_over_the_worst_share_is_continuous_from_the_mean_to_the_least():
+    fitnesses = [3.0, -1.0, 2.0, 8.0]
+    assert worst_mean(fitnesses, 1.0) == 3.0
+    assert worst_mean(fitnesses, 0.5) == 0.5
+    assert worst_mean(fitnesses, 0.25) == worst_mean(fitnesses, 0.1) == -1.0
+    shares = np.linspace(0.01, 1.0, 1000)
+    means = np.array([worst_mean(fitnesses, share) for share in shares])
+    # Beyond the least, share s counts 4 s draws: dm/ds = (worst of the rest - m) / s < 9 / 0.25.
+    assert (np.diff(means) >= 0.0).all() and np.diff(means).max() < 36.0 * (shares[1] - shares[0])
+
+
+def test_metrics_are_means_but_for_the_least_clearance_and_tension():
+    names = ("speed", "clearance", "tension", "lifted_shares", "cost_of_transport")
+    each = [[1.0, 2.0, 3.0, [0.5, 0.0], 1.0], [3.0, 1.0, 4.0, [0.0, 1.0], None]]
+    found = combine_metrics([dict(zip(names, values, strict=True)) for values in each])
+    assert list(found.values()) == [2.0, 1.0, 3.0, [0.25, 0.5], None]
+
+
+# Failures
+
+
+def test_a_gait_that_misses_a_requirement_has_failed_with_its_metrics(tiny, vector):
+    still = tiny.with_changes({"disturbances": None})
+    walked = GaitEvaluation(still)(vector)
+    demanding = {"require": {"lead": "3 ft", "distance": "-9 in"}}
+    failed = GaitEvaluation(still.with_changes(demanding))(vector)
+    assert (failed.fitness, failed.metrics) == (-math.inf, walked.metrics)
+    assert failed.failure.startswith("requirement: lead is ")
+    assert failed.failure.endswith(" 36 in") and "distance" not in failed.failure
+
+
+def test_a_requirement_missed_in_one_draw_is_missed(tiny, vector):
+    distances = [result.metrics.distance for result in by_hand(tiny, vector)]
+    least = sorted(distances)[1]
+    missed = distances.index(min(distances))
+    strict = tiny.with_changes({"require": {"distance": least}})
+    failed = GaitEvaluation(strict)(SeededVector(vector, SEED))
+    assert failed.failure.startswith(f"draw {missed}: requirement: distance is ")
+    assert (failed.fitness, failed.draws) == (-math.inf, None)
+    assert failed.metrics["distance"] == approx(np.mean(distances), rel=1e-14)
+
+
+def beside_a_step(scenario):
+    """The scenario with a step 10 mm ahead of the lead's feet, which draws move by up to 22 mm."""
+    feet = (scenario.robot.tetrahedra - 1) * scenario.robot.spacing
+    step = Steps(height=0.02, depth=0.02, count=1, start=feet + 0.01)
+    return scenario.with_changes({"terrain": step, "disturbances.start": 0.3})
+
+
+@pytest.mark.parametrize(
+    ("change", "kind"),
+    [
+        (beside_a_step, "no start"),
+        (lambda tiny: tiny.with_changes({"simulation.max_evaluations": 50}), "step budget"),
+    ],
+)
+def test_a_draw_that_fails_or_cannot_start_fails_its_gait_with_and_without_lanes(
+    tiny, vector, change, kind
+):
+    scenario = change(tiny)
+    tasks = [SeededVector(vector, (1, 0, iteration)) for iteration in range(4)]
+    with LanePool(1) as lanes:
+        alone, beside = (
+            [dataclasses.replace(evaluate(task), wall_time=0.0) for task in tasks]
+            for evaluate in (GaitEvaluation(scenario), GaitEvaluation(scenario, None, lanes))
+        )
+    assert alone == beside
+    failed = [each for each in alone if each.failure]
+    assert failed
+    for each in failed:
+        assert re.match(rf"draw [012]: {kind}: ", each.failure)
+        assert (each.fitness, each.metrics, each.draws) == (-math.inf, {}, None)
+
+
+# Runs
+
+
+class Asked:
+    """DrawnBowl, which keeps the seeds it is given."""
+
+    def __init__(self):
+        self.seeds = []
+
+    def __call__(self, task):
+        self.seeds.append(task.seed)
+        return DrawnBowl()(task)
+
+
+@pytest.fixture
+def run_drawn(tmp_path):
+    """run_drawn(name, ...): a small run among draws; its directory."""
+
+    def run(name, *, evaluate=None, executor=ThreadPoolExecutor, optimizer=SteadyState, **options):
+        workers, scenario = options.pop("workers", 1), drawn_scenario(**options)
+        way = {"workers": workers, "executor": executor, "optimizer": optimizer}
+        with RunRecord.create(tmp_path / name, scenario=scenario, seed=5) as record:
+            run_trials(record, evaluate=evaluate or DrawnBowl(), **way)
+        return tmp_path / name
+
+    return run
+
+
+def test_all_gaits_of_an_iteration_share_its_draws(run_drawn):
+    asked = Asked()
+    run_drawn("run", evaluate=asked)
+    expected = [(5, trial, 0) for trial in (0, 1) for _ in range(12)]
+    expected += [(5, t, i) for i in range(1, 16) for t in (0, 1) for _ in range(2)]
+    assert sorted(asked.seeds) == sorted(expected)
+
+
+def test_neither_workers_nor_executor_change_a_record_among_draws(run_drawn):
+    reference = read_record(run_drawn("alone"))
+    assert read_record(run_drawn("crowd", workers=5)) == reference
+    assert read_record(run_drawn("pool", workers=2, executor=process_executor)) == reference
+
+
+def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
+    directory = run_drawn("run", trials=1)
+    lines = (directory / "trial_00" / "evaluations.jsonl").read_text().splitlines()
+    entries = [json.loads(line) for line in lines]
+    walked = [entry for entry in entries if entry["failure"] is None]
+    assert 0 < len(walked) < len(entries)
+    for entry in walked:
+        assert entry["fitness"] == worst_mean(entry["draws"]["fitness"], TAIL)
+        assert entry["metrics"]["distance"] == approx(np.mean(entry["draws"]["distance"]))
+    assert all("draws" not in entry for entry in entries if entry["failure"])
+    table = load_run(directory).evaluations.dropna(subset="fitness")
+    assert table["draws_fitness"].tolist() == [entry["draws"]["fitness"] for entry in walked]
+    worst = [min(entry["draws"]["distance"]) / 0.0254 for entry in walked]
+    assert table["worst_distance_in"].tolist() == worst
+
+
+def test_the_score_goes_from_mean_to_tail_in_the_last_iteration(run_drawn):
+    scores = []
+
+    class Scored(RandomSearch):
+        def rescore(self, score):
+            scores.append(score(Evaluation(0.0, draws={"fitness": [0.0, 2.0, 1.0]})))
+
+    # Two iterations, and one that may follow: the last is number 2.
+    run_drawn("run", trials=1, iterations=2, optimizer=Scored)
+    # Shares 1 and (1 + 0.3) / 2 = 0.65: of three, 1.95 count.
+    assert scores == approx([1.0, 0.95 / 1.95], rel=1e-12)
+    scores.clear()
+    run_drawn("short", trials=1, iterations=1, optimizer=Scored)
+    assert scores == approx([1.0, 0.0], abs=1e-12)
+
+
+def test_an_optimiser_that_cannot_be_told_goes_by_what_is_aimed_for(run_drawn):
+    run_drawn("run", trials=1, optimizer=RandomSearch)
+    assert worst_share(drawn_scenario()) == TAIL
+
+
+def test_a_population_is_compared_by_the_score_that_counts_now():
+    settings = small_scenario(population=4, iterations=9)
+    space, generator = ParameterSpace.of(settings), np.random.default_rng(1)
+    optimizer = SteadyState(space, settings.evolution, generator)
+    optimizer.ask()
+    optimizer.tell([Evaluation(fitness) for fitness in (1.0, 2.0, 3.0, 4.0)])
+    optimizer.rescore(lambda evaluation: -evaluation.fitness)
+    optimizer.ask()
+    told = optimizer.tell([Evaluation(5.0), Evaluation(-1.0)])
+    # By the score, 5 is worse than all, and -1 better than whatever it meets.
+    assert told.placed[0] is None and told.placed[1] is not None
+    replaced = told.placed[1] + 1.0
+    assert told.report["mean_fitness"] == approx((10.0 - replaced - 1.0) / 4.0)
+
+
+def test_a_run_in_lanes_has_the_record_of_one_on_other_executors(tiny, tmp_path):
+    ways = {"lanes": {"workers": 2}, "alone": {"workers": 1, "executor": ThreadPoolExecutor}}
+    ours, theirs = (
+        evolve(tiny, tmp_path / name, seed=2, report=False, reevaluate=False, **way)
+        for name, way in ways.items()
+    )
+    ours, theirs = (run.evaluations.drop(columns="wall_time_s") for run in (ours, theirs))
+    assert ours.equals(theirs)
+    assert len(ours) == 2 * (4 + 2 * 2) and ours["failure"].isna().all()
+
+
+def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn):
+    directory, evaluate = run_drawn("run"), DrawnBowl()
+    run = reevaluate(directory, evaluate=evaluate, workers=1, executor=ThreadPoolExecutor)
+    again = run.reevaluations.set_index(["trial", "index"])
+    first = run.evaluations.set_index(["trial", "index"]).loc[again.index]
+    assert len(again) == 10
+    assert first["iteration"].nunique() > 1
+    assert again["draws_fitness"].equals(first["draws_fitness"])
