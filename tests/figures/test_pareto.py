@@ -35,8 +35,8 @@ def test_the_front_is_stepped_among_all_gaits_that_walk_forward(draw):
     assert front == [points[9.0], points[10.0], points[16.0], points[20.0]]
     (step,) = (line for line in axes.lines if line.get_drawstyle() == "steps-pre")
     assert step.get_xydata().tolist() == front[::-1]
-    # The fittest and farthest is one gait, under a star; the cheapest walks half as far.
-    assert lines(axes, "*") == [[points[20.0]]]
+    # The fittest and farthest is one gait, under one mark; the cheapest walks half as far.
+    assert lines(axes, "o") == [[points[20.0]]]
     assert lines(axes, "s") == [[points[10.0]]]
 
 

@@ -33,14 +33,15 @@ _FRONT: Any = {"color": "black", "linewidth": 1.0, "marker": ".", "markersize": 
 _NEAREST: Any = {"color": "0.4", "linewidth": 1.0, "linestyle": ":"}
 _MARKS: dict[str, Any] = {
     name: {"marker": marker, "color": OKABE_ITO[colour], "markersize": size}
-    | {"linestyle": "", "markeredgecolor": "white"}
+    | {"linestyle": "", "fillstyle": "none", "markeredgewidth": 1.6}
     for name, marker, colour, size in (
-        ("fittest", "*", "vermillion", 11.0),
-        ("farthest", "^", "blue", 8.0),
-        ("cheapest", "s", "green", 7.0),
-        ("steadiest", "D", "purple", 7.0),
+        ("fittest", "o", "vermillion", 8.0),
+        ("farthest", "^", "blue", 12.0),
+        ("cheapest", "s", "green", 10.0),
+        ("steadiest", "D", "purple", 9.0),
     )
 }
+"""Hollow, as one gait may lie over another's."""
 
 
 @common_style()
@@ -79,7 +80,7 @@ def _draw(axes: Axes, gaits: pandas.DataFrame, trade: Trade) -> None:
     """Draws gaits and front in the plane of a trade."""
     front, numbers = front_of(gaits, trade), trade.of(gaits)
     # One picture within the SVG, as there are tens of thousands.
-    faint: Any = {"color": "0.5", "alpha": 0.3, "markersize": 3.0, "rasterized": True}
+    faint: Any = {"color": "0.4", "alpha": 0.4, "markersize": 3.5, "rasterized": True}
     axes.plot(numbers, gaits["distance_in"], ".", markeredgewidth=0.0, **faint)
     axes.axhline(NEAREST * gaits["distance_in"].max(), **_NEAREST)
     # What is a little worse than one gait of the front goes as far as that gait.
