@@ -190,6 +190,15 @@ def test_objective_and_requirements_are_those_of_the_scenario(tmp_path):
     assert page.row("required") == ["lead: 0.5 in"]
 
 
+def test_gaits_of_a_run_with_disturbances_are_shown_undisturbed(tmp_path, study):
+    disturbed = {"disturbances": {"draws": 3, "start": 0.1}}
+    scenario = tiny_scenario().with_changes(disturbed)
+    shown = study_run(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
+    assert shown.best.distance_in == study.best.distance_in
+    (note,) = (text for text in render(shown).texts["p"] if "3 draws" in text)
+    assert f"{shown.best.label}: {shown.best.distance_in:.2f} in" in note
+
+
 def test_many_parameters_are_folded(tmp_path, study):
     assert len(study.run.vector(0, 0)) == 6
     assert not any("->" in text for text in render(study).texts["details"])

@@ -133,5 +133,5 @@ def comparisons(run: Run) -> list[Comparison]:
         row("best evolved gait", best, "best_distance", "in"),
         row("improvement, mean of trials", rises, "mean_improvement", "%"),
         row("improvement, best trial", [best_trial.improvement_percent], "best_improvement", "%"),
-        row("time per two simulations", [sum(times)], "iteration_time", "s"),
+        row("time per two evaluations", [sum(times)], "iteration_time", "s"),
     ]

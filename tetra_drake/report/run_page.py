@@ -85,14 +85,16 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
     best_gait, best_of = trial_folder(Path(), study.trial) / BEST_GAIT, champions(run)
     named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded} | best_of
     gaits = by_gait(named)
-    walks = {walk.label: walk.deviation_in for walk in (study.best, study.initial)}
+    walks = {walk.label: walk for walk in (study.best, study.initial)}
+    changes = {n: abs(walk.distance_in - walk.recorded["distance_in"]) for n, walk in walks.items()}
     return render(
         "report/report.html.jinja",
         run=run,
         manifest=manifest,
         ground=ground_text(manifest.scenario),
         best=study.best,
-        changed={label: inches for label, inches in walks.items() if inches > 1e-6},
+        again={label: walk.distance_in for label, walk in walks.items()},
+        changed={label: inches for label, inches in changes.items() if inches > 1e-6},
         versions=versions(),
         json=json.dumps,
         differences=differences(manifest.scenario, load_scenario("thesis")),
