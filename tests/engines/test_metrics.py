@@ -56,7 +56,7 @@ def test_tallied_metrics_are_those_of_the_trajectory(short, walk):
         ]
     )
     squares = [least_strut_distance(moved_nodes(structure, s), np.inf) for s in states]
-    # Looked at every 20 ms or so, in which nodes move by some millimetres.
+    # Looked at every 40 ms or so.
     assert metrics.clearance == pytest.approx(np.sqrt(min(squares)), abs=1e-4)
     assert metrics.clearance >= np.sqrt(min(squares)) - 1e-9
     coarse = steady.signal.sel(time=walk.path.times[walk.path.times >= 0.5]).values

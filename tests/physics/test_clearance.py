@@ -27,12 +27,12 @@ def nodes_at(p_WN: np.ndarray) -> np.ndarray:
     ("first", "second", "distance"),
     [
         ([(-1, 0, 0), (1, 0, 0)], [(0, -1, 2), (0, 1, 2)], 2.0),  # they cross
-        ([(-1, 0, 0), (1, 0, 0)], [(3, 0, 0), (4, 5, 0)], 2.0),  # end to end
-        ([(-1, 0, 0), (1, 0, 0)], [(0, 3, 0), (0, 5, 1)], 3.0),  # an end above a middle
-        ([(-1, 0, 0), (1, 0, 0)], [(4, 4, 0), (8, 8, 12)], 5.0),  # beyond both ends
-        ([(0, 0, 0), (1, 0, 0)], [(0.5, 1, 0), (2, 1, 0)], 1.0),  # parallel, side by side
-        ([(0, 0, 0), (1, 0, 0)], [(4, 4, 0), (5, 4, 0)], 5.0),  # parallel, apart
-        ([(0, 0, 0), (1, 0, 0)], [(0.5, 0, 0), (2, 0, 0)], 0.0),  # on one line
+        ([(-1, 0, 0), (1, 0, 0)], [(3, 0, 0), (3, 2, 0)], 2.0),  # end to end
+        ([(-1, 0, 0), (1, 0, 0)], [(0, 3, 0), (0, 5, 0)], 3.0),  # an end above a middle
+        ([(-1, 0, 0), (1, 0, 0)], [(4, 4, 0), (4, 4, 2)], 5.0),  # beyond both ends
+        ([(-1, 0, 0), (1, 0, 0)], [(0.5, 1, 0), (2.5, 1, 0)], 1.0),  # parallel, side by side
+        ([(-1, 0, 0), (1, 0, 0)], [(4, 4, 0), (6, 4, 0)], 5.0),  # parallel, apart
+        ([(-1, 0, 0), (1, 0, 0)], [(0.5, 0, 0), (2.5, 0, 0)], 0.0),  # on one line
         ([(-1, 0, 0), (1, 0, 0)], [(0, -1, 0), (0, 1, 0)], 0.0),  # they meet
     ],
 )
@@ -40,8 +40,9 @@ def test_segments_are_as_far_apart_as_their_nearest_points(first, second, distan
     for turned in (first, first[::-1]):
         for other in (second, second[::-1]):
             nodes = nodes_at(np.array([*turned, *other], dtype=float))
-            assert segment_distance(nodes, 0, 1, 2, 3) == pytest.approx(distance**2, abs=1e-12)
-            assert segment_distance(nodes, 2, 3, 0, 1) == pytest.approx(distance**2, abs=1e-12)
+            for pair in ((0, 1, 2, 3), (2, 3, 0, 1)):  # of length 2
+                square = segment_distance(nodes, *pair, 1.0 / 4.0)
+                assert square == pytest.approx(distance**2, abs=1e-12)
 
 
 def drake_distance(p_BN: np.ndarray, poses: list[RigidTransform], radius: float) -> float:

@@ -25,17 +25,20 @@ def least_strut_distance(nodes: Table, least: Real) -> Real:
     second. Where a plane across the line between their centres has the two on its sides, with more
     room than `least`, no distance is computed.
     """
+    x, y = nodes[1, P_WN] - nodes[0, P_WN], nodes[1, P_WN + 1] - nodes[0, P_WN + 1]
+    z = nodes[1, P_WN + 2] - nodes[0, P_WN + 2]
+    per_square = 1.0 / (x * x + y * y + z * z)  # all struts are alike
     for first in range(0, nodes.shape[0], CORNERS):
         for second in range(first + CORNERS, nodes.shape[0], CORNERS):
             base, tip, square = room_between(nodes, first, second)
             bound = _MARGIN * least * square
             if any_lane((tip <= 0.0) | (tip * tip <= bound)):
                 for a in range(first, first + 3):
-                    least = minimum(least, nearest_strut(nodes, a, first + 3, second))
+                    least = minimum(least, nearest_strut(nodes, a, first + 3, second, per_square))
             if any_lane((base <= 0.0) | (base * base <= bound)):
                 for k in range(3):
                     a, b = first + k, first + (k + 1) % 3
-                    least = minimum(least, nearest_strut(nodes, a, b, second))
+                    least = minimum(least, nearest_strut(nodes, a, b, second, per_square))
     return least
 
 
@@ -65,19 +68,20 @@ def along(nodes: Table, node: int, x: Real, y: Real, z: Real) -> Real:
 
 
 @compiled
-def nearest_strut(nodes: Table, a: int, b: int, second: int) -> Real:
+def nearest_strut(nodes: Table, a: int, b: int, second: int, per_square: Real) -> Real:
     """Square of the least distance (m²) of the strut from node a to b to those of the tetrahedron
-    that begins with node `second`."""
-    least = segment_distance(nodes, a, b, second, second + 1)
+    that begins with node `second`; see segment_distance."""
+    least = segment_distance(nodes, a, b, second, second + 1, per_square)
     for c in range(second, second + 2):
         for d in range(second + 2, second + 4):
-            least = minimum(least, segment_distance(nodes, a, b, c, d))
-    return minimum(least, segment_distance(nodes, a, b, second + 2, second + 3))
+            least = minimum(least, segment_distance(nodes, a, b, c, d, per_square))
+    return minimum(least, segment_distance(nodes, a, b, second + 2, second + 3, per_square))
 
 
 @compiled
-def segment_distance(nodes: Table, a: int, b: int, c: int, d: int) -> Real:
-    """Square of the distance (m²) between the segments from node a to b and from c to d.
+def segment_distance(nodes: Table, a: int, b: int, c: int, d: int, per_square: Real) -> Real:
+    """Square of the distance (m²) between the segments from node a to b and from c to d, which have
+    the same length; `per_square` is 1 over its square.
 
     The nearest points of the lines; where one is beyond its segment, the end there, and what is
     nearest to that (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9).
@@ -88,12 +92,13 @@ def segment_distance(nodes: Table, a: int, b: int, c: int, d: int) -> Real:
     r_x = nodes[a, P_WN] - nodes[c, P_WN]
     r_y = nodes[a, P_WN + 1] - nodes[c, P_WN + 1]
     r_z = nodes[a, P_WN + 2] - nodes[c, P_WN + 2]
-    uu, vv = u_x * u_x + u_y * u_y + u_z * u_z, v_x * v_x + v_y * v_y + v_z * v_z
+    # Products of u, v and r, in lengths of u and v.
     uv, ur = u_x * v_x + u_y * v_y + u_z * v_z, u_x * r_x + u_y * r_y + u_z * r_z
     vr = v_x * r_x + v_y * r_y + v_z * r_z
-    s = share((uv * vr - ur * vv) / maximum(uu * vv - uv * uv, _PARALLEL * (uu * vv)))
-    t = share((uv * s + vr) / vv)
-    s = share((uv * t - ur) / uu)
+    uv, ur, vr = per_square * uv, per_square * ur, per_square * vr
+    s = share((uv * vr - ur) / maximum(1.0 - uv * uv, _PARALLEL))
+    t = share(uv * s + vr)
+    s = share(uv * t - ur)
     x, y, z = r_x + s * u_x - t * v_x, r_y + s * u_y - t * v_y, r_z + s * u_z - t * v_z
     return x * x + y * y + z * z
 

@@ -49,11 +49,11 @@ def observe(
     counts = (passed > 0.0) & (tally.time[0] >= tally.begins[0])
     work, roughness, tension = 0.0 * passed, 0.0 * passed, tally.tension[0]
     for i in range(tally.lengths.size):
-        length, driver = pulls[i, LENGTH], cables.signal[i]
+        driver = cables.signal[i]
         if driver != PASSIVE:
             force = 0.5 * (tally.signals[driver] + signals[driver])
-            work += maximum(force * (tally.lengths[i] - length), 0.0)
-        tally.lengths[i] = length
+            work += maximum(force * (tally.lengths[i] - pulls[i, LENGTH]), 0.0)
+            tally.lengths[i] = pulls[i, LENGTH]
         tension = minimum(tension, pulls[i, TENSION])
     tally.tension[0] = tension
     for k in range(tally.signals.size):

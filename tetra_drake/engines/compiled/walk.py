@@ -53,8 +53,9 @@ the settings' `look_ahead`."""
 EVALUATIONS = 3
 """Force evaluations of an attempted step."""
 
-ROUND = 16
-"""Iterations, some 20 ms of a walk, after which the distances of struts are looked at."""
+ROUND = 32
+"""Iterations, some 40 ms of a walk, after which the distances of struts are looked at: enough to find
+the least one to within 0.1 mm."""
 
 STATUS, TIME, STEP, END, MARK, DUE, ACTIVE, SAMPLES, FLAG, TRIED, TAKEN, CLOCK_ROWS = range(12)
 """Rows of `clock`, (CLOCK_ROWS,): status, time, length of the step tried and its end, times of the
