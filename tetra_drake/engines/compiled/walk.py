@@ -54,8 +54,8 @@ EVALUATIONS = 3
 """Force evaluations of an attempted step."""
 
 ROUND = 32
-"""Iterations, some 40 ms of a walk, after which the distances of struts are looked at: enough to find
-the least one to within 0.1 mm."""
+"""Iterations, some 40 ms of a walk, after which the distances of struts are looked at: enough to
+find the least one to within 0.1 mm."""
 
 STATUS, TIME, STEP, END, MARK, DUE, ACTIVE, SAMPLES, FLAG, TRIED, TAKEN, CLOCK_ROWS = range(12)
 """Rows of `clock`, (CLOCK_ROWS,): status, time, length of the step tried and its end, times of the
