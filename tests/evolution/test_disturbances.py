@@ -19,6 +19,7 @@ from helpers.analytic import (
 from pytest import approx
 
 from tetra_drake import evolve
+from tetra_drake.engines.compiled.lane_engine import Walk
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mean, worst_share
@@ -78,6 +79,25 @@ def test_a_gait_is_simulated_in_each_of_its_draws(tiny, vector):
     assert found.metrics["twist"] == approx(np.mean([r.metrics.twist for r in results]), rel=1e-14)
     other = GaitEvaluation(tiny)(SeededVector(vector, (5, 0, 4)))
     assert other.draws["fitness"] != fitnesses
+
+
+def test_in_lanes_each_draw_is_prepared_once_for_all_gaits_of_an_iteration(tiny, monkeypatch):
+    prepared, prepare = [], Walk.of
+
+    def counted(*given, **kwargs):
+        prepared.append(given)
+        return prepare(*given, **kwargs)
+
+    monkeypatch.setattr(Walk, "of", counted)
+    generator, space = np.random.default_rng(2), ParameterSpace.of(tiny)
+    tasks = [SeededVector(space.random(generator), SEED) for _ in range(6)]
+    with LanePool(2) as lanes:
+        evaluate = GaitEvaluation(tiny, None, lanes)
+        first = evaluate(tasks[0])
+        with ThreadPoolExecutor(5) as executor:
+            rest = list(executor.map(evaluate, tasks[1:]))
+    assert len({each.fitness for each in (first, *rest)}) == 6
+    assert len(prepared) == 3
 
 
 def test_without_a_seed_a_gait_is_evaluated_undisturbed(tiny, vector):

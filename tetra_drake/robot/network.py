@@ -78,13 +78,15 @@ def make_senses(scenario: Scenario, structure: Structure) -> Senses:
     drivers, pathways = structure.actuation.drivers, scenario.cpg.feedback
     sizes = np.bincount(drivers[drivers != PASSIVE])[drivers]  # cables of each cable's group
     settled = settled_lengths(scenario) if "length" in pathways else np.ones(len(drivers))
-    weight = len(structure.bodies) * tetrahedron_inertia(structure).get_mass()
-    weight *= scenario.robot.gravity
+    per_load = 0.0
+    if "load" in pathways:
+        mass = len(structure.bodies) * tetrahedron_inertia(structure).get_mass()
+        per_load = 1.0 / (mass * scenario.robot.gravity)
     return Senses(
         drivers=drivers,
         ahead=structure.actuation.junctions + 1,
         carriers=structure.contacts // len(NODES),
         settled=settled,
         per_length=1.0 / (settled * sizes),
-        per_load=np.array([1.0 / weight if "load" in pathways else 0.0]),
+        per_load=np.array([per_load]),
     )

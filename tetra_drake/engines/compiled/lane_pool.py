@@ -23,6 +23,9 @@ _GATHERING = 1e-3
 _ITERATIONS = 5000
 """Iterations, some 30 ms, after which a thread looks for time budgets and the pool's end."""
 
+_PREPARED = 32
+"""Scenarios that are kept prepared, for gaits that are simulated on the same one."""
+
 
 @dataclass(eq=False)
 class _Job:
@@ -46,6 +49,7 @@ class LanePool:
         self._waiting: deque[_Job] = deque()
         self._changed = threading.Condition()
         self._closing = False
+        self._prepare = _Preparation()
         self._threads = [threading.Thread(target=self._work, daemon=True) for _ in range(threads)]
         for thread in self._threads:
             thread.start()
@@ -98,7 +102,7 @@ class LanePool:
 
     def _work(self) -> None:
         """What each thread does: fills idle lanes, lets them walk, hands over what has ended."""
-        crew = _Crew(self._say)
+        crew = _Crew(self._prepare, self._say)
         while (jobs := self._take(crew)) is not None:
             for job in jobs:
                 if not crew.load(job, among=len(jobs)):
@@ -126,17 +130,36 @@ class LanePool:
             return [self._waiting.popleft() for _ in range(min(room, len(self._waiting)))]
 
 
+class _Preparation:
+    """Prepares walks, each scenario once for all threads that need it at a time."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._latest: dict[tuple[int, bool], Walk] = {}
+        """By the scenario's identity, the one last used at the end."""
+
+    def __call__(self, job: _Job) -> Walk:
+        key = id(job.scenario), job.record
+        with self._lock:
+            walk = self._latest.pop(key, None)
+            walk = walk or Walk.of(job.scenario, job.gait, record=job.record)
+            self._latest[key] = walk  # with its scenario, so that no other one gets its id
+            if len(self._latest) > _PREPARED:
+                del self._latest[next(iter(self._latest))]
+        return walk.with_gait(job.gait)
+
+
 class _Crew:
     """The lanes of one thread and the jobs in them."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
+    def __init__(self, prepare: _Preparation, say: Callable[[str], None]) -> None:
         self.jobs: dict[int, _Job] = {}
         """By lane."""
+        self._prepare = prepare
         self._say = say
         self._engine: LaneEngine | None = None
         self._engines: dict[int, LaneEngine] = {}
         """By width."""
-        self._latest: Walk | None = None
 
     @property
     def room(self) -> int:
@@ -181,13 +204,6 @@ class _Crew:
         for job in self.jobs.values():
             job.future.set_exception(error)
         self.jobs, self._engine, self._engines = {}, None, {}
-
-    def _prepare(self, job: _Job) -> Walk:
-        latest = self._latest
-        if latest and latest.scenario is job.scenario and latest.record == job.record:
-            return latest.with_gait(job.gait)
-        self._latest = Walk.of(job.scenario, job.gait, record=job.record)
-        return self._latest
 
     def _engine_for(self, walk: Walk, width: int) -> LaneEngine:
         engine = self._engines.get(width)
