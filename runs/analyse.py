@@ -24,7 +24,7 @@ from tetra_drake.engines.simulate import available_cores, simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import evaluate_all, process_executor
-from tetra_drake.evolution.robustness import robustness
+from tetra_drake.evolution.robustness import PERCENT, judge, to_json
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.files import write_whole
 from tetra_drake.results.measures import dominant_frequency, lifted, share_of_time
@@ -34,7 +34,7 @@ from tetra_drake.robot.signals import signal_samples
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
-SCHEMA = 1
+SCHEMA = 2
 ANALYSIS = "analysis.json"
 
 DEFAULT = "default"
@@ -43,16 +43,22 @@ DEFAULT = "default"
 OSCILLATOR_TAU_A = 0.3
 """s, the time constant of the thesis's figures of a single oscillator."""
 
+_MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
 _COLUMNS = {
     "best_gaits": ("trial", "evaluation", "distance_in", "off_ground", "frequencies_hz"),
     "resimulations": ("trial", "setting", "distance_in", "failure"),
-    "variations": ("trial", "what", "percent", "distance_in", "failure"),
+    "gaits": ("gait", "undisturbed", "5 %", "50 %", "95 %", *_MEAN, *_KEPT, "failed"),
+    "over_gaits": ("of", "median", "low", "high"),
+    "changes": ("what", "median", "worst", "failed", "correlation", "correlation_size"),
 }
+_NUMBERS = ["distance_in", "correlation", "correlation_size"]
+"""What may be null in all rows."""
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """Content of analysis.json; distances in inches, NaN where a simulation failed."""
+    """Content of analysis.json; distances in inches if not said otherwise, NaN where a simulation
+    failed."""
 
     oscillator_frequency_hz: float
     """Of a single oscillator with OSCILLATOR_TAU_A."""
@@ -61,9 +67,12 @@ class Analysis:
     off_ground (share of the steady stretch by tetrahedron), frequencies_hz (by junction)."""
     resimulations: pandas.DataFrame
     """Those gaits on the Drake diagram: trial, setting, distance_in, failure."""
-    variations: pandas.DataFrame
-    """Those gaits with something changed, on the compiled engine: trial, what, percent,
-    distance_in, failure."""
+    gaits: pandas.DataFrame
+    """Those gaits under draws of the default disturbances, as of robustness.by_gait(), in m."""
+    over_gaits: pandas.DataFrame
+    """As of robustness.over_gaits(), in m."""
+    changes: pandas.DataFrame
+    """As of robustness.by_change(), in m."""
 
 
 def load_analysis(directory: Path) -> Analysis:
@@ -71,9 +80,11 @@ def load_analysis(directory: Path) -> Analysis:
     path = directory / ANALYSIS
     try:
         raw: Any = json.loads(path.read_text(encoding="utf-8"))
-        frames = {key: pandas.DataFrame(raw[key])[list(_COLUMNS[key])] for key in _COLUMNS}
+        rows = raw | raw["robustness"]
+        frames = {key: pandas.DataFrame(rows[key])[list(_COLUMNS[key])] for key in _COLUMNS}
         for frame in frames.values():
-            frame["distance_in"] = frame["distance_in"].astype(float)
+            numbers = frame.columns.intersection(_NUMBERS)
+            frame[numbers] = frame[numbers].astype(float)
         return Analysis(oscillator_frequency_hz=raw["oscillator"]["frequency_hz"], **frames)
     except (OSError, ValueError, KeyError, TypeError) as error:
         problem = f"cannot be read ({error}); run `python runs/analyse.py {directory}`"
@@ -101,11 +112,7 @@ def analyse(
             for trial, index in best
         ],
         "resimulations": resimulate(scenario, gaits, workers, executor),
-        "variations": [
-            {"trial": row["gait"], "what": row["what"], "percent": row["percent"]}
-            | _outcome(row, row["failure"])
-            for row in robustness(scenario, gaits, workers=workers).to_dict("records")
-        ],
+        "robustness": to_json(judge(scenario, gaits, percent=PERCENT, workers=workers)),
     }
     text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
     write_whole(directory / ANALYSIS, text + "\n")

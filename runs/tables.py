@@ -10,6 +10,7 @@ Each table stands in a Markdown file between two lines:
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -23,11 +24,12 @@ from engines import distances_on_both
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
-from tetra_drake.evolution.robustness import summarize
+from tetra_drake.evolution.robustness import inches, percents
 from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration, fixed, markdown_table, signed
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 HERE = Path(__file__).parent
 PAGES = (HERE.parent / "README.md", HERE / "README.md", HERE / "gaits.md")
@@ -73,11 +75,6 @@ class Recorded:
     def best_walk(self) -> pandas.Series:
         """The row of the analysis that describes the fittest gait of all trials."""
         return self.analysis.best_gaits.set_index("trial").loc[self.best_trial]
-
-    @property
-    def variations(self) -> pandas.DataFrame:
-        """A table as of robustness(), in inches."""
-        return self.analysis.variations.rename(columns={"trial": "gait", "distance_in": "distance"})
 
 
 def load_recorded(directory: Path) -> Recorded:
@@ -288,43 +285,41 @@ def resimulation_table(runs: Sequence[Recorded]) -> str:
 
 
 def robustness_table(runs: Sequence[Recorded]) -> str:
-    """Change of the distance (in) by what is changed, over the best gaits of runs of ten trials."""
+    """What hurts the best gaits of runs of ten trials most."""
     several = [run for run in runs if len(run.trials) > 1]
-    tables = {run.name: summarize(run.variations, by=["what", "percent"]) for run in several}
-    columns = [(name, percent) for name in tables for percent in _percents(tables[name])]
+    tables = [run.analysis.changes.set_index("what") for run in several]
     rows = [
-        [what, *(_change(tables[name].loc[(what, percent)]) for name, percent in columns)]
-        for what in tables[several[0].name].index.unique("what")
+        [what, *(cell for table in tables for cell in _change_cells(table.loc[what]))]
+        for what in tables[0].index
     ]
-    headings = [f"`{name}`, ± {percent:g} %" for name, percent in columns]
-    return markdown_table(["what is off", *headings], rows)
+    heads = ("alone: median change (worst), in", "rank correlation: mean (median size)")
+    headings = [f"`{run.name}`, {head}" for run in several for head in heads]
+    return markdown_table(["changed by 5 %", *headings], rows)
+
+
+def _change_cells(row: pandas.Series) -> list[str]:
+    failed = f", {row['failed']:.0f} failed" if row["failed"] else ""
+    worst = f"({signed(row['worst'] / INCH)}{failed})"
+    ranks = f"{signed(row['correlation'])} ({fixed(row['correlation_size'])})"
+    scaled = math.isfinite(row["correlation"])
+    return [f"{fixed(row['median'] / INCH)} {worst}", ranks if scaled else "-"]
 
 
 def robust_gaits_table(runs: Sequence[Recorded]) -> str:
-    """Change of the distance (in) by gait, and how often a tenth or more of it is lost."""
-    rows, headings = [], ["best gait", "distance, in"]
+    """How far each gait walks under draws of all changes, and how many it keeps."""
+    rows, names = [], ("undisturbed", "5 %", "50 %", "95 %")
     for run in runs:
-        table = summarize(run.variations, by=["gait", "percent"])
-        for trial in table.index.unique("gait"):
-            rows.append([f"`{run.name}`, trial {trial}", fixed(run.trials["distance_in"][trial])])
-            for _, row in table.loc[trial].iterrows():
-                rows[-1] += [_change(row), f"{100.0 * (1.0 - row['kept']):.0f} %"]
-        headings[2:] = [
-            f"± {percent:g} %: {what}"
-            for percent in _percents(table)
-            for what in ("change, in", "loses over 10 %")
-        ]
+        for trial, row in run.analysis.gaits.set_index("gait").iterrows():
+            mean, kept = (row[[name, f"{name}_low", f"{name}_high"]] for name in ("mean", "kept"))
+            cells = [fixed(row[name] / INCH) for name in names]
+            rows.append([f"`{run.name}`, trial {trial}", *cells, inches(*mean), percents(*kept)])
+        if len(run.trials) > 1:
+            over = run.analysis.over_gaits.set_index("of")
+            before, mean, kept = (over.loc[name] for name in ("undisturbed", "mean", "kept"))
+            middle = [inches(*before), "", "", "", inches(*mean), percents(*kept)]
+            rows.append([f"*`{run.name}`: median of the gaits*", *middle])
+    headings = ["best gait", *(f"{name}, in" for name in names), "mean, in", "keeps"]
     return markdown_table(headings, rows)
-
-
-def _percents(table: pandas.DataFrame) -> list[float]:
-    return sorted(table.index.unique("percent"))
-
-
-def _change(row: pandas.Series) -> str:
-    failed = f", {row['failed']:.0f} failed" if row["failed"] else ""
-    ends = f"{signed(row['least'])} to {signed(row['greatest'])}"
-    return f"{fixed(row['median'])} ({ends}{failed})"
 
 
 def tau_mutation_table(runs: Sequence[Recorded]) -> str:

@@ -5,11 +5,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import analyse
 import numpy as np
+import pandas
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.robustness import NOTHING, SCALED
+from tetra_drake.evolution.robustness import START, by_gait, default_disturbances, judge
 from tetra_drake.evolution.tables import load_run
 
 TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1)]]]
@@ -50,11 +51,13 @@ def test_every_integrator_setting_is_simulated_on_the_diagram(folder):
     assert again["distance_in"].nunique() > 2
 
 
-def test_every_change_is_simulated_on_the_compiled_engine_and_one_oscillator_alone(folder):
-    found = analyse.load_analysis(folder)
-    assert {what for what in SCALED if "friction" not in what} < set(found.variations["what"])
-    unchanged = found.variations[found.variations["what"] == NOTHING]
-    assert unchanged["distance_in"].tolist() == found.best_gaits["distance_in"].tolist()
+def test_the_best_gaits_are_judged_on_the_default_disturbances_and_one_oscillator_alone(folder):
+    found, run = analyse.load_analysis(folder), load_run(folder)
+    spreads = default_disturbances(run.manifest.scenario).spreads
+    assert set(found.changes["what"]) == {START, *spreads}
+    gaits = {0: run.gait(0, 2), 2: run.gait(2, 0)}
+    expected = by_gait(judge(run.manifest.scenario, gaits)).reset_index()
+    pandas.testing.assert_frame_equal(found.gaits, expected[list(found.gaits)])
     hertz = found.oscillator_frequency_hz  # that of its equations
     assert hertz == pytest.approx(1.0 / (2.0 * np.pi * analyse.OSCILLATOR_TAU_A), abs=0.01)
 
@@ -71,7 +74,7 @@ def test_a_run_without_any_fitness_is_refused(tmp_path, refused):
     [
         lambda text: text[:-9],
         lambda text: "[]",
-        lambda text: json.dumps(json.loads(text) | {"variations": [{"trial": 0}]}),
+        lambda text: json.dumps(json.loads(text) | {"resimulations": [{"trial": 0}]}),
         lambda text: json.dumps(json.loads(text) | {"oscillator": {}}),
     ],
     ids=["cut off", "no object", "columns", "oscillator"],

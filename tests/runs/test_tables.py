@@ -25,34 +25,39 @@ BEST["thesis-drake"] = {0: (0, 4.0)}
 
 
 def write_analysis(path, best):
-    """An analysis in which every gait changes alike, and one of two simulations at 5 % fails."""
-
-    def rows(*changes):
-        """A row per gait and change: how its distance changes (None: it fails), and the rest."""
-        return [
-            {"trial": trial, "distance_in": change if change is None else distance + change}
-            | {"failure": "fell" if change is None else None}
-            | rest
-            for trial, (_, distance) in best.items()
-            for change, rest in changes
-        ]
-
+    """An analysis in which every gait changes alike, and keeps half of the draws."""
     walk = {"off_ground": {"T1": 0.25, "T2": 0.5}, "frequencies_hz": {"T1-T2": 0.8, "T2-T3": None}}
     settings = (("default", 0.0), ("finer", 0.01), ("coarser", -0.5))
+    quantiles = {"5 %": 1.0 * INCH, "50 %": 2.0 * INCH, "95 %": 3.0 * INCH}
     content = {
-        "schema": 1,
+        "schema": 2,
         "oscillator": {"tau_a_s": 0.3, "frequency_hz": 0.53},
         "best_gaits": [
             {"trial": trial, "evaluation": index, "distance_in": distance} | walk
             for trial, (index, distance) in best.items()
         ],
-        "resimulations": rows(*((change, {"setting": name}) for name, change in settings)),
-        "variations": rows(
-            (0.0, {"what": "nothing", "percent": 0.0}),
-            (-1.0, {"what": "spacing", "percent": -2.0}),
-            (0.2, {"what": "spacing", "percent": 2.0}),
-            (None, {"what": "spacing", "percent": 5.0}),
-        ),
+        "resimulations": [
+            {"trial": trial, "distance_in": distance + change, "setting": name, "failure": None}
+            for trial, (_, distance) in best.items()
+            for name, change in settings
+        ],
+        "robustness": {
+            "gaits": [
+                {"gait": trial, "undisturbed": distance * INCH, "failed": 0, **quantiles}
+                | {name: 4.0 * INCH for name in ("mean", "mean_low", "mean_high")}
+                | {"kept": 0.5, "kept_low": 0.4, "kept_high": 0.61}
+                for trial, (_, distance) in best.items()
+            ],
+            "over_gaits": [
+                {"of": name, "median": 0.5, "low": 0.25, "high": 1.0}
+                for name in ("undisturbed", "mean", "kept")
+            ],
+            "changes": [
+                {"what": what, "median": 0.6 * INCH, "worst": -INCH, "failed": failed}
+                | {"correlation": correlation, "correlation_size": correlation}
+                for what, failed, correlation in (("spacing", 2, 0.25), ("start", 0, None))
+            ],
+        },
     }
     path.write_text(json.dumps(content))
 
@@ -88,18 +93,20 @@ def test_the_comparison_shows_each_run_beside_the_thesis(folder):
         assert rows[row] == expected
 
 
-def test_gaits_are_shown_per_trial_and_their_robustness_as_median_change_with_range(folder):
+def test_gaits_are_shown_per_trial_and_their_robustness_with_intervals(folder):
     distance, _, hertz, *lifted = cells("best-gaits", folder)["`thesis`, trial 1"]
     assert (distance, hertz, lifted) == ("5.00", "0.80", ["25", "50"])
     again = cells("resimulation", folder)
     assert again["`thesis`, trial 1"] == ["5.00", "5.00", "5.01", "4.50"]
     assert again["*`thesis`: median difference*"] == ["0.00", "", "0.01", "0.50"]
-    row = cells("robustness", folder)["spacing"]
-    assert row == ["0.60 (-1.00 to +0.20)", "- (- to -, 2 failed)"]
+    rows = cells("robustness", folder)
+    assert rows["spacing"] == ["0.60 (-1.00, 2 failed)", "+0.25 (0.25)"]
+    assert rows["start"] == ["0.60 (-1.00)", "-"]
     gaits = cells("robust-gaits", folder)
-    assert gaits["`thesis`, trial 0"][:3] == ["20.00", "0.60 (-1.00 to +0.20)", "0 %"]
-    assert gaits["`thesis`, trial 1"][:3] == ["5.00", "0.60 (-1.00 to +0.20)", "50 %"]
-    assert gaits["`thesis`, trial 0"][4] == "100 %"
+    mean, kept = "4.00 (4.00 to 4.00)", "50 % (40 to 61)"
+    assert gaits["`thesis`, trial 1"] == ["5.00", "1.00", "2.00", "3.00", mean, kept]
+    assert gaits["*`thesis`: median of the gaits*"][-1] == "50 % (25 to 100)"
+    assert "*`thesis-drake`: median of the gaits*" not in gaits
     rows = cells("tau-mutation", folder)
     assert (rows["0"][0::4], rows["0"][3::4]) == (["20.00", "6.00"], ["1", "1"])
     assert rows["1"][4:] == ["-"] * 4

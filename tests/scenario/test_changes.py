@@ -1,6 +1,5 @@
-"""Scenarios made from others: changed values, balanced spacing, references, perturbations."""
+"""Scenarios made from others: changed values, balanced spacing, references."""
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.fields import dump_yaml, tree_of
 from tetra_drake.scenario.load import differences, load_scenario
-from tetra_drake.scenario.perturb import displaced, scaled
 from tetra_drake.scenario.schema import Coulomb, ReferenceScenario, Scenario
 
 IN = 0.0254
@@ -138,28 +136,6 @@ def test_changes_keep_the_reference_by_the_same_rule(scenario):
     assert scenario.with_changes({"reference": None}).reference is None
     own = {"robot.tetrahedra": 4, "reference": ReferenceScenario(source="mine")}
     assert scenario.with_changes(own).reference == ReferenceScenario(source="mine")
-
-
-# Perturbations
-
-
-def test_scaled_values(scenario):
-    keys = ("cables.outer_stiffness", "cables.inner_stiffness")
-    changed = scaled(scenario, keys, 1.05)
-    assert changed.cables.outer_stiffness == scenario.cables.outer_stiffness * 1.05
-    assert [key for key, _ in differences(changed, scenario)] == list(keys)
-
-
-def test_displaced_starts_are_seeded_and_move_every_tetrahedron(scenario):
-    structure, moved = (
-        MakeStructure(each) for each in (scenario, displaced(scenario, percent=5, seed=3))
-    )
-    reach = 0.05 * scenario.robot.spacing
-    moves = np.random.default_rng(3).uniform(-reach, reach, (5, 3))
-    moves[:, 2] = np.abs(moves[:, 2])
-    assert np.array_equal(moved.p_WB, structure.p_WB + moves)
-    assert displaced(scenario, percent=5, seed=3) == displaced(scenario, percent=5, seed=3)
-    assert math.isclose(np.ptp(moved.p_BN), np.ptp(structure.p_BN))
 
 
 def test_a_difference_to_a_base_with_other_than_default_values_is_seen(scenario):

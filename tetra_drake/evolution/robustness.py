@@ -1,55 +1,82 @@
-"""Robustness of gaits: how far they walk with the robot or its surroundings slightly changed."""
+"""Robustness of gaits, judged on fresh draws: how far they walk when robot and surroundings differ
+from the model."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import SimulationFailure
 from tetra_drake.evolution.tables import load_run
-from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed, signed
+from tetra_drake.results.metrics import unmet_requirements
+from tetra_drake.results.result import SimulationResult, versions
 from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.scenario.disturbances import Draw, disturbed, draw_disturbances, key_groups
+from tetra_drake.scenario.fields import tree_of
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.perturb import displaced, scaled
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.schema import DisturbancesScenario, Scenario
 from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
     import pandas
 
-NOTHING = "nothing"
-"""What is changed in the simulations that the others are compared with."""
+NOTHING, ALL = "nothing", "all"
+START, TERRAIN = "displaced start", "terrain seed"
+"""What is changed, beside keys of the scenario's spreads."""
 
-SCALED = {
-    "initial spacing": ("robot.spacing",),
-    "stiction range p₀": ("friction.stiction_range",),
-    "stiction damping σ₁": ("friction.stiction_damping",),
-    "stiction switch a_c": ("friction.stiction_switch",),
-    "proportional stiction σ₀": ("friction.proportional_stiction",),
-    "friction coefficients μ": ("friction.static", "friction.kinetic"),
-    "friction damping c": ("friction.damping",),
-    "outer cables' stiffness": ("cables.outer_stiffness",),
-    "inner cables' stiffness": ("cables.inner_stiffness",),
-    "all cables' stiffness": ("cables.outer_stiffness", "cables.inner_stiffness"),
-    "ground stiffness k": ("ground.stiffness",),
-    "ground damping λ": ("ground.damping",),
-}
-"""Changes that multiply scenario keys by 1 + percent / 100, where the scenario has them."""
+SPREAD = (
+    *("robot.spacing", "friction.stiction_range", "friction.stiction_damping"),
+    *("friction.stiction_switch", "friction.proportional_stiction"),
+    *("friction.static, friction.kinetic", "friction.damping"),
+    *("cables.outer_stiffness", "cables.inner_stiffness", "ground.stiffness", "ground.damping"),
+)
+"""The keys that the default disturbances spread, where the scenario has them."""
 
-DISPLACED = "initial place of each tetrahedron"
-"""The change that displaces every tetrahedron at random by at most percent of the spacing."""
+PERCENT, DRAWS = 5.0, 200
+ALONE = 8
+"""Draws of which the displaced start, or the terrain seed, is also simulated alone."""
 
-PERCENTS = (2.0, 5.0)
-DRAWS = 5
-"""Displaced starts per percentage."""
+LOSS = 0.1
+"""A gait keeps a draw in which it loses at most this share of its undisturbed distance."""
 
-KEPT = 0.9
-"""A gait counts as kept under a change where it walks this share of its distance or more."""
+QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
+RESAMPLES = 2000
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What judge() has simulated.
+
+    All tables have the columns gait (its key), failure (None where there is none), missed (the
+    scenario's requirements that are not met), fitness and the metrics (distance ...) in SI, NaN
+    where the simulation failed.
+    """
+
+    scenario: Scenario
+    """With the disturbances that the draws are of."""
+    seed: int
+    undisturbed: pandas.DataFrame
+    """A row per gait."""
+    draws: pandas.DataFrame
+    """A row per gait and draw. Also: draw, and a factor by each key of the scenario's spreads."""
+    alone: pandas.DataFrame
+    """A row per gait and single change. Also: what (a key, START or TERRAIN), spread (of a key, of
+    either sign), draw (whose start or seed it is)."""
+
+    def compared(self, table: pandas.DataFrame) -> pandas.DataFrame:
+        """A table with more columns: undisturbed (distance), change (of the distance), kept."""
+        before = table["gait"].map(self.undisturbed.set_index("gait")["distance"])
+        change = table["distance"] - before
+        kept = change >= -LOSS * before.abs()  # False where one is NaN
+        return table.assign(undisturbed=before, change=change, kept=kept)
 
 
 def gaits_of(source: Path, *, scenario: str | None = None) -> tuple[Scenario, dict[Any, Gait]]:
@@ -57,8 +84,7 @@ def gaits_of(source: Path, *, scenario: str | None = None) -> tuple[Scenario, di
     one, a name or file, instead of the run's, or the thesis's for a gait file."""
     if not source.is_dir():
         loaded = load_scenario(scenario or "thesis")
-        gait = load_gait(source, loaded)
-        return loaded, {gait.name: gait}
+        return loaded, {source.stem: load_gait(source, loaded)}
     run = load_run(source)
     run.fittest()  # raises InputError if there is none
     loaded = load_scenario(scenario) if scenario else run.manifest.scenario
@@ -66,105 +92,268 @@ def gaits_of(source: Path, *, scenario: str | None = None) -> tuple[Scenario, di
     return loaded, {f"trial {trial}": run.gait(trial, index) for trial, index in best}
 
 
-def robustness(
+def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> DisturbancesScenario:
+    """Those that spread each key of SPREAD that the scenario has, and displace starts, by so many
+    percent, and draw the terrain's seed if it has one."""
+    share = percent / 100.0
+    groups = key_groups(dict.fromkeys(SPREAD, share))
+    return DisturbancesScenario(
+        draws=1,
+        spreads={joined: share for joined, keys in groups if _has(scenario, keys[0])},
+        start=share,
+        terrain=hasattr(scenario.terrain, "seed"),
+    )
+
+
+def _has(scenario: Scenario, key: str) -> bool:
+    section, _, name = key.partition(".")
+    return hasattr(getattr(scenario, section), name)
+
+
+def judge(
     scenario: Scenario,
     gaits: Mapping[Any, Gait],
     *,
-    percents: Sequence[float] = PERCENTS,
+    percent: float | None = None,
+    draws: int = DRAWS,
+    seed: int = 0,
     workers: int | None = None,
     say: Callable[[str], None] = lambda text: None,
-) -> pandas.DataFrame:
-    """Distances of gaits under every change, simulated on the compiled engine.
+) -> Judgement:
+    """Simulates gaits on the compiled engine: undisturbed, under fresh draws of the scenario's
+    disturbances, the same for all gaits, and under each change alone.
 
-    Columns: gait (its key), what (NOTHING first), percent, distance (m; NaN where the simulation
-    failed), failure. `workers` and `say` are those of simulate_many().
+    Without disturbances in the scenario, or with `percent`, they are the default ones. No evolution
+    ever sees these draws, whatever its seed. `workers` and `say` are those of simulate_many().
 
-    Raises InputError where a gait is for another number of tetrahedra.
+    Raises InputError where a gait is for another robot, or percent too large for the scenario.
     """
+    changes: dict[str, Any] = {"simulation.engine": "compiled"}
+    if scenario.disturbances is None or percent is not None:
+        changes["disturbances"] = default_disturbances(scenario, percent or PERCENT)
+    scenario = scenario.with_changes(changes)
+    settings = scenario.disturbances
+    assert settings is not None
+    fresh = [draw_disturbances(scenario, fresh_seed(seed, i)) for i in range(draws)]
+    plan: list[tuple[dict[str, Any], Draw]] = [({"what": NOTHING}, Draw({}))]
+    plan += [({"what": ALL, "draw": i, **each.factors}, each) for i, each in enumerate(fresh)]
+    plan += _alone(settings, fresh)
+    # One scenario for all gaits: the engine prepares it once.
+    scenarios = [each for _, draw in plan for each in [disturbed(scenario, draw)] * len(gaits)]
+    walking = [*gaits.values()] * len(plan)
+    found = simulate_many(scenario=scenarios, gaits=walking, workers=workers, say=say)
+    labels = [{"gait": key} | label for label, _ in plan for key in gaits]
+    rows = [a | _outcome(b, scenario.require) for a, b in zip(labels, found, strict=True)]
+    chosen = {what: [row for row in rows if row["what"] == what] for what in (NOTHING, ALL)}
+    alone = [row for row in rows if row["what"] not in chosen]
+    return Judgement(
+        scenario=scenario,
+        seed=seed,
+        undisturbed=_table(chosen[NOTHING]),
+        draws=_table(chosen[ALL], "draw", *settings.spreads),
+        alone=_table(alone, "what", "spread", "draw"),
+    )
+
+
+def fresh_seed(seed: int, draw: int) -> tuple[int, ...]:
+    """The seed of a fresh draw.
+
+    Those of evolution have four numbers, of which the first may count as two: numpy takes a seed
+    above 2³² for two numbers, and appends zeros where there are few. So it gets six, no zero last.
+    """
+    return seed, draw, 0, 0, 0, 1
+
+
+def _alone(
+    settings: DisturbancesScenario, fresh: Sequence[Draw]
+) -> Iterator[tuple[dict[str, Any], Draw]]:
+    """Each change alone, with its labels."""
+    for key, size in settings.spreads.items():
+        for spread in (-size, size):
+            yield {"what": key, "spread": spread}, Draw({key: 1.0 + spread})
+    for i, draw in enumerate(fresh[:ALONE]):
+        if draw.moves is not None:
+            yield {"what": START, "draw": i}, Draw({}, moves=draw.moves)
+        if draw.terrain_seed is not None:
+            yield {"what": TERRAIN, "draw": i}, Draw({}, terrain_seed=draw.terrain_seed)
+
+
+def _outcome(
+    found: SimulationResult | SimulationFailure, require: Mapping[str, float]
+) -> dict[str, Any]:
+    if isinstance(found, SimulationFailure):
+        return {"failure": str(found), "missed": ""}
+    missed = ", ".join(unmet_requirements(found.metrics, require))
+    return {"missed": missed, "fitness": found.fitness} | found.metrics.to_json()
+
+
+def _table(rows: list[dict[str, Any]], *labels: str) -> pandas.DataFrame:
     import pandas
 
-    scenario = scenario.with_changes({"simulation.engine": "compiled"})
-    rows: list[dict[str, Any]] = []
-    scenarios: list[Scenario] = []
-    for what, percent, changed in _changes(scenario, percents):
-        rows += [{"gait": key, "what": what, "percent": percent} for key in gaits]
-        scenarios += [changed] * len(gaits)
-    every = [gaits[row["gait"]] for row in rows]
-    results = simulate_many(scenario=scenarios, gaits=every, workers=workers, say=say)
-    for row, found in zip(rows, results, strict=True):
-        if isinstance(found, SimulationFailure):
-            row["distance"], row["failure"] = math.nan, str(found)
-        else:
-            row["distance"], row["failure"] = found.metrics.distance, None
-    return pandas.DataFrame(rows)
+    numbers = ["fitness", *METRICS]
+    table = pandas.DataFrame(rows, columns=["gait", *labels, "failure", "missed", *numbers])
+    table["failure"] = table["failure"].astype(object).where(table["failure"].notna(), None)
+    return table.astype(dict.fromkeys(numbers, float))
 
 
-def summarize(table: pandas.DataFrame, *, by: Sequence[str]) -> pandas.DataFrame:
-    """Changes of the distance in a table of robustness(), grouped by gait, what or percent, which
-    loses its sign.
+def interval(values: pandas.Series, statistic: Callable[..., Any] = np.mean) -> tuple[float, float]:
+    """The 95 % confidence interval of a statistic of the values, by bootstrap, always with the same
+    resamples; NaN are left out. It has no width where all values are alike."""
+    numbers = values.dropna().to_numpy(dtype=float)
+    if not len(numbers):
+        return math.nan, math.nan
+    picks = np.random.default_rng(0).integers(len(numbers), size=(RESAMPLES, len(numbers)))
+    low, high = np.quantile(statistic(numbers[picks], axis=1), [0.025, 0.975])
+    return float(low), float(high)
 
-    Columns, in the unit of the distance: unchanged (mean distance), median (of the absolute
-    change), least and greatest (change); kept (share of the simulations, 0 to 1, that walk at
-    least KEPT of the unchanged distance), failed (count).
+
+def by_gait(judgement: Judgement) -> pandas.DataFrame:
+    """A row per gait: undisturbed, QUANTILES and mean of the distance (m) under the draws, without
+    those that failed; kept (share of all draws); mean_low, mean_high, kept_low and kept_high (95 %
+    confidence intervals); failed and missed (draws that failed, or with too little of a required
+    metric)."""
+    import pandas
+
+    rows = {}
+    for gait, draws in judgement.compared(judgement.draws).groupby("gait", sort=False):
+        distance, kept = draws["distance"], draws["kept"].astype(float)
+        rows[gait] = {
+            "undisturbed": draws["undisturbed"].iloc[0],
+            **{name: distance.quantile(share) for name, share in QUANTILES.items()},
+            "mean": distance.mean(),
+            **dict(zip(("mean_low", "mean_high"), interval(distance), strict=True)),
+            "kept": kept.mean(),
+            **dict(zip(("kept_low", "kept_high"), interval(kept), strict=True)),
+            "failed": int(draws["failure"].notna().sum()),
+            "missed": int((draws["missed"] != "").sum()),
+        }
+    return pandas.DataFrame.from_dict(rows, orient="index").rename_axis("gait")
+
+
+def over_gaits(judgement: Judgement) -> pandas.DataFrame:
+    """Medians over the gaits of columns of by_gait(): undisturbed, mean, kept. Columns: median, and
+    low and high, the 95 % confidence interval if gaits are drawn anew."""
+    import pandas
+
+    gaits = by_gait(judgement)[["undisturbed", "mean", "kept"]]
+    rows = {name: [values.median(), *interval(values, np.median)] for name, values in gaits.items()}
+    table = pandas.DataFrame.from_dict(rows, orient="index", columns=["median", "low", "high"])
+    return table.rename_axis("of")
+
+
+def by_change(judgement: Judgement) -> pandas.DataFrame:
+    """A row per change, first what hurts most alone.
+
+    Columns: median (of the absolute change of the distance, m, over gaits and signs or draws),
+    worst (change) and failed (simulations) alone; correlation (mean over gaits of those of
+    rank_correlations()) and correlation_size (median over gaits of their absolute value), NaN where
+    nothing is scaled.
     """
-    is_changed = table["what"] != NOTHING
-    changed = table[is_changed]
-    before = changed["gait"].map(table[~is_changed].set_index("gait")["distance"])
-    change = changed["distance"] - before
-    changed = changed.assign(
-        percent=changed["percent"].abs(),
-        before=before,
-        change=change,
-        size=change.abs(),
-        kept=change > (KEPT - 1.0) * before.abs(),
-        failed=changed["failure"].notna(),
+    alone = judgement.compared(judgement.alone)
+    alone = alone.assign(size=alone["change"].abs(), failed=alone["failure"].notna())
+    table = alone.groupby("what", sort=False).agg(
+        median=("size", "median"), worst=("change", "min"), failed=("failed", "sum")
     )
-    return changed.groupby(list(by), sort=False).agg(
-        unchanged=("before", "mean"),
-        median=("size", "median"),
-        least=("change", "min"),
-        greatest=("change", "max"),
-        kept=("kept", "mean"),
-        failed=("failed", "sum"),
-    )
+    ranks = rank_correlations(judgement)
+    table["correlation"], table["correlation_size"] = ranks.mean(), ranks.abs().median()
+    return table.sort_values("median", ascending=False, na_position="first", kind="stable")
 
 
-def describe(table: pandas.DataFrame) -> str:
-    """Summaries of a table of robustness() for printing, in inches: by change, by gait."""
-    inches = table.assign(distance=table["distance"] / INCH)
-    shown: dict[Any, tuple[str, Callable[[Any], str]]] = {
-        "percent": ("by", "± {:g} %".format),
-        "unchanged": ("unchanged distance, in", fixed),
-        "median": ("median change", fixed),
-        "least": ("least", signed),
-        "greatest": ("greatest", signed),
-        "kept": (f"keeps {100.0 * KEPT:g} %", "{:.0%}".format),
-        "failed": ("failed", str),
+def rank_correlations(judgement: Judgement) -> pandas.DataFrame:
+    """Spearman's correlation of each factor (columns) and the distance over the draws of a gait
+    (index) without those that failed; NaN where all distances are the same."""
+    import pandas
+
+    settings = judgement.scenario.disturbances
+    keys = list(settings.spreads) if settings else []
+    rows = {}
+    for gait, draws in judgement.draws.dropna(subset="distance").groupby("gait", sort=False):
+        ranks = draws[["distance", *keys]].rank()
+        rows[gait] = [ranks["distance"].corr(ranks[key]) for key in keys]
+    return pandas.DataFrame.from_dict(rows, orient="index", columns=keys)
+
+
+def to_json(judgement: Judgement) -> dict[str, Any]:
+    """The summaries as JSON holds them, in SI: gaits, over_gaits and changes, and what they are
+    of."""
+    tables = {"gaits": by_gait, "over_gaits": over_gaits, "changes": by_change}
+    return {
+        "versions": versions(),
+        "scenario": judgement.scenario.name,
+        "disturbances": tree_of(judgement.scenario)["disturbances"],
+        "draws": int(judgement.draws["draw"].nunique()),
+        "seed": judgement.seed,
+    } | {
+        name: [
+            {key: None if value != value else value for key, value in row.items()}
+            for row in make(judgement).reset_index().to_dict("records")
+        ]
+        for name, make in tables.items()
     }
-    headings = {"what": "changed"} | {key: heading for key, (heading, _) in shown.items()}
-    formats = dict(shown.values())
-    texts = []
-    for key in ("what", "gait"):
-        summary = summarize(inches, by=[key, "percent"]).reset_index()[[key, *shown]]
-        summary = summary.rename(columns=headings)
-        texts.append(summary.to_string(index=False, formatters=formats))
-    return "\n\n".join(texts)
 
 
-def save_table(table: pandas.DataFrame, path: Path) -> None:
-    """Writes a table of robustness() as CSV, the distance (m) in the column distance_m."""
-    write_whole(path, table.rename(columns={"distance": "distance_m"}).to_csv(index=False))
+def describe(judgement: Judgement) -> str:
+    """The summaries as tables for printing, distances in inches."""
+    gaits, count = by_gait(judgement), judgement.draws["draw"].nunique()
+    texts = [
+        f"Distance in inches under {count} draws of the disturbances. A gait keeps a draw in which "
+        f"it loses at\nmost {100.0 * LOSS:g} % of its undisturbed distance. In brackets: 95 % "
+        "confidence intervals.",
+        _lines(_gait_cells(gaits, missed=bool(judgement.scenario.require))),
+    ]
+    if len(gaits) > 1:
+        over = over_gaits(judgement)
+        before, mean = (inches(*over.loc[name]) for name in ("undisturbed", "mean"))
+        texts.append(
+            f"Median over {len(gaits)} gaits: undisturbed {before}, mean {mean},\n"
+            f"keeps {percents(*over.loc['kept'])} of the draws."
+        )
+    texts.append(
+        "What hurts most: change of the distance by one change alone, in inches; Spearman's rank\n"
+        "correlation of factor and distance over the draws of a gait, mean and median size.\n"
+        f"Chance alone gives up to {chance(count):.2f}."
+    )
+    return "\n\n".join([*texts, _lines(_change_cells(by_change(judgement)))])
 
 
-def _changes(base: Scenario, percents: Sequence[float]) -> Iterator[tuple[str, float, Scenario]]:
-    """What is changed, by how many percent, and the changed scenario; first the scenario itself."""
-    yield NOTHING, 0.0, base
-    friction = {f"friction.{field.name}" for field in dataclasses.fields(base.friction)}
-    for what, keys in SCALED.items():
-        if any(key.startswith("friction.") and key not in friction for key in keys):
-            continue
-        for percent in (sign * size for size in percents for sign in (-1.0, 1.0)):
-            yield what, percent, scaled(base, keys, 1.0 + percent / 100.0)
-    for percent in percents:
-        for seed in range(DRAWS):
-            yield DISPLACED, percent, displaced(base, percent=percent, seed=seed)
+def chance(draws: int) -> float:
+    """The size that 95 % of the rank correlations of unrelated numbers do not reach."""
+    return 1.96 / math.sqrt(max(draws - 1, 1))
+
+
+def _gait_cells(gaits: pandas.DataFrame, *, missed: bool) -> list[list[str]]:
+    numbers, counts = ("undisturbed", "5 %", "50 %", "95 %"), ("failed", "missed")[: 1 + missed]
+    rows = [["gait", *numbers, "mean", "keeps", *counts]]
+    for gait, row in gaits.iterrows():
+        mean = inches(*row[["mean", "mean_low", "mean_high"]])
+        kept = percents(*row[["kept", "kept_low", "kept_high"]])
+        lengths, integers = (row[name] / INCH for name in numbers), (row[name] for name in counts)
+        rows.append([str(gait), *map(fixed, lengths), mean, kept, *map("{:.0f}".format, integers)])
+    return rows
+
+
+def _change_cells(changes: pandas.DataFrame) -> list[list[str]]:
+    rows = [["changed", "median change", "worst", "failed", "correlation", "size"]]
+    for what, row in changes.iterrows():
+        lengths = [fixed(row["median"] / INCH), signed(row["worst"] / INCH)]
+        ranks = [signed(row["correlation"]), fixed(row["correlation_size"])]
+        rows.append([str(what), *lengths, f"{row['failed']:.0f}", *ranks])
+    return rows
+
+
+def inches(value: float, low: float, high: float) -> str:
+    """A length (m) with its confidence interval."""
+    return f"{fixed(value / INCH)} ({fixed(low / INCH)} to {fixed(high / INCH)})"
+
+
+def percents(value: float, low: float, high: float) -> str:
+    """A share with its confidence interval."""
+    return f"{100.0 * value:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f})"
+
+
+def _lines(rows: list[list[str]]) -> str:
+    """Rows of cells as aligned lines, the first cell to the left, the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows
+    )
