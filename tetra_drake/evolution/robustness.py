@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.engines.simulate import simulate_many
-from tetra_drake.errors import SimulationFailure
+from tetra_drake.engines.simulate import check_scenario, simulate_many
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.formatting import fixed, signed
 from tetra_drake.results.metrics import unmet_requirements
@@ -45,7 +45,8 @@ ALONE = 8
 """Draws of which the displaced start, or the terrain seed, is also simulated alone."""
 
 LOSS = 0.1
-"""A gait keeps a draw in which it loses at most this share of its undisturbed distance."""
+"""A gait keeps a draw in which it loses at most this share of its undisturbed distance, and misses
+none of the scenario's requirements."""
 
 QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
 RESAMPLES = 2000
@@ -75,7 +76,7 @@ class Judgement:
         """A table with more columns: undisturbed (distance), change (of the distance), kept."""
         before = table["gait"].map(self.undisturbed.set_index("gait")["distance"])
         change = table["distance"] - before
-        kept = change >= -LOSS * before.abs()  # False where one is NaN
+        kept = (change >= -LOSS * before.abs()) & (table["missed"] == "")  # False where NaN
         return table.assign(undisturbed=before, change=change, kept=kept)
 
 
@@ -138,12 +139,9 @@ def judge(
     plan: list[tuple[dict[str, Any], Draw]] = [({"what": NOTHING}, Draw({}))]
     plan += [({"what": ALL, "draw": i, **each.factors}, each) for i, each in enumerate(fresh)]
     plan += _alone(settings, fresh)
-    # One scenario for all gaits: the engine prepares it once.
-    scenarios = [each for _, draw in plan for each in [disturbed(scenario, draw)] * len(gaits)]
-    walking = [*gaits.values()] * len(plan)
-    found = simulate_many(scenario=scenarios, gaits=walking, workers=workers, say=say)
+    outcomes = _outcomes(scenario, [draw for _, draw in plan], gaits, workers=workers, say=say)
     labels = [{"gait": key} | label for label, _ in plan for key in gaits]
-    rows = [a | _outcome(b, scenario.require) for a, b in zip(labels, found, strict=True)]
+    rows = [a | b for a, b in zip(labels, outcomes, strict=True)]
     chosen = {what: [row for row in rows if row["what"] == what] for what in (NOTHING, ALL)}
     alone = [row for row in rows if row["what"] not in chosen]
     return Judgement(
@@ -178,10 +176,35 @@ def _alone(
             yield {"what": TERRAIN, "draw": i}, Draw({}, terrain_seed=draw.terrain_seed)
 
 
+def _outcomes(
+    scenario: Scenario, draws: Sequence[Draw], gaits: Mapping[Any, Gait], **options: Any
+) -> Iterator[dict[str, Any]]:
+    """The columns that simulations fill, for each draw and gait."""
+    check_scenario(scenario)
+    # One scenario for all gaits: the engine prepares it once.
+    changed = [disturbed(scenario, draw) for draw in draws]
+    refused = [_refusal(each) for each in changed]
+    able = [each for each, error in zip(changed, refused, strict=True) if error is None]
+    scenarios, walking = [each for each in able for _ in gaits], [*gaits.values()] * len(able)
+    found = iter(simulate_many(scenario=scenarios, gaits=walking, **options))
+    for error in refused:
+        for _ in gaits:
+            yield _outcome(error or next(found), scenario.require)
+
+
+def _refusal(scenario: Scenario) -> InputError | None:
+    """Why a robot cannot start, such as one displaced into a step of the terrain."""
+    try:
+        check_scenario(scenario)
+    except InputError as error:
+        return error
+    return None
+
+
 def _outcome(
-    found: SimulationResult | SimulationFailure, require: Mapping[str, float]
+    found: SimulationResult | SimulationFailure | InputError, require: Mapping[str, float]
 ) -> dict[str, Any]:
-    if isinstance(found, SimulationFailure):
+    if not isinstance(found, SimulationResult):
         return {"failure": str(found), "missed": ""}
     missed = ", ".join(unmet_requirements(found.metrics, require))
     return {"missed": missed, "fitness": found.fitness} | found.metrics.to_json()
@@ -295,11 +318,12 @@ def to_json(judgement: Judgement) -> dict[str, Any]:
 def describe(judgement: Judgement) -> str:
     """The summaries as tables for printing, distances in inches."""
     gaits, count = by_gait(judgement), judgement.draws["draw"].nunique()
+    require = bool(judgement.scenario.require)
     texts = [
         f"Distance in inches under {count} draws of the disturbances. A gait keeps a draw in which "
-        f"it loses at\nmost {100.0 * LOSS:g} % of its undisturbed distance. In brackets: 95 % "
-        "confidence intervals.",
-        _lines(_gait_cells(gaits, missed=bool(judgement.scenario.require))),
+        f"it loses at\nmost {100.0 * LOSS:g} % of its undisturbed distance"
+        f"{' and misses no requirement' * require}.\nIn brackets: 95 % confidence intervals.",
+        _lines(_gait_cells(gaits, missed=require)),
     ]
     if len(gaits) > 1:
         over = over_gaits(judgement)
