@@ -153,7 +153,33 @@ def test_a_network_that_cannot_be_is_refused(scenario, refused, changes, key, fo
         scenario.with_changes(changes)
 
 
-@pytest.mark.parametrize("name", sorted({*shipped_scenarios()} - {*GROUNDS, *NETWORKS}))
+SPREAD = (
+    "robot.spacing friction.stiction_range friction.stiction_damping friction.stiction_switch "
+    "friction.proportional_stiction cables.outer_stiffness cables.inner_stiffness "
+    "ground.stiffness ground.damping"
+)
+AIMS = {
+    "efficient": {
+        "objective": {"cost_of_transport": -1.0, "twist": "-0.5 /in", "lateral_drift": "-0.1 /in"},
+        "require": {"speed": "0.25 in/s"},
+    },
+    "robust": {
+        "disturbances": {"draws": 8, "start": 0.05, "spreads": dict.fromkeys(SPREAD.split(), 0.05)}
+    },
+}
+
+
+@pytest.mark.parametrize("name", AIMS)
+def test_shipped_aims_are_the_thesis_evolved_for_something_else(name, scenario):
+    loaded = load_scenario(name)
+    assert loaded == scenario.with_changes({"name": name} | AIMS[name])
+    assert loaded.reference is None
+
+
+OTHERS = sorted({*shipped_scenarios()} - {*GROUNDS, *NETWORKS, *AIMS})
+
+
+@pytest.mark.parametrize("name", OTHERS)
 def test_shipped_scenarios_load_and_keep_the_thesis_reference(name, scenario):
     loaded = load_scenario(name)
     assert (loaded.name, loaded.reference) == (name, scenario.reference)

@@ -264,7 +264,7 @@ class EvolutionScenario:
     stop_window: int = setting(at_least=1)
     stop_after: int = setting(at_least=0)
     independent_tau_b: bool = setting()  # tau_B evolves by itself instead of staying at 2 tau_A
-    time_budget: float = quantity("s", above=0)  # wall time; a longer evaluation counts as failed
+    time_budget: float = quantity("s", above=0)  # wall time; a longer simulation counts as failed
 
 
 @dataclass
