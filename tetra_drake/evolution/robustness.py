@@ -342,7 +342,7 @@ def describe(judgement: Judgement) -> str:
 
 def chance(draws: int) -> float:
     """The size that 95 % of the rank correlations of unrelated numbers do not reach."""
-    return 1.96 / math.sqrt(max(draws - 1, 1))
+    return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
 
 
 def _gait_cells(gaits: pandas.DataFrame, *, missed: bool) -> list[list[str]]:
@@ -352,7 +352,8 @@ def _gait_cells(gaits: pandas.DataFrame, *, missed: bool) -> list[list[str]]:
         mean = inches(*row[["mean", "mean_low", "mean_high"]])
         kept = percents(*row[["kept", "kept_low", "kept_high"]])
         lengths, integers = (row[name] / INCH for name in numbers), (row[name] for name in counts)
-        rows.append([str(gait), *map(fixed, lengths), mean, kept, *map("{:.0f}".format, integers)])
+        name = str(gait) if len(str(gait)) < 12 else f"{str(gait)[:11]}…"
+        rows.append([name, *map(fixed, lengths), mean, kept, *map("{:.0f}".format, integers)])
     return rows
 
 
