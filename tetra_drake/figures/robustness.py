@@ -77,7 +77,7 @@ def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -
     axes.axvline(1.0, color="black", linewidth=0.8)
     margin = max(0.7, 2.5 - len(gaits) / 2)  # else the box of a single gait fills the axes
     axes.set(
-        title=f"each gait, and share of draws with {100.0 * (1.0 - LOSS):g} % or more",
+        title=f"gait: draws that it keeps ({100.0 * (1.0 - LOSS):g} % or more)",
         xlabel="distance / undisturbed distance",
         yticks=range(len(gaits)),
         yticklabels=[f"{g}: {fixed(100.0 * kept, 0)} %" for g, kept in gaits["kept"].items()],
@@ -104,7 +104,7 @@ def _draw_correlations(axes: Axes, changes: pandas.DataFrame, noise: float) -> N
     look: Any = {"marker": "d", "linestyle": "", "color": OKABE_ITO["blue"]}
     axes.plot(changes["correlation"], places, label="mean correlation", **look)
     axes.axvline(0.0, color="black", linewidth=0.8)
-    axes.set(title="all changes together", xlabel="rank correlation with distance")
+    axes.set(title="all changes together", xlabel="rank correlation")
     _finish(axes, [""] * len(changes))
 
 
