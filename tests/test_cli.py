@@ -17,6 +17,7 @@ from tetra_drake.cli import main
 from tetra_drake.formatting import fixed
 from tetra_drake.robot.gait import Gait, load_gait, save_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.metrics import METRICS
 
 SHORT = """\
 base: thesis
@@ -208,7 +209,8 @@ def test_the_result_holds_what_was_asked_for_and_done(simulated, result, scenari
     assert {"python", "drake", "numpy", "tetra_drake"} <= result["versions"].keys()
     inches = {key: value for key, value in result.items() if key.endswith("_in")}
     assert inches.pop("path_radius_in") is None  # 0.3 s are one step of the path
-    assert len(inches) == 5
+    lengths = {f"{name}_in" for name, unit in METRICS.items() if unit == "m"}
+    assert inches.keys() == lengths
     for name, length in inches.items():
         assert length == pytest.approx(result["metrics"][name.removesuffix("_in")] / INCH)
     assert result["path"]["time_s"] == [0.0, 0.3]

@@ -95,6 +95,6 @@ def _draw(axes: Axes, gaits: pandas.DataFrame, trade: Trade) -> None:
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
     else:
-        margin = 0.04 * (high - low)
+        margin = 0.04 * (high - low or 1.0)
         axes.set(xlim=(low - margin, high + margin))
     axes.set(xlabel=trade.name)
