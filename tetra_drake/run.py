@@ -116,11 +116,13 @@ def evolve(
 def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
     """What begins: scenario, size, method, and where the results will be."""
     scenario, settings, method = manifest.scenario, manifest.scenario.evolution, manifest.method
+    among = scenario.disturbances
+    draws = f", each gait among {among.draws} draws of disturbances" if among else ""
     own = [f", {part} {getattr(method, part).name}" for part in method.given_from_python]
     text = (
         f"{directory}: scenario {scenario.name}, seed {manifest.seed}, trials {settings.trials}, "
         f"each of at most {settings.max_iterations} iterations, population {settings.population}, "
-        f"engine {scenario.simulation.engine}, workers {workers}{''.join(own)}"
+        f"engine {scenario.simulation.engine}, workers {workers}{draws}{''.join(own)}"
     )
     if report:
         text += (

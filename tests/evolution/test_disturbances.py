@@ -310,6 +310,6 @@ def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn):
     run = reevaluate(directory, evaluate=evaluate, workers=1, executor=ThreadPoolExecutor)
     again = run.reevaluations.set_index(["trial", "index"])
     first = run.evaluations.set_index(["trial", "index"]).loc[again.index]
-    assert len(again) == 10
-    assert first["iteration"].nunique() > 1
+    assert len(again) == 2, "the best of each trial: 5 gaits would be 15 simulations"
+    assert first["iteration"].max() > 0
     assert again["draws_fitness"].equals(first["draws_fitness"])

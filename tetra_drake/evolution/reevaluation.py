@@ -20,7 +20,8 @@ from tetra_drake.evolution.record import REEVALUATIONS, evaluation_entry, trial_
 from tetra_drake.evolution.tables import Run, load_run
 
 BEST_GAITS = 5
-"""Number of best gaits per trial that are evaluated once more."""
+"""Number of best gaits per trial that are evaluated once more; among disturbances fewer, but one,
+so that there are about as many simulations."""
 
 
 def reevaluate(
@@ -46,7 +47,8 @@ def reevaluate(
     for trial in range(scenario.evolution.trials):
         repair_torn_line(trial_folder(run.directory, trial) / REEVALUATIONS)
     done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
-    chosen = run.initial() if initial else run.best(BEST_GAITS)
+    draws = scenario.disturbances.draws if scenario.disturbances else 1
+    chosen = run.initial() if initial else run.best(max(1, BEST_GAITS // draws))
     rows = chosen[["trial", "index", "iteration"]].itertuples(index=False, name=None)
     missing = [row for row in rows if row[:2] not in done]
     vectors = [run.vector(trial, index) for trial, index, _ in missing]
