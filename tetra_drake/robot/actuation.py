@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -38,12 +40,18 @@ class Actuation:
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
         """The oscillators of a scenario: `robot.actuation` and `cpg.reach`."""
-        groups, count = scenario.robot.actuation, scenario.robot.tetrahedra - 1
+        groups = tuple(map(tuple, scenario.robot.actuation))
+        return cls._of(groups, scenario.robot.tetrahedra - 1, scenario.cpg.reach)
+
+    @classmethod
+    @functools.lru_cache(maxsize=8)  # as draws of disturbances leave it as it is
+    def _of(cls, groups: tuple[tuple[str, ...], ...], count: int, reach: int | None) -> Self:
+        """Of so many junctions."""
         junctions = np.repeat(np.arange(count), len(groups))
         place = {cable: k for k, group in enumerate(groups) for cable in group}
         own = np.array([place.get(cable, PASSIVE) for cable in CABLES])
         drivers = [np.where(own == PASSIVE, own, own + len(groups) * i) for i in range(count)]
-        couplings = couplings_within(junctions, scenario.cpg.reach)
+        couplings = couplings_within(junctions, reach)
         sets = [set(group) for group in groups]
         others = [set(mirrored(group)) for group in groups]
         opposite = [sets.index(o) if o in sets else k for k, o in enumerate(others)]
@@ -87,7 +95,7 @@ def parse_weight_name(name: str) -> tuple[str, int, int] | None:
     return (found[3], int(found[2]), int(found[1])) if found else None
 
 
-def _side(group: list[str]) -> float:
+def _side(group: Sequence[str]) -> float:
     for side, name in zip((1.0, -1.0), SIDES, strict=True):
         if all(cable.endswith(name) for cable in group):
             return side

@@ -7,7 +7,7 @@ field existed.
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -451,7 +451,7 @@ def _network_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:
     ]
 
 
-def mirrored(cables: list[str]) -> list[str]:
+def mirrored(cables: Sequence[str]) -> list[str]:
     """The cables of a junction on the other side of the robot, by their names in CABLES."""
     swap = dict(zip(SIDES, reversed(SIDES), strict=True))
     return ["_".join(swap.get(part, part) for part in cable.split("_")) for cable in cables]
