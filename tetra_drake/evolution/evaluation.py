@@ -91,15 +91,12 @@ class GaitEvaluation:
         """Simulations to be made, or waited for where all are under way at once."""
         if self.lanes is None:
             return [functools.partial(self._simulate, scenario, gait) for scenario in scenarios]
-        walks, budget = (
-            [(scenario, gait) for scenario in scenarios],
-            self.scenario.evolution.time_budget,
-        )
-        futures = self.lanes.submit(walks, time_budget=budget)
+        walks = [(scenario, gait) for scenario in scenarios]
+        futures = self.lanes.submit(walks, time_budget=self.scenario.evolution.time_budget)
         return [functools.partial(self.lanes.result, future) for future in futures]
 
     def _simulate(self, scenario: Scenario, gait: Gait) -> SimulationResult:
-        with time_limit(scenario.evolution.time_budget):
+        with time_limit(self.scenario.evolution.time_budget):
             return simulate(scenario=scenario, gait=gait)
 
     def _evaluation(

@@ -68,6 +68,7 @@ _EVALUATION_KEYS = {
     "draws": dict | None,
 }
 _OPTIONAL = {"draws": None}
+"""What a line may lack: there are draws among disturbances only."""
 _FIRST_METRICS = {
     "distance_in": "distance",
     "steady_distance_in": "steady_distance",
