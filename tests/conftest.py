@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tetra_drake.engines.compiled import lane_pool
 from tetra_drake.errors import InputError
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import load_scenario
@@ -24,6 +25,15 @@ def scenario() -> Scenario:
 def structure(scenario: Scenario) -> Structure:
     """That of the thesis's robot."""
     return MakeStructure(scenario)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def few_widths() -> Iterator[None]:
+    """One lane or eight, as each width is compiled for half a minute for each kind of ground; the
+    numbers are the same with any."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lane_pool, "lanes_for", lambda walks: 1 if walks <= 1 else 8)
+        yield
 
 
 @pytest.fixture(scope="session")
