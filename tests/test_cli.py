@@ -146,7 +146,7 @@ def test_a_simulation_that_fails_says_when_and_why_with_status_1(unchanged, caps
 
 COMMANDS = (
     *("simulate", "evolve", "reevaluate", "replay", "figures"),
-    *("robustness", "benchmark", "gait", "cpg", "diagram"),
+    *("robustness", "compare", "benchmark", "gait", "cpg", "diagram"),
 )
 
 

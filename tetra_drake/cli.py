@@ -309,6 +309,39 @@ def _robustness(options: Options) -> None:
         print(f"wrote {', '.join(save_judgement(judgement, options.out))} to {options.out}/")
 
 
+def _compare_options(command: Command) -> None:
+    runs = "folders written by `evolve`, finished or not, all with the same objective"
+    _add_path(command, "runs", "RUN", runs, nargs="+")
+    command.add_argument(
+        "--reach",
+        metavar="LENGTH",
+        type=_length,
+        help="a distance to be reached, as '14.34 in' (default: that of the scenario's reference)",
+    )
+    command.add_argument("--labels", metavar="LABEL", nargs="+", help="a name for each run")
+    _add_path(command, "--out", "DIR", "write tables (CSV, JSON) and the figure into this folder")
+
+
+def _compare(options: Options) -> None:
+    """Compare how well runs search.
+
+    Compares runs by the best fitness of their trials so far, at the same number of evaluations,
+    or of simulations where runs differ in draws of disturbances: trials, interquartile means with
+    bootstrap intervals, evaluations until the fittest gait walks a distance, and time. Writes
+    trials.csv, curves.csv, summary.json and the figure search, if asked for.
+    """
+    from tetra_drake.evolution.comparison import compare, describe
+
+    if options.out:
+        check_folder(options.out)
+    compared = compare(options.runs, labels=options.labels, reach=options.reach)
+    print(describe(compared))
+    if options.out:
+        from tetra_drake.figures.search import save_comparison
+
+        print(f"wrote {', '.join(save_comparison(compared, options.out))} to {options.out}/")
+
+
 def _benchmark_options(command: Command) -> None:
     _add_path(command, "gaits", "GAIT", "gait files (default: random gaits)", nargs="*")
     gaits = f"number of random gaits, of seeds 0, 1 ... (default: {BENCHMARK_GAITS})"
@@ -505,6 +538,15 @@ def _positive(text: str) -> float:
     raise argparse.ArgumentTypeError(f"found '{text}', expected a number above 0")
 
 
+def _length(text: str) -> float:
+    from tetra_drake.scenario.units import quantity_to_si
+
+    try:
+        return quantity_to_si(text, "m")
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
 def _say(text: str) -> None:
     print(text, flush=True)
 
@@ -516,6 +558,7 @@ _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ..
     (_replay, _replay_options),
     (_figures, _figures_options),
     (_robustness, _robustness_options),
+    (_compare, _compare_options),
     (_benchmark, _benchmark_options),
     (_gait, _gait_options),
     (_cpg, _cpg_options),

@@ -36,6 +36,19 @@ def listed(items: Sequence[object]) -> str:
     return f"{', '.join(head)} and {last}" if head else last
 
 
+def ranged(value: float, low: float, high: float) -> str:
+    """A number with a range that belongs to it."""
+    return f"{fixed(value)} ({fixed(low)} to {fixed(high)})"
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> str:
+    """Rows of cells as aligned lines, the first cell to the left, the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows
+    )
+
+
 def markdown_table(
     headings: Sequence[str], rows: Sequence[Sequence[str]], text_columns: Sequence[int] = (0,)
 ) -> str:

@@ -21,7 +21,6 @@ from tetra_drake.evolution.robustness import (
     default_disturbances,
     describe,
     fresh_seed,
-    interval,
     judge,
     over_gaits,
     rank_correlations,
@@ -226,15 +225,6 @@ def test_the_summary_of_changes_begins_with_what_hurts_most_alone(made):
         [-0.1, 0.9]
     )
     assert found.loc[START, ["correlation", "correlation_size"]].isna().all()
-
-
-def test_the_bootstrap_interval_is_that_of_the_mean_of_many_numbers():
-    # Of 400 numbers of deviation 1, the mean has the deviation 0.05.
-    numbers = np.random.default_rng(1).normal(size=400)
-    numbers = pandas.Series((numbers - numbers.mean()) / numbers.std())
-    low, high = interval(numbers)
-    assert (low, high) == pytest.approx((-1.96 * 0.05, 1.96 * 0.05), abs=0.008)
-    assert interval(pandas.Series([3.0, 3.0, np.nan])) == (3.0, 3.0)
 
 
 def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement, tmp_path):

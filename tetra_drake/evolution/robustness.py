@@ -13,8 +13,9 @@ import numpy as np
 
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.evolution.statistics import interval
 from tetra_drake.evolution.tables import load_run
-from tetra_drake.formatting import fixed, signed
+from tetra_drake.formatting import aligned, fixed, ranged, signed
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult, versions
 from tetra_drake.robot.gait import Gait, load_gait
@@ -49,7 +50,6 @@ LOSS = 0.1
 none of the scenario's requirements."""
 
 QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
-RESAMPLES = 2000
 
 
 @dataclass(frozen=True)
@@ -219,17 +219,6 @@ def _table(rows: list[dict[str, Any]], *labels: str) -> pandas.DataFrame:
     return table.astype(dict.fromkeys(numbers, float))
 
 
-def interval(values: pandas.Series, statistic: Callable[..., Any] = np.mean) -> tuple[float, float]:
-    """The 95 % confidence interval of a statistic of the values, by bootstrap, always with the same
-    resamples; NaN are left out. It has no width where all values are alike."""
-    numbers = values.dropna().to_numpy(dtype=float)
-    if not len(numbers):
-        return math.nan, math.nan
-    picks = np.random.default_rng(0).integers(len(numbers), size=(RESAMPLES, len(numbers)))
-    low, high = np.quantile(statistic(numbers[picks], axis=1), [0.025, 0.975])
-    return float(low), float(high)
-
-
 def by_gait(judgement: Judgement) -> pandas.DataFrame:
     """A row per gait: undisturbed, QUANTILES and mean of the distance (m) under the draws, without
     those that failed; kept (share of all draws); mean_low, mean_high, kept_low and kept_high (95 %
@@ -323,7 +312,7 @@ def describe(judgement: Judgement) -> str:
         f"Distance in inches under {count} draws of the disturbances. A gait keeps a draw in which "
         f"it loses at\nmost {100.0 * LOSS:g} % of its undisturbed distance"
         f"{' and misses no requirement' * require}.\nIn brackets: 95 % confidence intervals.",
-        _lines(_gait_cells(gaits, missed=require)),
+        aligned(_gait_cells(gaits, missed=require)),
     ]
     if len(gaits) > 1:
         over = over_gaits(judgement)
@@ -337,7 +326,7 @@ def describe(judgement: Judgement) -> str:
         "correlation of factor and distance over the draws of a gait, mean and median size.\n"
         f"Chance alone gives up to {chance(count):.2f}."
     )
-    return "\n\n".join([*texts, _lines(_change_cells(by_change(judgement)))])
+    return "\n\n".join([*texts, aligned(_change_cells(by_change(judgement)))])
 
 
 def chance(draws: int) -> float:
@@ -368,17 +357,9 @@ def _change_cells(changes: pandas.DataFrame) -> list[list[str]]:
 
 def inches(value: float, low: float, high: float) -> str:
     """A length (m) with its confidence interval."""
-    return f"{fixed(value / INCH)} ({fixed(low / INCH)} to {fixed(high / INCH)})"
+    return ranged(value / INCH, low / INCH, high / INCH)
 
 
 def percents(value: float, low: float, high: float) -> str:
     """A share with its confidence interval."""
     return f"{100.0 * value:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f})"
-
-
-def _lines(rows: list[list[str]]) -> str:
-    """Rows of cells as aligned lines, the first cell to the left, the others to the right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows
-    )

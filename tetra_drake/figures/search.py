@@ -1,0 +1,82 @@
+"""How well runs search, as a figure and files."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+from tetra_drake.evolution.comparison import Compared, reach_text, to_json
+from tetra_drake.figures.style import common_style, line_style, make_figure, save_figure
+from tetra_drake.files import write_whole
+
+_LEGEND_WIDTH = 60
+"""Letters below an axis."""
+
+_FIRST = 10
+"""Where the axes of costs begin."""
+
+
+def save_comparison(compared: Compared, folder: Path) -> list[str]:
+    """Writes trials.csv, curves.csv, summary.json (lengths in m) and the figure to the folder;
+    returns the names. Raises InputError if a file cannot be written."""
+    for name, table in (("trials.csv", compared.trials), ("curves.csv", compared.curves)):
+        write_whole(folder / name, table.to_csv(index=False))
+    text = json.dumps(to_json(compared), indent=1, allow_nan=False, ensure_ascii=False)
+    write_whole(folder / "summary.json", text + "\n")
+    save_figure(search(compared), folder, "search")
+    return ["trials.csv", "curves.csv", "summary.json", "search.svg", "search.png"]
+
+
+@common_style()
+def search(compared: Compared) -> Figure:
+    """Best fitness so far, median and interquartile band over the trials of each run, and the share
+    of trials whose fittest gait so far walks the distance to be reached.
+
+    Trials that have ended go on with their last values; a dot marks the end of a run."""
+    columns = 1 if compared.reach is None else 2
+    trials = compared.runs["trials"]
+    labels = [f"{label} ({count} trial{'s' * (count > 1)})" for label, count in trials.items()]
+    across = min(len(labels), max(1, _LEGEND_WIDTH * columns // (max(map(len, labels)) + 10)))
+    height = 3.6 + 0.18 * math.ceil(len(labels) / across)
+    figure, [row] = make_figure(width_in=3.0 + 3.5 * columns, height_in=height, columns=columns)
+    ends = compared.curves.groupby("run", sort=False)["cost"].max()
+    first = min(_FIRST, ends.min())
+    for place, label in enumerate(compared.runs.index):
+        style: Any = line_style(place) | {"drawstyle": "steps-post", "marker": "o"}
+        style |= {"markevery": [-1]}
+        _draw_best(row[0], compared, label, first, style)
+        if compared.reach is not None:
+            _draw_reached(row[1], compared, label, ends[label], style)
+    for axes in row:
+        axes.set(xlabel=compared.unit, xscale="log", xlim=(first, 1.1 * ends.max()))
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    row[0].set(title="median and quartiles", ylabel="best fitness so far")
+    figure.legend(row[0].lines, labels, loc="outside lower center", ncols=across)
+    figure.suptitle(f"How well runs search, by {compared.unit}")
+    return figure
+
+
+def _draw_best(axes: Axes, compared: Compared, label: str, first: int, style: Any) -> None:
+    curve = compared.curves[compared.curves["run"] == label].replace(-math.inf, math.nan)
+    curve = curve.assign(cost=curve["cost"].clip(lower=first)).drop_duplicates("cost", keep="last")
+    axes.plot(curve["cost"], curve["median"], **style)
+    band: Any = {"step": "post", "color": style["color"], "alpha": 0.15, "linewidth": 0.0}
+    axes.fill_between(curve["cost"], curve["low"], curve["high"], **band)
+
+
+def _draw_reached(axes: Axes, compared: Compared, label: str, end: int, style: Any) -> None:
+    assert compared.reach is not None
+    trials = compared.trials[compared.trials["run"] == label]
+    there = np.sort(trials["reached"][trials["reached"] <= end])
+    shares = 100.0 * np.arange(len(there) + 1) / len(trials)
+    axes.plot([0.0, *there, end], [*shares, shares[-1]], **style)
+    axes.set(title=f"{reach_text(compared.reach)} reached", ylabel="trials (%)", ylim=(-3.0, 103.0))
