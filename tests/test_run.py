@@ -11,10 +11,12 @@ from helpers.meshcat_page import commands, read_page
 import tetra_drake
 from tetra_drake import cli
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.method import Part
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import read_manifest
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.optimizers import CmaEs
 from tetra_drake.scenario.terrain import Steps
 
 
@@ -177,6 +179,26 @@ def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
     assert read_record(run) == begun
     tetra_drake.evolve(None, run, resume=True, **own)
     assert read_record(run) == read_record(tmp_path / "whole")
+
+
+def test_the_scenarios_optimiser_is_used_recorded_and_resumed(
+    tiny, tmp_path, interrupting, refused
+):
+    scenario = tiny.with_changes(
+        {"optimizer": CmaEs(population=4), "evolution.max_evaluations": 10}
+    )
+    whole, run = tmp_path / "whole", tmp_path / "run"
+    own = {"reevaluate": False, "report": False}
+    evolved = tetra_drake.evolve(scenario, whole, **own)
+    assert evolved.iterations["population"].tolist() == [4, 4, 4]
+    assert len(evolved.evaluations) == 10
+    assert evolved.manifest.method.optimizer == Part("CmaEs")
+    with pytest.raises(KeyboardInterrupt):
+        tetra_drake.evolve(scenario, run, executor=interrupting, **own)
+    with refused(run, "optimizer", ""):
+        tetra_drake.evolve(None, run, resume=True, optimizer=SteadyState, **own)
+    tetra_drake.evolve(None, run, resume=True, **own)
+    assert read_record(run) == read_record(whole)
 
 
 def test_a_report_that_fails_is_no_failed_run_and_other_versions_are_told(

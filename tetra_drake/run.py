@@ -17,9 +17,8 @@ from tetra_drake.evolution.executors import (
     process_executor,
     thread_executor,
 )
-from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.method import Method, Part
 from tetra_drake.evolution.optimizers.base import MakeOptimizer
-from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import Manifest, RunRecord, read_manifest
 from tetra_drake.evolution.reevaluation import reevaluate as reevaluate_gaits
@@ -27,6 +26,7 @@ from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.evolution.trials import run_trials
 from tetra_drake.results.result import versions
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.optimizers import SteadyState
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -37,7 +37,7 @@ def evolve(
     seed: int | None = None,
     workers: int | None = None,
     resume: bool = False,
-    optimizer: MakeOptimizer = SteadyState,
+    optimizer: MakeOptimizer | None = None,
     objective: Objective | None = None,
     executor: MakeExecutor | None = None,
     progress: Progress | None = None,
@@ -51,7 +51,7 @@ def evolve(
     resume: goes on with the run in `out`; then `scenario` may be None, and what is given must be
         what the run began with.
     optimizer: optimizer(space, scenario.evolution, generator) makes the optimiser of a trial
-        (see optimizers.base); by default the thesis's steady-state algorithm.
+        (see optimizers.base); by default the scenario's.
     objective: objective(result) -> float, to be maximised; by default the scenario's fitness.
     executor: executor(workers) makes a concurrent.futures.Executor; by default worker processes,
         for which an objective must be defined in a module. On the compiled engine, by default,
@@ -119,10 +119,15 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
     among = scenario.disturbances
     draws = f", each gait among {among.draws} draws of disturbances" if among else ""
     own = [f", {part} {getattr(method, part).name}" for part in method.given_from_python]
+    ours = method.optimizer == Part(type(scenario.optimizer).__name__)
+    if ours and not isinstance(scenario.optimizer, SteadyState):
+        length = f"{settings.budget} evaluations by {method.optimizer.name}"
+    else:
+        length = f"{settings.max_iterations} iterations, population {settings.population}"
     text = (
         f"{directory}: scenario {scenario.name}, seed {manifest.seed}, trials {settings.trials}, "
-        f"each of at most {settings.max_iterations} iterations, population {settings.population}, "
-        f"engine {scenario.simulation.engine}, workers {workers}{draws}{''.join(own)}"
+        f"each of at most {length}, engine {scenario.simulation.engine}, workers {workers}{draws}"
+        f"{''.join(own)}"
     )
     if report:
         text += (

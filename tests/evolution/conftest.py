@@ -13,12 +13,13 @@ from tetra_drake.evolution.trials import run_trials
 def run_small(tmp_path):
     """run_small(name, ...): a small run in threads; its directory."""
 
-    def run(name="run", *, seed=5, workers=2, evaluate=None, resume=False, **options):
+    def run(name="run", *, seed=5, workers=2, evaluate=None, resume=False, changes=None, **options):
         directory = tmp_path / name
         if resume:
             record = RunRecord.resume(directory)
         else:
-            record = RunRecord.create(directory, scenario=small_scenario(**options), seed=seed)
+            scenario = small_scenario(**options).with_changes(changes or {})
+            record = RunRecord.create(directory, scenario=scenario, seed=seed)
         with record:
             run_trials(
                 record, evaluate=evaluate or Bowl(), workers=workers, executor=ThreadPoolExecutor

@@ -14,15 +14,18 @@ from helpers.analytic import DrawnBowl, drawn_scenario, read_record
 
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.trials import run_trials
+from tetra_drake.scenario.fields import TAG
 
 PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
 
 
-def run_and_kill(directory, executor, *, after=None, sign=signal.SIGKILL, delay=0.006):
+def run_and_kill(
+    directory, executor, *, after=None, sign=signal.SIGKILL, delay=0.006, kind="SteadyState"
+):
     """Starts the run, ends it `after` s; its exit status and its session's number."""
     # A session of its own: what the run leaves behind can be told from everything else.
     with subprocess.Popen(
-        [sys.executable, PROGRAM, directory, executor, str(delay)],
+        [sys.executable, PROGRAM, directory, executor, str(delay), kind],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         start_new_session=True,
@@ -48,26 +51,29 @@ def wait_until_gone(session):
     raise AssertionError("processes are left over")
 
 
+def uninterrupted_run(directory, kind="SteadyState"):
+    scenario = drawn_scenario(iterations=150).with_changes({"optimizer": {TAG: f"!{kind}"}})
+    with RunRecord.create(directory, scenario=scenario, seed=9) as record:
+        run_trials(record, evaluate=DrawnBowl(), workers=2, executor=ThreadPoolExecutor)
+    return read_record(directory)
+
+
 @pytest.fixture
 def uninterrupted(tmp_path):
-    with RunRecord.create(
-        tmp_path / "whole", scenario=drawn_scenario(iterations=150), seed=9
-    ) as record:
-        run_trials(record, evaluate=DrawnBowl(), workers=2, executor=ThreadPoolExecutor)
-    return read_record(tmp_path / "whole")
+    return uninterrupted_run(tmp_path / "whole")
 
 
-def kill_again_and_again(directory, executor, *, kills, longest, delay=0.006):
+def kill_again_and_again(directory, executor, *, kills, longest, delay=0.006, kind="SteadyState"):
     """Lets the run end after some kills; how many of them hit it before it was done."""
     generator = np.random.default_rng()
     hits = 0
     for _ in range(kills):
         after = generator.uniform(0.0, longest)
-        status, session = run_and_kill(directory, executor, after=after, delay=delay)
+        status, session = run_and_kill(directory, executor, after=after, delay=delay, kind=kind)
         hits += status == -signal.SIGKILL
         wait_until_gone(session)
     # The rest in threads, which start faster; the record must not depend on it.
-    assert run_and_kill(directory, "threads", delay=0.0)[0] == 0
+    assert run_and_kill(directory, "threads", delay=0.0, kind=kind)[0] == 0
     return hits
 
 
@@ -79,6 +85,12 @@ def test_a_run_killed_ends_like_one_that_was_not_and_leaves_no_process(
 ):
     kill_again_and_again(tmp_path / "run", executor, kills=kills, longest=longest)
     assert read_record(tmp_path / "run") == uninterrupted
+
+
+@pytest.mark.parametrize("kind", ["CmaEs", "DifferentialEvolution"])
+def test_every_optimiser_goes_on_as_if_nothing_had_happened(tmp_path, kind):
+    kill_again_and_again(tmp_path / "run", "threads", kills=2, longest=0.4, kind=kind)
+    assert read_record(tmp_path / "run") == uninterrupted_run(tmp_path / "whole", kind)
 
 
 @pytest.mark.slow

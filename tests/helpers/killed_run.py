@@ -1,4 +1,7 @@
-"""A small run to be killed, on a cheap fitness: killed_run.py DIRECTORY processes|threads DELAY."""
+"""A small run to be killed, on a cheap fitness: killed_run.py DIRECTORY EXECUTOR DELAY OPTIMIZER.
+
+The executor is processes or threads, the optimiser the name of a kind.
+"""
 
 import signal
 import sys
@@ -9,6 +12,7 @@ from helpers.analytic import DrawnBowl, drawn_scenario
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.record import MANIFEST, RunRecord
 from tetra_drake.evolution.trials import run_trials
+from tetra_drake.scenario.fields import TAG
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in jobs of a script
@@ -16,7 +20,10 @@ if __name__ == "__main__":
     if (directory / MANIFEST).exists():
         opened = RunRecord.resume(directory)
     else:
-        opened = RunRecord.create(directory, scenario=drawn_scenario(iterations=150), seed=9)
+        scenario = drawn_scenario(iterations=150).with_changes(
+            {"optimizer": {TAG: f"!{sys.argv[4]}"}}
+        )
+        opened = RunRecord.create(directory, scenario=scenario, seed=9)
     with opened as record:
         print("begun", flush=True)
         run_trials(

@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -58,13 +57,17 @@ class Method:
 
     @classmethod
     def of(
-        cls, scenario: Scenario, *, objective: object | None = None, optimizer: object = SteadyState
+        cls,
+        scenario: Scenario,
+        *,
+        objective: object | None = None,
+        optimizer: object | None = None,
     ) -> Method:
-        """The method of a run; without an objective its own is the scenario's fitness."""
+        """The method of a run; what is not given is the scenario's."""
         return cls(
             evaluator=Part(scenario.simulation.engine),
             objective=Part("fitness") if objective is None else Part.of(objective),
-            optimizer=Part.of(optimizer),
+            optimizer=Part.of(optimizer) if optimizer else Part(type(scenario.optimizer).__name__),
         )
 
     @classmethod

@@ -13,6 +13,7 @@ import numpy as np
 
 from tetra_drake.evolution.draws import SeededVector, score_at, task_of, worst_share
 from tetra_drake.evolution.executors import EvaluationPool, MakeExecutor, process_executor
+from tetra_drake.evolution.optimizers import optimizer_of
 from tetra_drake.evolution.optimizers.base import (
     Evaluate,
     Evaluation,
@@ -20,7 +21,6 @@ from tetra_drake.evolution.optimizers.base import (
     Optimizer,
     Rescoring,
 )
-from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, trial_folder
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.schema import Scenario
@@ -186,7 +186,7 @@ def run_trials(
     evaluate: Evaluate,
     workers: int,
     executor: MakeExecutor = process_executor,
-    optimizer: MakeOptimizer = SteadyState,
+    optimizer: MakeOptimizer | None = None,
     show: Callable[[Sequence[TrialStatus]], None] = lambda statuses: None,
 ) -> list[TrialStatus]:
     """Runs all trials of a record to their ends, from wherever they are.
@@ -195,6 +195,7 @@ def run_trials(
     executor, or interruptions. Trials share nothing: one more trial changes no other.
     """
     scenario, seed = record.manifest.scenario, record.manifest.seed
+    make = optimizer or optimizer_of(scenario.optimizer)
     space = ParameterSpace.of(scenario)
     seeds = np.random.SeedSequence(seed).spawn(scenario.evolution.trials)
     trials = [
@@ -202,7 +203,7 @@ def run_trials(
             number,
             scenario=scenario,
             seed=seed,
-            optimizer=optimizer(space, scenario.evolution, np.random.default_rng(own_seed)),
+            optimizer=make(space, scenario.evolution, np.random.default_rng(own_seed)),
             folder=trial_folder(record.directory, number),
         )
         for number, own_seed in enumerate(seeds)

@@ -37,7 +37,7 @@ def same_experiment(tree: Tree, base: Tree) -> bool:
     """Whether two trees agree in all that the numbers of a reference depend on."""
 
     def relevant(tree: Tree) -> list[Any]:
-        others = ("name", "reference", "simulation", "compiled", "mujoco", "evolution")
+        others = ("name", "reference", "simulation", "compiled", "mujoco", "evolution", "optimizer")
         simulation = tree.get("simulation", {})
         rest = {name: value for name, value in tree.items() if name not in others}
         return [rest, simulation.get("duration"), simulation.get("steady_from")]

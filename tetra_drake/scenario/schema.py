@@ -15,6 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import Check, hint, quantity, setting, tree_of, with_values
 from tetra_drake.scenario.metrics import METRICS, inverse
+from tetra_drake.scenario.optimizers import OptimizerKind, SteadyState
 from tetra_drake.scenario.terrain import Flat, Terrain
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -252,6 +253,9 @@ class EvolutionScenario:
     tournament: int = setting(at_least=1)
     trials: int = setting(at_least=1)
     max_iterations: int = setting(at_least=1)
+    max_evaluations: int | None = setting(at_least=1, default=None)
+    """Of a trial by an optimiser other than !SteadyState; if not given, as many as there are in
+    max_iterations of that one."""
     crossover: str = setting(choices=("uniform",))
     crossover_probability: float = setting(at_least=0, at_most=1)
     mutation_probability: float = setting(at_least=0, at_most=1)
@@ -265,6 +269,12 @@ class EvolutionScenario:
     stop_after: int = setting(at_least=0)
     independent_tau_b: bool = setting()  # tau_B evolves by itself instead of staying at 2 tau_A
     time_budget: float = quantity("s", above=0)  # wall time; a longer simulation counts as failed
+
+    @property
+    def budget(self) -> int:
+        """Evaluations of a trial that does not end early: max_evaluations, or the population and
+        two children in each iteration."""
+        return self.max_evaluations or self.population + 2 * self.max_iterations
 
 
 @dataclass
@@ -310,6 +320,7 @@ class Scenario:
     """The least values of metrics: a gait with less counts as failed. Replaced as a whole."""
     disturbances: DisturbancesScenario | None = setting(default=None)
     evolution: EvolutionScenario
+    optimizer: OptimizerKind = setting(default=SteadyState())
     reference: ReferenceScenario | None = setting(default=None)
 
     @property

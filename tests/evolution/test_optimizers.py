@@ -1,0 +1,215 @@
+"""The optimisers beside the thesis's: what all have in common, then each by itself."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from helpers.analytic import read_record, small_scenario
+
+from tetra_drake.evolution.optimizers import optimizer_of
+from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.robot.gait import TAU_A, TAU_B, ParameterSpace
+from tetra_drake.scenario.optimizers import (
+    CmaEs,
+    DifferentialEvolution,
+    RandomSearch,
+    SteadyState,
+)
+
+LEARNING = [CmaEs(), CmaEs(sample=20), DifferentialEvolution(population=20)]
+BUDGETED = [*LEARNING, RandomSearch()]
+
+
+def make(kind, *, seed=3, budget=600, **changes):
+    scenario = small_scenario().with_changes({"evolution.max_evaluations": budget} | changes)
+    generator = np.random.default_rng(seed)
+    return optimizer_of(kind)(ParameterSpace.of(scenario), scenario.evolution, generator)
+
+
+def bowl(vector):
+    """0 at most, where the weights are 2 and tau_A is at its floor."""
+    return Evaluation(-float(((vector[:-2] - 2.0) ** 2).sum() + 40.0 * (vector[TAU_A] - 0.2)))
+
+
+def failing(vector):
+    return Evaluation.failed("fell")
+
+
+def run(optimizer, evaluate=bowl):
+    """All vectors asked for, batch by batch, and the iterations."""
+    batches, iterations = [], []
+    while not iterations or iterations[-1].stop is None:
+        batches.append(optimizer.ask())
+        iterations.append(optimizer.tell([evaluate(vector) for vector in batches[-1]]))
+    return batches, iterations
+
+
+def fitnesses(batches):
+    return np.array([bowl(vector).fitness for batch in batches for vector in batch])
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_a_trial_ends_with_the_evaluation_that_the_display_expects_last(kind):
+    optimizer = make(kind, budget=101)
+    batches, iterations = run(optimizer)
+    assert sum(map(len, batches)) == optimizer.evaluations_at_most == 101
+    assert [iteration.stop is None for iteration in iterations[-2:]] == [True, False]
+
+
+def test_the_budget_is_that_of_the_thesiss_algorithm_unless_it_is_given():
+    settings = small_scenario(population=12, iterations=15).evolution
+    space = ParameterSpace.of(small_scenario())
+    made = [optimizer_of(kind)(space, settings, None) for kind in (SteadyState(), RandomSearch())]
+    assert [optimizer.evaluations_at_most for optimizer in made] == [12 + 2 * 15] * 2
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_the_trials_own_generator_alone_decides(kind):
+    before = str(np.random.get_state())
+    ours, theirs, others = (np.concatenate(run(make(kind, seed=seed))[0]) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(ours, theirs)
+    assert not np.array_equal(ours, others)
+    assert str(np.random.get_state()) == before
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_what_is_asked_for_can_be_changed_without_harm(kind):
+    first, second = make(kind), make(kind)
+    for _ in range(3):
+        batch = first.ask()
+        told = [bowl(vector) for vector in batch]
+        for vector in batch:
+            vector[:] = 0.0
+        first.tell(told)
+        second.tell([bowl(vector) for vector in second.ask()])
+    np.testing.assert_array_equal(first.ask(), second.ask())
+
+
+@pytest.mark.parametrize("kind", LEARNING)
+def test_a_quarter_of_the_evaluations_of_random_search_is_enough(kind):
+    best = fitnesses(run(make(RandomSearch(), budget=2400))[0]).max()
+    reached = [fitnesses(run(make(kind, seed=seed))[0]).max() for seed in range(3)]
+    assert min(reached) > 0.5 * best
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_no_vector_is_below_a_floor_and_none_is_asked_for_twice(kind):
+    vectors = np.concatenate(run(make(kind, budget=1500))[0])
+    assert (vectors[:, :-2] >= 0.0).all() and (vectors[:, TAU_A] >= 0.2).all()
+    np.testing.assert_array_equal(vectors[:, TAU_B], 2.0 * vectors[:, TAU_A])
+    assert len(np.unique(vectors[:, :-1], axis=0)) == 1500
+    on_floor = vectors[:, TAU_A] == 0.2
+    assert on_floor.mean() < 0.01
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_parameters_with_equal_bounds_stay_and_tau_b_may_go_its_own_way(kind):
+    fixed = {"gait_bounds.tau_a_min": 0.3, "gait_bounds.tau_a_max": 0.3}
+    vectors = np.concatenate(run(make(kind, **fixed))[0])
+    assert (vectors[:, -2:] == [0.3, 0.6]).all()
+    if kind in LEARNING:
+        vectors = np.concatenate(run(make(kind, **{"evolution.independent_tau_b": True}))[0])
+        assert (vectors[:, TAU_B] != 2.0 * vectors[:, TAU_A]).mean() > 0.5
+        assert (vectors[:, TAU_B] >= 0.4).all()
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_one_parameter_is_enough(kind):
+    vectors = np.concatenate(run(make(kind, **{"robot.tetrahedra": 2}))[0])
+    assert vectors.shape == (600, 2)
+    assert vectors[:, TAU_A].min() < 0.205
+
+
+@pytest.mark.parametrize("kind", LEARNING)
+def test_failures_count_like_the_worst_of_their_batch(kind):
+    """However large the other fitnesses are, and wherever the failures are."""
+
+    def steep(vector):
+        if vector[0] > 2.0:
+            return failing(vector)
+        return Evaluation(1e6 * (bowl(vector).fitness - 1e3))
+
+    batches, iterations = run(make(kind, budget=900), steep)
+    shares = [np.mean([vector[0] > 2.0 for vector in batch]) for batch in batches]
+    assert np.mean(shares[:3]) > 0.3
+    assert fitnesses(batches[-3:]).mean() > 0.3 * fitnesses(batches[:1]).mean()
+    assert all(math.isfinite(iteration.report["mean_fitness"]) for iteration in iterations)
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_batches_that_fail_as_a_whole_teach_nothing_and_stop_nothing(kind):
+    spoilt, optimizer = 0, make(kind, budget=1200)
+    while spoilt < 240:
+        batch = optimizer.ask()
+        spoilt += len(batch)
+        assert optimizer.tell(list(map(failing, batch))).report["mean_fitness"] is None
+    batches, _ = run(optimizer)
+    assert spoilt + sum(map(len, batches)) == 1200
+    if kind in LEARNING:
+        assert fitnesses(batches).max() > -1.5
+    assert run(make(kind), failing)[1][-1].stop is not None
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_a_run_killed_after_any_iteration_ends_like_one_that_was_not(kind, run_small):
+    changes = {"optimizer": kind, "evolution.max_evaluations": 90}
+    whole = run_small("whole", trials=1, changes=changes)
+    reference = read_record(whole)
+    files = [whole / "trial_00" / f"{name}.jsonl" for name in ("evaluations", "iterations")]
+    evaluations, iterations = (file.read_text().splitlines(keepends=True) for file in files)
+    for complete, line in enumerate(iterations):
+        kept = json.loads(line)["evaluations"]
+        files[0].write_text("".join(evaluations[:kept]))
+        files[1].write_text("".join(iterations[:complete]))
+        run_small("whole", resume=True)
+        assert read_record(whole) == reference
+
+
+# CMA-ES
+
+
+def test_the_sample_is_random_and_the_best_of_it_is_the_start():
+    kind = CmaEs(sample=30, sigma=1e-9)
+    batches, iterations = run(make(kind, seed=8, budget=60))
+    generator, space = np.random.default_rng(8), ParameterSpace.of(small_scenario())
+    np.testing.assert_allclose(batches[0], [space.random(generator) for _ in range(30)])
+    best = max(batches[0], key=lambda vector: bowl(vector).fitness)
+    np.testing.assert_allclose(batches[1], [best] * len(batches[1]), atol=1e-6)
+    assert [iteration.report["sigma"] for iteration in iterations[:2]] == [
+        None,
+        pytest.approx(1e-9),
+    ]
+
+
+def test_without_a_sample_it_starts_in_the_middle_as_wide_as_sigma_says():
+    (batch, *_), _ = run(make(CmaEs(population=400, sigma=0.1), budget=400))
+    widths = np.array([2.4] * 24 + [0.3])  # of [1, 3.4] and [0.2, 0.5] s
+    middle = np.array([2.2] * 24 + [0.35])
+    deviations = (np.array(batch)[:, :-1] - middle) / widths
+    # Of 400 numbers: the standard error of the mean is 0.005, of the deviation 0.0035.
+    np.testing.assert_allclose(deviations.mean(axis=0), 0.0, atol=0.02)
+    np.testing.assert_allclose(deviations.std(axis=0), 0.1, atol=0.015)
+
+
+def test_it_begins_anew_and_larger_where_it_has_converged():
+    flat = {"gait_bounds.weight_min": 2.0, "gait_bounds.weight_max": 2.0}  # tau_A is left
+    _, iterations = run(make(CmaEs(population=6, growth=1.5), budget=3000, **flat))
+    found = {(i.report["restart"], i.report["population"]) for i in iterations[:-1]}
+    assert {(0, 6), (1, 9), (2, 14)} <= found
+    sigmas = [i.report["sigma"] for i in iterations if i.report["restart"] == 1]
+    assert sigmas[0] == pytest.approx(CmaEs().sigma, rel=1e-4)
+    assert min(sigmas) < 1e-3
+
+
+# Differential evolution
+
+
+def test_no_member_gets_worse_and_their_number_falls_to_four():
+    optimizer = make(DifferentialEvolution(population=30), budget=900)
+    batches, iterations = run(optimizer)
+    best = [fitnesses(batches[: i + 1]).max() for i in range(len(batches))]
+    assert best[-1] > -0.5
+    sizes = [iteration.report["population"] for iteration in iterations]
+    assert sizes == sorted(sizes, reverse=True)
+    assert (sizes[0], sizes[-2]) == (30, 4)

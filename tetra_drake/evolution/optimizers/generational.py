@@ -1,0 +1,85 @@
+"""What optimisers that go on until their evaluations are used up have in common."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tetra_drake.evolution.optimizers.base import Evaluation, Iteration
+from tetra_drake.robot.gait import TAU_B, ParameterSpace, Vector
+from tetra_drake.scenario.schema import EvolutionScenario
+
+Matrix = npt.NDArray[np.float64]
+
+
+class Ranges:
+    """The parameters that vary, in units of their ranges in random gaits: 0 is the lower bound, 1
+    the upper one. Only floors limit them."""
+
+    def __init__(self, space: ParameterSpace) -> None:
+        self._space = space
+        self._free = space.high > space.low
+        self._free[TAU_B] &= not space.couples_tau_b
+        self._width = (space.high - space.low)[self._free]
+        self.size = len(self._width)
+        self.floors = (space.floors - space.low)[self._free] / self._width
+
+    def vector(self, point: Vector) -> Vector:
+        """The vector of a point; what is below its floor is put there."""
+        vector = self._space.low.copy()
+        vector[self._free] += point * self._width
+        return self._space.repair(np.maximum(vector, self._space.floors))
+
+    def point(self, vector: Vector) -> Vector:
+        """The point of a vector."""
+        return (vector - self._space.low)[self._free] / self._width
+
+
+class Generational:
+    """An Optimizer that draws batches until the evaluations are used up; the last may be smaller.
+
+    Of a batch whose evaluations are not all failures it learns; failures count like the worst of
+    the others. Reports mean_fitness, over the evaluations of the batch without failure.
+    """
+
+    def __init__(
+        self, space: ParameterSpace, settings: EvolutionScenario, generator: np.random.Generator
+    ) -> None:
+        self._space = space
+        self._settings = settings
+        self._generator = generator
+        self._left = settings.budget
+
+    @property
+    def evaluations_at_most(self) -> int:
+        """Number of evaluations of a trial."""
+        return self._settings.budget
+
+    def ask(self) -> list[Vector]:
+        """The next batch."""
+        return self._draw()[: self._left]
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
+        """Takes a batch."""
+        self._left -= len(evaluations)
+        fitnesses = np.array([each.fitness for each in evaluations])
+        known = np.isfinite(fitnesses)
+        mean = float(np.mean(fitnesses[known])) if known.any() else math.nan
+        report = {"mean_fitness": mean if known.any() else None, **self._state()}
+        if self._left and known.any():
+            self._learn(np.where(known, fitnesses, np.min(fitnesses[known])))
+        return Iteration(report=report, stop=None if self._left else "all evaluations done")
+
+    def _draw(self) -> list[Vector]:
+        raise NotImplementedError
+
+    def _learn(self, fitnesses: Vector) -> None:
+        """Takes the fitnesses of all that was drawn."""
+
+    def _state(self) -> Mapping[str, Any]:
+        """What to report besides."""
+        return {}
