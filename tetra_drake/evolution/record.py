@@ -12,7 +12,8 @@
 
 Evaluations become final lines iteration by iteration, so the record does not depend on
 which of them was ready first. A run is resumed by repeating it from the start with recorded
-fitnesses in place of simulations; every vector and every line must come out as recorded.
+fitnesses in place of simulations; every vector and every line must come out as recorded. Only an
+optimiser that can follow takes over vectors that, on another processor, come out differently.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
 import yaml
 
 from tetra_drake.errors import InputError
@@ -193,21 +195,36 @@ class TrialRecord:
         self._iterations = read_entries(folder / ITERATIONS)
         in_progress = read_entries(folder / IN_PROGRESS)
         self._in_progress = {entry["index"]: (i, entry) for i, entry in enumerate(in_progress)}
+        self._follows = False
+
+    def vector(self, index: int, vector: Vector) -> Vector:
+        """The recorded vector of this index in place of another one, as a following optimiser takes
+        it; then, what the optimiser reports is no longer compared. `vector` itself if it is the
+        recorded one, or none is."""
+        _, _, entry = self._find(index)
+        genome = vector.tolist() if entry is None else entry["genome"]
+        if genome == vector.tolist() or [*map(type, genome)] != [float] * len(vector):
+            return vector
+        self._follows = True
+        return np.array(genome)
 
     def recall(self, index: int, vector: Vector) -> Evaluation | None:
         """The recorded evaluation of this index, None if there is none; InputError if it is of
         another vector."""
-        if index < len(self._evaluations):
-            name, row, entry = EVALUATIONS, index, self._evaluations[index]
-        elif index in self._in_progress:
-            name, (row, entry) = IN_PROGRESS, self._in_progress[index]
-        else:
+        name, row, entry = self._find(index)
+        if entry is None:
             return None
         if entry["genome"] != vector.tolist():
             self._refuse(name, row, "the genome is not the one that scenario and seed lead to")
         fitness = -math.inf if entry["fitness"] is None else entry["fitness"]
         rest = [entry[key] for key in ("metrics", "failure", "wall_time_s", "engine")]
         return dataclasses.replace(Evaluation(fitness, *rest), draws=entry.get("draws"))
+
+    def _find(self, index: int) -> tuple[str, int, dict[str, Any] | None]:
+        """File, row and entry of an evaluation."""
+        if index < len(self._evaluations):
+            return EVALUATIONS, index, self._evaluations[index]
+        return IN_PROGRESS, *self._in_progress.get(index, (0, None))
 
     def keep(self, entry: dict[str, Any]) -> None:
         """Saves an evaluation whose iteration is not complete yet."""
@@ -233,8 +250,9 @@ class TrialRecord:
 
     def _write(self, name: str, recorded: _Lines, entries: _Lines, *, first: int) -> None:
         for row, (there, entry) in enumerate(zip(recorded[first:], entries, strict=False), first):
-            if there != entry:
-                key = next(key for key in there | entry if there.get(key) != entry.get(key))
+            keys = _ITERATION_KEYS if self._follows and name == ITERATIONS else there | entry
+            key = next((key for key in keys if there.get(key) != entry.get(key)), None)
+            if key is not None:
                 self._refuse(name, row, f"{key} is not what scenario and seed lead to")
         if missing := entries[max(0, len(recorded) - first) :]:
             append_lines(self._folder / name, missing)

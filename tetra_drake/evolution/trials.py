@@ -17,6 +17,7 @@ from tetra_drake.evolution.optimizers import optimizer_of
 from tetra_drake.evolution.optimizers.base import (
     Evaluate,
     Evaluation,
+    Following,
     MakeOptimizer,
     Optimizer,
     Rescoring,
@@ -121,6 +122,7 @@ class Trial:
         while self.status.stop is None:
             self._rescore()
             batch = dict(enumerate(self._optimizer.ask(), start=self.status.evaluations))
+            batch = self._follow(batch)
             self._results = {}
             for index, vector in batch.items():
                 recorded = self._record.recall(index, vector)
@@ -134,6 +136,16 @@ class Trial:
             self._complete(batch)
         self._record.finish(self.status.evaluations)
         self._save_best()
+
+    def _follow(self, batch: dict[int, Vector]) -> dict[int, Vector]:
+        """The batch with what the record has in its place, which the optimiser is told if it can
+        go on with that."""
+        if not isinstance(self._optimizer, Following):
+            return batch
+        followed = {i: self._record.vector(i, vector) for i, vector in batch.items()}
+        if any(followed[i] is not vector for i, vector in batch.items()):
+            self._optimizer.follow(list(followed.values()))
+        return followed
 
     def _rescore(self) -> None:
         """Where the score goes from mean to tail, tells the optimiser that of the iteration."""

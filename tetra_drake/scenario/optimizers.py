@@ -21,6 +21,8 @@ class CmaEs:
     """Standard deviation at the start, as a share of each parameter's range in random gaits."""
     sample: int = setting(at_least=0, default=0)
     """Random gaits evaluated first, of which the best is the start; 0: the middle of the ranges."""
+    tolerance: float = setting(above=0, default=1e-3)
+    """A run has converged where all standard deviations are below this, in the same units."""
     growth: float = setting(at_least=1, default=2.0)
     """Factor on the population at each restart (IPOP)."""
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.evolution.optimizers.generational import Generational, Matrix, Ranges
+from tetra_drake.evolution.optimizers.generational import Generational, Matrix
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario import optimizers as kinds
 from tetra_drake.scenario.schema import EvolutionScenario
@@ -18,7 +18,7 @@ MEMORIES, LEAST, SPREAD = 6, 4, 0.1
 class DifferentialEvolution(Generational):
     """First the random population, then one trial vector for each member, which it replaces if it
     is fitter: current-to-pbest/1 with an archive of replaced members and binomial crossover.
-    Reports the population, and scale and crossover, the means of F and CR, besides."""
+    Reports besides scale and crossover, the means of what F and CR are drawn around."""
 
     def __init__(
         self,
@@ -29,26 +29,18 @@ class DifferentialEvolution(Generational):
     ) -> None:
         super().__init__(space, settings, generator)
         self._own = own or kinds.DifferentialEvolution()
-        self._ranges = Ranges(space)
         self._members: Matrix = np.empty((0, self._ranges.size))
         """By fitness, the best first."""
         self._fitnesses = np.empty(0)
         self._archive = self._members
-        self._points = self._members
-        """Those asked for; of the member of the same row."""
         self._memory = np.full((MEMORIES, 2), 0.5)
         """What F and CR are drawn around; row `_oldest` is overwritten next."""
         self._oldest = 0
         self._drawn = np.empty((0, 2))
         """F and CR of the points."""
 
-    def _draw(self) -> list[Vector]:
-        if len(self._members):
-            self._points = self._breed()
-        else:
-            draws = [self._space.random(self._generator) for _ in range(self._own.population)]
-            self._points = np.array([self._ranges.point(vector) for vector in draws])
-        return [self._ranges.vector(point) for point in self._points]
+    def _draw(self) -> Matrix:
+        return self._breed() if len(self._members) else self._random(self._own.population)
 
     def _breed(self) -> Matrix:
         """A trial vector for each member x: x + F (best - x) + F (r1 - r2), crossed with x."""
@@ -102,4 +94,4 @@ class DifferentialEvolution(Generational):
 
     def _state(self) -> Mapping[str, Any]:
         scale, crossover = self._memory.mean(axis=0).tolist()
-        return {"population": len(self._points), "scale": scale, "crossover": crossover}
+        return {"scale": scale, "crossover": crossover}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -42,8 +41,8 @@ class Ranges:
 class Generational:
     """An Optimizer that draws batches until the evaluations are used up; the last may be smaller.
 
-    Of a batch whose evaluations are not all failures it learns; failures count like the worst of
-    the others. Reports mean_fitness, over the evaluations of the batch without failure.
+    It learns from a batch unless all of it has failed; a failure is worse than all others. Reports
+    mean_fitness, over the evaluations of the batch without failure.
     """
 
     def __init__(
@@ -52,7 +51,10 @@ class Generational:
         self._space = space
         self._settings = settings
         self._generator = generator
+        self._ranges = Ranges(space)
         self._left = settings.budget
+        self._points: Matrix = np.empty((0, self._ranges.size))
+        """Those drawn last."""
 
     @property
     def evaluations_at_most(self) -> int:
@@ -61,24 +63,36 @@ class Generational:
 
     def ask(self) -> list[Vector]:
         """The next batch."""
-        return self._draw()[: self._left]
+        self._points = self._draw()
+        return [self._ranges.vector(point) for point in self._points[: self._left]]
+
+    def follow(self, vectors: Sequence[Vector]) -> None:
+        """Takes these vectors in place of those asked for."""
+        self._points[: len(vectors)] = [self._ranges.point(vector) for vector in vectors]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes a batch."""
+        """Takes the evaluations of a batch."""
         self._left -= len(evaluations)
         fitnesses = np.array([each.fitness for each in evaluations])
-        known = np.isfinite(fitnesses)
-        mean = float(np.mean(fitnesses[known])) if known.any() else math.nan
-        report = {"mean_fitness": mean if known.any() else None, **self._state()}
-        if self._left and known.any():
-            self._learn(np.where(known, fitnesses, np.min(fitnesses[known])))
+        known = fitnesses[np.isfinite(fitnesses)]
+        mean = float(np.mean(known)) if known.size else None
+        report = {"mean_fitness": mean, "population": len(self._points), **self._state()}
+        if self._left and known.size:
+            failed = np.min(known) - abs(np.min(known)) - 1.0
+            self._learn(np.where(np.isfinite(fitnesses), fitnesses, failed))
         return Iteration(report=report, stop=None if self._left else "all evaluations done")
 
-    def _draw(self) -> list[Vector]:
+    def _random(self, count: int) -> Matrix:
+        """The points of random vectors."""
+        drawn = [self._space.random(self._generator) for _ in range(count)]
+        return np.array([self._ranges.point(vector) for vector in drawn])
+
+    def _draw(self) -> Matrix:
+        """The points to evaluate next."""
         raise NotImplementedError
 
     def _learn(self, fitnesses: Vector) -> None:
-        """Takes the fitnesses of all that was drawn."""
+        """Takes the fitnesses of all points drawn last, all finite."""
 
     def _state(self) -> Mapping[str, Any]:
         """What to report besides."""
