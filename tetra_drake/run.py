@@ -18,6 +18,7 @@ from tetra_drake.evolution.executors import (
     thread_executor,
 )
 from tetra_drake.evolution.method import Method, Part
+from tetra_drake.evolution.optimizers import optimizer_of
 from tetra_drake.evolution.optimizers.base import MakeOptimizer
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import Manifest, RunRecord, read_manifest
@@ -70,6 +71,7 @@ def evolve(
     if own is None:
         raise InputError("scenario", "", "is needed to begin a run")
     check_scenario(own)  # before there is a directory
+    make = optimizer or optimizer_of(own.optimizer)
     method = Method.of(own, objective=objective, optimizer=optimizer)
     evaluate = GaitEvaluation(own, objective)
     in_lanes = executor is None and own.simulation.engine == "compiled"
@@ -94,7 +96,7 @@ def evolve(
                 evaluate=evaluate,
                 workers=at_a_time,
                 executor=where,
-                optimizer=optimizer,
+                optimizer=make,
                 show=progress.show,
             )
         if reevaluate and own.simulation.engine != "drake":

@@ -1,11 +1,13 @@
 """The optimisers beside the thesis's: what all have in common, then each by itself."""
 
+import dataclasses
 import json
 import math
+import sys
 
 import numpy as np
 import pytest
-from helpers.analytic import read_record, small_scenario
+from helpers.analytic import measures, read_record, small_scenario
 
 from tetra_drake.evolution import optimizers
 from tetra_drake.evolution.optimizers import optimizer_of
@@ -14,12 +16,14 @@ from tetra_drake.robot.gait import TAU_A, TAU_B, ParameterSpace
 from tetra_drake.scenario.optimizers import (
     CmaEs,
     DifferentialEvolution,
+    QualityDiversity,
     RandomSearch,
     SteadyState,
 )
 
 LEARNING = [CmaEs(), CmaEs(sample=20), DifferentialEvolution(population=20)]
-BUDGETED = [*LEARNING, RandomSearch()]
+DIVERSE = QualityDiversity(emitters=2, batch=10, floor=-50.0)
+BUDGETED = [*LEARNING, DIVERSE, RandomSearch()]
 
 
 def make(kind, *, seed=3, budget=600, **changes):
@@ -30,7 +34,8 @@ def make(kind, *, seed=3, budget=600, **changes):
 
 def bowl(vector):
     """0 at most, where the weights are 2 and tau_A is at its floor."""
-    return Evaluation(-float(((vector[:-2] - 2.0) ** 2).sum() + 40.0 * (vector[TAU_A] - 0.2)))
+    fitness = -float(((vector[:-2] - 2.0) ** 2).sum() + 40.0 * (vector[TAU_A] - 0.2))
+    return Evaluation(fitness, measures(vector))
 
 
 def failing(vector):
@@ -246,3 +251,50 @@ def test_no_member_gets_worse_and_their_number_falls_to_four():
     sizes = [iteration.report["population"] for iteration in iterations]
     assert sizes == sorted(sizes, reverse=True)
     assert (sizes[0], sizes[-2]) == (30, 4)
+
+
+# Quality-diversity
+
+
+def walker(vector):
+    """As bowl(), but every seventh vector fails, and every seventh lacks a measure."""
+    chance = hash(vector.tobytes()) % 7
+    if chance == 0:
+        return failing(vector)
+    return (
+        dataclasses.replace(bowl(vector), metrics={"lifted": 0.5}) if chance == 1 else bowl(vector)
+    )
+
+
+def cells(batches):
+    """By the cells of the default map, the greatest fitness above the floor."""
+    best = {}
+    for vector in np.concatenate(batches):
+        found = walker(vector)
+        if len(found.metrics) == 2 and found.fitness > DIVERSE.floor:
+            x, y = found.metrics["travelling_index"], found.metrics["lifted"]
+            cell = tuple(np.clip([int(20 * x), int(20 * (y - 0.3) / 0.5)], 0, 19).tolist())
+            best[cell] = max(found.fitness, best.get(cell, -math.inf))
+    return best
+
+
+def test_elites_are_the_cells_of_gaits_above_the_floor_that_have_not_failed():
+    batches, iterations = run(make(DIVERSE), walker)
+    found = [len(cells(batches[: i + 1])) for i in range(len(batches))]
+    assert [iteration.report["elites"] for iteration in iterations] == found
+    assert found[-1] > 30
+    _, iterations = run(make(QualityDiversity(batch=10)))  # the bowl is below 0 everywhere
+    assert iterations[-1].report["elites"] == 0
+
+
+def test_the_map_is_fuller_and_fitter_than_that_of_random_search():
+    runs = (run(make(kind, budget=4000), walker) for kind in (DIVERSE, RandomSearch()))
+    ours, theirs = (cells(batches) for batches, _ in runs)
+    assert len(ours) > 1.2 * len(theirs)
+    assert np.median([ours[cell] - theirs[cell] for cell in ours.keys() & theirs.keys()]) > 2.0
+
+
+def test_without_pyribs_it_is_refused(monkeypatch, refused):
+    monkeypatch.setitem(sys.modules, "ribs", None)
+    with refused("optimizer", "", "tetra_drake[qd]"):
+        optimizer_of(QualityDiversity())

@@ -32,7 +32,13 @@ class Bowl:
         if chance % self.fails_every == 0:
             return Evaluation.failed("fell off the table")
         fitness = -float(((genome[:-2] - 2.0) ** 2).sum())
-        return Evaluation(fitness, {"distance": 10.0 + fitness}, wall_time=self.delay)
+        metrics = {"distance": 10.0 + fitness, **measures(genome)}
+        return Evaluation(fitness, metrics, wall_time=self.delay)
+
+
+def measures(genome):
+    """Two metrics that two weights decide: 0.25 to 0.85 of weights from 1 to 3.4."""
+    return {"travelling_index": genome[0] / 4.0, "lifted": genome[1] / 4.0}
 
 
 TAIL = 0.3

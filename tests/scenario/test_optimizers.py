@@ -4,7 +4,14 @@ import pytest
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.optimizers import CmaEs, DifferentialEvolution, RandomSearch, SteadyState
+from tetra_drake.scenario.optimizers import (
+    CmaEs,
+    DifferentialEvolution,
+    QualityDiversity,
+    RandomSearch,
+    SteadyState,
+)
+from tetra_drake.scenario.units import INCH
 
 MINE = "base: thesis\nname: mine\nevolution: {max_evaluations: 900}\noptimizer: "
 
@@ -15,6 +22,11 @@ MINE = "base: thesis\nname: mine\nevolution: {max_evaluations: 900}\noptimizer: 
         ("!CmaEs {sigma: 0.3, population: 20}", CmaEs(sigma=0.3, population=20)),
         ("!DifferentialEvolution {}", DifferentialEvolution()),
         ("!RandomSearch", RandomSearch()),
+        ("!QualityDiversity {floor: -9}", QualityDiversity(floor=-9.0)),
+        (
+            "!QualityDiversity {measures: {speed: [0 in/s, 2 in/s], lifted: [0, 1]}}",
+            QualityDiversity(measures={"speed": [0.0, 2.0 * INCH], "lifted": [0.0, 1.0]}),
+        ),
         ("!SteadyState {}", SteadyState()),
     ],
 )
@@ -44,6 +56,14 @@ def test_the_thesiss_algorithm_is_the_default_and_is_not_written(scenario):
         ("!CmaEs {population: 3}", "optimizer.population"),
         ("!SteadyState {population: 9}", "optimizer.population"),
         ("!CMAES {}", "optimizer"),
+        ("!QualityDiversity {measures: {lifted: [0, 1]}}", "optimizer.measures"),
+        ("!QualityDiversity {measures: {lited: [0, 1]}}", "optimizer.measures.lited"),
+        ("!QualityDiversity {measures: {lifted: [0, 1, 2]}}", "optimizer.measures.lifted"),
+        (
+            "!QualityDiversity {measures: {lifted: [0, 1], tension: [1 lbf, 0 lbf]}}",
+            "optimizer.measures.tension",
+        ),
+        ("!QualityDiversity {cells: [9, 1]}", "optimizer.cells[1]"),
     ],
 )
 def test_a_wrong_one_is_refused(tmp_path, text, key):

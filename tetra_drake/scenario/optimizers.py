@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from tetra_drake.scenario.fields import setting
+from tetra_drake.scenario.metrics import METRICS
 
 
 @dataclass
@@ -42,5 +43,32 @@ class RandomSearch:
     """Random gaits, as many in an iteration as `evolution.population`: a baseline."""
 
 
-OptimizerKind = SteadyState | CmaEs | DifferentialEvolution | RandomSearch
+@dataclass
+class QualityDiversity:
+    """Gaits that differ: a map of two metrics, in each of whose cells the fittest gait counts, by
+    pyribs (extra `qd`). Several runs of CMA-ES look for gaits that raise the levels of cells, which
+    follow the fittest gaits slowly (CMA-MAE, Fontaine and Nikolaidis, arXiv 2205.10752)."""
+
+    measures: dict[str, list[float]] = setting(
+        units=METRICS, length=2, default={"travelling_index": [0.0, 1.0], "lifted": [0.3, 0.8]}
+    )
+    """Two metrics and the range of each on the map. What lies outside counts to the cells at the
+    edge."""
+    cells: list[int] = setting(at_least=2, length=2, default=[20, 20])
+    """Of each metric."""
+    floor: float = setting(default=0.0)
+    """The fitness that gaits on the map exceed: the level of all cells at the start."""
+    learning_rate: float = setting(above=0, at_most=1, default=0.01)
+    """Share of the way to a better gait's fitness by which it raises the level of its cell."""
+    emitters: int = setting(at_least=1, default=4)
+    """Runs of CMA-ES side by side."""
+    batch: int = setting(at_least=2, default=15)
+    """Vectors of each in an iteration."""
+    sigma: float = setting(above=0, default=0.5)
+    """As of !CmaEs; starts are random gaits and, where one begins anew, gaits of the map."""
+    draws: int = setting(at_least=0, default=10)
+    """In the end, each gait of the map is simulated in as many draws of disturbances."""
+
+
+OptimizerKind = SteadyState | CmaEs | DifferentialEvolution | RandomSearch | QualityDiversity
 """What `optimizer` may be; without a tag it is the first."""

@@ -15,7 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import Check, hint, quantity, setting, tree_of, with_values
 from tetra_drake.scenario.metrics import METRICS, inverse
-from tetra_drake.scenario.optimizers import OptimizerKind, SteadyState
+from tetra_drake.scenario.optimizers import OptimizerKind, QualityDiversity, SteadyState
 from tetra_drake.scenario.terrain import Flat, Terrain
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -397,6 +397,7 @@ def _check_relations(scenario: Scenario, source: object) -> None:
         (mu > most, "friction.kinetic", mu, f"at most static, {most}"),
         (offsets not in (0, n), "robot.offsets", f"{offsets} items", f"none or {n}, one each"),
         *_network_relations(scenario),
+        *_map_relations(scenario),
     ):
         if wrong:
             raise InputError(source, key, f"found {found}, expected {expected}")
@@ -459,6 +460,18 @@ def _network_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:
             needs_live and cpg.signals != "live",
             *("cpg.signals", f"'{cpg.signals}'", f"{live} {cpg.feedback}"),
         ),
+    ]
+
+
+def _map_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:
+    """As _network_relations(), of the map of !QualityDiversity."""
+    kind, key = scenario.optimizer, "optimizer.measures"
+    if not isinstance(kind, QualityDiversity):
+        return []
+    count = len(kind.measures)
+    return [(count != 2, key, f"{count} metrics", "two, one for each side of the map")] + [
+        (low >= high, f"{key}.{name}", low, f"less than the range's end, {high}")
+        for name, (low, high) in kind.measures.items()
     ]
 
 

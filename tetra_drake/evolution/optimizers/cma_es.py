@@ -56,8 +56,7 @@ class CmaEs(Generational):
         if self._strategy is None:
             return self._random(self._own.sample)
         self._raw = self._strategy.ask()
-        points, floors = np.array(self._raw)[:, : self._ranges.size], self._ranges.floors
-        return np.where(points < floors, 2.0 * floors - points, points)
+        return self._ranges.mirrored(np.array(self._raw)[:, : self._ranges.size])
 
     def _learn(self, fitnesses: Vector) -> None:
         if self._strategy is None:

@@ -33,6 +33,10 @@ class Ranges:
         vector[self._free] += point * self._width
         return self._space.repair(np.maximum(vector, self._space.floors))
 
+    def mirrored(self, points: Matrix) -> Matrix:
+        """The points with what is below its floor as far above it."""
+        return np.where(points < self.floors, 2.0 * self.floors - points, points)
+
     def point(self, vector: Vector) -> Vector:
         """The point of a vector."""
         return (vector - self._space.low)[self._free] / self._width
