@@ -149,7 +149,7 @@ def _evolve_options(command: Command) -> None:
 def _evolve(options: Options) -> None:
     """Evolve gaits that walk far.
 
-    Evolves gaits by the thesis's evolutionary algorithm, one simulation per candidate, and
+    Evolves gaits by the scenario's optimiser, by default the thesis's evolutionary algorithm, and
     records every evaluation in a run directory. Ctrl-C ends it; the same command with --resume
     continues it. The result depends on scenario and seed only. At the end it writes
     report.html, replay.html, figures/ and champions/ (gait files) into the run directory.

@@ -17,7 +17,7 @@ from tetra_drake.evolution.executors import (
     process_executor,
     thread_executor,
 )
-from tetra_drake.evolution.method import Method, Part
+from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers import optimizer_of
 from tetra_drake.evolution.optimizers.base import MakeOptimizer
 from tetra_drake.evolution.progress import Progress
@@ -27,7 +27,6 @@ from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.evolution.trials import run_trials
 from tetra_drake.results.result import versions
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.optimizers import SteadyState
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -117,19 +116,15 @@ def evolve(
 
 def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
     """What begins: scenario, size, method, and where the results will be."""
-    scenario, settings, method = manifest.scenario, manifest.scenario.evolution, manifest.method
+    scenario, method = manifest.scenario, manifest.method
     among = scenario.disturbances
     draws = f", each gait among {among.draws} draws of disturbances" if among else ""
-    own = [f", {part} {getattr(method, part).name}" for part in method.given_from_python]
-    ours = method.optimizer == Part(type(scenario.optimizer).__name__)
-    if ours and not isinstance(scenario.optimizer, SteadyState):
-        length = f"{settings.budget} evaluations by {method.optimizer.name}"
-    else:
-        length = f"{settings.max_iterations} iterations, population {settings.population}"
+    own = f", objective {method.objective.name}" if method.objective.digest else ""
     text = (
-        f"{directory}: scenario {scenario.name}, seed {manifest.seed}, trials {settings.trials}, "
-        f"each of at most {length}, engine {scenario.simulation.engine}, workers {workers}{draws}"
-        f"{''.join(own)}"
+        f"{directory}: scenario {scenario.name}, seed {manifest.seed}, optimiser "
+        f"{method.optimizer.name}, trials {scenario.evolution.trials}, each of at most "
+        f"{manifest.longest_trial}, engine {scenario.simulation.engine}, workers {workers}{draws}"
+        f"{own}"
     )
     if report:
         text += (

@@ -34,12 +34,13 @@ import yaml
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
-from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.method import Method, Part
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
+from tetra_drake.scenario.optimizers import SteadyState
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
@@ -94,6 +95,14 @@ class Manifest:
     seed: int
     versions: Mapping[str, str]
     method: Method
+
+    @property
+    def longest_trial(self) -> str:
+        """How long a trial is that does not end early, in words."""
+        settings, kind = self.scenario.evolution, type(self.scenario.optimizer)
+        if kind is SteadyState or self.method.optimizer != Part(kind.__name__):
+            return f"{settings.max_iterations} iterations, population {settings.population}"
+        return f"{settings.budget} evaluations"
 
 
 def read_manifest(directory: Path) -> Manifest:

@@ -101,7 +101,7 @@ def whole_experiment(scenario: Scenario, *, seconds: float) -> str:
     """What evolving on a whole scenario takes on this machine's cores, and its command; seconds:
     wall time per evaluation on the compiled engine."""
     settings, cores, name = scenario.evolution, available_cores(), scenario.name
-    evaluations = settings.trials * (settings.population + CHILDREN * settings.max_iterations)
+    evaluations = settings.trials * settings.budget
     time = duration(evaluations * seconds / cores)
     return (
         f"this is a first look; scenario {name}, {settings.trials} trials of at most "
