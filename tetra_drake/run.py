@@ -8,6 +8,7 @@ from pathlib import Path
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import available_cores, check_scenario, prepare
 from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.evolution.elites import judge_elites
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import (
     EvaluationImpossible,
@@ -57,8 +58,9 @@ def evolve(
         for which an objective must be defined in a module. On the compiled engine, by default,
         threads simulate the candidates of all trials side by side; see simulate_many.
     progress: shown none by default; see evolution.progress.
-    reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another.
-    report: in the end, writes report.html, replay.html, figures/ and champions/.
+    reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another,
+        and simulates those of a map on disturbed robots.
+    report: in the end, writes report.html, replay.html, figures/, champions/, elites/ (of a map).
 
     Raises InputError for what cannot be used, EvaluationImpossible if no evaluation can run.
     """
@@ -109,6 +111,8 @@ def evolve(
                 )
             except EvaluationImpossible as error:
                 progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
+        if reevaluate:
+            judge_elites(out, workers=workers, say=progress.say)
         if report:
             _report(out, progress)
     return load_run(out)

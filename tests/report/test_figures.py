@@ -1,9 +1,11 @@
 """`tetra-drake figures` on runs, finished or not, and on result folders."""
 
 import pytest
-from helpers.synthetic_run import write_run
+from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.report.run_page import write_figures
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.scenario.optimizers import QualityDiversity
 
 ONE_GAIT = (
     "time_lapse path_of_the_centre relative_distances one_step signals_and_tensions ground_forces"
@@ -84,3 +86,22 @@ def test_what_cannot_be_drawn_or_written_is_refused_before_anything_is_simulated
         with refused(out, "", ""):
             write_figures(run, out)
     assert contents(tmp_path) == before
+
+
+def test_a_map_is_drawn_and_its_chosen_gaits_are_files_linked_from_the_report(tmp_path):
+    scenario = tiny_scenario().with_changes({"optimizer": QualityDiversity(cells=[2, 2])})
+    places = {4.0: (0.9, 0.5), 3.0: (0.1, 0.5), 2.0: (0.9, 0.4), 1.0: (0.9, 0.5)}
+    metrics = {f: {"travelling_index": x, "lifted": y} for f, (x, y) in places.items()}
+    trials = [[[(fitness, place) for place, fitness in enumerate(places)]]]
+    run = write_run(tmp_path / "run", trials, scenario=scenario, metrics=metrics)
+    write_figures(run)
+    assert "map_of_gaits" in figures_in(run / "figures")
+    # The fittest, which walks on replay.html already, is that of a corner; 3.0 is that of two.
+    corners = [f"{end}_travelling_index_low_lifted" for end in ("low", "high")]
+    files = {f"{name}.{kind}" for name in corners for kind in ("html", "json")}
+    written = contents(run / "elites")
+    assert written.keys() == files | {"fittest_of_the_map.json", "elites.csv"}
+    page = (run / "report.html").read_text()
+    assert all(f'href="elites/{name}"' in page for name in written)
+    assert load_gait(run / "elites" / "fittest_of_the_map.json", scenario)
+    assert len(written["elites.csv"].splitlines()) == 1 + 3

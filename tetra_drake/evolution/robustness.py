@@ -118,11 +118,12 @@ def judge(
     percent: float | None = None,
     draws: int = DRAWS,
     seed: int = 0,
+    alone: bool = True,
     workers: int | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Judgement:
     """Simulates gaits on the compiled engine: undisturbed, under fresh draws of the scenario's
-    disturbances, the same for all gaits, and under each change alone.
+    disturbances, the same for all gaits, and, if `alone`, under each change alone.
 
     Without disturbances in the scenario, or with `percent`, they are the default ones. No evolution
     ever sees these draws, whatever its seed. `workers` and `say` are those of simulate_many().
@@ -138,18 +139,18 @@ def judge(
     fresh = [draw_disturbances(scenario, fresh_seed(seed, i)) for i in range(draws)]
     plan: list[tuple[dict[str, Any], Draw]] = [({"what": NOTHING}, Draw({}))]
     plan += [({"what": ALL, "draw": i, **each.factors}, each) for i, each in enumerate(fresh)]
-    plan += _alone(settings, fresh)
+    plan += _alone(settings, fresh) if alone else []
     outcomes = _outcomes(scenario, [draw for _, draw in plan], gaits, workers=workers, say=say)
     labels = [{"gait": key} | label for label, _ in plan for key in gaits]
     rows = [a | b for a, b in zip(labels, outcomes, strict=True)]
     chosen = {what: [row for row in rows if row["what"] == what] for what in (NOTHING, ALL)}
-    alone = [row for row in rows if row["what"] not in chosen]
+    changed = [row for row in rows if row["what"] not in chosen]
     return Judgement(
         scenario=scenario,
         seed=seed,
         undisturbed=_table(chosen[NOTHING]),
         draws=_table(chosen[ALL], "draw", *settings.spreads),
-        alone=_table(alone, "what", "spread", "draw"),
+        alone=_table(changed, "what", "spread", "draw"),
     )
 
 

@@ -49,6 +49,8 @@ def metric_rows(gaits: Sequence[pandas.Series]) -> list[MetricRow]:
         if name == "distance":
             worst = [fixed(gait.get("worst_distance_in", math.nan), 3) for gait in gaits]
             rows.append(MetricRow("distance, worst draw", "in", worst))
+    kept = [fixed(100.0 * gait.get("kept", math.nan), 0) for gait in gaits]
+    rows.append(MetricRow("draws kept, disturbed", "%", kept))
     shares = [[gait[n] for n in gait.index if n.startswith("lifted_T")] for gait in gaits]
     percents = [" ".join(fixed(100.0 * share, 0) for share in each) for each in shares]
     rows.append(MetricRow(f"lifted, T1 to T{len(shares[0])}", "%", percents))

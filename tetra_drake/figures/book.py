@@ -11,8 +11,10 @@ from typing import Any
 
 import xarray
 
+from tetra_drake.evolution.elites import elites
 from tetra_drake.evolution.pareto import forward_gaits, trades
 from tetra_drake.figures import evolution, forces, motion, pareto
+from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.study import Study
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import write_whole
@@ -53,6 +55,8 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
         pictures.append((evolution.initial_distances, run))
     if study.trial in trials:
         pictures.append((evolution.initial_fitness, run, study.trial))
+    if len(elites(run)):
+        pictures.append((map_of_gaits, run))
     if trades(forward_gaits(run)):
         pictures.append((pareto.pareto, run))
     walks = [(walk.label, walk.trajectory) for walk in (initial, best)]

@@ -56,11 +56,12 @@ def study_run(run: Run) -> Study:
     """
     trial, index = run.fittest()
     first = run.initial_best(trial)
-    walks = {i: _walk(run, trial, i) for i in {first, index}}
+    walks = {i: walk_again(run, trial, i) for i in {first, index}}
     return Study(run=run, trial=trial, initial=walks[first], best=walks[index])
 
 
-def _walk(run: Run, trial: int, index: int) -> Walk:
+def walk_again(run: Run, trial: int, index: int) -> Walk:
+    """A gait of a run, simulated again. Raises SimulationFailure."""
     gait = run.gait(trial, index)
     trajectory = simulate(scenario=run.manifest.scenario, gait=gait, record=True).trajectory
     assert trajectory is not None

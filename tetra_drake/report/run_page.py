@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
 import pandas
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.elites import chosen, elites
 from tetra_drake.evolution.pareto import NEAREST, TRADES, by_gait, champions
 from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.evolution.reevaluation import best_distances
@@ -17,7 +18,7 @@ from tetra_drake.evolution.summary import comparisons, metric_rows
 from tetra_drake.evolution.tables import gait_label, load_run
 from tetra_drake.figures.book import TWO_BEST, draw_run, draw_trajectory
 from tetra_drake.figures.evolution import two_best
-from tetra_drake.figures.study import Study, study_run
+from tetra_drake.figures.study import Study, study_run, walk_again
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import render
 from tetra_drake.results.folder import RESULT, RUN_MANIFEST, load_result_folder
@@ -29,7 +30,7 @@ from tetra_drake.scenario.units import shown
 from tetra_drake.visualization.replay import replay_title, save_replay
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
-CHAMPIONS = "champions"
+CHAMPIONS, ELITES, ELITES_CSV = "champions", "elites", "elites.csv"
 
 
 def write_figures(source: Path, out: Path | None = None) -> list[Path]:
@@ -55,8 +56,8 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
 
 
 def write_report(directory: Path) -> list[Path]:
-    """Writes figures/, champions/, replay.html and report.html into a run's directory; returns the
-    paths of all but the champions, of which older records have none.
+    """Writes figures/, champions/, elites/, replay.html and report.html into a run's directory;
+    returns the paths of all but champions and elites, which not every run has.
 
     Works for an unfinished run, too. Raises InputError if `directory` holds no run, a damaged
     one, or one without any fitness, or cannot be written to.
@@ -68,6 +69,7 @@ def write_report(directory: Path) -> list[Path]:
     for name, row in champions(study.run).items():
         gait = study.run.gait(row["trial"], row["index"])
         save_gait(gait, directory / _champion(name), scenario)
+    _write_map(study, directory)
     title = replay_title(study.best.gait.name, trajectory)
     save_replay(replay, scenario=scenario, trajectory=trajectory, title=title)
     write_whole(report, render_report(study, captions, folder=figures))
@@ -79,12 +81,35 @@ def _champion(name: str) -> Path:
     return Path(CHAMPIONS) / f"{name}.json"
 
 
+def _write_map(study: Study, directory: Path) -> None:
+    """Writes all gaits of the run's map as a table, and the chosen ones as gait files and, but for
+    the run's best, replay pages."""
+    run = study.run
+    if chosen(run):
+        write_whole(directory / ELITES / ELITES_CSV, elites(run).to_csv(index=False))
+    for names, row in by_gait(chosen(run)):
+        walk = walk_again(run, row["trial"], row["index"])
+        file, page = (directory / each for each in _map_files(names, row, study))
+        save_gait(walk.gait, file, run.manifest.scenario)
+        if page != directory / REPLAY:
+            title, trajectory = replay_title(walk.gait.name, walk.trajectory), walk.trajectory
+            save_replay(page, scenario=run.manifest.scenario, trajectory=trajectory, title=title)
+
+
+def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[Path, Path]:
+    """Gait file and replay page of a chosen gait of the map in a run's directory."""
+    path = Path(ELITES) / names[0].replace(", ", "_").replace(" ", "_")
+    page = Path(REPLAY) if gait_label(row) == study.best.label else path.with_suffix(".html")
+    return path.with_suffix(".json"), page
+
+
 def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) -> str:
     """The page, with the pictures in `folder` by name and caption in it; its links are relative."""
     run, manifest = study.run, study.run.manifest
     best_gait, best_of = trial_folder(Path(), study.trial) / BEST_GAIT, champions(run)
     named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded} | best_of
-    gaits = by_gait(named)
+    gaits, on_map = by_gait(named), by_gait(chosen(run))
+    on_map_files = {n: _map_files(each, gait, study) for each, gait in on_map for n in each}
     walks = {walk.label: walk for walk in (study.best, study.initial)}
     changes = {n: abs(walk.distance_in - walk.recorded["distance_in"]) for n, walk in walks.items()}
     return render(
@@ -107,10 +132,15 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         nearest=NEAREST,
         trades=[f"the {trade.champion}" for trade in TRADES if trade.champion in best_of],
         metrics=metric_rows([gait for _, gait in gaits]),
+        map=[(names, gait_label(gait)) for names, gait in on_map],
+        map_links={name: files[0] for name, files in on_map_files.items()},
+        map_pages={name: files[1] for name, files in on_map_files.items()},
+        map_metrics=metric_rows([gait for _, gait in on_map]) if on_map else [],
         parameters=_parameters(study),
         pictures=[(_embedded(folder / f"{name}.svg"), captions[name]) for name in captions],
         gait=best_gait,
-        files={"scenario": SCENARIO, "replay": REPLAY, "figures": FIGURES, "two_best": TWO_BEST},
+        files={"scenario": SCENARIO, "replay": REPLAY, "figures": FIGURES, "two_best": TWO_BEST}
+        | {"elites": Path(ELITES) / ELITES_CSV},
         settings=dump_scenario(manifest.scenario),
     )
 
