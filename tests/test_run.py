@@ -11,12 +11,13 @@ from helpers.meshcat_page import commands, read_page
 import tetra_drake
 from tetra_drake import cli
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.elites import elites
 from tetra_drake.evolution.method import Part
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import read_manifest
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.optimizers import CmaEs
+from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
 from tetra_drake.scenario.terrain import Steps
 
 
@@ -199,6 +200,21 @@ def test_the_scenarios_optimiser_is_used_recorded_and_resumed(
         tetra_drake.evolve(None, run, resume=True, optimizer=SteadyState, **own)
     tetra_drake.evolve(None, run, resume=True, **own)
     assert read_record(run) == read_record(whole)
+
+
+def test_the_gaits_of_a_map_are_simulated_on_disturbed_robots(tiny, tmp_path, interrupting):
+    kind = QualityDiversity(emitters=2, batch=2, floor=-1e3, draws=2)
+    scenario = tiny.with_changes({"optimizer": kind, "evolution.max_evaluations": 10})
+    whole, run = tmp_path / "whole", tmp_path / "run"
+    found = elites(tetra_drake.evolve(scenario, whole, report=False, workers=1))
+    assert len(found) > 1
+    assert found["kept"].isin([0.0, 0.5, 1.0]).all()
+    with pytest.raises(KeyboardInterrupt):
+        tetra_drake.evolve(scenario, run, executor=interrupting, report=False)
+    again = elites(tetra_drake.evolve(None, run, resume=True, report=False, workers=1))
+    pandas.testing.assert_frame_equal(
+        *(table.drop(columns="wall_time_s") for table in (again, found))
+    )
 
 
 def test_a_report_that_fails_is_no_failed_run_and_other_versions_are_told(

@@ -112,7 +112,12 @@ def evolve(
             except EvaluationImpossible as error:
                 progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
         if reevaluate:
-            judge_elites(out, workers=workers, say=progress.say)
+            try:
+                judge_elites(out, workers=workers, say=progress.say)
+            except InputError as error:
+                progress.warn(
+                    f"the gaits of the map were not simulated on disturbed robots: {error}"
+                )
         if report:
             _report(out, progress)
     return load_run(out)
