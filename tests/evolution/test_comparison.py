@@ -69,14 +69,18 @@ def test_runs_are_compared_where_the_shortest_ends_and_in_their_ends(run):
 
 
 def test_a_distance_is_reached_when_the_fittest_gait_walks_it(run):
-    # In inches: 1, 2, 3; 2.5; never 2 or more; only failures.
-    trials = [trial(2.0, 4.0, 6.0), trial(5.0), trial(3.0, 3.5), trial(None, None)]
+    # In inches: 1, 2, 3; 2.5; 0, 0, 0.5, 2; never 2 or more; only failures.
+    trials = [trial(2.0, 4.0, 6.0), trial(5.0), trial(None, 0.0, 1.0, 4.0)]
+    trials += [trial(3.0, 3.5), trial(None, None)]
     found = compare([run("a", *trials)], reach=2.0 * INCH)
-    assert found.trials["reached"].tolist() == [2.0, 1.0, math.inf]
+    assert found.trials["reached"].tolist() == [2.0, 1.0, 4.0, math.inf, math.inf]
     row = found.runs.loc["a"]
-    assert row[["reached_low", "reached", "reached_high"]].tolist() == [1.5, 2.0, math.inf]
-    assert row["share"] == pytest.approx(2.0 / 3.0)
-    assert "2 (2 to never)" in describe(found)
+    assert row[["reached_low", "reached", "reached_high"]].tolist() == [2.0, 4.0, math.inf]
+    assert (row["trials"], row["share"]) == (5, 0.6)
+    # Means are over those with a fitness: 6, 5, 4 and 3.5 without the greatest and the least.
+    assert (row["fitness_mean"], row["fitness"]) == (4.5, 4.5)
+    assert any("1 of 5" in note for note in found.notes)
+    assert "4 (2 to never)" in describe(found)
     assert compare([run("b", trial(1.0), trial(1.0))], reach=INCH).runs.loc["b", "reached"] == (
         math.inf
     )

@@ -43,18 +43,18 @@ class Compared:
     reach: float | None
     """The distance (m) to be reached by the fittest gait so far."""
     trials: pandas.DataFrame
-    """A row per trial with a fitness: run, trial, ended, cost, at_common and fitness (the best so
-    far there and at the trial's end), distance (m, of the fittest), reached (cost of the first
-    fittest so far that walks `reach`; infinite where none does)."""
+    """A row per trial that has begun: run, trial, ended, cost, at_common and fitness (the best so
+    far there and at the trial's end, -inf where there is none), distance (m, of the fittest),
+    reached (cost of the first fittest so far that walks `reach`; infinite where none does)."""
     curves: pandas.DataFrame
     """The best fitness so far, where it rises: run, cost, low, median, high (QUARTILES over the
     trials). A trial that has ended goes on with its last value; the curve ends where the first
     trial does that has not, else with the longest."""
     runs: pandas.DataFrame
     """A row per run: trials, going_on, draws, cost (median over trials); at_common, fitness and
-    distance (medians), each with _mean, _low and _high (interquartile mean over trials and its 95 %
-    confidence interval); reached_low, reached and reached_high (quartiles over trials), share (of
-    trials that reach it); wall_time (s, mean per evaluation)."""
+    distance (medians over trials with a fitness), each with _mean, _low and _high (interquartile
+    mean and its 95 % confidence interval); reached_low, reached and reached_high (quartiles over
+    trials), share (of trials that reach it); wall_time (s, mean per evaluation)."""
     notes: list[str]
     """What else than search differs, or is not done."""
 
@@ -98,6 +98,8 @@ def compare(
     for label, trials in searches.items():
         if going_on := sum(not trial.ended for trial in trials.values()):
             notes.append(f"{label}: {going_on} of {len(trials)} trials go on")
+        if failed := sum(np.isneginf(trial.best[-1]) for trial in trials.values()):
+            notes.append(f"{label}: {failed} of {len(trials)} trials have no fitness")
     summaries = {
         label: {"draws": draws[label]}
         | _summary(table[table["run"] == label])
@@ -139,7 +141,7 @@ class _Trial:
 
 
 def _trials(run: Run, cost: int) -> dict[int, _Trial]:
-    """The trials that have a fitness, by their numbers; `cost`: of an evaluation."""
+    """The trials that have begun, by their numbers; `cost`: of an evaluation."""
     run.fittest()  # raises InputError if there is none
     found = {}
     for number, rows in run.evaluations.groupby("trial"):
@@ -149,9 +151,8 @@ def _trials(run: Run, cost: int) -> dict[int, _Trial]:
         fittest = np.maximum.accumulate(np.where(rises, np.arange(len(best)), 0))
         distance = np.where(np.isfinite(best), rows["distance"].to_numpy()[fittest], math.nan)
         costs = cost * np.arange(1, len(best) + 1)
-        if np.isfinite(best[-1]):
-            ended = run.statuses[int(number)].stop is not None
-            found[int(number)] = _Trial(costs, best, distance, ended)
+        ended = run.statuses[int(number)].stop is not None
+        found[int(number)] = _Trial(costs, best, distance, ended)
     return found
 
 
@@ -300,7 +301,7 @@ def _reach_headings(compared: Compared) -> list[str]:
 
 def _distance(compared: Compared, row: pandas.Series) -> list[str]:
     mean = ranged(*(row[["distance_mean", "distance_low", "distance_high"]] / INCH))
-    cells = [mean, fixed(row["wall_time"])]
+    cells = [mean, fixed(row["wall_time"], 3)]
     if compared.reach is not None:
         low, median, high = map(_cost, row[["reached_low", "reached", "reached_high"]])
         there = row["share"] * row["trials"]
