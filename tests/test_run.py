@@ -54,10 +54,10 @@ class Heaviest:
 
 @pytest.fixture
 def interrupting():
-    """An executor that ends a run by Ctrl-C after five evaluations."""
+    """An executor that ends a run by Ctrl-C after three tasks, of one or more evaluations."""
 
     class Interrupting(ThreadPoolExecutor):
-        left = 5
+        left = 3
 
         def submit(self, *arguments):
             Interrupting.left -= 1

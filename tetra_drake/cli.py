@@ -142,6 +142,12 @@ def _evolve_options(command: Command) -> None:
     command.add_argument("--seed", metavar="N", type=_integer(0), help="random seed (default: 0)")
     _add_workers(command)
     command.add_argument(
+        "--executor",
+        metavar="dask[:ADDRESS]",
+        help="evaluate on a Dask cluster: of --workers processes on this machine, or yours, all of "
+        "it, by its scheduler's address, such as dask:tcp://node1:8786",
+    )
+    command.add_argument(
         "--resume", action="store_true", help="continue an interrupted run; needs only --out"
     )
 
@@ -162,19 +168,34 @@ def _evolve(options: Options) -> None:
     if options.scenario is None and not options.resume:
         print(whole_experiment(load_scenario("thesis"), seconds=0.2), flush=True)
     try:
-        run = evolve(
-            _scenario_to_evolve(options),
-            options.out,
-            seed=options.seed,
-            workers=options.workers,
-            resume=options.resume,
-            progress=Display(sys.stdout),
-        )
+        with _executor(options) as executor:
+            run = evolve(
+                _scenario_to_evolve(options),
+                options.out,
+                seed=options.seed,
+                workers=options.workers,
+                resume=options.resume,
+                executor=executor,
+                progress=Display(sys.stdout),
+            )
     except KeyboardInterrupt:
         resume = f"tetra-drake evolve --out {options.out} --resume"
         print(f"\nnothing is lost; continue with: {resume}", file=sys.stderr)
         raise
     print(summary(run))
+
+
+def _executor(options: Options) -> contextlib.AbstractContextManager[Any]:
+    """What makes executors by --executor; None without it."""
+    if options.executor is None:
+        return contextlib.nullcontext()
+    from tetra_drake.evolution.cluster import dask_cluster
+
+    kind, colon, address = options.executor.partition(":")
+    if kind != "dask" or (colon and not address):
+        problem = f"found '{options.executor}', expected dask or dask:ADDRESS"
+        raise InputError("--executor", "", problem)
+    return dask_cluster(address or None, workers=options.workers)
 
 
 def _scenario_to_evolve(options: Options) -> Scenario | None:

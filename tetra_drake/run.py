@@ -65,7 +65,8 @@ def evolve(
     Raises InputError for what cannot be used, EvaluationImpossible if no evaluation can run.
     """
     check_guard()
-    out, progress, workers = Path(out), progress or Progress(), workers or available_cores()
+    out, progress = Path(out), progress or Progress()
+    workers = getattr(executor, "workers", None) or workers or available_cores()
     if isinstance(scenario, (str, Path)):
         scenario = load_scenario(scenario)
     own = read_manifest(out).scenario if resume else scenario

@@ -2,6 +2,8 @@
 
 import math
 import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,11 +11,14 @@ from helpers.analytic import small_scenario
 
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.errors import Diverged, TimeBudgetExceeded
+from tetra_drake.engines.time_limit import check_time
+from tetra_drake.errors import Diverged
 from tetra_drake.evolution import evaluation
-from tetra_drake.evolution.evaluation import GaitEvaluation, time_limit
+from tetra_drake.evolution.draws import SeededVector
+from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import evaluate_all
 from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.scenario.schema import DisturbancesScenario
 
 
 @pytest.fixture
@@ -93,9 +98,30 @@ def test_the_reason_of_a_failed_simulation_is_kept(tiny, vectors, monkeypatch):
     assert failure.startswith("diverged: ") and failure.endswith("1.5000 s: too fast")
 
 
-def test_the_time_limit_is_gone_after_its_block():
-    with time_limit(0.05):
-        pass
-    time.sleep(0.1)
-    with pytest.raises(TimeBudgetExceeded), time_limit(0.05):
-        time.sleep(1.0)
+@pytest.mark.parametrize("engine", ["drake", "compiled", "mujoco"])
+def test_time_budgets_hold_in_any_thread_and_end_with_their_evaluation(tiny, vectors, engine):
+    if engine == "mujoco":
+        pytest.importorskip("mujoco")
+    changes = {"simulation.engine": engine, "simulation.duration": 60.0}
+    late = GaitEvaluation(tiny.with_changes(changes | {"evolution.time_budget": 0.01}))
+    with ThreadPoolExecutor(1) as thread:
+        failed = thread.submit(late, vectors[0]).result()
+        assert failed.failure == "time budget: not done after 0.01 s"
+        assert thread.submit(check_time).exception() is None
+
+
+def test_many_gaits_in_lanes_are_those_gaits_one_by_one(tiny, vectors):
+    compiled = tiny.with_changes({"simulation.engine": "compiled"})
+    draws = DisturbancesScenario(draws=2, start=0.1)
+    among = compiled.with_changes({"disturbances": draws})
+    for scenario, tasks in (
+        (compiled, vectors),
+        (among, [SeededVector(vector, (1, 2, 3)) for vector in vectors]),
+    ):
+        evaluate = GaitEvaluation(scenario)
+        assert evaluate.side_by_side > 1
+        alone, found = [evaluate(task) for task in tasks], evaluate.many(tasks)
+        for one, other in zip(alone, found, strict=True):
+            assert replace(one, wall_time=0.0) == replace(other, wall_time=0.0)
+            assert other.wall_time > 0.0
+    assert GaitEvaluation(tiny).side_by_side == 1

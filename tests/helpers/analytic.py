@@ -7,8 +7,10 @@ import json
 import os
 import signal
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +41,20 @@ class Bowl:
 def measures(genome):
     """Two metrics that two weights decide: 0.25 to 0.85 of weights from 1 to 3.4."""
     return {"travelling_index": genome[0] / 4.0, "lifted": genome[1] / 4.0}
+
+
+@dataclass(frozen=True)
+class Chunked:
+    """Another evaluation, which wants its tasks in chunks of a multiple of three."""
+
+    evaluate: Callable[[Any], Evaluation]
+    side_by_side = 3
+
+    def __call__(self, task):
+        return self.evaluate(task)
+
+    def many(self, tasks):
+        return [self.evaluate(task) for task in tasks]
 
 
 TAIL = 0.3

@@ -10,6 +10,7 @@ from pydrake.systems.framework import Context, Diagram
 
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.recorder import Recorder, Sample, evaluate_ports, make_dataset
+from tetra_drake.engines.time_limit import check_time
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
@@ -55,6 +56,7 @@ def simulate_drake(
 
     def after_step(context: Context) -> None:
         # What is done here must not depend on whether somebody records or watches.
+        check_time()
         bodies, now = state.Eval(context), context.get_time()
         velocities = bodies[7 * len(structure.bodies) :]
         _check(settings, now, velocities, work)

@@ -27,6 +27,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 import numpy as np
 
 from tetra_drake.engines.observer import Observer
+from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
 from tetra_drake.physics.contact import Ground
@@ -223,6 +224,7 @@ class _Robot:
                 chosen = [signals[i][first : first + _STRETCH, self._motors] for i in latest]
                 if not chosen:
                     break
+                check_time()
                 initial = np.array(list(latest.values()))
                 stretches, _ = rollout.rollout(self._model, data, initial, np.array(chosen))
                 here = (first < wanted) & (wanted <= first + len(chosen[0]))

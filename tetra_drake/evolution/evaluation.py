@@ -3,19 +3,16 @@ each draw of the scenario's disturbances."""
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import functools
 import math
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import FrameType
 from typing import TYPE_CHECKING
 
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.time_limit import time_limit
 from tetra_drake.errors import (
     Diverged,
     InputError,
@@ -53,16 +50,35 @@ class GaitEvaluation:
 
     def __call__(self, task: Vector | SeededVector) -> Evaluation:
         """Fitness and metrics of one vector, or the reason of a failure; of one with a seed, those
-        among its draws."""
-        started = time.perf_counter()
-        if isinstance(task, SeededVector):
-            draws = self._evaluations(task.vector, self._draws(task.seed))
-            found = combine(draws, worst_share(self.scenario))
-        else:
-            (found,) = self._evaluations(task, [self.scenario])
-        wall_time = time.perf_counter() - started if self.lanes is None else found.wall_time
-        engine = self.scenario.simulation.engine
-        return dataclasses.replace(found, wall_time=wall_time, engine=engine)
+        among its draws, which end where one has failed."""
+        if self.lanes is not None:
+            return self._evaluate_in(self.lanes, [task])[0]
+        started, (gait, scenarios), draws = time.perf_counter(), self._walks(task), []
+        for scenario in scenarios:
+            simulation = functools.partial(self._simulate, scenario, gait)
+            draws.append(self._evaluation(scenario, simulation))
+            if not draws[-1].metrics:
+                break
+        wall_time = time.perf_counter() - started
+        return dataclasses.replace(self._combined(task, draws), wall_time=wall_time)
+
+    @property
+    def side_by_side(self) -> int:
+        """The number of vectors, or a multiple, for which many() takes least time each."""
+        if self.lanes is not None or self.scenario.simulation.engine != "compiled":
+            return 1
+        from tetra_drake.engines.compiled.lane_engine import lanes_for
+
+        return lanes_for(math.inf)
+
+    def many(self, tasks: Sequence[Vector | SeededVector]) -> list[Evaluation]:
+        """The evaluations of several vectors: in lanes on one core, if that is faster."""
+        if len(tasks) == 1 or self.side_by_side == 1:
+            return [self(task) for task in tasks]
+        from tetra_drake.engines.compiled.lane_pool import LanePool
+
+        with LanePool(1) as lanes:
+            return self._evaluate_in(lanes, tasks)
 
     def __reduce__(self) -> tuple[object, ...]:
         return GaitEvaluation, (self.scenario, self.objective, self.lanes)  # nothing that is kept
@@ -76,24 +92,31 @@ class GaitEvaluation:
         """The scenario's draws of a seed: the same objects for all vectors of an iteration."""
         return functools.lru_cache(_SEEDS_KEPT)(functools.partial(draws_of, self.scenario))
 
-    def _evaluations(self, vector: Vector, scenarios: Sequence[Scenario]) -> list[Evaluation]:
-        """A gait's evaluations on scenarios; one after another, they end where one has failed."""
-        gait, found = self._space.gait(vector, name="candidate"), []
-        for scenario, simulation in zip(scenarios, self._simulations(gait, scenarios), strict=True):
-            found.append(self._evaluation(scenario, simulation))
-            if self.lanes is None and not found[-1].metrics:
-                break
+    def _evaluate_in(
+        self, lanes: LanePool, tasks: Sequence[Vector | SeededVector]
+    ) -> list[Evaluation]:
+        """Evaluates all tasks, and all their draws, at once."""
+        plans = [self._walks(task) for task in tasks]
+        walks = [(scenario, gait) for gait, scenarios in plans for scenario in scenarios]
+        futures = iter(lanes.submit(walks, time_budget=self.scenario.evolution.time_budget))
+        found = []
+        for task, (_, scenarios) in zip(tasks, plans, strict=True):
+            waits = [functools.partial(lanes.result, next(futures)) for _ in scenarios]
+            draws = [self._evaluation(*each) for each in zip(scenarios, waits, strict=True)]
+            found.append(self._combined(task, draws))
         return found
 
-    def _simulations(
-        self, gait: Gait, scenarios: Sequence[Scenario]
-    ) -> list[Callable[[], SimulationResult]]:
-        """Simulations to be made, or waited for where all are under way at once."""
-        if self.lanes is None:
-            return [functools.partial(self._simulate, scenario, gait) for scenario in scenarios]
-        walks = [(scenario, gait) for scenario in scenarios]
-        futures = self.lanes.submit(walks, time_budget=self.scenario.evolution.time_budget)
-        return [functools.partial(self.lanes.result, future) for future in futures]
+    def _walks(self, task: Vector | SeededVector) -> tuple[Gait, list[Scenario]]:
+        """The gait of a task and the scenarios to simulate it on."""
+        if isinstance(task, SeededVector):
+            return self._space.gait(task.vector, name="candidate"), self._draws(task.seed)
+        return self._space.gait(task, name="candidate"), [self.scenario]
+
+    def _combined(self, task: Vector | SeededVector, draws: list[Evaluation]) -> Evaluation:
+        """The evaluation of a task from those of its draws."""
+        seeded = isinstance(task, SeededVector)
+        found = combine(draws, worst_share(self.scenario)) if seeded else draws[0]
+        return dataclasses.replace(found, engine=self.scenario.simulation.engine)
 
     def _simulate(self, scenario: Scenario, gait: Gait) -> SimulationResult:
         with time_limit(self.scenario.evolution.time_budget):
@@ -127,24 +150,3 @@ _KINDS: dict[type[Exception], str] = {
     StepBudgetExceeded: "step budget",
     TimeBudgetExceeded: "time budget",
 }
-
-
-@contextlib.contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """A block that ends with TimeBudgetExceeded after this wall time, in a process's main thread;
-    in other threads there is no limit."""
-    if threading.current_thread() is not threading.main_thread() or not math.isfinite(seconds):
-        yield
-        return
-
-    def give_up(number: int, frame: FrameType | None) -> None:
-        raise TimeBudgetExceeded(f"not done after {seconds:g} s")
-
-    # Drake calls back into Python at every derivative evaluation: there the alarm is heard.
-    before = signal.signal(signal.SIGALRM, give_up)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)

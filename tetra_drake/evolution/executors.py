@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import multiprocessing
 import os
 import pickle
@@ -9,6 +11,7 @@ import signal
 import sys
 import tempfile
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
@@ -29,23 +32,30 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.optimizers.base import Evaluation
 
 MakeExecutor = Callable[[int], Executor]
-"""Makes an executor with this many workers."""
+"""Makes an executor with this many workers; if they are not its to choose, its attribute `workers`
+says how many there are, which may change."""
 
 TASKS_PER_WORKER = 150
 """After as many a fresh worker takes its place: Drake before 1.56 keeps about 2 MB of every
 diagram that holds Python systems."""
 
 
+@contextlib.contextmanager
+def deaf_to_ctrl_c() -> Iterator[None]:
+    """A block whose new threads and processes, and theirs, no Ctrl-C reaches, from birth."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class _Worker(SpawnProcess):
     """A process that a Ctrl-C at the terminal does not reach, not even while it starts."""
 
     def start(self) -> None:
-        # The signal mask is inherited, so the new process has SIGINT blocked from birth.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
+        with deaf_to_ctrl_c():
             super().start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _WorkerContext(SpawnContext):
@@ -91,6 +101,9 @@ TaskT = TypeVar("TaskT")
 _HOPELESS = 3
 """Tasks that end their workers before any other has succeeded: then no task can run."""
 
+_CHUNK_TIME = 0.5
+"""Time (s) that a chunk of tasks shall take: sending it takes some ms."""
+
 
 class EvaluationImpossible(InputError):
     """No evaluation can run: workers do not start, or cannot load the function."""
@@ -99,12 +112,16 @@ class EvaluationImpossible(InputError):
 class EvaluationPool(Generic[JobT]):
     """Evaluates tasks (mostly vectors), at most `workers` at a time; `job` identifies each.
 
-    If a worker dies, what was under way runs again, one at a time; a task that ends its worker
-    when alone counts as failed. Until any task has succeeded such failures are held back, as the
-    cause may be that none can run: then EvaluationImpossible is raised.
+    An evaluation that has `many(tasks)` and `side_by_side`, the number of tasks for which that is
+    fastest, gets tasks in chunks, as large as their measured time and the number of workers
+    suggest.
+
+    If a worker dies, what was under way there runs again, one at a time; a task that ends its
+    worker when alone counts as failed. Until any task has succeeded such failures are held back,
+    as the cause may be that none can run: then EvaluationImpossible is raised.
     """
 
-    # The queue is kept here, and an executor never has more tasks than workers: with a backlog,
+    # The queue is kept here, and an executor never has more chunks than workers: with a backlog,
     # Python's process pool can forget to replace recycled workers and then hangs.
 
     def __init__(
@@ -122,7 +139,9 @@ class EvaluationPool(Generic[JobT]):
         self._queue: deque[tuple[JobT, Any]] = deque()
         self._suspects: deque[tuple[JobT, Any]] = deque()
         """What was under way when a worker died."""
-        self._running: dict[Future[Evaluation], tuple[JobT, Any]] = {}
+        self._running: dict[Future[_Evaluated], list[tuple[JobT, Any]]] = {}
+        self._task_time = math.inf
+        """Of each task (s) in the chunk that ended last."""
         self._proven = False
         """Whether any task has succeeded."""
         self._held: list[tuple[JobT, Evaluation]] = []
@@ -131,7 +150,9 @@ class EvaluationPool(Generic[JobT]):
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._executor.shutdown(wait=kind is None, cancel_futures=True)
+        for future in self._running:
+            future.cancel()
+        self._executor.shutdown(wait=kind is None)
         if kind is not None:
             _terminate_workers()
 
@@ -146,7 +167,8 @@ class EvaluationPool(Generic[JobT]):
 
     def wait(self, timeout: float | None = None) -> list[tuple[JobT, Evaluation]]:
         """Whatever has been evaluated, as soon as there is something or time (s) is up."""
-        found = self._try_suspect() if self._suspects else self._collect(timeout)
+        alone = self._suspects and not self._running
+        found = self._try_suspect() if alone else self._collect(timeout)
         self._proven = self._proven or bool(found)
         if self._proven:
             found, self._held = self._held + found, []
@@ -155,33 +177,67 @@ class EvaluationPool(Generic[JobT]):
         return found
 
     def _collect(self, timeout: float | None) -> list[tuple[JobT, Evaluation]]:
-        """Keeps the workers busy; if one dies, new ones start."""
-        while self._queue and len(self._running) < self._workers:
+        """Keeps the workers busy, unless there are suspects; if an executor breaks, there is a
+        new one."""
+        while self._queue and not self._suspects and (size := self._chunk_size()):
+            chunk = [self._queue[i] for i in range(size)]
             try:
-                future = self._executor.submit(self._evaluate, self._queue[0][1])
-                self._running[future] = self._queue.popleft()
+                future = self._send(self._executor, chunk)
             except BrokenExecutor:
                 self._renew()
+                continue
+            self._running[future] = chunk
+            for _ in chunk:
+                self._queue.popleft()
         done, _ = wait(self._running, timeout=timeout, return_when=FIRST_COMPLETED)
-        broken = {future for future in done if isinstance(future.exception(), BrokenExecutor)}
-        found = [(self._running.pop(future)[0], future.result()) for future in done - broken]
+        found: list[tuple[JobT, Evaluation]] = []
+        broken = False
+        for future in done:
+            chunk = self._running.pop(future)
+            if future.cancelled():
+                raise EvaluationImpossible(_SOURCE, "", "the executor has dropped evaluations")
+            if _is_death(error := future.exception()):
+                self._suspects.extend(chunk)
+                broken |= isinstance(error, BrokenExecutor)
+                continue
+            evaluations, seconds = future.result()
+            self._task_time = seconds / len(chunk)
+            found += [(job, each) for (job, _), each in zip(chunk, evaluations, strict=True)]
         if broken:
-            self._suspects.extend(self._running.values())
+            self._suspects.extend(each for chunk in self._running.values() for each in chunk)
             self._running.clear()
             self._renew()
         return found
+
+    def _chunk_size(self) -> int:
+        """How many tasks the next idle worker gets: its share of those that wait, but not more than
+        can be done in time; 0 if none is idle."""
+        idle = getattr(self._make_executor, "workers", self._workers) - len(self._running)
+        if idle <= 0:
+            return 0
+        side_by_side = getattr(self._evaluate, "side_by_side", 1)
+        if side_by_side == 1:
+            return 1
+        size = min(math.ceil(len(self._queue) / idle), max(1, int(_CHUNK_TIME / self._task_time)))
+        return size - size % side_by_side or size
 
     def _try_suspect(self) -> list[tuple[JobT, Evaluation]]:
         """Evaluates a suspect in a worker of its own: if that dies, the suspect is the cause."""
         job, task = self._suspects.popleft()
         alone = self._make_executor(1)
         try:
-            return [(job, alone.submit(self._evaluate, task).result())]
-        except BrokenExecutor:
+            (found,), _ = self._send(alone, [(job, task)]).result()
+        except Exception as error:
+            if not _is_death(error):
+                raise
             self._held.append((job, Evaluation.failed("its process died")))
             return []
         finally:
             alone.shutdown(wait=False)
+        return [(job, found)]
+
+    def _send(self, executor: Executor, chunk: list[tuple[JobT, Any]]) -> Future[_Evaluated]:
+        return executor.submit(_evaluate_chunk, self._evaluate, [task for _, task in chunk])
 
     def _renew(self) -> None:
         self._executor.shutdown(wait=False)
@@ -189,6 +245,24 @@ class EvaluationPool(Generic[JobT]):
         if not self._proven and self._make_executor is process_executor:
             _check_worker(self._evaluate)
         self._executor = self._make_executor(self._workers)
+
+
+_Evaluated = tuple[list[Evaluation], float]
+"""Evaluations of a chunk, and the time they took (s)."""
+
+
+def _evaluate_chunk(evaluate: Callable[[Any], Evaluation], tasks: Sequence[Any]) -> _Evaluated:
+    """What a worker does."""
+    started = time.perf_counter()
+    many = getattr(evaluate, "many", None)
+    found = many(tasks) if many else [evaluate(task) for task in tasks]
+    return found, time.perf_counter() - started
+
+
+def _is_death(error: BaseException | None) -> bool:
+    """Whether a worker died: one of Python's or MPI's, with its executor, or one of Dask's."""
+    dask = sys.modules.get("distributed")
+    return isinstance(error, (BrokenExecutor, *([dask.KilledWorker] if dask else [])))
 
 
 def evaluate_all(

@@ -16,6 +16,7 @@ from tetra_drake.engines.compiled.walk import (
     TOO_FAST,
     TOO_MANY_EVALUATIONS,
 )
+from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import LENGTH, PULL_COLUMNS, TENSION
 from tetra_drake.physics.contact import STICK_POINT
@@ -42,7 +43,7 @@ def simulate_compiled(
     engine = LaneEngine(walk, width=1)
     engine.load(0, walk)
     while not (ended := engine.advance(_ITERATIONS)):
-        pass
+        check_time()
     _, walk, course = ended[0]
     return make_outcome(walk, course)
 

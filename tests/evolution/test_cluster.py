@@ -1,0 +1,123 @@
+"""A Dask cluster of two processes: the records of local workers, whatever happens to its own."""
+
+import contextlib
+import logging
+import os
+import signal
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from helpers.analytic import (
+    Bowl,
+    Chunked,
+    Deadly,
+    DrawnBowl,
+    drawn_scenario,
+    is_deadly,
+    read_record,
+)
+
+from tetra_drake import cli
+from tetra_drake.evolution.cluster import dask_cluster
+from tetra_drake.evolution.executors import evaluate_all
+from tetra_drake.evolution.record import RunRecord
+from tetra_drake.evolution.trials import run_trials
+from tetra_drake.robot.gait import ParameterSpace
+
+dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    options = {"dashboard_address": ":0", "silence_logs": logging.CRITICAL}
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, **options) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def vectors(scenario):
+    generator, space = np.random.default_rng(2), ParameterSpace.of(scenario)
+    return [space.random(generator) for _ in range(40)]
+
+
+def test_only_what_ends_its_worker_fails_and_its_chunk_does_not(cluster, vectors, monkeypatch):
+    monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
+    tasks = [vector for vector in vectors if not is_deadly(vector.tolist())][:14]
+    tasks.insert(12, next(vector for vector in vectors if is_deadly(vector.tolist())))
+    with dask_cluster(cluster) as executor:
+        found = dict(evaluate_all(Chunked(Deadly()), tasks, executor=executor))
+    assert found.pop(12).failure == "its process died"
+    assert found == {i: Bowl()(task) for i, task in enumerate(tasks) if i != 12}
+
+
+@contextlib.contextmanager
+def killing(cluster, *, period):
+    """A block during which a worker of the cluster is killed every so often (s); gives the list
+    of those that were."""
+    killed, over, generator = [], threading.Event(), np.random.default_rng()
+
+    def kill():
+        while not over.wait(generator.uniform(0.5, 1.5) * period):
+            up = [worker.name for worker in list(cluster.scheduler.workers.values())]
+            if up and (process := cluster.workers[up[generator.integers(len(up))]].pid):
+                killed.append(process)
+                os.kill(process, signal.SIGKILL)
+
+    thread = threading.Thread(target=kill)
+    thread.start()
+    try:
+        yield killed
+    finally:
+        over.set()
+        thread.join()
+
+
+def run_on(executor, directory, *, iterations, delay=0.0):
+    """The record of a run among draws, with its tasks in chunks."""
+    scenario = drawn_scenario(iterations=iterations)
+    with RunRecord.create(directory, scenario=scenario, seed=9) as record:
+        run_trials(record, evaluate=Chunked(DrawnBowl(delay)), workers=2, executor=executor)
+    return read_record(directory)
+
+
+def test_killed_workers_leave_no_trace(cluster, tmp_path):
+    with dask_cluster(cluster) as executor, killing(cluster, period=0.8) as killed:
+        disturbed = run_on(executor, tmp_path / "disturbed", iterations=12, delay=0.1)
+    assert len(killed) >= 2
+    assert disturbed == run_on(ThreadPoolExecutor, tmp_path / "whole", iterations=12)
+
+
+@pytest.mark.slow
+def test_twenty_killed_workers_leave_no_trace(cluster, tmp_path):
+    with dask_cluster(cluster) as executor, killing(cluster, period=2.0) as killed:
+        disturbed = run_on(executor, tmp_path / "disturbed", iterations=150, delay=0.2)
+    assert len(killed) >= 20
+    assert disturbed == run_on(ThreadPoolExecutor, tmp_path / "whole", iterations=150)
+
+
+def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, vectors):
+    with dask_cluster(cluster) as executor, pytest.raises(KeyboardInterrupt):
+        for _ in evaluate_all(Bowl(delay=1.0), vectors[:8], executor=executor):
+            assert cluster.scheduler.tasks
+            raise KeyboardInterrupt
+    deadline = time.monotonic() + 10.0
+    while cluster.scheduler.tasks and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not cluster.scheduler.tasks
+
+
+def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("tetra_drake.run.GaitEvaluation", lambda scenario, objective: Bowl())
+    monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
+    command = ["evolve", "--scenario", "quick", "--iterations", "2", "--workers", "1"]
+    for name, executor in (("dask", ("--executor", "dask")), ("local", ())):
+        assert cli.main([*command, "--out", str(tmp_path / name), *executor]) == 0
+    assert read_record(tmp_path / "dask") == read_record(tmp_path / "local")
+    with dask.config.set({"distributed.comm.timeouts.connect": "0.2s"}):
+        for wrong in ("slurm", "dask:", "dask:tcp://127.0.0.1:1", "dask:gopher://here"):
+            assert cli.main([*command, "--out", str(tmp_path / "no"), "--executor", wrong]) == 2
+            assert "executor: " in capsys.readouterr().err
+    assert not (tmp_path / "no").exists()

@@ -1,0 +1,79 @@
+"""Executors whose workers are those of a Dask cluster."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import time
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from typing import TYPE_CHECKING, Any
+
+from tetra_drake.engines.simulate import available_cores
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.executors import check_guard, deaf_to_ctrl_c
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+_COUNTING_PERIOD = 5.0  # s
+
+
+class DaskExecutors:
+    """Makes executors of a Dask client; all have the workers of its cluster."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._counted, self._workers = -_COUNTING_PERIOD, 1
+
+    def __call__(self, workers: int) -> Executor:
+        # Not pure: a task that has killed its worker gets another chance under another key.
+        return self._client.get_executor(pure=False)
+
+    @property
+    def workers(self) -> int:
+        """The cluster's threads, counted every few seconds; 1 as long as there are none."""
+        if time.monotonic() > self._counted + _COUNTING_PERIOD:
+            self._workers = max(1, sum(self._client.nthreads().values()))
+            self._counted = time.monotonic()
+        return self._workers
+
+
+@contextlib.contextmanager
+def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator[DaskExecutors]:
+    """Executors for evolve(), for as long as the block lasts, on a Dask cluster: an object, such as
+    an SSHCluster, or its scheduler's address. By default one of its own on this machine, with as
+    many worker processes (one per core by default).
+
+    Raises InputError if Dask is missing or no scheduler answers.
+    """
+    try:
+        import distributed
+    except ImportError as error:
+        problem = "Dask is not installed: pip install 'tetra_drake[cluster]'"
+        raise InputError("executor", "", problem) from error
+    check_guard()
+    with contextlib.ExitStack() as stack:
+        if cluster is None:
+            cluster = stack.enter_context(_local_cluster(workers or available_cores()))
+        try:
+            client = stack.enter_context(distributed.Client(cluster))
+        except (OSError, ValueError) as error:
+            problem = f"no Dask scheduler answers at '{cluster}': {error}"
+            raise InputError("executor", "", problem) from error
+        yield DaskExecutors(client)
+
+
+def _local_cluster(workers: int) -> Any:
+    import dask
+    from distributed import LocalCluster
+
+    # Drake before 1.56 keeps memory: a worker that has too much is replaced, and never paused.
+    memory = {f"distributed.worker.memory.{level}": False for level in ("target", "spill", "pause")}
+    with dask.config.set(memory), deaf_to_ctrl_c():
+        return LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address=":0",
+            silence_logs=logging.CRITICAL,  # of workers that die: the pool copes
+        )
