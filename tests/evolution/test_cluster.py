@@ -1,10 +1,7 @@
 """A Dask cluster of two processes: the records of local workers, whatever happens to its own."""
 
-import contextlib
-import logging
 import os
 import signal
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -21,7 +18,7 @@ from helpers.analytic import (
 )
 
 from tetra_drake import cli
-from tetra_drake.evolution.cluster import dask_cluster
+from tetra_drake.evolution.cluster import dask_cluster, local_cluster
 from tetra_drake.evolution.executors import evaluate_all
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.trials import run_trials
@@ -32,8 +29,7 @@ dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distribute
 
 @pytest.fixture(scope="module")
 def cluster():
-    options = {"dashboard_address": ":0", "silence_logs": logging.CRITICAL}
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, **options) as cluster:
+    with local_cluster(2) as cluster:
         yield cluster
 
 
@@ -53,49 +49,35 @@ def test_only_what_ends_its_worker_fails_and_its_chunk_does_not(cluster, vectors
     assert found == {i: Bowl()(task) for i, task in enumerate(tasks) if i != 12}
 
 
-@contextlib.contextmanager
-def killing(cluster, *, period):
-    """A block during which a worker of the cluster is killed every so often (s); gives the list
-    of those that were."""
-    killed, over, generator = [], threading.Event(), np.random.default_rng()
+class Killer:
+    """Kills one of the cluster's workers, any, after every 30 evaluations of a run."""
 
-    def kill():
-        while not over.wait(generator.uniform(0.5, 1.5) * period):
-            up = [worker.name for worker in list(cluster.scheduler.workers.values())]
-            if up and (process := cluster.workers[up[generator.integers(len(up))]].pid):
-                killed.append(process)
-                os.kill(process, signal.SIGKILL)
+    def __init__(self, cluster):
+        self.cluster, self.generator, self.killed = cluster, np.random.default_rng(), 0
 
-    thread = threading.Thread(target=kill)
-    thread.start()
-    try:
-        yield killed
-    finally:
-        over.set()
-        thread.join()
+    def __call__(self, statuses):
+        up = [nanny.pid for nanny in list(self.cluster.workers.values()) if nanny.pid]
+        if up and sum(status.evaluations for status in statuses) >= 30 * (self.killed + 1):
+            os.kill(self.generator.choice(up), signal.SIGKILL)
+            self.killed += 1
 
 
-def run_on(executor, directory, *, iterations, delay=0.0):
-    """The record of a run among draws, with its tasks in chunks."""
+def record_on(executor, directory, *, iterations, **options):
+    """The record of two trials of 12 + 2 iterations evaluations among draws, in chunks."""
     scenario = drawn_scenario(iterations=iterations)
     with RunRecord.create(directory, scenario=scenario, seed=9) as record:
-        run_trials(record, evaluate=Chunked(DrawnBowl(delay)), workers=2, executor=executor)
+        evaluate = Chunked(DrawnBowl(delay=0.05))
+        run_trials(record, evaluate=evaluate, workers=2, executor=executor, **options)
     return read_record(directory)
 
 
-def test_killed_workers_leave_no_trace(cluster, tmp_path):
-    with dask_cluster(cluster) as executor, killing(cluster, period=0.8) as killed:
-        disturbed = run_on(executor, tmp_path / "disturbed", iterations=12, delay=0.1)
-    assert len(killed) >= 2
-    assert disturbed == run_on(ThreadPoolExecutor, tmp_path / "whole", iterations=12)
-
-
-@pytest.mark.slow
-def test_twenty_killed_workers_leave_no_trace(cluster, tmp_path):
-    with dask_cluster(cluster) as executor, killing(cluster, period=2.0) as killed:
-        disturbed = run_on(executor, tmp_path / "disturbed", iterations=150, delay=0.2)
-    assert len(killed) >= 20
-    assert disturbed == run_on(ThreadPoolExecutor, tmp_path / "whole", iterations=150)
+@pytest.mark.parametrize("kills", [2, pytest.param(20, marks=pytest.mark.slow)])
+def test_killed_workers_leave_no_trace(cluster, tmp_path, kills):
+    size, killer = {"iterations": 8 * kills}, Killer(cluster)
+    whole = record_on(ThreadPoolExecutor, tmp_path / "whole", **size)
+    with dask_cluster(cluster) as executor:
+        assert record_on(executor, tmp_path / "disturbed", **size, show=killer) == whole
+    assert killer.killed >= kills
 
 
 def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, vectors):

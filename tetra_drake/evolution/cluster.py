@@ -14,7 +14,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.executors import check_guard, deaf_to_ctrl_c
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, LocalCluster
 
 _COUNTING_PERIOD = 5.0  # s
 
@@ -55,7 +55,7 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
     check_guard()
     with contextlib.ExitStack() as stack:
         if cluster is None:
-            cluster = stack.enter_context(_local_cluster(workers or available_cores()))
+            cluster = stack.enter_context(local_cluster(workers or available_cores()))
         try:
             client = stack.enter_context(distributed.Client(cluster))
         except (OSError, ValueError) as error:
@@ -64,16 +64,19 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
         yield DaskExecutors(client)
 
 
-def _local_cluster(workers: int) -> Any:
+def local_cluster(workers: int) -> LocalCluster:
+    """A Dask cluster of so many worker processes on this machine, which replaces those that die."""
     import dask
     from distributed import LocalCluster
 
     # Drake before 1.56 keeps memory: a worker that has too much is replaced, and never paused.
     memory = {f"distributed.worker.memory.{level}": False for level in ("target", "spill", "pause")}
     with dask.config.set(memory), deaf_to_ctrl_c():
-        return LocalCluster(
+        cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             dashboard_address=":0",
             silence_logs=logging.CRITICAL,  # of workers that die: the pool copes
         )
+    cluster.adapt(minimum=workers, maximum=workers)  # also replaces one that died as it started
+    return cluster
