@@ -273,7 +273,7 @@ def cells(batches):
         found = walker(vector)
         if len(found.metrics) == 2 and found.fitness > DIVERSE.floor:
             x, y = found.metrics["travelling_index"], found.metrics["lifted"]
-            cell = tuple(np.clip([int(20 * x), int(20 * (y - 0.3) / 0.3)], 0, 19).tolist())
+            cell = tuple(np.clip([int(20 * x), int(20 * (y - 0.4) / 0.2)], 0, 19).tolist())
             best[cell] = max(found.fitness, best.get(cell, -math.inf))
     return best
 

@@ -90,7 +90,7 @@ def test_what_cannot_be_drawn_or_written_is_refused_before_anything_is_simulated
 
 def test_a_map_is_drawn_and_its_chosen_gaits_are_files_linked_from_the_report(tmp_path):
     scenario = tiny_scenario().with_changes({"optimizer": QualityDiversity(cells=[2, 2])})
-    places = {4.0: (0.9, 0.5), 3.0: (0.1, 0.5), 2.0: (0.9, 0.4), 1.0: (0.9, 0.5)}
+    places = {4.0: (0.9, 0.55), 3.0: (0.1, 0.55), 2.0: (0.9, 0.45), 1.0: (0.9, 0.55)}
     metrics = {f: {"travelling_index": x, "lifted": y} for f, (x, y) in places.items()}
     trials = [[[(fitness, place) for place, fitness in enumerate(places)]]]
     run = write_run(tmp_path / "run", trials, scenario=scenario, metrics=metrics)

@@ -50,7 +50,7 @@ class QualityDiversity:
     follow the fittest gaits slowly (CMA-MAE, Fontaine and Nikolaidis, arXiv 2205.10752)."""
 
     measures: dict[str, list[float]] = setting(
-        units=METRICS, length=2, default={"travelling_index": [0.0, 1.0], "lifted": [0.3, 0.6]}
+        units=METRICS, length=2, default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
     )
     """Two metrics and the range of each on the map. What lies outside counts to the cells at the
     edge."""
