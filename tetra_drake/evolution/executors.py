@@ -23,6 +23,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
+from multiprocessing import resource_tracker
 from multiprocessing.connection import wait as wait_for_any
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Generic, TypeVar
@@ -43,6 +44,7 @@ diagram that holds Python systems."""
 @contextlib.contextmanager
 def deaf_to_ctrl_c() -> Iterator[None]:
     """A block whose new threads and processes, and theirs, no Ctrl-C reaches, from birth."""
+    resource_tracker.ensure_running()  # it starts with the first process, and unblocks signals
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
