@@ -107,7 +107,11 @@ def test_the_scenarios_and_the_gait_of_their_page_load(work: Path) -> None:
     assert td.load_gait("gait.json", small).gains.length == json.loads(gait)["gains"]["length"]
 
 
-FOLDERS = ("diagrams", "runs", "tetra_drake/engines", "tetra_drake/scenario")
+FOLDERS = (
+    "diagrams",
+    "runs",
+    *(f"tetra_drake/{name}" for name in ("engines", "evolution", "scenario")),
+)
 
 
 @pytest.mark.parametrize("page", ["README.md", *(f"{folder}/README.md" for folder in FOLDERS)])

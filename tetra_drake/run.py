@@ -48,7 +48,7 @@ def evolve(
     """Evolves gaits on a scenario and records the run in the new directory `out`.
 
     seed: 0 by default. The record depends on scenario, method and seed only.
-    workers: one per core by default.
+    workers: one per core by default; a Dask cluster's are as many as it has.
     resume: goes on with the run in `out`; then `scenario` may be None, and what is given must be
         what the run began with.
     optimizer: optimizer(space, scenario.evolution, generator) makes the optimiser of a trial
@@ -56,7 +56,8 @@ def evolve(
     objective: objective(result) -> float, to be maximised; by default the scenario's fitness.
     executor: executor(workers) makes a concurrent.futures.Executor; by default worker processes,
         for which an objective must be defined in a module. On the compiled engine, by default,
-        threads simulate the candidates of all trials side by side; see simulate_many.
+        threads simulate the candidates of all trials side by side; see simulate_many. Others:
+        evolution.cluster.dask_cluster(), mpi4py.futures.MPIPoolExecutor.
     progress: shown none by default; see evolution.progress.
     reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another,
         and simulates those of a map on disturbed robots.

@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -99,3 +100,29 @@ def test_programs_that_workers_cannot_import_are_told_at_once(how, call, cause, 
     error = ended.stderr.splitlines()[-1]
     assert "EvaluationImpossible" in error
     assert cause in error
+
+
+MPI = """
+from mpi4py.futures import MPIPoolExecutor
+from helpers.analytic import Chunked
+if __name__ == "__main__":
+    vectors = [np.full(26, 1.0 + i / 7) for i in range(9)]
+    for _ in range(2):
+        found = evaluate_all(Chunked(Bowl()), vectors, workers=2, executor=MPIPoolExecutor)
+        print([evaluation == Bowl()(vectors[i]) for i, evaluation in sorted(found)])
+"""
+
+
+def test_mpi_is_an_executor(tmp_path):
+    pytest.importorskip("mpi4py")
+    if not (mpiexec := shutil.which("mpiexec")):
+        pytest.skip("mpiexec is not installed")
+    (tmp_path / "mpi.py").write_text(PROGRAM + MPI)
+    ended = subprocess.run(
+        [mpiexec, "-n", "3", sys.executable, "-m", "mpi4py.futures", tmp_path / "mpi.py"],
+        text=True,
+        capture_output=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        timeout=60,
+    )
+    assert ended.stdout.splitlines() == [str([True] * 9)] * 2, ended.stderr

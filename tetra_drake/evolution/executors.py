@@ -197,7 +197,7 @@ class EvaluationPool(Generic[JobT]):
         for future in done:
             chunk = self._running.pop(future)
             if future.cancelled():
-                raise EvaluationImpossible(_SOURCE, "", "the executor has dropped evaluations")
+                raise EvaluationImpossible("executor", "", _DROPPED)
             if _is_death(error := future.exception()):
                 self._suspects.extend(chunk)
                 broken |= isinstance(error, BrokenExecutor)
@@ -289,6 +289,7 @@ def evaluate_all(
 
 
 _SOURCE = "worker processes"
+_DROPPED = "has dropped evaluations, as if its scheduler had ended; the run can be resumed"
 _INSTEAD = "or use threads: executor=concurrent.futures.ThreadPoolExecutor"
 _UNGUARDED = 'the program lacks `if __name__ == "__main__":` around what it does'
 
