@@ -113,6 +113,7 @@ BAD = [
     ("require: {twits: 1 in}", "require.twits", "'twist'"),
     ("require: {twist: 1 lbf}", "require.twist", "'1 lbf'"),
     ("fitness: {twits: 1}", "fitness.twits", "'twist'"),
+    ("fitness: {twist: 1}\nobjective: {lead: 1 /m}", "fitness", "objective"),
     ("disturbances: {draws: 0}", "disturbances.draws", "0"),
     ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
     ("disturbances: {draws: 2, aggregation: best}", "disturbances.aggregation", "'best'"),

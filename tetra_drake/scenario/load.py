@@ -84,6 +84,8 @@ def _load_tree(file: Path, seen: tuple[Path, ...] = ()) -> Tree:
     base = raw.pop("base", None) if isinstance(raw, dict) else None
     fitness = raw.pop("fitness", {}) if isinstance(raw, dict) else {}
     given: Tree = Check(file).value(Scenario, raw)
+    if fitness and "objective" in given:
+        raise InputError(file, "fitness", "found beside objective, which replaces it; give one")
     terrain = given.get("terrain", {})
     if "file" in terrain:
         terrain["file"] = os.path.abspath(file.parent / terrain["file"])
