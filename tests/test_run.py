@@ -112,7 +112,7 @@ def test_a_robot_of_any_length_is_evolved_and_drawn(tiny, tmp_path, bodies):
 
 def test_workers_of_ones_own_find_the_engine_compiled(tiny, tmp_path, reports, monkeypatch):
     prepared = []
-    monkeypatch.setattr("tetra_drake.run.prepare", lambda scenario, say: prepared.append(scenario))
+    monkeypatch.setattr("tetra_drake.run.prepare", lambda own, **options: prepared.append(own))
     tetra_drake.evolve(tiny, tmp_path / "own", executor=OneByOne, reevaluate=False)
     assert prepared == [tiny]
 

@@ -93,7 +93,7 @@ def evolve(
                 lanes = stack.enter_context(LanePool(workers, say=progress.say))
                 evaluate, at_a_time = GaitEvaluation(own, objective, lanes), lanes.capacity
             else:
-                prepare(own, say=progress.say)
+                prepare(own, many=True, say=progress.say)
             run_trials(
                 record,
                 evaluate=evaluate,

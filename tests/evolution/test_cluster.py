@@ -1,9 +1,11 @@
 """A Dask cluster of two processes: the records of local workers, whatever happens to its own."""
 
+import importlib
 import os
 import signal
 import time
 from concurrent.futures import ThreadPoolExecutor
+from importlib import metadata
 
 import numpy as np
 import pytest
@@ -89,6 +91,16 @@ def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, vectors):
     while cluster.scheduler.tasks and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not cluster.scheduler.tasks
+
+
+def test_workers_with_other_versions_are_refused(cluster, refused):
+    with distributed.Client(cluster) as client:
+        client.run(setattr, metadata, "version", str.upper)
+        with refused("executor", "", "found 'TETRA_DRAKE'"), dask_cluster(cluster):
+            pass
+        client.run(importlib.reload, metadata)
+    with dask_cluster(cluster) as executor:
+        assert executor.workers == 2
 
 
 def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 from collections.abc import Callable, Sequence
 
@@ -117,11 +118,15 @@ def check_scenario(scenario: Scenario) -> None:
         check_mujoco(scenario)
 
 
-def prepare(scenario: Scenario, *, say: Callable[[str], None] = lambda text: None) -> None:
-    """Compiles the scenario's engine, so that no simulation has to wait for that; `say` is told if
-    it takes longer than a moment."""
+def prepare(
+    scenario: Scenario, *, many: bool = False, say: Callable[[str], None] = lambda text: None
+) -> None:
+    """Compiles the scenario's engine, so that no simulation, nor one of many gaits, has to wait for
+    that; `say` is told if it takes longer than a moment."""
     if scenario.simulation.engine == "compiled":
         from tetra_drake.engines.compiled.engine import ready_engine
-        from tetra_drake.engines.compiled.lane_engine import Walk
+        from tetra_drake.engines.compiled.lane_engine import Walk, lanes_for
 
-        ready_engine(Walk.of(scenario, seeded_gait(scenario), record=False), 1, say=say)
+        walk = Walk.of(scenario, seeded_gait(scenario), record=False)
+        for width in {1, lanes_for(math.inf) if many else 1}:
+            ready_engine(walk, width, say=say)

@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor
+from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from tetra_drake.engines.simulate import available_cores
@@ -34,7 +35,8 @@ class DaskExecutors:
     def workers(self) -> int:
         """The cluster's threads, counted every few seconds; 1 as long as there are none."""
         if time.monotonic() > self._counted + _COUNTING_PERIOD:
-            self._workers = max(1, sum(self._client.nthreads().values()))
+            with contextlib.suppress(OSError):  # the client is connecting again
+                self._workers = max(1, sum(self._client.nthreads().values()))
             self._counted = time.monotonic()
         return self._workers
 
@@ -45,7 +47,8 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
     an SSHCluster, or its scheduler's address. By default one of its own on this machine, with as
     many worker processes (one per core by default).
 
-    Raises InputError if Dask is missing or no scheduler answers.
+    Raises InputError if Dask is missing, no scheduler answers, workers do not start, or have
+    another version of this package or of Drake.
     """
     try:
         import distributed
@@ -54,14 +57,26 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
         raise InputError("executor", "", problem) from error
     check_guard()
     with contextlib.ExitStack() as stack:
-        if cluster is None:
-            cluster = stack.enter_context(local_cluster(workers or available_cores()))
         try:
+            if cluster is None:
+                cluster = stack.enter_context(local_cluster(workers or available_cores()))
             client = stack.enter_context(distributed.Client(cluster))
+        except RuntimeError as error:
+            raise InputError("executor", "", f"Dask's workers do not start: {error}") from error
         except (OSError, ValueError) as error:
             problem = f"no Dask scheduler answers at '{cluster}': {error}"
             raise InputError("executor", "", problem) from error
+        for name in ("tetra_drake", "drake"):
+            _check_version(client, name)
         yield DaskExecutors(client)
+
+
+def _check_version(client: Client, name: str) -> None:
+    """Raises InputError if a worker that is up has another version of a package, or none."""
+    for worker, found in client.run(metadata.version, name, on_error="return").items():
+        if found != (ours := metadata.version(name)):
+            problem = f"{name} on worker {worker}: found {found!r}, expected '{ours}' as here"
+            raise InputError("executor", "", problem)
 
 
 def local_cluster(workers: int) -> LocalCluster:

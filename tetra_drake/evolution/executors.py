@@ -103,7 +103,7 @@ TaskT = TypeVar("TaskT")
 _HOPELESS = 3
 """Tasks that end their workers before any other has succeeded: then no task can run."""
 
-_CHUNK_TIME = 0.5
+_CHUNK_TIME = 1.0
 """Time (s) that a chunk of tasks shall take: sending it takes some ms."""
 
 
