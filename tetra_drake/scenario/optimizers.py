@@ -14,16 +14,18 @@ class SteadyState:
 @dataclass
 class CmaEs:
     """Covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772): vectors are drawn from a
-    normal distribution that learns from them. Where it has converged, it begins anew, larger."""
+    normal distribution that learns from them. Where it has converged, it begins anew around the
+    best gait, larger."""
 
     population: int | None = setting(at_least=4, default=None)
     """Vectors in an iteration; 4 + 3 ln n, rounded down, of n parameters if not given."""
-    sigma: float = setting(above=0, default=0.5)
+    sample: int = setting(at_least=0, default=40)
+    """Random gaits evaluated first. The mean of the best quarter is its start; 0: the middle
+    of the ranges."""
+    sigma: float = setting(above=0, default=0.2)
     """Standard deviation at the start, as a share of each parameter's range in random gaits."""
-    sample: int = setting(at_least=0, default=0)
-    """Random gaits evaluated first, of which the best is the start; 0: the middle of the ranges."""
-    tolerance: float = setting(above=0, default=1e-3)
-    """A run has converged where all standard deviations are below this, in the same units."""
+    tolerance: float = setting(above=0, default=0.01)
+    """It has converged where all standard deviations are below this share of the ranges."""
     growth: float = setting(at_least=1, default=2.0)
     """Factor on the population at each restart (IPOP)."""
 
