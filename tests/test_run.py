@@ -186,7 +186,7 @@ def test_the_scenarios_optimiser_is_used_recorded_and_resumed(
     tiny, tmp_path, interrupting, refused
 ):
     scenario = tiny.with_changes(
-        {"optimizer": CmaEs(population=4), "evolution.max_evaluations": 10}
+        {"optimizer": CmaEs(population=4, sample=0), "evolution.max_evaluations": 10}
     )
     whole, run = tmp_path / "whole", tmp_path / "run"
     own = {"reevaluate": False, "report": False}
