@@ -26,7 +26,7 @@ from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import evaluate_all, process_executor
 from tetra_drake.evolution.robustness import PERCENT, judge, to_json
 from tetra_drake.evolution.tables import load_run
-from tetra_drake.files import write_whole
+from tetra_drake.files import json_number, write_whole
 from tetra_drake.results.measures import dominant_frequency, lifted, share_of_time
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, ParameterSpace
@@ -170,7 +170,7 @@ def walk(scenario: Scenario, gait: Gait) -> dict[str, Any]:
     return {
         "distance_in": result.metrics.distance_in,
         "off_ground": shares_off_ground(result.trajectory, since=since),
-        "frequencies_hz": {name: _finite(value) for name, value in frequencies.items()},
+        "frequencies_hz": {name: json_number(value) for name, value in frequencies.items()},
     }
 
 
@@ -187,7 +187,7 @@ def oscillator_frequency(scenario: Scenario) -> float:
 
 def _outcome(metrics: Mapping[str, Any], failure: str | None) -> dict[str, Any]:
     distance = metrics.get("distance", math.nan) / INCH
-    return {"distance_in": _finite(distance), "failure": failure}
+    return {"distance_in": json_number(distance), "failure": failure}
 
 
 def shares_off_ground(trajectory: xarray.Dataset, *, since: float) -> dict[str, float]:
@@ -203,10 +203,6 @@ def signal_frequencies(trajectory: xarray.Dataset, *, since: float) -> dict[str,
         str(name): dominant_frequency(signals.time.values, signals.sel(oscillator=name).values)
         for name in signals.oscillator.values
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -1,12 +1,14 @@
-"""Text files: read with one-line errors, written whole or not at all."""
+"""Text files: read with one-line errors, written whole or not at all; numbers for JSON."""
 
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from tetra_drake.errors import InputError
 
@@ -51,6 +53,11 @@ def check_folder(folder: str | Path) -> None:
         raise InputError(folder, "", f"{what}, expected a folder to write to")
     if not os.access(existing, os.W_OK | os.X_OK):
         raise InputError(folder, "", f"'{existing}' is not writable")
+
+
+def json_number(value: Any) -> Any:
+    """A value as JSON holds it: None for a number that is not finite."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def read_text(path: str | Path, what: str) -> str:

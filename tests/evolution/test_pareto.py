@@ -9,8 +9,8 @@ from helpers.synthetic_run import PER_DISTANCE, write_run
 
 from tetra_drake.evolution.pareto import (
     STEADINESS,
-    by_gait,
     champions,
+    distinct_gaits,
     forward_gaits,
     pareto_front,
     trades,
@@ -54,7 +54,7 @@ def test_champions_walk_forward_and_at_least_half_as_far_as_the_farthest(tmp_pat
     assert found == {"farthest": (0, 3), "cheapest": (1, 0)}
     assert best["cheapest"]["distance_in"] == pytest.approx(10.0 / PER_DISTANCE)
     again = {"fittest": best["farthest"]} | best
-    assert [names for names, _ in by_gait(again)] == [["fittest", "farthest"], ["cheapest"]]
+    assert [names for names, _ in distinct_gaits(again)] == [["fittest", "farthest"], ["cheapest"]]
 
 
 def test_steadiness_is_the_worst_draws_share_of_the_mean_distance(tmp_path):

@@ -24,6 +24,7 @@ from tetra_drake.benchmark.settings import (
 from tetra_drake.engines.mujoco import check_mujoco
 from tetra_drake.engines.simulate import available_cores, simulate, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.files import json_number
 from tetra_drake.results.result import SimulationResult, versions
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.scenario.schema import Scenario
@@ -283,4 +284,4 @@ def _distances(scenario: Scenario, changes: Changes, gaits: Sequence[Gait]) -> A
 
 def _finite(values: list[float]) -> list[float | None]:
     """The values for JSON, None for NaN."""
-    return [value if math.isfinite(value) else None for value in values]
+    return [json_number(value) for value in values]

@@ -51,7 +51,8 @@ def simulate_drake(
     work = _Work(integrator)
     aimer = _StepAimer(diagram, simulator, settings, work)
     samples = sample_times(settings.duration, settings.sample_period) if record else np.empty(0)
-    times = np.union1d(result_times(settings), samples)
+    needed = result_times(settings)
+    times = np.union1d(needed, samples)
     recorder = Recorder(structure, times)
 
     def after_step(context: Context) -> None:
@@ -80,14 +81,14 @@ def simulate_drake(
     wall_time = time.perf_counter() - started
 
     kept = recorder.samples
-    chosen = [kept[i] for i in np.searchsorted(times, samples)]
+    chosen, ours = ([kept[i] for i in np.searchsorted(times, at)] for at in (samples, needed))
     steps, derivative_evaluations, jacobian_evaluations = work.total()
     return make_result(
         scenario,
         structure,
-        times=times,
-        states=np.array([each.continuous[: 13 * len(structure.bodies)] for each in kept]),
-        signals=evaluate_ports(diagram, kept, ["signals"])["signals"],
+        times=needed,
+        states=np.array([each.continuous[: 13 * len(structure.bodies)] for each in ours]),
+        signals=evaluate_ports(diagram, ours, ["signals"])["signals"],
         totals=observer.totals(),
         mass=float(model.body.mass[0]),
         wall_time=wall_time,

@@ -15,6 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.method import Part
 from tetra_drake.evolution.statistics import interquartile_mean, interval
 from tetra_drake.evolution.tables import Run, load_run
+from tetra_drake.files import json_number
 from tetra_drake.formatting import aligned, fixed, ranged
 from tetra_drake.scenario.load import differences
 from tetra_drake.scenario.units import INCH
@@ -77,7 +78,7 @@ def compare(
 
     runs = _labelled([load_run(directory) for directory in directories], labels)
     notes = _differences(runs)
-    draws = {label: _draws(run) for label, run in runs.items()}
+    draws = {label: run.manifest.scenario.draws for label, run in runs.items()}
     unit = EVALUATIONS if len({*draws.values()}) == 1 else SIMULATIONS
     costs = {label: count if unit == SIMULATIONS else 1 for label, count in draws.items()}
     if reach is None:
@@ -147,13 +148,17 @@ def _trials(run: Run, cost: int) -> dict[int, _Trial]:
     for number, rows in run.evaluations.groupby("trial"):
         fitness = rows["fitness"].fillna(-math.inf).to_numpy()
         best = np.maximum.accumulate(fitness)
-        rises = np.r_[True, best[1:] > best[:-1]]
-        fittest = np.maximum.accumulate(np.where(rises, np.arange(len(best)), 0))
+        fittest = np.maximum.accumulate(np.where(_rises(best), np.arange(len(best)), 0))
         distance = np.where(np.isfinite(best), rows["distance"].to_numpy()[fittest], math.nan)
         costs = cost * np.arange(1, len(best) + 1)
         ended = run.statuses[int(number)].stop is not None
         found[int(number)] = _Trial(costs, best, distance, ended)
     return found
+
+
+def _rises(best: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Where the best so far is a new one, as the first always is."""
+    return np.r_[True, best[1:] > best[:-1]]
 
 
 def _end(trials: Mapping[int, _Trial]) -> int:
@@ -166,7 +171,7 @@ def _curve(trials: Mapping[int, _Trial], end: int) -> pandas.DataFrame:
     """The quartiles over the trials where they rise, and at the end."""
     import pandas
 
-    rises = [t.costs[np.r_[True, t.best[1:] > t.best[:-1]]] for t in trials.values()]
+    rises = [trial.costs[_rises(trial.best)] for trial in trials.values()]
     costs = np.unique(np.concatenate([*rises, [end]]))
     costs = costs[costs <= end]
     quartiles = _quartiles(np.array([trial.at(costs) for trial in trials.values()]))
@@ -235,11 +240,6 @@ def _objective(run: Run) -> tuple[Part, Mapping[str, float]]:
     return part, own if part.digest is None else {}
 
 
-def _draws(run: Run) -> int:
-    disturbances = run.manifest.scenario.disturbances
-    return disturbances.draws if disturbances else 1
-
-
 def to_json(compared: Compared) -> dict[str, Any]:
     """The summary as JSON holds it, lengths in m; null for what is infinite or unknown."""
     rows = compared.runs.reset_index().to_dict("records")
@@ -248,12 +248,8 @@ def to_json(compared: Compared) -> dict[str, Any]:
         "common": compared.common,
         "reach": compared.reach,
         "notes": compared.notes,
-        "runs": [{key: _finite(value) for key, value in row.items()} for row in rows],
+        "runs": [{key: json_number(value) for key, value in row.items()} for row in rows],
     }
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def describe(compared: Compared) -> str:

@@ -34,8 +34,7 @@ def task_of(scenario: Scenario, vector: Vector, seed: Seed) -> Vector | SeededVe
 
 def draws_of(scenario: Scenario, seed: Sequence[int]) -> list[Scenario]:
     """The scenario's draws of the seed of a SeededVector."""
-    count = scenario.disturbances.draws if scenario.disturbances else 1
-    seeds = [(*seed, k) for k in range(count)]
+    seeds = [(*seed, k) for k in range(scenario.draws)]
     return [disturbed(scenario, draw_disturbances(scenario, each)) for each in seeds]
 
 

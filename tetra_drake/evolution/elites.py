@@ -6,7 +6,6 @@ elites.jsonl    those gaits of a run's map that were simulated on disturbed robo
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
+from tetra_drake.evolution.record import read_manifest
 from tetra_drake.evolution.robustness import by_gait, judge
 from tetra_drake.evolution.tables import Run, load_run
+from tetra_drake.files import json_number
 from tetra_drake.scenario.optimizers import QualityDiversity
 
 if TYPE_CHECKING:
@@ -72,12 +73,14 @@ def judge_elites(
 ) -> None:
     """Simulates the elites of a run on robots disturbed as judge() does, as often as the scenario
     says, and adds to the record how far they walk. Those that have been are skipped."""
+    kind = read_manifest(directory).scenario.optimizer
+    if not isinstance(kind, QualityDiversity) or not kind.draws:
+        return
     repair_torn_line(directory / ELITES)
     run = load_run(directory)
     scenario, found = run.manifest.scenario, elites(run)
     missing = found[found["kept"].isna()]
-    kind = scenario.optimizer
-    if missing.empty or not isinstance(kind, QualityDiversity) or not kind.draws:
+    if missing.empty:
         return
     say(f"simulating {len(missing)} gaits of the map in {kind.draws} draws of disturbances")
     keys = [(int(trial), int(index)) for trial, index in missing[_KEY].to_numpy()]
@@ -88,14 +91,10 @@ def judge_elites(
     )
     table = by_gait(judgement)
     lines = [
-        {"trial": trial, "index": index, "kept": kept, "mean_distance": _finite(mean)}
+        {"trial": trial, "index": index, "kept": kept, "mean_distance": json_number(mean)}
         for (trial, index), kept, mean in zip(keys, table["kept"], table["mean"], strict=True)
     ]
     append_lines(directory / ELITES, lines)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def robust(found: pandas.DataFrame) -> pandas.DataFrame:
@@ -105,10 +104,10 @@ def robust(found: pandas.DataFrame) -> pandas.DataFrame:
 
 def chosen(run: Run) -> dict[str, pandas.Series]:
     """By name, the fittest of the robust elites and those nearest to the corners of the map."""
-    found, kind = elites(run), run.manifest.scenario.optimizer
-    if not isinstance(kind, QualityDiversity) or robust(found).empty:
+    found, kind = robust(elites(run)), run.manifest.scenario.optimizer
+    if not isinstance(kind, QualityDiversity) or found.empty:
         return {}
-    return {"fittest of the map": robust(found).iloc[0]} | _corners(robust(found), kind)
+    return {"fittest of the map": found.iloc[0]} | _corners(found, kind)
 
 
 def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, pandas.Series]:

@@ -88,7 +88,7 @@ def champions(run: Run) -> dict[str, pandas.Series]:
     return {name: gaits.loc[row] for name, row in best.items()}
 
 
-def by_gait(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:
+def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:
     """The different ones among named gaits, each with all of its names."""
     names: dict[Any, list[str]] = {}
     for name, gait in named.items():

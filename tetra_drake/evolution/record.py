@@ -36,7 +36,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
 from tetra_drake.evolution.method import Method, Part
 from tetra_drake.evolution.optimizers.base import Evaluation
-from tetra_drake.files import check_folder, write_whole
+from tetra_drake.files import check_folder, json_number, write_whole
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
@@ -280,7 +280,7 @@ def evaluation_entry(
         "iteration": iteration,
         "genome": vector.tolist(),
         "metrics": dict(evaluation.metrics),
-        "fitness": evaluation.fitness if math.isfinite(evaluation.fitness) else None,
+        "fitness": json_number(evaluation.fitness),
         "failure": evaluation.failure,
         "wall_time_s": round(evaluation.wall_time, 4),
         "engine": evaluation.engine,

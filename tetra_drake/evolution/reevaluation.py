@@ -47,8 +47,7 @@ def reevaluate(
     for trial in range(scenario.evolution.trials):
         repair_torn_line(trial_folder(run.directory, trial) / REEVALUATIONS)
     done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
-    draws = scenario.disturbances.draws if scenario.disturbances else 1
-    chosen = run.initial() if initial else run.best(max(1, BEST_GAITS // draws))
+    chosen = run.initial() if initial else run.best(max(1, BEST_GAITS // scenario.draws))
     rows = chosen[["trial", "index", "iteration"]].itertuples(index=False, name=None)
     missing = [row for row in rows if row[:2] not in done]
     vectors = [run.vector(trial, index) for trial, index, _ in missing]

@@ -15,6 +15,7 @@ from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.statistics import interval
 from tetra_drake.evolution.tables import load_run
+from tetra_drake.files import json_number
 from tetra_drake.formatting import aligned, fixed, ranged, signed
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult, versions
@@ -298,7 +299,7 @@ def to_json(judgement: Judgement) -> dict[str, Any]:
         "seed": judgement.seed,
     } | {
         name: [
-            {key: None if value != value else value for key, value in row.items()}
+            {key: json_number(value) for key, value in row.items()}
             for row in make(judgement).reset_index().to_dict("records")
         ]
         for name, make in tables.items()

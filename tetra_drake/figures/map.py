@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tetra_drake.evolution.elites import CELLS, LUCKY, chosen, elites, robust
-from tetra_drake.evolution.pareto import by_gait
+from tetra_drake.evolution.pareto import distinct_gaits
 from tetra_drake.evolution.tables import Run, gait_label
 from tetra_drake.figures.style import common_style, make_figure
 from tetra_drake.formatting import fixed, listed
@@ -43,18 +43,17 @@ def map_of_gaits(run: Run) -> Figure:
     if judged:
         shares: Any = {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
         panels.append(("draws kept (%)", found, 100.0 * found["kept"], shares))
+    edges = [_edges(*each) for each in zip(kind.measures.items(), kind.cells, strict=True)]
+    middles, named = [(edge[:-1] + edge[1:]) / 2.0 for edge in edges], distinct_gaits(chosen(run))
     for axes, (title, gaits, values, look) in zip(row, panels, strict=True):
-        edges = [_edges(*each) for each in zip(kind.measures.items(), kind.cells, strict=True)]
         grid = np.full(kind.cells, np.nan)
         grid[tuple(gaits[CELLS].to_numpy().T)] = values
         mesh = axes.pcolormesh(*edges, grid.T, rasterized=True, **look)
         figure.colorbar(mesh, ax=axes, label=title)
         axes.grid(visible=False)
         axes.set(xlabel=_label(kind, 0))
-        middles = [(edge[:-1] + edge[1:]) / 2.0 for edge in edges]
         if axes is row[0]:
             axes.plot(*(m[lucky[c]] for m, c in zip(middles, CELLS, strict=True)), **_LUCKY)
-        named = by_gait(chosen(run))
         for number, (_, gait) in enumerate(named, start=1):
             place = [m[gait[c]] for m, c in zip(middles, CELLS, strict=True)]
             axes.text(*place, str(number), bbox=_DISC, **_NUMBER)

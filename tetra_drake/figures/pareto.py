@@ -8,19 +8,18 @@ import pandas
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.evolution.pareto import (
     NEAREST,
     Trade,
-    by_gait,
     champions,
+    distinct_gaits,
     forward_gaits,
     front_of,
     trades,
 )
 from tetra_drake.evolution.tables import Run, gait_label
-from tetra_drake.figures.style import OKABE_ITO, common_style, make_figure
+from tetra_drake.figures.style import OKABE_ITO, common_style, make_figure, round_logarithmic
 from tetra_drake.formatting import listed
 
 _SHOWN = 0.95
@@ -55,7 +54,7 @@ def pareto(run: Run) -> Figure:
     its mean distance, by the draws of its own iteration."""
     gaits = forward_gaits(run)
     fittest = run.evaluation(*run.fittest())
-    marked = by_gait({"fittest": fittest} | champions(run))
+    marked = distinct_gaits({"fittest": fittest} | champions(run))
     panels = trades(gaits)
     figure, [row] = make_figure(width_in=7.0, height_in=4.4, columns=len(panels), sharey=True)
     for axes, trade in zip(row, panels, strict=True):
@@ -91,9 +90,7 @@ def _draw(axes: Axes, gaits: pandas.DataFrame, trade: Trade) -> None:
     if low > 0.0 and high > _WIDE * low:
         margin = (high / low) ** 0.04
         axes.set(xscale="log", xlim=(low / margin, high * margin))
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        round_logarithmic(axes.xaxis, "{x:g}")
     else:
         margin = 0.04 * (high - low or 1.0)
         axes.set(xlim=(low - margin, high + margin))

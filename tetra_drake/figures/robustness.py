@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,7 @@ from tetra_drake.evolution.robustness import (
     chance,
     to_json,
 )
-from tetra_drake.figures.style import OKABE_ITO, REFERENCE, SHADE, common_style, save_figure
-from tetra_drake.files import write_whole
+from tetra_drake.figures.style import OKABE_ITO, REFERENCE, SHADE, common_style, save_findings
 from tetra_drake.formatting import fixed
 from tetra_drake.scenario.units import INCH
 
@@ -32,12 +30,10 @@ _BOX |= {"manage_ticks": False}
 def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
     """Writes draws.csv and alone.csv (all simulations, SI), summary.json and the figure to the
     folder; returns the names. Raises InputError if a file cannot be written."""
-    for name, table in (("draws.csv", judgement.draws), ("alone.csv", judgement.alone)):
-        write_whole(folder / name, judgement.compared(table).to_csv(index=False))
-    text = json.dumps(to_json(judgement), indent=1, allow_nan=False, ensure_ascii=False)
-    write_whole(folder / "summary.json", text + "\n")
-    save_figure(robustness(judgement), folder, "robustness")
-    return ["draws.csv", "alone.csv", "summary.json", "robustness.svg", "robustness.png"]
+    given = {"draws": judgement.draws, "alone": judgement.alone}
+    tables = {name: judgement.compared(table) for name, table in given.items()}
+    figure, summary = robustness(judgement), to_json(judgement)
+    return save_findings(figure, folder, "robustness", tables=tables, summary=summary)
 
 
 @common_style()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -10,11 +9,15 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.evolution.comparison import Compared, reach_text, to_json
-from tetra_drake.figures.style import common_style, line_style, make_figure, save_figure
-from tetra_drake.files import write_whole
+from tetra_drake.figures.style import (
+    common_style,
+    line_style,
+    make_figure,
+    round_logarithmic,
+    save_findings,
+)
 
 _LEGEND_WIDTH = 60
 """Letters below an axis."""
@@ -26,12 +29,9 @@ _FIRST = 10
 def save_comparison(compared: Compared, folder: Path) -> list[str]:
     """Writes trials.csv, curves.csv, summary.json (lengths in m) and the figure to the folder;
     returns the names. Raises InputError if a file cannot be written."""
-    for name, table in (("trials.csv", compared.trials), ("curves.csv", compared.curves)):
-        write_whole(folder / name, table.to_csv(index=False))
-    text = json.dumps(to_json(compared), indent=1, allow_nan=False, ensure_ascii=False)
-    write_whole(folder / "summary.json", text + "\n")
-    save_figure(search(compared), folder, "search")
-    return ["trials.csv", "curves.csv", "summary.json", "search.svg", "search.png"]
+    tables = {"trials": compared.trials, "curves": compared.curves}
+    figure, summary = search(compared), to_json(compared)
+    return save_findings(figure, folder, "search", tables=tables, summary=summary)
 
 
 @common_style()
@@ -56,9 +56,7 @@ def search(compared: Compared) -> Figure:
             _draw_reached(row[1], compared, label, ends[label], style)
     for axes in row:
         axes.set(xlabel=compared.unit, xscale="log", xlim=(first, 1.1 * ends.max()))
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        round_logarithmic(axes.xaxis, "{x:,.0f}")
     row[0].set(title="median and quartiles", ylabel="best fitness so far")
     figure.legend(row[0].lines, labels, loc="outside lower center", ncols=across)
     figure.suptitle(f"How well runs search, by {compared.unit}")

@@ -7,6 +7,7 @@ figure; save_figure() writes it. Neither a display nor pyplot is needed.
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,13 +16,16 @@ from typing import Any
 
 import matplotlib.style
 import numpy as np
+import pandas
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from tetra_drake.files import whole_file
+from tetra_drake.files import whole_file, write_whole
 from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.units import INCH
 
@@ -101,6 +105,31 @@ def draw_reference(axes: Axes, reference: ReferenceScenario | None, name: str) -
     place: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
     place["bbox"] = {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.0}
     axes.annotate(f"{reference.source}: {inches:.4g} in", (0.02, inches), (0, 4), **place)
+
+
+def round_logarithmic(axis: Axis, form: str) -> None:
+    """Marks a logarithmic axis at 1, 2, 5, 10 ..., written as `form`, such as "{x:g}"."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(StrMethodFormatter(form))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def save_findings(
+    figure: Figure,
+    folder: Path,
+    name: str,
+    *,
+    tables: Mapping[str, pandas.DataFrame],
+    summary: Mapping[str, Any],
+) -> list[str]:
+    """Writes tables by their names as CSV, summary.json and the figure to the folder; returns the
+    names of the files. Raises InputError if one cannot be written."""
+    for table, rows in tables.items():
+        write_whole(folder / f"{table}.csv", rows.to_csv(index=False))
+    text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
+    write_whole(folder / "summary.json", text + "\n")
+    save_figure(figure, folder, name)
+    return [*(f"{table}.csv" for table in tables), "summary.json", f"{name}.svg", f"{name}.png"]
 
 
 @common_style()

@@ -11,7 +11,7 @@ import pandas
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.elites import chosen, elites
-from tetra_drake.evolution.pareto import NEAREST, TRADES, by_gait, champions
+from tetra_drake.evolution.pareto import NEAREST, TRADES, champions, distinct_gaits
 from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.summary import comparisons, metric_rows
@@ -85,9 +85,10 @@ def _write_map(study: Study, directory: Path) -> None:
     """Writes all gaits of the run's map as a table, and the chosen ones as gait files and, but for
     the run's best, replay pages."""
     run = study.run
-    if chosen(run):
+    on_map = distinct_gaits(chosen(run))
+    if on_map:
         write_whole(directory / ELITES / ELITES_CSV, elites(run).to_csv(index=False))
-    for names, row in by_gait(chosen(run)):
+    for names, row in on_map:
         walk = walk_again(run, row["trial"], row["index"])
         file, page = (directory / each for each in _map_files(names, row, study))
         save_gait(walk.gait, file, run.manifest.scenario)
@@ -108,7 +109,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
     run, manifest = study.run, study.run.manifest
     best_gait, best_of = trial_folder(Path(), study.trial) / BEST_GAIT, champions(run)
     named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded} | best_of
-    gaits, on_map = by_gait(named), by_gait(chosen(run))
+    gaits, on_map = distinct_gaits(named), distinct_gaits(chosen(run))
     on_map_files = {n: _map_files(each, gait, study) for each, gait in on_map for n in each}
     walks = {walk.label: walk for walk in (study.best, study.initial)}
     changes = {n: abs(walk.distance_in - walk.recorded["distance_in"]) for n, walk in walks.items()}

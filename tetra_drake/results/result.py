@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.files import write_whole
+from tetra_drake.files import json_number, write_whole
 from tetra_drake.formatting import fixed
 from tetra_drake.results.metrics import (
     Totals,
@@ -148,7 +148,7 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
         "scenario": scenario.name,
         "metrics": result.metrics.to_json(),
         **result.metrics.in_inches(),
-        "path_radius_in": radius / INCH if math.isfinite(radius) else None,
+        "path_radius_in": json_number(radius / INCH),
         "fitness": result.fitness,
         "duration_s": result.duration,
         "wall_time_s": result.wall_time,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 
@@ -48,9 +48,8 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
 
     Its values are not checked again: those of the largest changes are when a scenario is loaded.
     """
-    changed = dataclasses.replace(scenario, disturbances=None, reference=None)
-    for section in ("robot", *sorted({key.split(".")[0] for key in _keys(draw)})):
-        setattr(changed, section, copy.copy(getattr(scenario, section)))
+    sections = {name: copy.copy(section) for name, section in vars(scenario).items()}
+    changed = dataclasses.replace(scenario, **sections | {"disturbances": None, "reference": None})
     for joined, keys in key_groups(draw.factors):
         for key in keys:
             section, _, name = key.partition(".")
@@ -61,11 +60,5 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
         offsets = scenario.robot.offsets or np.zeros_like(draw.moves)
         changed.robot.offsets = (draw.moves + offsets).tolist()
     if draw.terrain_seed is not None:
-        changed.terrain = copy.copy(scenario.terrain)
         setattr(changed.terrain, "seed", draw.terrain_seed)  # noqa: B010 (kinds with a seed only)
     return changed
-
-
-def _keys(draw: Draw) -> Iterator[str]:
-    for _, keys in key_groups(draw.factors):
-        yield from keys

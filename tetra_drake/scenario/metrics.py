@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+from tetra_drake.files import json_number
 from tetra_drake.scenario.units import INCH
 
 STRAIGHT = 0.01
@@ -89,9 +90,8 @@ class Metrics:
 
     def to_json(self) -> dict[str, Any]:
         """The metrics by name, as JSON holds them: None for an infinite one."""
-        numbers = {name: getattr(self, name) for name in METRICS}
-        finite = {n: value if math.isfinite(value) else None for n, value in numbers.items()}
-        return finite | {"lifted_shares": list(self.lifted_shares)}
+        numbers = {name: json_number(getattr(self, name)) for name in METRICS}
+        return numbers | {"lifted_shares": list(self.lifted_shares)}
 
 
 METRICS: dict[str, str] = {

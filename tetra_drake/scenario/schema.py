@@ -328,6 +328,11 @@ class Scenario:
         """One neural oscillator for each group of cables of each junction between tetrahedra."""
         return len(self.robot.actuation) * (self.robot.tetrahedra - 1)
 
+    @property
+    def draws(self) -> int:
+        """Simulations of a gait in evolution: one, or one for each draw of disturbances."""
+        return self.disturbances.draws if self.disturbances else 1
+
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
         """A checked copy with other values: {"robot.tetrahedra": 7, "cables.damping": "8 N*s/m"}.
 

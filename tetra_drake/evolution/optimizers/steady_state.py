@@ -6,7 +6,6 @@ The comparisons are the listing's: an event of probability p happens if a number
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from operator import attrgetter
 
@@ -14,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.evolution.optimizers.base import Evaluation, Iteration, Score
+from tetra_drake.files import json_number
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.schema import EvolutionScenario
 
@@ -71,7 +71,7 @@ class SteadyState:
             placed = tuple(map(self._place, self._asked, evaluations))
         mean = mean_fitness(np.array([each.fitness for each in self._evaluations]))
         self._means.append(mean)
-        report = {"mean_fitness": mean if math.isfinite(mean) else None}
+        report = {"mean_fitness": json_number(mean)}
         return Iteration(report=report, placed=placed, stop=self._stop())
 
     def _breed(self) -> list[Vector]:
