@@ -95,6 +95,7 @@ def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, vectors):
 
 def test_workers_with_other_versions_are_refused(cluster, refused):
     with distributed.Client(cluster) as client:
+        client.wait_for_workers(2)  # a killed one comes back
         client.run(setattr, metadata, "version", str.upper)
         with refused("executor", "", "found 'TETRA_DRAKE'"), dask_cluster(cluster):
             pass

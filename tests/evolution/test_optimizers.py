@@ -231,6 +231,16 @@ def test_without_a_sample_it_starts_in_the_middle_as_wide_as_sigma_says():
     np.testing.assert_allclose(deviations.std(axis=0), 0.1, atol=0.015)
 
 
+def test_the_best_of_several_searches_goes_on():
+    optimizer = make(CmaEs(population=10, sample=10, starts=5, tryout=45), budget=300)
+    batches, iterations = run(optimizer)
+    starts = [iteration.report["start"] for iteration in iterations]
+    tried, after = starts[:15], starts[15:]
+    assert tried == [0] * 5 + [1] * 5 + [2] * 5  # a fourth one would take more than 150 in all
+    best = max(range(3), key=lambda start: fitnesses(batches[5 * start : 5 * start + 5]).max())
+    assert set(after) == {best} and best != 2
+
+
 def test_it_begins_anew_and_larger_around_its_best_where_it_has_converged():
     kind, small = CmaEs(population=6, growth=1.5), {"robot.tetrahedra": 3}
     batches, iterations = run(make(kind, budget=3000, **small))  # four weights and tau_A

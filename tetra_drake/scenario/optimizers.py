@@ -22,9 +22,14 @@ class CmaEs:
     sample: int = setting(at_least=0, default=40)
     """Random gaits evaluated first. The mean of the best quarter is its start; 0: the middle
     of the ranges."""
+    starts: int = setting(at_least=1, default=5)
+    """Searches, each with a sample of its own, of which the one with the best gait goes on; fewer
+    where trying them out would take more than half of the evaluations."""
+    tryout: int = setting(at_least=1, default=350)
+    """Evaluations in which each of them is tried out."""
     sigma: float = setting(above=0, default=0.2)
     """Standard deviation at the start, as a share of each parameter's range in random gaits."""
-    tolerance: float = setting(above=0, default=0.01)
+    tolerance: float = setting(above=0, default=0.05)
     """It has converged where all standard deviations are below this share of the ranges."""
     growth: float = setting(at_least=1, default=2.0)
     """Factor on the population at each restart (IPOP)."""
