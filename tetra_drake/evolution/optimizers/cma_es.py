@@ -1,7 +1,7 @@
 """CMA-ES with restarts, through pycma (Hansen, arXiv 1604.00772; IPOP: Auger and Hansen, CEC 2005).
 
-Below a floor the search space is mirrored, so that no vector is thrown away there; pycma is told
-the mirror images.
+pycma searches the roots of the distances to floors (see Ranges.from_roots), so that no vector is
+thrown away, and nothing keeps it from a best vector at a floor.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.evolution.optimizers.generational import Generational, Matrix, Ranges
+from tetra_drake.evolution.optimizers.generational import (
+    MIDDLE,
+    Generational,
+    Matrix,
+    Ranges,
+)
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario import optimizers as kinds
 from tetra_drake.scenario.schema import EvolutionScenario
-
-MIDDLE = 0.5
 
 
 class CmaEs(Generational):
@@ -46,7 +49,7 @@ class CmaEs(Generational):
         untried = (each for each in self._searches if each.evaluations < self._own.tryout)
         self._current = next(untried, None) or max(self._searches, key=lambda each: each.best)
         if self._current.begun:
-            return self._ranges.mirrored(self._current.draw())
+            return self._current.draw()
         return self._random(self._own.sample)
 
     def _learn(self, fitnesses: Vector) -> None:
@@ -62,14 +65,15 @@ class _Search:
     where it has converged, anew around its best point, with a larger population."""
 
     def __init__(self, own: kinds.CmaEs, ranges: Ranges, generator: np.random.Generator) -> None:
-        self._own, self._generator, self._size = own, generator, ranges.size
-        self._population = own.population or 4 + int(3.0 * math.log(max(2, self._size)))
+        self._own, self._ranges, self._generator = own, ranges, generator
+        self._population = own.population or 4 + int(3.0 * math.log(max(2, ranges.size)))
         self.evaluations = self.restarts = 0
         self.best = -math.inf
         """Fitness of the best point."""
-        self._best = np.full(self._size, MIDDLE)
-        self._spare: Matrix = np.empty((0, 0))
-        """Coordinates of pycma's that no parameter has."""
+        self._best = np.full(ranges.size, MIDDLE)
+        self._drawn: Matrix = np.empty((0, 0))
+        """The roots drawn last, with a second one where there is a single parameter only, as pycma
+        knows no single dimension."""
         self._strategy: Any = None
         """None during the sample."""
         if not own.sample:
@@ -86,10 +90,9 @@ class _Search:
         return float(np.sqrt(np.mean(self._strategy.stds**2))) if self.begun else None
 
     def draw(self) -> Matrix:
-        """Points of the normal distribution, also below floors."""
-        drawn = np.array(self._strategy.ask())
-        self._spare = drawn[:, self._size :]
-        return drawn[:, : self._size]
+        """Points of the distribution."""
+        self._drawn = np.array(self._strategy.ask())
+        return self._ranges.from_roots(self._drawn[:, : self._ranges.size])
 
     def learn(self, points: Matrix, fitnesses: Vector) -> None:
         """Takes the points evaluated for it and their fitnesses."""
@@ -100,7 +103,8 @@ class _Search:
         if not self.begun:
             self._begin(points[order[: max(1, len(order) // 4)]].mean(axis=0))
             return
-        told = np.hstack([points, self._spare])
+        told, size = self._drawn, self._ranges.size
+        told[:, :size] = np.copysign(self._ranges.roots(points), told[:, :size])
         self._strategy.tell(list(told), (-fitnesses).tolist(), check_points=False)
         if self._strategy.stop():
             self.restarts += 1
@@ -117,5 +121,5 @@ class _Search:
             "seed": math.nan,  # leaves the generator of numpy alone
             "verbose": -10,  # and reads no file of signals
         }
-        padded = np.pad(start, (0, max(0, 2 - self._size)))  # as pycma knows no single dimension
-        self._strategy = cma.CMAEvolutionStrategy(padded, self._own.sigma, options)
+        roots = np.pad(self._ranges.roots(start), (0, max(0, 2 - len(start))))
+        self._strategy = cma.CMAEvolutionStrategy(roots, self._own.sigma, options)

@@ -14,6 +14,9 @@ from tetra_drake.scenario.schema import EvolutionScenario
 
 Matrix = npt.NDArray[np.float64]
 
+MIDDLE = 0.5
+"""Of a range, in its units."""
+
 
 class Ranges:
     """The parameters that vary, in units of their ranges in random gaits: 0 is the lower bound, 1
@@ -33,9 +36,19 @@ class Ranges:
         vector[self._free] += point * self._width
         return self._space.repair(np.maximum(vector, self._space.floors))
 
-    def mirrored(self, points: Matrix) -> Matrix:
-        """The points with what is below its floor as far above it."""
-        return np.where(points < self.floors, 2.0 * self.floors - points, points)
+    def from_roots(self, roots: Matrix) -> Matrix:
+        """The points floor + root^2 / (4 (MIDDLE - floor)), and the roots where there is no floor.
+
+        All roots are allowed, and a best point at the floor is one that fitness is smooth around.
+        In the middle of its range, a point moves as its root does.
+        """
+        points = self.floors + roots**2 / (4.0 * (MIDDLE - self.floors))
+        return np.where(np.isfinite(self.floors), points, roots)
+
+    def roots(self, points: Matrix) -> Matrix:
+        """The roots of points, none negative where there is a floor."""
+        roots = 2.0 * np.sqrt((MIDDLE - self.floors) * (points - self.floors))
+        return np.where(np.isfinite(self.floors), roots, points)
 
     def point(self, vector: Vector) -> Vector:
         """The point of a vector."""

@@ -37,6 +37,8 @@ class QualityDiversity(Generational):
 
         super().__init__(space, settings, generator)
         self._own = own = own or kinds.QualityDiversity()
+        self._roots: Matrix = np.empty((0, self._ranges.size))
+        """Those drawn last; see Ranges.from_roots()."""
         self._told: dict[str, Any] = {}
         self._added: dict[str, Any] = {}
         self._archive = GridArchive(
@@ -57,7 +59,7 @@ class QualityDiversity(Generational):
         self._emitters = [
             EvolutionStrategyEmitter(
                 self._archive,
-                x0=self._random(1)[0],
+                x0=self._ranges.roots(self._random(1))[0],
                 sigma0=own.sigma,
                 es=make_strategy,
                 ranker="imp",
@@ -73,13 +75,15 @@ class QualityDiversity(Generational):
         return int(self._generator.integers(2**63))
 
     def follow(self, vectors: Sequence[Vector]) -> None:
-        """Takes these vectors in place of those asked for, as if none had been mirrored."""
+        """Takes these vectors in place of those asked for."""
         super().follow(vectors)
+        self._roots = np.copysign(self._ranges.roots(self._points), self._roots)
         for i, strategy in enumerate(self._strategies):
-            strategy._solutions = self._points[i * self._own.batch :][: self._own.batch].copy()
+            strategy._solutions = self._roots[i * self._own.batch :][: self._own.batch].copy()
 
     def _draw(self) -> Matrix:
-        return self._ranges.mirrored(np.concatenate([e.ask() for e in self._emitters]))
+        self._roots = np.concatenate([emitter.ask() for emitter in self._emitters])
+        return self._ranges.from_roots(self._roots)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes a batch."""
@@ -94,8 +98,7 @@ class QualityDiversity(Generational):
         self._added = {"status": np.zeros(len(known), np.int32), "value": np.zeros(len(known))}
         if known.any():
             chosen = {key: values[known] for key, values in self._told.items()}
-            points = self._points[: len(known)][known]
-            added = self._archive.add(solution=points, **chosen)
+            added = self._archive.add(solution=self._roots[: len(known)][known], **chosen)
             for key, values in added.items():
                 self._added[key][known] = values
             self._added["value"][~known] = np.min(added["value"]) - 1.0
@@ -106,7 +109,7 @@ class QualityDiversity(Generational):
     def _learn(self, fitnesses: Vector) -> None:
         if self._archive.empty:
             return
-        told = {"solution": self._points, **self._told}
+        told = {"solution": self._roots, **self._told}
         for i, emitter in enumerate(self._emitters):
             own = slice(i * self._own.batch, (i + 1) * self._own.batch)
             added = {key: values[own] for key, values in self._added.items()}
