@@ -118,11 +118,21 @@ def test_mpi_is_an_executor(tmp_path):
     if not (mpiexec := shutil.which("mpiexec")):
         pytest.skip("mpiexec is not installed")
     (tmp_path / "mpi.py").write_text(PROGRAM + MPI)
+    as_root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     ended = subprocess.run(
-        [mpiexec, "-n", "3", sys.executable, "-m", "mpi4py.futures", tmp_path / "mpi.py"],
+        [
+            mpiexec,
+            "--oversubscribe",
+            "-n",
+            "3",
+            sys.executable,
+            "-m",
+            "mpi4py.futures",
+            tmp_path / "mpi.py",
+        ],
         text=True,
         capture_output=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        env=os.environ | as_root | {"PYTHONPATH": os.pathsep.join(sys.path)},
         timeout=60,
     )
     assert ended.stdout.splitlines() == [str([True] * 9)] * 2, ended.stderr

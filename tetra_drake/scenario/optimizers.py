@@ -28,7 +28,8 @@ class CmaEs:
     tryout: int = setting(at_least=1, default=350)
     """Evaluations in which each of them is tried out."""
     sigma: float = setting(above=0, default=0.2)
-    """Standard deviation at the start, as a share of each parameter's range in random gaits."""
+    """Standard deviation at the start, as a share of each parameter's range in random gaits (in its
+    middle; smaller near a floor)."""
     tolerance: float = setting(above=0, default=0.05)
     """It has converged where all standard deviations are below this share of the ranges."""
     growth: float = setting(at_least=1, default=2.0)
