@@ -38,7 +38,13 @@ from tetra_drake.report.replay_page import write_replay
 from tetra_drake.results.folder import REPLAY
 from tetra_drake.run import evolve
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
+from tetra_drake.scenario.optimizers import (
+    CmaEs,
+    DifferentialEvolution,
+    OptimizerKind,
+    QualityDiversity,
+    RandomSearch,
+)
 from tetra_drake.scenario.schema import Scenario
 
 HERE = Path(__file__).parent
@@ -65,10 +71,10 @@ class Experiment:
 _COMPILED = {"simulation.engine": "compiled"}
 
 
-def _by_cma_es(trials: int, evaluations: int, **settings: Any) -> dict[str, Any]:
+def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, Any]:
     """Changes of an experiment on the compiled engine."""
     sizes = {"evolution.trials": trials, "evolution.max_evaluations": evaluations}
-    return {**_COMPILED, "optimizer": CmaEs(**settings), **sizes}
+    return {**_COMPILED, "optimizer": optimizer, **sizes}
 
 
 EXPERIMENTS = {
@@ -81,31 +87,38 @@ EXPERIMENTS = {
         "thesis",
         {"evolution.trials": 1, "evolution.max_iterations": 200},
     ),
+    "cma": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
+    "de": Experiment(
+        "the same by differential evolution", "thesis", _by(DifferentialEvolution(), 10, 4000)
+    ),
+    "random": Experiment("the same at random, a baseline", "thesis", _by(RandomSearch(), 10, 4000)),
     "coulomb": Experiment("the same under friction that grows with the load", "coulomb", _COMPILED),
-    "incline": Experiment("up an incline of 5°", "incline", _by_cma_es(3, 2000)),
-    "steps": Experiment("up four steps of 0.25 in", "steps", _by_cma_es(3, 2000)),
-    "rough": Experiment("over rough ground", "rough", _by_cma_es(3, 2000)),
+    "incline": Experiment("up an incline of 5°", "incline", _by(CmaEs(), 3, 2000)),
+    "steps": Experiment("up four steps of 0.25 in", "steps", _by(CmaEs(), 3, 2000)),
+    "rough": Experiment("over rough ground", "rough", _by(CmaEs(), 3, 2000)),
     "rough-feedback": Experiment(
-        "over rough ground, with feedback to the oscillators", "feedback", _by_cma_es(3, 2000)
+        "over rough ground, with feedback to the oscillators", "feedback", _by(CmaEs(), 3, 2000)
     ),
     "undulation": Experiment(
         "an oscillator for each bottom cable, so that the robot can undulate",
         "undulation",
-        _by_cma_es(3, 2000),
+        _by(CmaEs(), 3, 2000),
     ),
-    "turning": Experiment("turning on the spot, in 30 s", "turning", _by_cma_es(3, 2000)),
-    "robust": Experiment("far on eight disturbed robots", "robust", _by_cma_es(3, 1000)),
-    "efficient": Experiment("with little work", "efficient", _by_cma_es(3, 2000)),
+    "turning": Experiment("turning on the spot, in 30 s", "turning", _by(CmaEs(), 3, 2000)),
+    "robust": Experiment("far on eight disturbed robots", "robust", _by(CmaEs(), 3, 1000)),
+    "efficient": Experiment("with little work", "efficient", _by(CmaEs(), 3, 2000)),
     "twelve": Experiment(
-        "twelve tetrahedra", "thesis", _by_cma_es(2, 1000) | {"robot.tetrahedra": 12}
+        "twelve tetrahedra", "thesis", _by(CmaEs(), 2, 1000) | {"robot.tetrahedra": 12}
     ),
     "champion": Experiment(
-        "the farthest: a long search", "thesis", _by_cma_es(2, 20000, population=40)
+        "the farthest: a long search",
+        "thesis",
+        _by(CmaEs(population=20, starts=20, tryout=400), 2, 20000),
     ),
     "map": Experiment(
         "gaits that differ, the fittest of each kind",
         "thesis",
-        _by_cma_es(1, 20000) | {"optimizer": QualityDiversity()},
+        _by(QualityDiversity(), 1, 30000),
     ),
 }
 """By the names of their folders, in the order of the gallery."""
