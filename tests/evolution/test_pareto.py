@@ -62,7 +62,7 @@ def test_steadiness_is_the_worst_draws_share_of_the_mean_distance(tmp_path):
     run = load_run(write_run(tmp_path / "run", [trial]))
     worst = [2.0, 6.0, 4.8, 3.9, -2.0]  # of means 10, 8, 6, 4 and -2 in
     run = dataclasses.replace(run, evaluations=run.evaluations.assign(worst_distance_in=worst))
-    gaits = forward_gaits(run)
+    gaits = forward_gaits(run.evaluations)
     assert trades(gaits) == [STEADINESS]
     np.testing.assert_allclose(STEADINESS.of(gaits), [0.2, 0.75, 0.8, 0.975], rtol=1e-12)
     # The last one walks less than half as far as the farthest.
@@ -73,5 +73,5 @@ def test_steadiness_is_the_worst_draws_share_of_the_mean_distance(tmp_path):
 @pytest.mark.parametrize("metrics", [{}, {-1.0: {"cost_of_transport": 1.0}}])
 def test_without_a_number_to_trade_there_are_no_champions(tmp_path, metrics):
     run = load_run(write_run(tmp_path / "run", [[[(3.0, 0), (-1.0, 1)]]], metrics=metrics))
-    assert trades(forward_gaits(run)) == []
+    assert trades(forward_gaits(run.evaluations)) == []
     assert champions(run) == {}

@@ -43,7 +43,7 @@ def elites(run: Run) -> pandas.DataFrame:
     """
     import pandas
 
-    table, kind = run.evaluations, run.manifest.scenario.optimizer
+    table, kind = run.whole, run.manifest.scenario.optimizer
     judged = pandas.DataFrame(read_lines(run.directory / ELITES), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > kind.floor].dropna(subset=list(kind.measures))

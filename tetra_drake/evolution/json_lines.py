@@ -1,5 +1,5 @@
-"""Append-only files of JSON objects, one per line, that survive a kill at any moment. A complete
-one can be read after `xz` has compressed it to NAME.xz, too."""
+"""Append-only files of JSON objects, one per line, that survive a kill at any moment. Those that
+`xz` has compressed are NAME.xz; what is appended later stands in NAME."""
 
 from __future__ import annotations
 
@@ -15,8 +15,6 @@ from tetra_drake.errors import InputError
 
 def append_lines(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
     """Appends the entries, handed to the system on return; a kill can tear only the last line."""
-    if _compressed(path).exists():
-        raise InputError(_compressed(path), "", "is compressed; to add to it, decompress it first")
     text = "".join(json.dumps(entry, allow_nan=False) + "\n" for entry in entries)
     try:
         with path.open("ab") as file:
@@ -35,18 +33,20 @@ def repair_torn_line(path: Path) -> None:
 def read_lines(path: Path) -> list[dict[str, Any]]:
     """The entries of all whole lines; none if there is no file. InputError, naming file and line,
     where a line is not a JSON object."""
-    packed = _compressed(path)
-    path = packed if packed.exists() else path
-    try:
-        content = path.read_bytes() if path.exists() else b""
-        content = lzma.decompress(content) if path == packed else content
-    except (OSError, lzma.LZMAError) as error:
-        raise InputError(path, "", f"cannot be read: {error}") from error
-    lines = content.split(b"\n")[:-1]
-    return [_parse(line, path, number) for number, line in enumerate(lines, start=1)]
+    entries = []
+    for file in (compressed(path), path):
+        try:
+            content = file.read_bytes() if file.exists() else b""
+            content = lzma.decompress(content) if content and file != path else content
+        except (OSError, lzma.LZMAError) as error:
+            raise InputError(file, "", f"cannot be read: {error}") from error
+        lines = content.split(b"\n")[:-1]
+        entries += [_parse(line, file, number) for number, line in enumerate(lines, start=1)]
+    return entries
 
 
-def _compressed(path: Path) -> Path:
+def compressed(path: Path) -> Path:
+    """The compressed file of lines, which stands before `path` or in its place."""
     return path.with_name(path.name + ".xz")
 
 

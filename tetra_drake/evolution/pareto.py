@@ -60,9 +60,9 @@ def pareto_front(points: np.ndarray) -> np.ndarray:
     return front
 
 
-def forward_gaits(run: Run) -> pandas.DataFrame:
-    """The evaluations with a fitness that walk forward."""
-    return run.evaluations.dropna(subset="fitness").query("distance > 0.0")
+def forward_gaits(evaluations: pandas.DataFrame) -> pandas.DataFrame:
+    """Those evaluations with a fitness that walk forward."""
+    return evaluations.dropna(subset="fitness").query("distance > 0.0")
 
 
 def trades(gaits: pandas.DataFrame) -> list[Trade]:
@@ -80,7 +80,7 @@ def front_of(gaits: pandas.DataFrame, trade: Trade) -> pandas.DataFrame:
 def champions(run: Run) -> dict[str, pandas.Series]:
     """By name, the farthest of the gaits that walk forward and, for each trade, the best in it that
     walks at least NEAREST as far: rows of the evaluations. Empty where there is no trade."""
-    gaits = forward_gaits(run)
+    gaits = forward_gaits(run.whole)
     near = gaits[gaits["distance"] >= NEAREST * gaits["distance"].max()]
     best = {"farthest": gaits["distance"].idxmax()} if trades(gaits) else {}
     for trade in trades(near):

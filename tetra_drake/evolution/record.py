@@ -62,7 +62,7 @@ _ITERATION_KEYS = {
 _EVALUATION_KEYS = {
     "index": int,
     "iteration": int,
-    "genome": list,
+    "genome": list | None,
     "metrics": dict,
     "fitness": float | int | None,
     "failure": str | None,
@@ -95,6 +95,8 @@ class Manifest:
     seed: int
     versions: Mapping[str, str]
     method: Method
+    thinned: bool = False
+    """Whether most genomes were left out; see `thinning`."""
 
     @property
     def longest_trial(self) -> str:
@@ -129,7 +131,7 @@ def read_manifest(directory: Path) -> Manifest:
         method = Method.from_json(raw, path)
     if not unchanged:
         raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
-    return Manifest(scenario, raw["seed"], raw["versions"], method)
+    return Manifest(scenario, raw["seed"], raw["versions"], method, raw.get("thinned", False))
 
 
 @dataclass(frozen=True)
@@ -170,6 +172,8 @@ class RunRecord:
     ) -> RunRecord:
         """Opens a run to go on with it. What is given must be the run's."""
         manifest = read_manifest(directory)
+        if manifest.thinned:
+            raise InputError(directory, "", "is thinned: it lacks genomes that resuming needs")
         if seed not in (None, manifest.seed):
             raise InputError(directory, "seed", f"the run has seed {manifest.seed}, not {seed}")
         if scenario is not None:

@@ -47,8 +47,9 @@ class Run:
     wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
     have one), the metrics (distance ...), lifted_T1 ... (Metrics.lifted_shares), distance_in, and
     the parameters: weight_1 ... in the listing's order, time_scale_T1-T2 ..., gain_length ...,
-    tau_a_s, tau_b_s. Among disturbances, also draws_fitness and draws_distance (m), lists with a
-    number for each draw (missing if it failed), and worst_distance_in."""
+    tau_a_s, tau_b_s, NaN where thinning has left them out. Among disturbances, also draws_fitness
+    and draws_distance (m), lists with a number for each draw (missing if it failed), and
+    worst_distance_in."""
     iterations: pandas.DataFrame
     """One row per iteration, 0 being the initial one: trial, iteration, evaluations so far,
     best_fitness, best_evaluation (its index), best_distance_in (that gait's), stop, and the
@@ -58,13 +59,18 @@ class Run:
     `placed`; empty if there are none."""
 
     @cached_property
+    def whole(self) -> pandas.DataFrame:
+        """The evaluations with their genomes: all of them, unless the run is thinned."""
+        return self.evaluations[self.evaluations.filter(self._columns).notna().all(axis=1)]
+
+    @cached_property
     def statuses(self) -> list[TrialStatus]:
         """The state of each trial."""
         return [self._status(trial) for trial in range(self.manifest.scenario.evolution.trials)]
 
     def best(self, count: int = 1) -> pandas.DataFrame:
         """The fittest different gaits of each trial, best first: rows of `evaluations`."""
-        ranked = self.evaluations.dropna(subset="fitness").sort_values(
+        ranked = self.whole.dropna(subset="fitness").sort_values(
             ["trial", "fitness", "index"], ascending=[True, False, True]
         )
         return ranked.drop_duplicates(["trial", *self._columns]).groupby("trial").head(count)
@@ -101,8 +107,11 @@ class Run:
         return rows.sort_values("placed")
 
     def vector(self, trial: int, index: int) -> Vector:
-        """The parameters of an evaluation."""
-        rows = self.evaluations.set_index(["trial", "index"])
+        """The parameters of an evaluation; InputError if thinning has left them out."""
+        rows = self.whole.set_index(["trial", "index"])
+        if (trial, index) not in rows.index:
+            problem = f"has no genome of trial {trial}, evaluation {index}"
+            raise InputError(self.directory, "", problem)
         return rows.loc[(trial, index), self._columns].to_numpy(dtype=np.float64)
 
     def gait(self, trial: int, index: int) -> Gait:
@@ -181,7 +190,8 @@ def _table(directory: Path, trials: int, name: str, columns: list[str]) -> panda
 
 def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:
     """A line of evaluations with a column for each number."""
-    parameters = dict(zip(columns, entry.pop("genome"), strict=True))
+    genome = entry.pop("genome") or [math.nan] * len(columns)
+    parameters = dict(zip(columns, genome, strict=True))
     metrics = dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
     shares = enumerate(metrics.pop("lifted_shares", []), start=1)
     metrics |= {f"lifted_T{number}": share for number, share in shares}

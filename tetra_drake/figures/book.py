@@ -57,7 +57,7 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
         pictures.append((evolution.initial_fitness, run, study.trial))
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
-    if trades(forward_gaits(run)):
+    if trades(forward_gaits(run.evaluations)):
         pictures.append((pareto.pareto, run))
     walks = [(walk.label, walk.trajectory) for walk in (initial, best)]
     scenario = run.manifest.scenario

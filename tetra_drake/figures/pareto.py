@@ -52,7 +52,7 @@ def pareto(run: Run) -> Figure:
     The cheapest and the steadiest gait are found among those that walk at least half as far as the
     farthest, above the dotted line. Steadiness is the distance in a gait's worst draw as a share of
     its mean distance, by the draws of its own iteration."""
-    gaits = forward_gaits(run)
+    gaits = forward_gaits(run.evaluations)
     fittest = run.evaluation(*run.fittest())
     marked = distinct_gaits({"fittest": fittest} | champions(run))
     panels = trades(gaits)

@@ -1,0 +1,104 @@
+"""A recorded run in a tenth of its size, for publishing.
+
+    manifest.json, scenario.yaml, trial_00/best_gait.json    as they are, and `thinned` in the first
+    trial_00/evaluations.jsonl.xz      genomes and all digits of the gaits that matter alone
+    trial_00/iterations.jsonl.xz, trial_00/reevaluations.jsonl.xz (without genomes), elites.jsonl.xz
+
+The gaits that matter are the first of each trial, each best so far, the last population, the best
+of each trial, those evaluated again on the diagram, the champions and those of a map.
+"""
+
+from __future__ import annotations
+
+import decimal
+import json
+import lzma
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from tetra_drake.evolution.elites import ELITES, elites
+from tetra_drake.evolution.json_lines import compressed, read_lines
+from tetra_drake.evolution.pareto import champions
+from tetra_drake.evolution.record import (
+    BEST_GAIT,
+    EVALUATIONS,
+    ITERATIONS,
+    MANIFEST,
+    REEVALUATIONS,
+    SCENARIO,
+    read_entries,
+    trial_folder,
+)
+from tetra_drake.evolution.reevaluation import BEST_GAITS
+from tetra_drake.evolution.tables import Run, load_run
+from tetra_drake.files import whole_file, write_whole
+
+_DIGITS, _WALL_TIME_DIGITS = 3, 2
+"""Significant ones of numbers of an evaluation without its genome, and of the time of all."""
+
+_DECIMALS = 9
+"""Of metrics in SI; less is rounding, such as the drift of a robot that is symmetric."""
+
+_DOWN = decimal.Context(prec=6, rounding=decimal.ROUND_FLOOR)
+"""For the fitness of an evaluation without its genome, so that none becomes a new best."""
+
+
+def thin(source: Path, out: Path) -> None:
+    """Writes a run, thinned, into the folder `out`; InputError if one cannot be read or written."""
+    run = load_run(source)
+    manifest = json.loads((source / MANIFEST).read_text(encoding="utf-8")) | {"thinned": True}
+    whole = {(int(trial), int(index)) for trial, index in _that_matter(run)}
+    for trial in range(run.manifest.scenario.evolution.trials):
+        old, new = trial_folder(source, trial), trial_folder(out, trial)
+        entries = read_entries(old / EVALUATIONS)
+        thinned = [_thinned(e, whole=(trial, e["index"]) in whole) for e in entries]
+        again = read_entries(old / REEVALUATIONS)
+        _write(new / EVALUATIONS, thinned)
+        _write(new / ITERATIONS, read_entries(old / ITERATIONS))
+        _write(new / REEVALUATIONS, [entry | {"genome": None} for entry in again])
+        if (old / BEST_GAIT).exists():
+            write_whole(new / BEST_GAIT, (old / BEST_GAIT).read_text(encoding="utf-8"))
+    _write(out / ELITES, read_lines(source / ELITES))
+    write_whole(out / SCENARIO, (source / SCENARIO).read_text(encoding="utf-8"))
+    write_whole(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+
+
+def _that_matter(run: Run) -> set[tuple[Any, Any]]:
+    """Trial and index of the evaluations that keep their genomes."""
+    table = run.evaluations
+    rises = table[table["fitness"] == table.groupby("trial")["fitness"].cummax()]
+    last = [run.last_population(trial) for trial in table["trial"].unique()]
+    chosen = [run.initial(), rises, run.best(BEST_GAITS), run.reevaluations, elites(run), *last]
+    rows = [*champions(run).values(), *(row for each in chosen for _, row in each.iterrows())]
+    return {(row["trial"], row["index"]) for row in rows}
+
+
+def _thinned(entry: Mapping[str, Any], *, whole: bool) -> dict[str, Any]:
+    """An entry of evaluations as a thinned run has it."""
+    few = dict(entry) | {"wall_time_s": _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)}
+    if whole:
+        return few
+    few |= {key: _rounded(entry[key], _DIGITS) for key in ("metrics", "draws") if key in entry}
+    if entry["fitness"] is not None:
+        few["fitness"] = float(_DOWN.create_decimal_from_float(float(entry["fitness"])))
+    return few | {"genome": None}
+
+
+def _rounded(value: Any, digits: int) -> Any:
+    """A number, or those in lists and mappings, rounded."""
+    if isinstance(value, float):
+        return float(f"{round(value, _DECIMALS) + 0.0:.{digits}g}")
+    if isinstance(value, list):
+        return [_rounded(each, digits) for each in value]
+    if isinstance(value, dict):
+        return {key: _rounded(each, digits) for key, each in value.items()}
+    return value
+
+
+def _write(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
+    """Writes lines compressed, if there are any."""
+    text = "".join(json.dumps(entry, allow_nan=False) + "\n" for entry in entries)
+    if text:
+        with whole_file(compressed(path)) as temporary:
+            temporary.write_bytes(lzma.compress(text.encode(), preset=9 | lzma.PRESET_EXTREME))
