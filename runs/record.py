@@ -1,0 +1,142 @@
+"""Makes the recorded runs beside this file from nothing.
+
+    python runs/record.py [--scratch DIR] [NAME ...]
+
+Each experiment is evolved and analysed in a folder of DIR, out/runs by default, thinned into a
+folder here, and shown on a page. Interrupted, it goes on; what is done is skipped.
+
+    times.json    how long each experiment took here, in s
+"""
+
+from __future__ import annotations
+
+import argparse
+import filecmp
+import json
+import shutil
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from analyse import ANALYSIS, analyse
+
+from tetra_drake.engines.simulate import available_cores
+from tetra_drake.evolution.progress import Display
+from tetra_drake.evolution.record import MANIFEST
+from tetra_drake.evolution.reevaluation import reevaluate
+from tetra_drake.evolution.thinning import thin
+from tetra_drake.files import write_whole
+from tetra_drake.formatting import duration
+from tetra_drake.run import evolve
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
+from tetra_drake.scenario.schema import Scenario
+
+HERE = Path(__file__).parent
+TIMES = "times.json"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What makes a recorded run."""
+
+    base: str
+    """A shipped scenario."""
+    changes: Mapping[str, Any]
+    """By keys of the scenario, beside its name."""
+    initial: bool = False
+    """Whether its initial gaits are evaluated on the Drake diagram, too."""
+
+    def scenario(self, name: str) -> Scenario:
+        """Of the run of this name."""
+        return load_scenario(self.base).with_changes({"name": name} | dict(self.changes))
+
+
+_COMPILED = {"simulation.engine": "compiled"}
+
+
+def _by_cma_es(trials: int, evaluations: int, **settings: Any) -> dict[str, Any]:
+    """Changes of an experiment on the compiled engine."""
+    sizes = {"evolution.trials": trials, "evolution.max_evaluations": evaluations}
+    return {**_COMPILED, "optimizer": CmaEs(**settings), **sizes}
+
+
+EXPERIMENTS = {
+    "thesis": Experiment("thesis", _COMPILED, initial=True),
+    "thesis-listing": Experiment("thesis-listing", _COMPILED),
+    "thesis-drake": Experiment("thesis", {"evolution.trials": 1, "evolution.max_iterations": 200}),
+    "coulomb": Experiment("coulomb", _COMPILED),
+    "incline": Experiment("incline", _by_cma_es(3, 2000)),
+    "steps": Experiment("steps", _by_cma_es(3, 2000)),
+    "rough": Experiment("rough", _by_cma_es(3, 2000)),
+    "rough-feedback": Experiment("feedback", _by_cma_es(3, 2000)),
+    "undulation": Experiment("undulation", _by_cma_es(3, 2000)),
+    "turning": Experiment("turning", _by_cma_es(3, 2000)),
+    "robust": Experiment("robust", _by_cma_es(3, 1000)),
+    "efficient": Experiment("efficient", _by_cma_es(3, 2000)),
+    "twelve": Experiment("thesis", _by_cma_es(2, 1000) | {"robot.tetrahedra": 12}),
+    "champion": Experiment("thesis", _by_cma_es(2, 20000, population=40)),
+    "map": Experiment("thesis", _by_cma_es(1, 20000) | {"optimizer": QualityDiversity()}),
+}
+"""By the names of their folders, in the order of the gallery."""
+
+
+def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> None:
+    """Makes a run in `scratch` and, thinned, in `out`, from wherever that was left.
+
+    Raises InputError where `scratch` holds a run of another scenario.
+    """
+    made, shown = scratch / name, out / name
+    if _same(made / ANALYSIS, shown / ANALYSIS):
+        return
+    resume = (made / MANIFEST).exists()
+    with _timed(name, out / TIMES, resume=resume):
+        progress = Display(sys.stdout)
+        evolve(experiment.scenario(name), made, resume=resume, report=False, progress=progress)
+        if experiment.initial:
+            reevaluate(made, initial=True, progress=progress)
+        if not (made / ANALYSIS).exists():
+            analyse(made, workers=available_cores())
+        for old in {*shown.glob("*")} - {shown / "README.md"}:
+            shutil.rmtree(old) if old.is_dir() else old.unlink()
+        thin(made, shown)
+        shutil.copy(made / ANALYSIS, shown / ANALYSIS)
+
+
+def _same(first: Path, second: Path) -> bool:
+    """Whether both files are there, and alike."""
+    return first.exists() and second.exists() and filecmp.cmp(first, second, shallow=False)
+
+
+@contextmanager
+def _timed(name: str, file: Path, *, resume: bool) -> Iterator[None]:
+    """Prints how long the block takes and keeps it in a file, added to what is there already."""
+    begin = time.monotonic()
+    try:
+        yield
+    finally:
+        times = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        times[name] = round(time.monotonic() - begin) + (times.get(name, 0) if resume else 0)
+        write_whole(file, json.dumps(times, indent=1) + "\n")
+        print(f"{name}: {duration(times[name])}", flush=True)
+
+
+def main() -> None:
+    """Records the experiments of the given names, or all."""
+    assert __doc__
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("names", metavar="NAME", nargs="*", default=[*EXPERIMENTS])
+    parser.add_argument("--scratch", metavar="DIR", type=Path, default=Path("out/runs"))
+    options = parser.parse_args()
+    if unknown := {*options.names} - {*EXPERIMENTS}:
+        parser.error(f"found {', '.join(sorted(unknown))}; there are {', '.join(EXPERIMENTS)}")
+    for name in options.names:
+        record(name, EXPERIMENTS[name], scratch=options.scratch, out=HERE)
+
+
+if __name__ == "__main__":
+    main()

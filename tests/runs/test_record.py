@@ -1,0 +1,75 @@
+"""Making recorded runs: what is done is kept, and what is written can be read."""
+
+import json
+
+import pytest
+import record
+from analyse import ANALYSIS
+
+from tetra_drake.evolution.tables import load_run
+from tetra_drake.scenario.optimizers import CmaEs
+
+TINY = record.Experiment(
+    "thesis",
+    {
+        **{"simulation.engine": "compiled", "simulation.duration": 0.4},
+        **{"simulation.steady_from": 0.1, "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)},
+        **{"evolution.trials": 2, "evolution.max_evaluations": 12},
+    },
+)
+
+
+@pytest.fixture
+def quick_analysis(monkeypatch):
+    """An analysis that takes no time; the folders that were analysed."""
+    analysed = []
+
+    def analyse(directory, *, workers):
+        analysed.append(directory)
+        (directory / ANALYSIS).write_text("{}")
+
+    monkeypatch.setattr(record, "analyse", analyse)
+    return analysed
+
+
+def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, quick_analysis):
+    scratch, out = tmp_path / "scratch", tmp_path / "runs"
+    (out / "tiny").mkdir(parents=True)
+    for name in ("README.md", "figures"):
+        (out / "tiny" / name).write_text("of an older run")
+    record.record("tiny", TINY, scratch=scratch, out=out)
+    run = load_run(out / "tiny")
+    assert run.manifest.thinned and run.manifest.scenario == TINY.scenario("tiny")
+    assert run.evaluations.groupby("trial").size().tolist() == [12, 12]
+    assert run.reevaluations["engine"].unique() == ["drake"]
+    assert {file.name for file in (out / "tiny").iterdir()} == {
+        *("README.md", "analysis.json", "manifest.json", "scenario.yaml", "trial_00", "trial_01")
+    }
+    (out / "tiny/manifest.json").unlink()
+    record.record("tiny", TINY, scratch=scratch, out=out)
+    assert not (out / "tiny/manifest.json").exists()
+    (out / "tiny" / ANALYSIS).unlink()  # as if interrupted
+    record.record("tiny", TINY, scratch=scratch, out=out)
+    assert load_run(out / "tiny").evaluations.equals(run.evaluations)
+    assert quick_analysis == [scratch / "tiny"]
+    assert set(json.loads((out / record.TIMES).read_text())) == {"tiny"}
+
+
+def test_times_add_up_when_a_run_goes_on(tmp_path, monkeypatch):
+    file = tmp_path / "times.json"
+    for resume, expected in ((False, 10), (True, 20), (False, 10)):
+        with monkeypatch.context() as patch:
+            patch.setattr(record.time, "monotonic", iter([0.0, 10.0]).__next__)
+            with record._timed("a", file, resume=resume):
+                pass
+        assert json.loads(file.read_text()) == {"a": expected}
+    with pytest.raises(KeyboardInterrupt), record._timed("b", file, resume=False):
+        raise KeyboardInterrupt
+    assert json.loads(file.read_text())["b"] == 0
+
+
+def test_every_experiment_is_a_scenario():
+    for name, experiment in record.EXPERIMENTS.items():
+        scenario = experiment.scenario(name)
+        assert scenario.name == name
+        assert (scenario.simulation.engine == "drake") == (name == "thesis-drake")
