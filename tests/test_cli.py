@@ -96,6 +96,9 @@ def unchanged(work):
         ("diagram --scenario short.yaml --out a.docx", "a.docx", ".docx"),
         ("replay good.json --out folder", "folder", ""),
         ("replay good.json --out good.json/a.html", "good.json", ""),
+        ("replay good.json --out a.html --viewer folder", "folder", ""),
+        ("replay good.json --out a.html --viewer good.json/a.js", "good.json", ""),
+        ("replay good.json --out a.html --viewer six.yaml --scenario short.yaml", "six.yaml", ""),
     ],
 )
 def test_bad_files_and_places_are_refused_in_one_line(command, source, values, unchanged, capsys):
@@ -240,6 +243,14 @@ def test_replay_makes_the_page_of_simulate_from_its_recording_and_from_the_gait(
         page = (work / "sub/again.html").read_bytes()
         assert page == (simulated[0] / "replay.html").read_bytes()
         assert capsys.readouterr().out.splitlines()[-1].endswith("again.html")
+
+
+def test_replay_writes_a_small_page_beside_a_viewer_that_pages_share(simulated, work):
+    for name in ("a", "b"):
+        arguments = ["replay", str(simulated[0]), "--out", f"{name}/replay.html"]
+        assert main([*arguments, "--viewer", "meshcat.js"]) == 0
+    assert Path("a/replay.html").read_bytes() == Path("b/replay.html").read_bytes()
+    assert Path("a/replay.html").stat().st_size < 200_000 < Path("meshcat.js").stat().st_size
 
 
 @pytest.mark.parametrize(

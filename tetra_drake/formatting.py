@@ -68,4 +68,5 @@ def render(template: str, **values: object) -> str:
     source = (resources.files("tetra_drake") / template).read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined)
     environment.filters.update(fixed=fixed, duration=duration)
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":")}  # compact, not sorted
     return environment.from_string(source).render(values)

@@ -59,9 +59,9 @@ def browser():
 
 
 @contextlib.contextmanager
-def opened(browser, address, *, size=WINDOW, offline=True, received=None):
-    """A page, which must not complain, nor ask for anything but what lies beside it; what comes
-    through a socket is `received`."""
+def opened(browser, address, *, size=WINDOW, offline=True, received=None, beside=None):
+    """A page, which must not complain, nor ask for anything but what lies beside it, or in the
+    folder `beside`; what comes through a socket is `received`."""
     complaints, requests, messages = [], [], [] if received is None else received
     viewport = dict(zip(("width", "height"), size, strict=True))
     with contextlib.closing(browser.new_context(viewport=viewport, offline=offline)) as context:
@@ -76,7 +76,7 @@ def opened(browser, address, *, size=WINDOW, offline=True, received=None):
         page.goto(address)
         yield page
     assert not complaints
-    local = ("data:", "blob:", address.rpartition("/")[0])
+    local = ("data:", "blob:", beside.as_uri() if beside else address.rpartition("/")[0])
     assert not [url for url in requests if not url.startswith(local)]
 
 
@@ -86,6 +86,27 @@ def page(browser, replay):
     with opened(browser, replay.as_uri()) as loaded:
         loaded.wait_for_function("parseFloat(document.getElementById('clock').value) > 0.1")
         yield loaded
+
+
+def test_pages_that_share_a_viewer_play_and_say_so_where_it_is_missing(
+    browser, trajectory, tmp_path
+):
+    path, viewer = tmp_path / "run" / "replay.html", tmp_path / "the viewer's.js"
+    scenario = load_scenario("thesis")
+    save_replay(path, scenario=scenario, trajectory=trajectory, title="small", viewer=viewer)
+    with opened(browser, path.as_uri(), beside=tmp_path) as page:
+        animation.wait_until_loaded(page)
+        assert page.evaluate("viewer.animator.duration") == pytest.approx(5.0)
+        page.wait_for_function("parseFloat(document.getElementById('clock').value) > 0.1")
+        assert page.locator("h1").text_content() == "small"
+        assert page.get_by_text("Open Controls", exact=True).is_visible()
+    viewer.rename(tmp_path / "elsewhere.js")
+    with contextlib.closing(browser.new_page()) as page:
+        page.goto(path.as_uri())
+        page.wait_for_function("document.body.innerText.startsWith('Missing')")
+        assert page.locator("body").inner_text().splitlines() == [
+            "Missing: ../the%20viewer%27s.js, the viewer of this page."
+        ]
 
 
 def pixels_of(image, name):

@@ -15,17 +15,27 @@ from tetra_drake.scenario.schema import Scenario
 from tetra_drake.visualization.replay import replay_title, save_replay
 
 
-def write_replay(source: Path, out: Path, *, scenario: str | None = None) -> str:
+def write_replay(
+    source: Path, out: Path, *, scenario: str | None = None, viewer: Path | None = None
+) -> str:
     """Writes the replay page of what load_recording() finds; returns the page's title.
 
-    Raises InputError, before anything is simulated, if `out` cannot be written.
+    With `viewer`, a file, the page shares Meshcat's script with others (see save_replay).
+    Raises InputError, before anything is simulated, if the files cannot be written.
     """
-    if out.is_dir():
-        raise InputError(out, "", "is a directory, expected a file to write")
-    check_folder(out.parent)
+    for file in (out,) if viewer is None else (out, viewer):
+        if file.is_dir():
+            raise InputError(file, "", "is a directory, expected a file to write")
+        check_folder(file.parent)
     recording = load_recording(source, scenario=scenario)
     title = replay_title(recording.gait.name, recording.trajectory)
-    save_replay(out, scenario=recording.scenario, trajectory=recording.trajectory, title=title)
+    save_replay(
+        out,
+        scenario=recording.scenario,
+        trajectory=recording.trajectory,
+        title=title,
+        viewer=viewer,
+    )
     return title
 
 

@@ -6,16 +6,20 @@ import base64
 import gzip
 import html
 import logging
+import os
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams
 from pydrake.math import RigidTransform
 
+from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import fixed, render
 from tetra_drake.robot.ground import make_ground
@@ -38,7 +42,11 @@ if TYPE_CHECKING:
     import xarray
 
 FRAMES_PER_SECOND = 25.0
-"""Key frames per second of motion, at most; 15 s of motion give a page of 2.5 MB."""
+"""Key frames per second of motion, at most."""
+
+RESOLUTION = 2.0**-16
+"""To what pages round positions and sizes (m) and quaternions; 15 s of the thesis's robot then take
+0.2 MB, and Meshcat's script 1 MB."""
 
 TRACE_FRAMES = 5
 """Key frames per piece of the traces, each of which becomes visible when it ends."""
@@ -47,7 +55,7 @@ TICKS_PER_SECOND = 100_000
 """Resolution of the time of key frames: Meshcat counts in integers."""
 
 REPETITIONS = 1_000_000
-"""How often the page plays the motion before it stops."""
+"""How often the motion is played before it stops."""
 
 LEGEND = {
     "actuated": "actuated cable",
@@ -60,23 +68,79 @@ LEGEND = {
 }
 
 
+@dataclass(frozen=True)
+class Film:
+    """What moves in a scene, and when."""
+
+    ticks: list[int]
+    """Of the key frames, from 0."""
+    motions: list[Motion]
+    """Over these frames."""
+    traces: dict[str, int]
+    """By path in the scene: the tick when a piece becomes visible."""
+
+    def animation(self) -> MeshcatAnimation:
+        """The film as Meshcat plays it."""
+        animation = MeshcatAnimation(frames_per_second=TICKS_PER_SECOND)
+        animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
+        animation.set_repetitions(REPETITIONS)
+        for motion in self.motions:
+            for frame, tick in enumerate(self.ticks):
+                position = motion.positions[frame]
+                if motion.quaternions is None:
+                    animation.SetProperty(tick, motion.path, "position", position.tolist())
+                else:
+                    pose = RigidTransform(Quaternion(motion.quaternions[frame]), position)
+                    animation.SetTransform(tick, motion.path, pose)
+                if motion.scales is not None:
+                    scale = motion.scales[frame].tolist()
+                    animation.SetProperty(tick, motion.path, "scale", scale)
+        for path, shown in self.traces.items():
+            animation.SetProperty(0, path, "visible", False)
+            for tick in {shown, self.ticks[-1]}:  # a motion that ends earlier repeats
+                animation.SetProperty(tick, path, "visible", True)
+        return animation
+
+    def packed(self) -> dict[str, Any]:
+        """The film as overlay.html.jinja plays it, small when compressed: motions are steps from
+        frame to frame, the first one from 0, in RESOLUTION, in a row for each component."""
+        return {
+            "per_second": TICKS_PER_SECOND,
+            "resolution": RESOLUTION,
+            "repetitions": REPETITIONS,
+            "ticks": self.ticks,
+            "motions": {motion.path: _steps(motion) for motion in self.motions},
+            "traces": self.traces,
+        }
+
+
 def save_replay(
-    path: str | Path, *, scenario: Scenario, trajectory: xarray.Dataset, title: str
+    path: str | Path,
+    *,
+    scenario: Scenario,
+    trajectory: xarray.Dataset,
+    title: str,
+    viewer: str | Path | None = None,
 ) -> None:
     """Writes the page that replays a trajectory.
 
-    Every key frame is a sample of the trajectory; browsers interpolate between key frames.
+    Every key frame is a sample of the trajectory; browsers interpolate between key frames. With
+    `viewer`, the page reads Meshcat's script, which is most of it, from that file, so that pages
+    can share it; it is written if it does not exist.
 
-    Raises InputError if `path` cannot be written.
+    Raises InputError if `path` or `viewer` cannot be written, or `viewer` holds anything else.
     """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     structure = MakeStructure(scenario)
     add_robot(meshcat, structure)
-    show_replay(meshcat, scenario=scenario, trajectory=trajectory)
+    film = add_film(meshcat, scenario=scenario, trajectory=trajectory)
     absent = set(CABLE_KINDS) - {cable_kind(cable) for cable in structure.cables}
     legend = {name: meaning for name, meaning in LEGEND.items() if name not in absent}
-    page = _with_overlay(meshcat.StaticHtml(), title, legend)
-    write_whole(path, pack_page(page, title=title))
+    page = meshcat.StaticHtml()
+    if viewer is not None:
+        page, script = _without_viewer(page, address=_relative(viewer, Path(path).parent))
+        _write_once(viewer, script)
+    write_whole(path, pack_page(_with_overlay(page, title, legend, film), title=title))
 
 
 def replay_title(gait: str, trajectory: xarray.Dataset) -> str:
@@ -88,15 +152,53 @@ def replay_title(gait: str, trajectory: xarray.Dataset) -> str:
 
 def show_replay(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset) -> None:
     """Lets a Meshcat that shows the scenario's robot (scene.add_robot) play a trajectory."""
+    meshcat.SetAnimation(add_film(meshcat, scenario=scenario, trajectory=trajectory).animation())
+
+
+def add_film(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset) -> Film:
+    """Sets the first frame of a trajectory, its surroundings and its traces in a Meshcat that shows
+    the scenario's robot (scene.add_robot), but plays nothing."""
     structure = MakeStructure(scenario)
     ground = make_ground(scenario, structure)
     set_surroundings(meshcat, structure, ground, trajectory["p_WN"].values)
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
-    film = _Film(meshcat, frames["time"].values)
-    film.add_traces(frames["p_WN"].values[:, :, [BOTTOM_LEFT, BOTTOM_RIGHT]])
-    for motion in motions(structure, ground, frames):
-        film.add(motion)
-    film.publish()
+    times = frames["time"].values
+    ticks = np.rint((times - times[0]) * TICKS_PER_SECOND).astype(int).tolist()
+    moving = list(motions(structure, ground, frames))
+    for motion in moving:
+        meshcat.SetTransform(motion.path, motion.matrix(0))
+    bottom = _rounded(frames["p_WN"].values[:, :, [BOTTOM_LEFT, BOTTOM_RIGHT]]) * RESOLUTION
+    return Film(ticks, moving, _add_traces(meshcat, bottom, ticks))
+
+
+def _add_traces(meshcat: Meshcat, paths: np.ndarray, ticks: list[int]) -> dict[str, int]:
+    """Paths (frames, ..., 3) in m of nodes, in pieces; returns when each has been walked."""
+    steps = np.stack([paths[:-1], paths[1:]]).reshape(2, len(paths) - 1, -1, 3)
+    traces = {}
+    for first in range(0, len(paths) - 1, TRACE_FRAMES):
+        last = min(first + TRACE_FRAMES, len(paths) - 1)
+        start, end = steps[:, first:last].reshape(2, -1, 3).swapaxes(1, 2)
+        path = f"/traces/{ticks[last] / TICKS_PER_SECOND:g} s"
+        meshcat.SetLineSegments(path, start, end, rgba=rgba("trace"))
+        traces[path] = ticks[last]
+    return traces
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Whole multiples of RESOLUTION."""
+    return np.rint(values / RESOLUTION).astype(int)
+
+
+def _steps(motion: Motion) -> dict[str, list[list[int]]]:
+    """By property of the object: a row of steps for each component (see Film.packed)."""
+    values = {"position": motion.positions, "scale": motion.scales}
+    if motion.quaternions is not None:
+        values["quaternion"] = np.roll(motion.quaternions, -1, axis=1)  # x y z w
+    return {
+        name: np.diff(_rounded(rows.T), prepend=0).tolist()
+        for name, rows in values.items()
+        if rows is not None
+    }
 
 
 def frame_samples(times: np.ndarray, rate: float = FRAMES_PER_SECOND) -> np.ndarray:
@@ -120,62 +222,46 @@ def quiet_meshcat(params: MeshcatParams) -> Meshcat:
         logger.setLevel(level)
 
 
-class _Film:
-    """Key frames of an animation, one for each of `times` (s)."""
-
-    def __init__(self, meshcat: Meshcat, times: np.ndarray) -> None:
-        self._meshcat = meshcat
-        self._animation = MeshcatAnimation(frames_per_second=TICKS_PER_SECOND)
-        self._animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
-        self._animation.set_repetitions(REPETITIONS)
-        self._ticks = np.rint((times - times[0]) * TICKS_PER_SECOND).astype(int).tolist()
-
-    def add_traces(self, paths: np.ndarray) -> None:
-        """Paths (frames, ..., 3) in m of nodes, in pieces that are shown once walked."""
-        steps = np.stack([paths[:-1], paths[1:]]).reshape(2, len(paths) - 1, -1, 3)
-        for first in range(0, len(paths) - 1, TRACE_FRAMES):
-            last = min(first + TRACE_FRAMES, len(paths) - 1)
-            start, end = steps[:, first:last].reshape(2, -1, 3).swapaxes(1, 2)
-            path = f"/traces/{self._ticks[last] / TICKS_PER_SECOND:g} s"
-            self._meshcat.SetLineSegments(path, start, end, rgba=rgba("trace"))
-            self._animation.SetProperty(0, path, "visible", False)
-            for tick in {self._ticks[last], self._ticks[-1]}:  # a motion that ends earlier repeats
-                self._animation.SetProperty(tick, path, "visible", True)
-
-    def add(self, motion: Motion) -> None:
-        """Key frames of one object's motion; without animation it stands in the first."""
-        self._meshcat.SetTransform(motion.path, motion.matrix(0))
-        if motion.quaternions is None:
-            self._vectors(motion.path, "position", motion.positions)
-        else:
-            self._poses(motion.path, motion.quaternions, motion.positions)
-        if motion.scales is not None:
-            self._vectors(motion.path, "scale", motion.scales)
-
-    def publish(self) -> None:
-        """Hands the key frames to Meshcat; nothing can be added afterwards."""
-        self._meshcat.SetAnimation(self._animation)
-
-    def _poses(self, path: str, quaternions: np.ndarray, positions: np.ndarray) -> None:
-        for tick, q, p in zip(self._ticks, quaternions, positions, strict=True):
-            self._animation.SetTransform(tick, path, RigidTransform(Quaternion(q), p))
-
-    def _vectors(self, path: str, name: str, values: np.ndarray) -> None:
-        for tick, row in zip(self._ticks, values.tolist(), strict=True):
-            self._animation.SetProperty(tick, path, name, row)
-
-
 def pack_page(page: str, *, title: str) -> str:
     """A page that holds `page` compressed and unpacks it in the browser; `title` is plain text."""
     packed = base64.b64encode(gzip.compress(page.encode("utf-8"), mtime=0)).decode("ascii")
     return render("visualization/packed_page.html.jinja", title=title, packed=packed)
 
 
-def _with_overlay(page: str, title: str, legend: Mapping[str, str]) -> str:
-    """Meshcat's page with a title, and over the scene a heading, a legend and a clock."""
-    lines = [(COLOURS[name], meaning) for name, meaning in legend.items()]
-    overlay = render("visualization/overlay.html.jinja", title=title, legend=lines, aspect=ASPECT)
+def _with_overlay(page: str, title: str, legend: Mapping[str, str], film: Film) -> str:
+    """Meshcat's page that plays a film, with a title, and over the scene a heading, a legend and a
+    clock."""
+    overlay = render(
+        "visualization/overlay.html.jinja",
+        title=title,
+        legend=[(COLOURS[name], meaning) for name, meaning in legend.items()],
+        aspect=ASPECT,
+        film=film.packed(),
+    )
     # Functions, as backslashes in a replacement text would mean something.
     named = f"<title>{html.escape(title)}</title>"
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
     return re.sub(r"<body[^>]*>", lambda tag: tag[0] + overlay, page, count=1)
+
+
+def _without_viewer(page: str, *, address: str) -> tuple[str, str]:
+    """Meshcat's page with its script read from an address, and that script."""
+    before, script, after = re.split(r"<script[^>]*>(.+?)</script>", page, maxsplit=1, flags=re.S)
+    reader = render("visualization/viewer.html.jinja", address=address)
+    # Before the body, of which nothing is to be seen if the viewer is missing.
+    return (before + after).replace("</head>", f"{reader}</head>", 1), script
+
+
+def _relative(path: str | Path, folder: Path) -> str:
+    """The address of a file as pages in a folder refer to it."""
+    return quote(Path(os.path.relpath(path, folder)).as_posix())
+
+
+def _write_once(path: str | Path, text: str) -> None:
+    """Writes a file unless it holds the text already; raises InputError if it holds another."""
+    path = Path(path)
+    if not path.exists():
+        write_whole(path, text)
+    elif not path.is_file() or path.read_bytes() != text.encode("utf-8"):
+        problem = "is not the viewer of this version of Drake, expected that or no file yet"
+        raise InputError(path, "", problem)

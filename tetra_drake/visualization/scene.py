@@ -54,8 +54,9 @@ ARROW_LENGTH = 30.0 * INCH / POUND_FORCE
 ARROW_WIDTH = 0.06
 """Length in m above which an arrow grows no thicker."""
 
-HIDDEN = 1e-6
-"""Drawn force in N where there is none: a scale of 0 would make matrices singular."""
+HIDDEN = 1e-4
+"""Drawn force in N where there is none: a scale of 0, also a rounded one, would make matrices
+singular."""
 
 FORWARD_LENGTH = 6.0 * INCH
 """Length of the arrow on the floor that shows the direction of travel."""
@@ -288,7 +289,7 @@ def _force_motions(
         upright = None
         if not ground.flat:
             axes = ground_axes(p_WN[:, node], ground)
-            upright = aligning_quaternions(axes[:, 2])
+            upright = aligning_quaternions(normal[:, c, np.newaxis] * axes[:, 2])
             force = np.einsum("fi,fij->fj", force, axes)
         scales = _arrow_scales(normal[:, c])
         yield Motion(f"/forces/normal/{name}", p_WN[:, node], upright, scales)
@@ -332,8 +333,8 @@ def _add_relief(meshcat: Meshcat, floor: np.ndarray) -> None:
     meshcat.SetTriangleColorMesh(
         "/floor/relief",
         vertices.reshape(-1, 3).T,
-        np.hstack([[a, b, c], [a, c, d]]),
-        colours.clip(0.0, 1.0).reshape(-1, 3).T ** _GAMMA,
+        np.column_stack([a, b, c, a, c, d]).reshape(-1, 3).T,
+        ((colours.clip(0.0, 1.0) * 255).round() / 255).reshape(-1, 3).T ** _GAMMA,
     )
 
 
