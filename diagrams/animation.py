@@ -1,9 +1,11 @@
-"""The walking robot as an animated GIF: a replay page, filmed in a headless browser.
+"""The walking robot in pictures: a replay page, filmed in a headless browser.
 
-    python diagrams/robot.py
-    python diagrams/animation.py diagrams/robot.html diagrams/walking.gif
+    tetra-drake replay RUN|GAIT --out replay.html
+    python diagrams/animation.py replay.html walking.gif walking.png
 
-Needs Chromium or Chrome, and the Python package playwright (`pip install -e '.[test]'`).
+A GIF shows the first 15 s at twice their speed; a PNG the end of the motion, with the paths of the
+bottom nodes. Needs Chromium or Chrome, and the Python package playwright
+(`pip install -e '.[test]'`).
 """
 
 from __future__ import annotations
@@ -12,26 +14,32 @@ import argparse
 import contextlib
 import io
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageChops
 
 from tetra_drake.errors import InputError
+from tetra_drake.files import whole_file
 from tetra_drake.visualization.scene import ASPECT, COLOURS
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-WIDTH, HEIGHT, SUPERSAMPLING = 720, 243, 2  # pixels
-START, STEP = 1.0, 0.2  # s of the motion: of the first frame, between frames
+LIMITS = {".gif": 500_000, ".png": 60_000}
+"""Sizes of files in bytes, for which pictures become as narrow as they must."""
+
+GROUND_COLOURS = {".gif": 8, ".png": 64}
+"""How many colours of its own a picture has beside the robot's."""
+
+WIDTHS, SUPERSAMPLING = range(720, 239, -80), 2  # pixels
+START, END, STEP = 1.0, 15.0, 0.2  # s of the motion: of the frames, between frames
 FRAME_TIME = 100  # ms: twice as fast as the robot walks
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 _SOFTWARE_WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-_HIDDEN = "/Background", "/traces", "/forces"
 
 
 def find_browser() -> str | None:
@@ -78,50 +86,96 @@ def show_instant(page: Page, time: float) -> None:
 
 
 def film(page: Page) -> Iterator[Image.Image]:
-    """Frames of a replay page, as wide as its floor, on white and without texts."""
+    """Frames of a replay page's motion, without the traces."""
+    _strip(page, traces=False)
+    for time in np.arange(START, min(page.evaluate("viewer.animator.duration"), END), STEP):
+        yield _shot(page, float(time))
+
+
+def end(page: Page) -> Image.Image:
+    """The end of a replay page's motion, with the traces."""
+    _strip(page, traces=True)
+    return _shot(page, page.evaluate("viewer.animator.duration"))
+
+
+def _strip(page: Page, *, traces: bool) -> None:
+    """Leaves only robot and floor of a page, on white, and the traces if they are wanted."""
     page.add_style_tag(content="#heading, .dg { display: none !important }")
+    shown = {"Background": False, "forces": False, "traces": traces}
     page.evaluate(
-        """([zoom, hidden]) => {
-            for (const path of hidden) {
-                viewer.set_property(path.split("/").slice(1), "visible", false);
+        """shown => {
+            for (const [name, visible] of Object.entries(shown)) {
+                viewer.set_property([name], "visible", visible);
             }
-            viewer.camera.zoom = zoom;
-            viewer.camera.updateProjectionMatrix();
         }""",
-        [WIDTH / HEIGHT / ASPECT, _HIDDEN],
+        shown,
     )
-    end = page.evaluate("viewer.animator.duration")
-    for time in np.arange(START, end, STEP):
-        show_instant(page, float(time))
-        frame = Image.open(io.BytesIO(page.screenshot()))
-        yield frame.convert("RGB").resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
 
 
-def save_gif(frames: list[Image.Image], path: Path) -> None:
-    """Writes an endless animation in the scene's colours, and those half faded into the floor."""
+def _shot(page: Page, time: float) -> Image.Image:
+    show_instant(page, time)
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
+def save(images: Sequence[Image.Image], path: Path) -> None:
+    """Writes images on white as a picture or an endless animation, without the margins that all
+    have, as wide as LIMITS allow."""
+    white = Image.new("RGB", images[0].size, "white")
+    boxes = np.array([ImageChops.difference(image, white).getbbox() for image in images])
+    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    cut = [image.crop((*low.tolist(), *high.tolist())) for image in images]
+    palette = _palette(images[0], GROUND_COLOURS[path.suffix])
+    with whole_file(path) as temporary:
+        for width in WIDTHS:
+            size = width, round(width * cut[0].height / cut[0].width)
+            small = [image.resize(size, Image.Resampling.LANCZOS) for image in cut]
+            first, *others = (
+                image.quantize(palette=palette, dither=Image.Dither.NONE) for image in small
+            )
+            if path.suffix == ".gif":
+                film = {"append_images": others, "duration": FRAME_TIME, "loop": 0}
+                first.save(temporary, None, save_all=True, **film)
+            else:
+                first.save(temporary, optimize=True)
+            if temporary.stat().st_size <= LIMITS[path.suffix]:
+                break
+
+
+def _palette(image: Image.Image, count: int) -> Image.Image:
+    """The colours of the robot, those half faded into the floor, and `count` of an image."""
     rgb = {name: np.array(list(bytes.fromhex(code[1:]))) for name, code in COLOURS.items()}
-    ground = [np.full(3, 255), rgb["floor"], rgb["inch"], rgb["six_inches"]]
-    drawn = [rgb[name] for name in ("odd", "even", "actuated", "outer", "inner")]
-    faded = [(colour + rgb["floor"]) // 2 for colour in [*drawn, *ground[2:]]]
+    drawn = [rgb[name] for name in ("odd", "even", "actuated", "outer", "inner", "trace")]
+    faded = [(colour + rgb["floor"]) // 2 for colour in drawn]
+    own = image.quantize(count).getpalette() or []
     palette = Image.new("P", (1, 1))
-    palette.putpalette(np.concatenate([*ground, *drawn, *faded]).tolist())
-    first, *others = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-    first.save(path, save_all=True, append_images=others, duration=FRAME_TIME, loop=0)
+    palette.putpalette(np.concatenate([[255, 255, 255], *drawn, *faded, own]).tolist())
+    return palette
+
+
+def make_pictures(replay: Path, files: Sequence[Path]) -> None:
+    """Writes pictures of a replay page, of kinds in LIMITS. Raises InputError."""
+    for file in files:
+        if file.suffix not in LIMITS:
+            raise InputError(file, "", f"expected a file that ends in {' or '.join(LIMITS)}")
+    width = max(WIDTHS)
+    with launch_browser() as browser:
+        page = browser.new_page(
+            viewport={"width": width, "height": round(width / ASPECT)},
+            device_scale_factor=SUPERSAMPLING,
+        )
+        page.goto(replay.resolve().as_uri())
+        wait_until_loaded(page)
+        for file in files:
+            save(list(film(page)) if file.suffix == ".gif" else [end(page)], file)
 
 
 def main() -> None:
     """Films a page."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("replay", metavar="REPLAY.html", type=Path)
-    parser.add_argument("out", metavar="FILE.gif", type=Path)
+    parser.add_argument("files", metavar="FILE.gif|FILE.png", type=Path, nargs="+")
     options = parser.parse_args()
-    with launch_browser() as browser:
-        page = browser.new_page(
-            viewport={"width": WIDTH, "height": HEIGHT}, device_scale_factor=SUPERSAMPLING
-        )
-        page.goto(options.replay.resolve().as_uri())
-        wait_until_loaded(page)
-        save_gif(list(film(page)), options.out)
+    make_pictures(options.replay, options.files)
 
 
 if __name__ == "__main__":
