@@ -152,17 +152,16 @@ def _palette(image: Image.Image, count: int) -> Image.Image:
     return palette
 
 
-def make_pictures(replay: Path, files: Sequence[Path]) -> None:
+def make_pictures(browser: Browser, replay: Path, files: Sequence[Path]) -> None:
     """Writes pictures of a replay page, of kinds in LIMITS. Raises InputError."""
     for file in files:
         if file.suffix not in LIMITS:
             raise InputError(file, "", f"expected a file that ends in {' or '.join(LIMITS)}")
-    width = max(WIDTHS)
-    with launch_browser() as browser:
-        page = browser.new_page(
-            viewport={"width": width, "height": round(width / ASPECT)},
-            device_scale_factor=SUPERSAMPLING,
-        )
+    page = browser.new_page(
+        viewport={"width": WIDTHS[0], "height": round(WIDTHS[0] / ASPECT)},
+        device_scale_factor=SUPERSAMPLING,
+    )
+    with contextlib.closing(page):
         page.goto(replay.resolve().as_uri())
         wait_until_loaded(page)
         for file in files:
@@ -175,7 +174,8 @@ def main() -> None:
     parser.add_argument("replay", metavar="REPLAY.html", type=Path)
     parser.add_argument("files", metavar="FILE.gif|FILE.png", type=Path, nargs="+")
     options = parser.parse_args()
-    make_pictures(options.replay, options.files)
+    with launch_browser() as browser:
+        make_pictures(browser, options.replay, options.files)
 
 
 if __name__ == "__main__":

@@ -184,14 +184,14 @@ def test_every_window_shows_the_whole_robot_and_its_path(page, trajectory):
 
 
 def test_a_page_is_filmed_and_its_end_pictured_as_wide_as_files_may_be_large(
-    replay, tmp_path, monkeypatch, refused
+    browser, replay, tmp_path, monkeypatch, refused
 ):
     monkeypatch.setattr(animation, "STEP", 1.5)
     monkeypatch.setitem(animation.LIMITS, ".gif", 30_000)
     film, picture = tmp_path / "walking.gif", tmp_path / "walking.png"
     with refused(tmp_path / "walking.jpg", "", ".png"):
-        animation.make_pictures(replay, [film, tmp_path / "walking.jpg"])
-    animation.make_pictures(replay, [film, picture])
+        animation.make_pictures(browser, replay, [film, tmp_path / "walking.jpg"])
+    animation.make_pictures(browser, replay, [film, picture])
     with Image.open(film) as gif:
         shots = [np.asarray(shot.convert("RGB")) / 255 for shot in ImageSequence.Iterator(gif)]
     assert len(shots) == 3  # at 1, 2.5 and 4 s of 5
