@@ -3,9 +3,11 @@
     python runs/record.py [--scratch DIR] [NAME ...]
 
 Each experiment is evolved and analysed in a folder of DIR, out/runs by default, thinned into a
-folder here, and shown on a page. Interrupted, it goes on; what is done is skipped.
+folder here, and its best gait shown on a page there. Interrupted, it goes on; what is done is
+skipped. Pictures of the pages are made afterwards, by diagrams/animation.py.
 
     times.json    how long each experiment took here, in s
+    meshcat.js    the viewer that all pages share, of one version of Drake
 """
 
 from __future__ import annotations
@@ -31,13 +33,15 @@ from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.thinning import thin
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration
+from tetra_drake.report.replay_page import write_replay
+from tetra_drake.results.folder import REPLAY
 from tetra_drake.run import evolve
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
 from tetra_drake.scenario.schema import Scenario
 
 HERE = Path(__file__).parent
-TIMES = "times.json"
+TIMES, VIEWER = "times.json", "meshcat.js"
 
 
 @dataclass(frozen=True)
@@ -104,6 +108,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
         for old in {*shown.glob("*")} - {shown / "README.md"}:
             shutil.rmtree(old) if old.is_dir() else old.unlink()
         thin(made, shown)
+        write_replay(made, shown / REPLAY, viewer=out / VIEWER)
         shutil.copy(made / ANALYSIS, shown / ANALYSIS)
 
 

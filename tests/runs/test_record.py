@@ -5,6 +5,7 @@ import json
 import pytest
 import record
 from analyse import ANALYSIS
+from helpers.meshcat_page import read_page
 
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.scenario.optimizers import CmaEs
@@ -43,8 +44,11 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, quick_an
     assert run.evaluations.groupby("trial").size().tolist() == [12, 12]
     assert run.reevaluations["engine"].unique() == ["drake"]
     assert {file.name for file in (out / "tiny").iterdir()} == {
-        *("README.md", "analysis.json", "manifest.json", "scenario.yaml", "trial_00", "trial_01")
+        *("README.md", "analysis.json", "manifest.json", "scenario.yaml", "trial_00", "trial_01"),
+        "replay.html",
     }
+    assert 'src="../meshcat.js"' in read_page(out / "tiny/replay.html")
+    assert (out / "meshcat.js").is_file()
     (out / "tiny/manifest.json").unlink()
     record.record("tiny", TINY, scratch=scratch, out=out)
     assert not (out / "tiny/manifest.json").exists()
