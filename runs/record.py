@@ -3,11 +3,10 @@
     python runs/record.py [--scratch DIR] [NAME ...]
 
 Each experiment is evolved and analysed in a folder of DIR, out/runs by default, thinned into a
-folder here, and its best gait shown on a page there. Interrupted, it goes on; what is done is
-skipped. Pictures of the pages are made afterwards, by diagrams/animation.py.
+folder here, and shown on a page. Interrupted, it goes on; what is done is skipped.
 
     times.json    how long each experiment took here, in s
-    meshcat.js    the viewer that all pages share, of one version of Drake
+    meshcat.js    the script that all pages share
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from tetra_drake.evolution.thinning import thin
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration
 from tetra_drake.report.replay_page import write_replay
-from tetra_drake.results.folder import REPLAY
+from tetra_drake.report.run_page import REPLAY
 from tetra_drake.run import evolve
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
@@ -48,6 +47,7 @@ TIMES, VIEWER = "times.json", "meshcat.js"
 class Experiment:
     """What makes a recorded run."""
 
+    title: str
     base: str
     """A shipped scenario."""
     changes: Mapping[str, Any]
@@ -70,21 +70,41 @@ def _by_cma_es(trials: int, evaluations: int, **settings: Any) -> dict[str, Any]
 
 
 EXPERIMENTS = {
-    "thesis": Experiment("thesis", _COMPILED, initial=True),
-    "thesis-listing": Experiment("thesis-listing", _COMPILED),
-    "thesis-drake": Experiment("thesis", {"evolution.trials": 1, "evolution.max_iterations": 200}),
-    "coulomb": Experiment("coulomb", _COMPILED),
-    "incline": Experiment("incline", _by_cma_es(3, 2000)),
-    "steps": Experiment("steps", _by_cma_es(3, 2000)),
-    "rough": Experiment("rough", _by_cma_es(3, 2000)),
-    "rough-feedback": Experiment("feedback", _by_cma_es(3, 2000)),
-    "undulation": Experiment("undulation", _by_cma_es(3, 2000)),
-    "turning": Experiment("turning", _by_cma_es(3, 2000)),
-    "robust": Experiment("robust", _by_cma_es(3, 1000)),
-    "efficient": Experiment("efficient", _by_cma_es(3, 2000)),
-    "twelve": Experiment("thesis", _by_cma_es(2, 1000) | {"robot.tetrahedra": 12}),
-    "champion": Experiment("thesis", _by_cma_es(2, 20000, population=40)),
-    "map": Experiment("thesis", _by_cma_es(1, 20000) | {"optimizer": QualityDiversity()}),
+    "thesis": Experiment("the thesis's experiment, ten trials", "thesis", _COMPILED, initial=True),
+    "thesis-listing": Experiment(
+        "the same with the listing's mutation, which never reaches τ_A", "thesis-listing", _COMPILED
+    ),
+    "thesis-drake": Experiment(
+        "the same evolved on the Drake diagram itself",
+        "thesis",
+        {"evolution.trials": 1, "evolution.max_iterations": 200},
+    ),
+    "coulomb": Experiment("the same under friction that grows with the load", "coulomb", _COMPILED),
+    "incline": Experiment("up an incline of 5°", "incline", _by_cma_es(3, 2000)),
+    "steps": Experiment("up four steps of 0.25 in", "steps", _by_cma_es(3, 2000)),
+    "rough": Experiment("over rough ground", "rough", _by_cma_es(3, 2000)),
+    "rough-feedback": Experiment(
+        "over rough ground, with feedback to the oscillators", "feedback", _by_cma_es(3, 2000)
+    ),
+    "undulation": Experiment(
+        "an oscillator for each bottom cable, so that the robot can undulate",
+        "undulation",
+        _by_cma_es(3, 2000),
+    ),
+    "turning": Experiment("turning on the spot, in 30 s", "turning", _by_cma_es(3, 2000)),
+    "robust": Experiment("far on eight disturbed robots", "robust", _by_cma_es(3, 1000)),
+    "efficient": Experiment("with little work", "efficient", _by_cma_es(3, 2000)),
+    "twelve": Experiment(
+        "twelve tetrahedra", "thesis", _by_cma_es(2, 1000) | {"robot.tetrahedra": 12}
+    ),
+    "champion": Experiment(
+        "the farthest: a long search", "thesis", _by_cma_es(2, 20000, population=40)
+    ),
+    "map": Experiment(
+        "gaits that differ, the fittest of each kind",
+        "thesis",
+        _by_cma_es(1, 20000) | {"optimizer": QualityDiversity()},
+    ),
 }
 """By the names of their folders, in the order of the gallery."""
 
@@ -108,7 +128,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
         for old in {*shown.glob("*")} - {shown / "README.md"}:
             shutil.rmtree(old) if old.is_dir() else old.unlink()
         thin(made, shown)
-        write_replay(made, shown / REPLAY, viewer=out / VIEWER)
+        write_replay(shown, shown / REPLAY, viewer=out / VIEWER)
         shutil.copy(made / ANALYSIS, shown / ANALYSIS)
 
 

@@ -1,4 +1,4 @@
-"""The tables of runs/README.md and README.md, made from the recorded runs beside this file.
+"""The tables of README.md, of the one beside this file and of those of the recorded runs.
 
     python runs/tables.py [FILE ...]
 
@@ -10,35 +10,48 @@ Each table stands in a Markdown file between two lines:
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas
-from analyse import ANALYSIS, DEFAULT, Analysis, load_analysis
-from engines import distances_on_both
+from analyse import ANALYSIS, LAWS, MUJOCO, TIGHT, Analysis, load_analysis
+from record import EXPERIMENTS, TIMES
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
-from tetra_drake.evolution.robustness import inches, percents
+from tetra_drake.evolution.record import MANIFEST
+from tetra_drake.evolution.robustness import percents
 from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import duration, fixed, markdown_table, signed
+from tetra_drake.formatting import duration, fixed, listed, markdown_table, signed
+from tetra_drake.report.run_page import REPLAY
+from tetra_drake.results.measures import dominant_frequency
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.signals import signal_samples
+from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.units import INCH, customary
 
 HERE = Path(__file__).parent
-PAGES = (HERE.parent / "README.md", HERE / "README.md", HERE / "gaits.md")
+PICTURE, README = "walking.png", "README.md"
 
 INTENDED, LISTING, DIAGRAM = RUNS = ("thesis", "thesis-listing", "thesis-drake")
-"""Folders of the runs: tau_A mutated as intended, as by the listing, evolved on the diagram."""
+"""The repetitions of the thesis: tau_A mutated as intended, as by the listing, evolved on the
+diagram."""
+COULOMB = "coulomb"
 
-CLOSE = 0.1
-"""in: distances on two engines that differ by less agree."""
+CLOSE, APART = 0.1, 0.3
+"""in: distances on two engines that differ by less agree; where they differ by more, a page says
+so."""
+
+OSCILLATOR_TAU_A = 0.3
+"""s, the time constant of the thesis's figures of a single oscillator."""
 
 _BEGIN = re.compile(r"<!-- table (?P<name>\S+): made by runs/tables.py -->")
 _END = "<!-- end -->"
@@ -51,10 +64,12 @@ class Recorded:
     name: str
     record: Run
     trials: pandas.DataFrame
-    """Index: trial. Columns as of the evaluation of its fittest gait, and: iterations, ended,
-    first_mean and last_mean (mean fitness of the population), initial_distance_in (of the fittest
-    initial gait)."""
+    """Index: trial. Columns as of the evaluation of its fittest gait, and: iterations,
+    evaluations, ended, first_mean and last_mean (mean fitness of the population),
+    initial_distance_in (of the fittest initial gait)."""
     analysis: Analysis
+    seconds: float
+    """What it took to make it; NaN where that is not known."""
 
     @property
     def scenario(self) -> Scenario:
@@ -71,10 +86,27 @@ class Recorded:
         """The evaluations of the initial populations that have not failed."""
         return self.record.initial().dropna(subset="fitness")
 
+    def again(self, trial: int, setting: str) -> float:
+        """Distance (in) of a trial's fittest gait with a setting of the analysis; NaN without."""
+        rows = self.analysis.resimulations.query("trial == @trial and setting == @setting")
+        return float(rows["distance_in"].iloc[0]) if len(rows) else math.nan
+
+    def undisturbed(self, trial: int) -> float:
+        """Distance (in) of a trial's fittest gait on the compiled engine."""
+        return float(self.judged.loc[trial, "undisturbed"]) / INCH
+
     @property
-    def best_walk(self) -> pandas.Series:
-        """The row of the analysis that describes the fittest gait of all trials."""
-        return self.analysis.best_gaits.set_index("trial").loc[self.best_trial]
+    def judged(self) -> pandas.DataFrame:
+        """What disturbances do to the trials' fittest gaits, in m. Index: trial."""
+        return self.analysis.gaits.set_index("gait")
+
+    @property
+    def command(self) -> str:
+        """What makes the run again."""
+        return f"`tetra-drake evolve --scenario runs/{self.name}/scenario.yaml --out again`"
+
+
+Runs = Mapping[str, Recorded]
 
 
 def load_recorded(directory: Path) -> Recorded:
@@ -84,34 +116,135 @@ def load_recorded(directory: Path) -> Recorded:
     if dict(best["index"]) != dict(analysis.best_gaits[["trial", "evaluation"]].to_numpy()):
         problem = f"does not hold the run's best gaits; run `python runs/analyse.py {directory}`"
         raise InputError(directory / ANALYSIS, "best_gaits", problem)
-    iterations = run.iterations.groupby("trial")
-    initial = run.initial().dropna(subset="fitness").sort_values("fitness").groupby("trial")
+    statuses = pandas.DataFrame(map(vars, run.statuses)).set_index("number")
     trials = best.assign(
-        iterations=iterations["iteration"].last(),
-        ended=iterations["stop"].last().notna(),
-        first_mean=iterations["mean_fitness"].first(),
-        last_mean=iterations["mean_fitness"].last(),
-        initial_distance_in=initial["distance_in"].last(),
+        iterations=statuses["iteration"],
+        evaluations=statuses["evaluations"],
+        ended=statuses["stop"].notna(),
+        first_mean=statuses["initial_mean_fitness"],
+        last_mean=statuses["mean_fitness"],
+        initial_distance_in=statuses["initial_best_distance_in"],
     )
-    return Recorded(directory.name, run, trials, analysis)
+    times = directory.parent / TIMES
+    seconds = json.loads(times.read_text(encoding="utf-8")) if times.exists() else {}
+    name = directory.name
+    return Recorded(name, run, trials, analysis, seconds.get(name, math.nan))
 
 
-def load_all(directory: Path = HERE) -> list[Recorded]:
-    """All recorded runs, in the order of RUNS."""
-    return [load_recorded(directory / name) for name in RUNS]
+def load_all(directory: Path = HERE) -> dict[str, Recorded]:
+    """The recorded runs that are there, by name, in the order of EXPERIMENTS."""
+    there = (name for name in EXPERIMENTS if (directory / name / MANIFEST).exists())
+    return {name: load_recorded(directory / name) for name in there}
 
 
-def comparison_table(runs: Sequence[Recorded]) -> str:
-    """The thesis's numbers beside those of the runs."""
-    headings = ["", "thesis", *(f"ours, `{run.name}`" for run in runs)]
-    rows = [[name, theirs, *(ours(run) for run in runs)] for name, theirs, ours in COMPARISON]
+def gallery_table(runs: Runs) -> str:
+    """All runs with the distances of their best gaits."""
+    headings = ["", "experiment", "distance, in", "on the Drake diagram, in", "keeps"]
+    rows = [[*_picture(run), *_best_distances(run), run.command] for run in runs.values()]
+    return markdown_table([*headings, "makes it again"], rows, text_columns=(0, 1, 5))
+
+
+def _picture(run: Recorded) -> list[str]:
+    picture, page = f"![{run.name}]({run.name}/{PICTURE})", f"[page]({run.name}/{REPLAY})"
+    title = EXPERIMENTS[run.name].title
+    return [picture, f"[`{run.name}`]({run.name}/README.md): {title} ({page})"]
+
+
+def _best_distances(run: Recorded) -> list[str]:
+    best = run.best_trial
+    kept = f"{100.0 * run.judged.loc[best, 'kept']:.0f} %"
+    return [fixed(run.undisturbed(best)), fixed(run.again(best, TIGHT)), kept]
+
+
+def times_table(runs: Runs) -> str:
+    """How long each run took to record."""
+    rows = [[f"`{name}`", duration(run.seconds)] for name, run in runs.items()]
+    total = sum(run.seconds for run in runs.values())
+    rows.append(["**all**", duration(total)])
+    return markdown_table(["experiment", "h:mm:ss"], rows)
+
+
+def trials_table(run: Recorded) -> str:
+    """The fittest gait of each trial on all engines and on disturbed robots; below, in which trials
+    the engines differ."""
+    shown = ("cost_of_transport", "tension", "clearance")
+    units = {name: customary(METRICS[name]) for name in shown}
+    names = [name.replace("_", " ") + f", {unit}" * bool(unit) for name, (_, unit) in units.items()]
+    rows, apart = [], []
+    for trial, gait in run.trials.iterrows():
+        compiled, tight = run.undisturbed(trial), run.again(trial, TIGHT)
+        if not abs(compiled - tight) <= APART:
+            apart.append(trial)
+        judged = run.judged.loc[trial]
+        distances = [compiled, tight, run.again(trial, MUJOCO), judged["mean"] / INCH]
+        kept = percents(*judged[["kept", "kept_low", "kept_high"]])
+        metrics = [gait[name] / size for name, (size, _) in units.items()]
+        counts = [f"{trial}", f"{gait['evaluations']}", fixed(gait["fitness"])]
+        rows.append([*counts, *map(fixed, distances), kept, *map(fixed, metrics)])
+    headings = ["trial", "evaluations", "fitness", "compiled, in", "diagram, in", "MuJoCo, in"]
+    table = markdown_table([*headings, "disturbed, in", "keeps", *names], rows)
+    where = f"in trial{'s' * (len(apart) > 1)} {listed(apart)}"
+    return table + f"\n\nThe engines differ by more than {APART} in {where}." * bool(apart)
+
+
+def facts_table(run: Recorded) -> str:
+    """What the run is, and the command that repeats it."""
+    manifest, evaluations = run.record.manifest, run.record.evaluations
+    failed = int(evaluations["failure"].notna().sum())
+    rows = [
+        ["engine", run.scenario.simulation.engine],
+        ["optimiser", manifest.method.optimizer.name],
+        ["trials", f"{len(run.trials)}, {run.trials['ended'].sum()} of them ended"],
+        ["evaluations", f"{len(evaluations)}, of which {failed} failed"],
+        ["simulation took (h:mm:ss)", duration(float(evaluations["wall_time_s"].sum()))],
+        ["versions", ", ".join(f"{name} {number}" for name, number in manifest.versions.items())],
+        ["makes it again", run.command],
+    ]
+    return markdown_table(["", f"`{run.name}`"], rows, text_columns=(0, 1))
+
+
+def changes_table(run: Recorded) -> str:
+    """What hurts the best gaits most."""
+    rows = [[row["what"], *_change_cells(row)] for _, row in run.analysis.changes.iterrows()]
+    headings = ["changed by 5 %", "alone: median change (worst), in"]
+    return markdown_table([*headings, "rank correlation: mean (median size)"], rows)
+
+
+def _change_cells(row: pandas.Series) -> list[str]:
+    failed = f", {row['failed']:.0f} failed" if row["failed"] else ""
+    worst = f"({signed(row['worst'] / INCH)}{failed})"
+    ranks = f"{signed(row['correlation'])} ({fixed(row['correlation_size'])})"
+    scaled = math.isfinite(row["correlation"])
+    return [f"{fixed(row['median'] / INCH)} {worst}", ranks if scaled else "-"]
+
+
+def laws_table(runs: Runs) -> str:
+    """The best gaits evolved under either law of friction, under the other and in MuJoCo."""
+    rows, settings = [], [*LAWS, MUJOCO]
+    for name, own in zip((INTENDED, COULOMB), LAWS, strict=True):
+        run = runs[name]
+        again = {s: {trial: run.again(trial, s) for trial in run.trials.index} for s in settings}
+        table = pandas.DataFrame(again)
+        for trial, distances in table.iterrows():
+            rows.append([f"`{name}`, trial {trial}", *map(fixed, distances)])
+        shares = 100.0 * table.div(table[own], axis=0).median()
+        rows.append([f"*`{name}`: median*", *map(fixed, table.median())])
+        rows.append([f"*`{name}`: median share*", *(f"{share:.0f} %" for share in shares)])
+    return markdown_table(["best gait, distance in inches", *settings], rows)
+
+
+def comparison_table(runs: Runs) -> str:
+    """The thesis's numbers beside those of its repetitions."""
+    headings = ["", "thesis", *(f"ours, `{name}`" for name in RUNS)]
+    rows = [[what, theirs, *(ours(runs[n]) for n in RUNS)] for what, theirs, ours in COMPARISON]
     return markdown_table(headings, rows)
 
 
-def summary_table(runs: Sequence[Recorded]) -> str:
-    """The most important numbers of the first run, for README.md."""
-    headings = ["distance in 15 s, inches", "thesis", "[`runs/thesis`](runs/README.md)"]
-    return markdown_table(headings, [[name, value, ours(runs[0])] for name, value, ours in SUMMARY])
+def summary_table(runs: Runs) -> str:
+    """The most important numbers of the thesis's repetition, for README.md."""
+    headings = ["distance in 15 s, inches", "thesis", "[`runs/thesis`](runs/thesis/README.md)"]
+    rows = [[what, theirs, ours(runs[INTENDED])] for what, theirs, ours in SUMMARY]
+    return markdown_table(headings, rows)
 
 
 def _iterations(run: Recorded) -> str:
@@ -121,10 +254,6 @@ def _iterations(run: Recorded) -> str:
 
 def _seconds_per_iteration(run: Recorded) -> str:
     return f"{CHILDREN * run.record.evaluations['wall_time_s'].median():.2g}"
-
-
-def _best_initial(run: Recorded) -> str:
-    return fixed(run.initial["distance_in"].max())
 
 
 def _best_initial_per_trial(run: Recorded) -> str:
@@ -146,8 +275,7 @@ def _best_evolved(run: Recorded) -> str:
 
 
 def _on_diagram(run: Recorded) -> str:
-    again = run.analysis.resimulations.set_index(["trial", "setting"])["distance_in"]
-    return fixed(again[(run.best_trial, DEFAULT)])
+    return fixed(run.again(run.best_trial, TIGHT))
 
 
 def _fitness_rise(trials: pandas.DataFrame) -> str:
@@ -160,15 +288,24 @@ def _distance_rise(trials: pandas.DataFrame) -> str:
 
 
 def _off_ground(run: Recorded) -> str:
-    return ", ".join(f"{100.0 * share:.0f}" for share in run.best_walk["off_ground"].values())
+    shares = run.trials.loc[run.best_trial].filter(regex="^lifted_T")
+    return ", ".join(f"{100.0 * share:.0f}" for share in shares) or "-"
 
 
 def _oscillator_frequency(run: Recorded) -> str:
-    return fixed(run.analysis.oscillator_frequency_hz)
+    """Of a single oscillator with OSCILLATOR_TAU_A, from 5 s on."""
+    single = run.scenario.with_changes(
+        {"robot.tetrahedra": 2, "cpg.signals": "recorded", "simulation.duration": 15.0}
+    )
+    gait = Gait("single", weights=(), tau_a=OSCILLATOR_TAU_A, tau_b=2.0 * OSCILLATOR_TAU_A)
+    signal = signal_samples(single, gait)[:, 0]
+    times = single.cpg.listing_step * np.arange(len(signal))
+    return fixed(dominant_frequency(times[times >= 5.0], signal[times >= 5.0]))
 
 
 def _signal_frequencies(run: Recorded) -> str:
-    values = run.best_walk["frequencies_hz"].values()
+    best = run.analysis.best_gaits.set_index("trial").loc[run.best_trial]
+    values = best["frequencies_hz"].values()
     return ", ".join("-" if value is None else fixed(value) for value in values)
 
 
@@ -196,11 +333,10 @@ COMPARISON: list[Row] = [
     ("trials", "10", lambda r: f"{len(r.trials)}"),
     ("iterations of a trial, median (most)", "at most 2000", _iterations),
     ("seconds per iteration", "22", _seconds_per_iteration),
-    ("best initial distance, in", "about 6.6", _best_initial),
-    ("best initial distance per trial, mean (range), in", "–", _best_initial_per_trial),
+    ("best of an initial population, mean (range), in", "about 6.6 (one)", _best_initial_per_trial),
     ("initial gaits that go backward", "nearly half", _backward),
     ("best evolved distance, in", "14.34", _best_evolved),
-    ("the same gait on the Drake diagram, in", "–", _on_diagram),
+    ("the same gait on the Drake diagram, tight settings, in", "–", _on_diagram),
     ("mean fitness, average trial, in", "rises in all trials", lambda r: _fitness_rise(r.trials)),
     ("mean fitness, best trial, in", "–", lambda r: _fitness_rise(r.trials.loc[[r.best_trial]])),
     ("rise of the best distance, average trial", "32 %", lambda r: _distance_rise(r.trials)),
@@ -224,107 +360,9 @@ SUMMARY: list[Row] = [
 ]
 
 
-def runs_table(runs: Sequence[Recorded]) -> str:
-    """What the runs are, and the command that repeats each."""
-    columns = [_run_facts(run) for run in runs]
-    rows = [[name, *(facts[name] for facts in columns)] for name in columns[0]]
-    headings = ["", *(f"`{run.name}`" for run in runs)]
-    return markdown_table(headings, rows, text_columns=range(len(headings)))
-
-
-def _run_facts(run: Recorded) -> dict[str, str]:
-    manifest, evaluations = run.record.manifest, run.record.evaluations
-    return {
-        "engine": run.scenario.simulation.engine,
-        "mutation of the time constants": run.scenario.evolution.tau_mutation,
-        "trials": f"{len(run.trials)}, {run.trials['ended'].sum()} of them ended",
-        "seed": f"{manifest.seed}",
-        "evaluations": f"{len(evaluations)}",
-        "of which failed": f"{int(evaluations['failure'].notna().sum())}",
-        "simulation took (h:mm:ss)": duration(float(evaluations["wall_time_s"].sum())),
-        "evaluated again on the Drake diagram": f"{len(run.record.reevaluations)}",
-        "versions": ", ".join(f"{name} {number}" for name, number in manifest.versions.items()),
-        "makes it again": f"`tetra-drake evolve --scenario runs/{run.name}/scenario.yaml "
-        f"--seed {manifest.seed} --out again`",
-    }
-
-
-def best_gaits_table(runs: Sequence[Recorded]) -> str:
-    """The best gait of each trial: distance, time constant, frequencies, time off the ground."""
-    rows, headings = [], ["best gait", "distance, in", "τ_A, s", "signals, Hz"]
-    for run in runs:
-        walks = run.analysis.best_gaits.set_index("trial")
-        for trial, gait in run.trials.iterrows():
-            off, hertz = walks.loc[trial, "off_ground"], walks.loc[trial, "frequencies_hz"]
-            swings = [value for value in hertz.values() if value is not None]
-            numbers = [fixed(gait["distance_in"]), fixed(gait["tau_a_s"], 3), _from_to(swings)]
-            shares = [f"{100.0 * share:.0f}" for share in off.values()]
-            rows.append([f"`{run.name}`, trial {trial}", *numbers, *shares])
-            headings[4:] = [f"{name} lifted, %" for name in off]
-    return markdown_table(headings, rows)
-
-
-def resimulation_table(runs: Sequence[Recorded]) -> str:
-    """The best gait of each trial on the Drake diagram with several integrator settings.
-
-    Below each run, the absolute difference from the default settings, median and greatest.
-    """
-    rows = []
-    for run in runs:
-        again = run.analysis.resimulations
-        settings = list(dict.fromkeys(again["setting"]))
-        table = again.pivot(index="trial", columns="setting", values="distance_in")[settings]
-        table.insert(0, "as recorded", run.trials["distance_in"])
-        for trial, distances in table.iterrows():
-            rows.append([f"`{run.name}`, trial {trial}", *map(fixed, distances)])
-        differences = table.sub(table[DEFAULT], axis=0).abs()
-        for name, values in (("median", differences.median()), ("greatest", differences.max())):
-            cells = ["" if key == DEFAULT else fixed(value) for key, value in values.items()]
-            rows.append([f"*`{run.name}`: {name} difference*", *cells])
-    return markdown_table(["best gait", *table.columns], rows)
-
-
-def robustness_table(runs: Sequence[Recorded]) -> str:
-    """What hurts the best gaits of runs of ten trials most."""
-    several = [run for run in runs if len(run.trials) > 1]
-    tables = [run.analysis.changes.set_index("what") for run in several]
-    rows = [
-        [what, *(cell for table in tables for cell in _change_cells(table.loc[what]))]
-        for what in tables[0].index
-    ]
-    heads = ("alone: median change (worst), in", "rank correlation: mean (median size)")
-    headings = [f"`{run.name}`, {head}" for run in several for head in heads]
-    return markdown_table(["changed by 5 %", *headings], rows)
-
-
-def _change_cells(row: pandas.Series) -> list[str]:
-    failed = f", {row['failed']:.0f} failed" if row["failed"] else ""
-    worst = f"({signed(row['worst'] / INCH)}{failed})"
-    ranks = f"{signed(row['correlation'])} ({fixed(row['correlation_size'])})"
-    scaled = math.isfinite(row["correlation"])
-    return [f"{fixed(row['median'] / INCH)} {worst}", ranks if scaled else "-"]
-
-
-def robust_gaits_table(runs: Sequence[Recorded]) -> str:
-    """How far each gait walks under draws of all changes, and how many it keeps."""
-    rows, names = [], ("undisturbed", "5 %", "50 %", "95 %")
-    for run in runs:
-        for trial, row in run.analysis.gaits.set_index("gait").iterrows():
-            mean, kept = (row[[name, f"{name}_low", f"{name}_high"]] for name in ("mean", "kept"))
-            cells = [fixed(row[name] / INCH) for name in names]
-            rows.append([f"`{run.name}`, trial {trial}", *cells, inches(*mean), percents(*kept)])
-        if len(run.trials) > 1:
-            over = run.analysis.over_gaits.set_index("of")
-            before, mean, kept = (over.loc[name] for name in ("undisturbed", "mean", "kept"))
-            middle = [inches(*before), "", "", "", inches(*mean), percents(*kept)]
-            rows.append([f"*`{run.name}`: median of the gaits*", *middle])
-    headings = ["best gait", *(f"{name}, in" for name in names), "mean, in", "keeps"]
-    return markdown_table(headings, rows)
-
-
-def tau_mutation_table(runs: Sequence[Recorded]) -> str:
+def tau_mutation_table(runs: Runs) -> str:
     """The two ways to mutate the time constants, trial by trial."""
-    chosen = [run for run in runs if run.name in (INTENDED, LISTING)]
+    chosen = [runs[INTENDED], runs[LISTING]]
     what = ("best distance, in", "its τ_A, s", "population's τ_A, s", "iterations")
     numbers = [_tau_numbers(run) for run in chosen]
     columns = [table.reindex(numbers[0].index) for table in numbers]
@@ -349,12 +387,12 @@ def _tau_cells(row: pandas.Series) -> list[str]:
     return [fixed(value, digits) for value, digits in zip(row, (2, 3, 3, 0), strict=True)]
 
 
-def engines_table(runs: Sequence[Recorded]) -> str:
+def engines_table(runs: Runs) -> str:
     """How far the two engines agree on the gaits that were evaluated on both."""
     headings = ["gaits on both engines", "count", "failed on either", "median difference, in"]
     headings += ["95 % differ by less than, in", f"differ by less than {CLOSE:g} in"]
     rows = []
-    for run in runs:
+    for run in runs.values():
         both = distances_on_both(run.record)
         for what, chosen in (
             ("initial gaits", both[both["iteration"] == 0]),
@@ -363,6 +401,18 @@ def engines_table(runs: Sequence[Recorded]) -> str:
             if len(chosen.dropna()):
                 rows.append([f"`{run.name}`, {what}", *_agreement(chosen)])
     return markdown_table([*headings, "go the same way"], rows)
+
+
+def distances_on_both(run: Run) -> pandas.DataFrame:
+    """Distances of the gaits that were evaluated again on the Drake diagram.
+
+    Columns: trial, index, iteration, compiled_in and drake_in (NaN where a gait failed).
+    """
+    key = ["trial", "index"]
+    compiled = run.evaluations[[*key, "iteration", "distance_in"]]
+    drake = run.reevaluations.reindex(columns=[*key, "distance_in"])
+    both = compiled.merge(drake, on=key, validate="one_to_one")
+    return both.rename(columns={"distance_in_x": "compiled_in", "distance_in_y": "drake_in"})
 
 
 def _agreement(distances: pandas.DataFrame) -> list[str]:
@@ -384,17 +434,35 @@ def _from_to(values: Sequence[float] | pandas.Series) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-TABLES: dict[str, Callable[[Sequence[Recorded]], str]] = {
+TABLES: dict[str, Callable[[Runs], str]] = {
     "summary": summary_table,
+    "gallery": gallery_table,
+    "times": times_table,
     "comparison": comparison_table,
-    "runs": runs_table,
-    "best-gaits": best_gaits_table,
-    "resimulation": resimulation_table,
-    "robustness": robustness_table,
-    "robust-gaits": robust_gaits_table,
     "tau-mutation": tau_mutation_table,
     "engines": engines_table,
+    "laws": laws_table,
 }
+RUN_TABLES: dict[str, Callable[[Recorded], str]] = {
+    "trials": trials_table,
+    "facts": facts_table,
+    "changes": changes_table,
+}
+"""Of the run in whose folder the page is."""
+
+
+def pages(runs: Runs) -> list[Path]:
+    """All pages with tables."""
+    return [HERE.parent / README, HERE / README, *(HERE / name / README for name in runs)]
+
+
+def made_again(page: Path, runs: Runs) -> str:
+    """The text of a page with its tables made again."""
+
+    def table(name: str) -> str:
+        return TABLES[name](runs) if name in TABLES else RUN_TABLES[name](runs[page.parent.name])
+
+    return filled(page.read_text(encoding="utf-8"), table)
 
 
 def filled(text: str, make_table: Callable[[str], str]) -> str:
@@ -420,11 +488,10 @@ def filled(text: str, make_table: Callable[[str], str]) -> str:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Makes the tables of the given Markdown files, or of PAGES, again."""
+    """Makes the tables of the given Markdown files, or of all pages, again."""
     runs = load_all()
-    for path in [Path(name) for name in arguments] or PAGES:
-        text = path.read_text(encoding="utf-8")
-        write_whole(path, filled(text, lambda name: TABLES[name](runs)))
+    for page in [Path(name).resolve() for name in arguments] or pages(runs):
+        write_whole(page, made_again(page, runs))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,9 @@
-"""What analyse.py simulates of a run's best gaits, and its figure."""
+"""What analyse.py simulates of a run's best gaits."""
 
 import json
 from concurrent.futures import ThreadPoolExecutor
 
 import analyse
-import numpy as np
 import pandas
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
@@ -12,6 +11,8 @@ from helpers.synthetic_run import tiny_scenario, write_run
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.robustness import START, by_gait, default_disturbances, judge
 from tetra_drake.evolution.tables import load_run
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Coulomb
 
 TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1)]]]
 """Trial 1 has no gait with a fitness."""
@@ -33,33 +34,42 @@ def distances(run, scenario):
     ]
 
 
-def test_the_best_gait_of_each_trial_is_simulated_on_the_engine_of_the_run(folder):
-    run, best = load_run(folder), analyse.load_analysis(folder).best_gaits
+def test_the_best_gait_of_each_trial_is_analysed(folder):
+    best = analyse.load_analysis(folder).best_gaits
     assert best[["trial", "evaluation"]].to_numpy().tolist() == [[0, 2], [2, 0]]
-    assert best["distance_in"].tolist() == distances(run, run.manifest.scenario)
-    assert all(list(off) == ["T1", "T2", "T3"] for off in best["off_ground"])
     assert all(list(hertz) == ["T1-T2", "T2-T3"] for hertz in best["frequencies_hz"])
 
 
-def test_every_integrator_setting_is_simulated_on_the_diagram(folder):
+def test_they_are_simulated_on_other_engines_and_under_other_laws(folder):
     run, again = load_run(folder), analyse.load_analysis(folder).resimulations
-    settings = analyse.integrator_settings(run.manifest.scenario)
+    scenario = run.manifest.scenario
+    settings = analyse.settings_of(scenario)
     assert list(again["setting"]) == [name for name in settings for _ in range(2)]
-    assert {each.simulation.engine for each in settings.values()} == {"drake"}
-    default = again[again["setting"] == analyse.DEFAULT]["distance_in"].tolist()
-    assert default == distances(run, settings[analyse.DEFAULT])
+    engines = {name: each.simulation.engine for name, each in settings.items()}
+    assert engines == {
+        **{analyse.TIGHT: "drake", analyse.MUJOCO: "mujoco"},
+        **{"reset integrator": "compiled", "Coulomb": "compiled"},
+    }
+    assert settings["Coulomb"].friction == Coulomb()
+    found = again.groupby("setting")["distance_in"].apply(list)
+    assert found["reset integrator"] == distances(run, scenario)
+    assert found[analyse.TIGHT] == distances(run, settings[analyse.TIGHT])
     assert again["distance_in"].nunique() > 2
 
 
-def test_the_best_gaits_are_judged_on_the_default_disturbances_and_one_oscillator_alone(folder):
+def test_only_what_an_engine_can_simulate_is_asked_of_it():
+    rough = load_scenario("feedback").with_changes({"simulation.engine": "compiled"})
+    assert set(analyse.settings_of(rough)) == {analyse.TIGHT}
+    assert set(analyse.settings_of(load_scenario("incline"))) == {analyse.TIGHT, analyse.MUJOCO}
+
+
+def test_the_best_gaits_are_judged_on_the_default_disturbances(folder):
     found, run = analyse.load_analysis(folder), load_run(folder)
     spreads = default_disturbances(run.manifest.scenario).spreads
     assert set(found.changes["what"]) == {START, *spreads}
     gaits = {0: run.gait(0, 2), 2: run.gait(2, 0)}
     expected = by_gait(judge(run.manifest.scenario, gaits)).reset_index()
     pandas.testing.assert_frame_equal(found.gaits, expected[list(found.gaits)])
-    hertz = found.oscillator_frequency_hz  # that of its equations
-    assert hertz == pytest.approx(1.0 / (2.0 * np.pi * analyse.OSCILLATOR_TAU_A), abs=0.01)
 
 
 def test_a_run_without_any_fitness_is_refused(tmp_path, refused):
@@ -75,9 +85,9 @@ def test_a_run_without_any_fitness_is_refused(tmp_path, refused):
         lambda text: text[:-9],
         lambda text: "[]",
         lambda text: json.dumps(json.loads(text) | {"resimulations": [{"trial": 0}]}),
-        lambda text: json.dumps(json.loads(text) | {"oscillator": {}}),
+        lambda text: json.dumps(json.loads(text) | {"robustness": {}}),
     ],
-    ids=["cut off", "no object", "columns", "oscillator"],
+    ids=["cut off", "no object", "columns", "robustness"],
 )
 def test_a_missing_or_damaged_analysis_is_refused(folder, tmp_path, refused, change):
     path = tmp_path / analyse.ANALYSIS

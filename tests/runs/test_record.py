@@ -11,6 +11,7 @@ from tetra_drake.evolution.tables import load_run
 from tetra_drake.scenario.optimizers import CmaEs
 
 TINY = record.Experiment(
+    "two tetrahedra",
     "thesis",
     {
         **{"simulation.engine": "compiled", "simulation.duration": 0.4},

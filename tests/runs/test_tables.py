@@ -4,12 +4,12 @@ import json
 
 import pytest
 import tables
-from analyse import ANALYSIS
+from analyse import ANALYSIS, MUJOCO, TIGHT
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.evolution.json_lines import read_lines
 from tetra_drake.evolution.record import REEVALUATIONS, trial_folder
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 INITIAL = [(8.0, 0), (-4.0, 1), (None, 2)]
 """The initial population of a trial: its best walks 4 in, one of the two that walk backward."""
@@ -19,25 +19,27 @@ TRIALS = {
     "thesis-listing": [[INITIAL, [(12.0, 1), (None, None)]]],
     "thesis-drake": [[INITIAL]],
 }
+TRIALS["coulomb"] = [[INITIAL, [(24.0, 1)]]]
 BEST = {"thesis": {0: (3, 20.0), 1: (3, 5.0)}, "thesis-listing": {0: (3, 6.0)}}
+BEST["coulomb"] = {0: (3, 12.0)}
 BEST["thesis-drake"] = {0: (0, 4.0)}
 """Evaluation and distance (in) of the best gait of each trial."""
 
 
 def write_analysis(path, best):
     """An analysis in which every gait changes alike, and keeps half of the draws."""
-    walk = {"off_ground": {"T1": 0.25, "T2": 0.5}, "frequencies_hz": {"T1-T2": 0.8, "T2-T3": None}}
-    settings = (("default", 0.0), ("finer", 0.01), ("coarser", -0.5))
+    walk = {"frequencies_hz": {"T1-T2": 0.8, "T2-T3": None}}
+    settings = ((TIGHT, 0.25), (MUJOCO, -3.0), ("reset integrator", 0.0), ("Coulomb", -2.0))
     quantiles = {"5 %": 1.0 * INCH, "50 %": 2.0 * INCH, "95 %": 3.0 * INCH}
     content = {
-        "schema": 2,
-        "oscillator": {"tau_a_s": 0.3, "frequency_hz": 0.53},
+        "schema": 3,
+        "versions": {},
         "best_gaits": [
-            {"trial": trial, "evaluation": index, "distance_in": distance} | walk
-            for trial, (index, distance) in best.items()
+            {"trial": trial, "evaluation": index} | walk for trial, (index, _) in best.items()
         ],
         "resimulations": [
-            {"trial": trial, "distance_in": distance + change, "setting": name, "failure": None}
+            {"trial": trial, "setting": name, "failure": None}
+            | {"distance_in": distance + change * (1 + trial * 0.5)}
             for trial, (_, distance) in best.items()
             for name, change in settings
         ],
@@ -62,17 +64,26 @@ def write_analysis(path, best):
     path.write_text(json.dumps(content))
 
 
+WALK = {"cost_of_transport": 4.0, "tension": 2.0 * POUND_FORCE, "clearance": 0.5 * INCH}
+"""Of the gait that walks 20 in."""
+
+
 @pytest.fixture
 def folder(tmp_path):
     for name, iterations in TRIALS.items():
-        run = write_run(tmp_path / name, iterations, scenario=tiny_scenario(name=name))
+        metrics = {40.0: WALK | {"lifted_shares": [0.25, 0.5, 1.0]}}
+        scenario = tiny_scenario(name=name)
+        run = write_run(tmp_path / name, iterations, scenario=scenario, metrics=metrics)
         write_analysis(run / ANALYSIS, BEST[name])
     return tmp_path
 
 
 def cells(name, folder):
     """The cells of a table by the first cell of their row."""
-    lines = tables.TABLES[name](tables.load_all(folder)).splitlines()
+    runs = tables.load_all(folder)
+    own = name in tables.RUN_TABLES
+    table = tables.RUN_TABLES[name](runs["thesis"]) if own else tables.TABLES[name](runs)
+    lines = [line for line in table.splitlines() if line.startswith("|")]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     assert len({len(row) for row in rows}) == 1
     return {row[0]: row[1:] for row in rows}
@@ -81,32 +92,58 @@ def cells(name, folder):
 def test_the_comparison_shows_each_run_beside_the_thesis(folder):
     rows = cells("comparison", folder)
     for row, expected in {
-        "best initial distance, in": ["about 6.6", "4.00", "4.00", "4.00"],
+        tables.COMPARISON[3][0]: ["about 6.6 (one)", *["4.00 (4.00)"] * 3],
         "initial gaits that go backward": ["nearly half", "50 % of 4", "50 % of 2", "50 % of 2"],
         "best evolved distance, in": ["14.34", "20.00", "6.00", "4.00"],
-        "the same gait on the Drake diagram, in": ["–", "20.00", "6.00", "4.00"],
+        "the same gait on the Drake diagram, tight settings, in": ["–", "20.25", "6.25", "4.25"],
         "mean fitness, best trial, in": ["–", "2.00 → 24.00", "2.00 → 10.00", "2.00 → 2.00"],
         "rise of the best distance, average trial": ["32 %", "212 %", "50 %", "0 %"],
+        "frequency of a single oscillator, τ_A = 0.3 s, Hz": ["about 0.7", *["0.53"] * 3],
         "frequency of each signal, best gait, Hz": ["no number", *["0.80, -"] * 3],
         "seconds per iteration": ["22", "1", "1", "1"],
     }.items():
         assert rows[row] == expected
+    off_ground = next(cells for row, cells in rows.items() if row.startswith("time off the ground"))
+    assert off_ground == ["no number", "25, 50, 100", "-", "-"]
 
 
-def test_gaits_are_shown_per_trial_and_their_robustness_with_intervals(folder):
-    distance, _, hertz, *lifted = cells("best-gaits", folder)["`thesis`, trial 1"]
-    assert (distance, hertz, lifted) == ("5.00", "0.80", ["25", "50"])
-    again = cells("resimulation", folder)
-    assert again["`thesis`, trial 1"] == ["5.00", "5.00", "5.01", "4.50"]
-    assert again["*`thesis`: median difference*"] == ["0.00", "", "0.01", "0.50"]
-    rows = cells("robustness", folder)
-    assert rows["spacing"] == ["0.60 (-1.00, 2 failed)", "+0.25 (0.25)"]
-    assert rows["start"] == ["0.60 (-1.00)", "-"]
-    gaits = cells("robust-gaits", folder)
-    mean, kept = "4.00 (4.00 to 4.00)", "50 % (40 to 61)"
-    assert gaits["`thesis`, trial 1"] == ["5.00", "1.00", "2.00", "3.00", mean, kept]
-    assert gaits["*`thesis`: median of the gaits*"][-1] == "50 % (25 to 100)"
-    assert "*`thesis-drake`: median of the gaits*" not in gaits
+def test_a_runs_trials_are_shown_on_all_engines_and_disturbed(folder):
+    rows = cells("trials", folder)
+    kept = ["4.00", "50 % (40 to 61)"]
+    assert rows["0"] == ["5", "40.00", "20.00", "20.25", "17.00", *kept, "4.00", "2.00", "0.50"]
+    assert rows["1"][:5] == ["5", "10.00", "5.00", "5.38", "0.50"]
+    assert cells("changes", folder)["spacing"] == ["0.60 (-1.00, 2 failed)", "+0.25 (0.25)"]
+    assert cells("changes", folder)["start"] == ["0.60 (-1.00)", "-"]
+    facts = cells("facts", folder)
+    assert facts["evaluations"] == ["10, of which 2 failed"]
+    (command,) = facts["makes it again"]
+    assert "runs/thesis/scenario.yaml" in command
+
+
+def test_trials_in_which_the_engines_differ_are_named(folder):
+    runs = tables.load_all(folder)
+    assert tables.trials_table(runs["thesis"]).endswith("in trial 1.")
+    assert tables.trials_table(runs["coulomb"]).endswith("|")
+
+
+def test_the_gallery_shows_the_best_gait_of_each_run(folder):
+    (folder / tables.TIMES).write_text(json.dumps({"thesis": 60, "coulomb": 3600}))
+    rows = [
+        line.split("|")[2:6] for line in tables.gallery_table(tables.load_all(folder)).split("\n")
+    ]
+    assert [row[0].split("`")[1] for row in rows[2:]] == list(TRIALS)
+    assert [cell.strip() for cell in rows[2][1:]] == ["20.00", "20.25", "50 %"]
+    assert cells("times", folder)["`coulomb`"] == ["1:00:00"]
+
+
+def test_either_laws_gaits_are_shown_under_the_other(folder):
+    rows = cells("laws", folder)
+    assert rows["`thesis`, trial 0"] == ["20.00", "18.00", "17.00"]
+    assert rows["*`thesis`: median share*"] == ["100 %", "65 %", "48 %"]
+    assert rows["*`coulomb`: median share*"] == ["120 %", "100 %", "90 %"]
+
+
+def test_the_mutations_are_compared_trial_by_trial(folder):
     rows = cells("tau-mutation", folder)
     assert (rows["0"][0::4], rows["0"][3::4]) == (["20.00", "6.00"], ["1", "1"])
     assert rows["1"][4:] == ["-"] * 4
