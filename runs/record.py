@@ -3,10 +3,11 @@
     python runs/record.py [--scratch DIR] [NAME ...]
 
 Each experiment is evolved and analysed in a folder of DIR, out/runs by default, thinned into a
-folder here, and shown on a page. Interrupted, it goes on; what is done is skipped.
+folder here, and its best gait shown on a page and, by Chromium, in a picture there. Interrupted, it
+goes on; what is done is skipped.
 
     times.json    how long each experiment took here, in s
-    meshcat.js    the script that all pages share
+    meshcat.js    the viewer that all pages share, of one version of Drake
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import argparse
 import filecmp
 import json
 import shutil
+import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping
@@ -33,14 +35,14 @@ from tetra_drake.evolution.thinning import thin
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration
 from tetra_drake.report.replay_page import write_replay
-from tetra_drake.report.run_page import REPLAY
+from tetra_drake.results.folder import REPLAY
 from tetra_drake.run import evolve
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
 from tetra_drake.scenario.schema import Scenario
 
 HERE = Path(__file__).parent
-TIMES, VIEWER = "times.json", "meshcat.js"
+TIMES, VIEWER, PICTURE = "times.json", "meshcat.js", "walking.png"
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,14 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
             shutil.rmtree(old) if old.is_dir() else old.unlink()
         thin(made, shown)
         write_replay(shown, shown / REPLAY, viewer=out / VIEWER)
+        take_picture(shown / REPLAY, shown / PICTURE)
         shutil.copy(made / ANALYSIS, shown / ANALYSIS)
+
+
+def take_picture(page: Path, picture: Path) -> None:
+    """Draws the end of a page's motion, in a browser. Raises CalledProcessError."""
+    script = HERE.parent / "diagrams" / "animation.py"
+    subprocess.run([sys.executable, script, page, picture], check=True)
 
 
 def _same(first: Path, second: Path) -> bool:

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import pandas
 from analyse import ANALYSIS, LAWS, MUJOCO, TIGHT, Analysis, load_analysis
-from record import EXPERIMENTS, TIMES
+from record import EXPERIMENTS, PICTURE, TIMES
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
@@ -30,7 +30,7 @@ from tetra_drake.evolution.robustness import percents
 from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration, fixed, listed, markdown_table, signed
-from tetra_drake.report.run_page import REPLAY
+from tetra_drake.results.folder import REPLAY
 from tetra_drake.results.measures import dominant_frequency
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.signals import signal_samples
@@ -39,7 +39,7 @@ from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, customary
 
 HERE = Path(__file__).parent
-PICTURE, README = "walking.png", "README.md"
+README = "README.md"
 
 INTENDED, LISTING, DIAGRAM = RUNS = ("thesis", "thesis-listing", "thesis-drake")
 """The repetitions of the thesis: tau_A mutated as intended, as by the listing, evolved on the

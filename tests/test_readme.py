@@ -110,6 +110,7 @@ def test_the_scenarios_and_the_gait_of_their_page_load(work: Path) -> None:
 FOLDERS = (
     "diagrams",
     "runs",
+    *(f"runs/{path.parent.name}" for path in sorted((CHECKOUT / "runs").glob("*/manifest.json"))),
     *(f"tetra_drake/{name}" for name in ("engines", "evolution", "scenario")),
 )
 

@@ -22,8 +22,8 @@ TINY = record.Experiment(
 
 
 @pytest.fixture
-def quick_analysis(monkeypatch):
-    """An analysis that takes no time; the folders that were analysed."""
+def analysed(monkeypatch):
+    """An analysis and pictures that take no time; the folders that were analysed."""
     analysed = []
 
     def analyse(directory, *, workers):
@@ -31,10 +31,11 @@ def quick_analysis(monkeypatch):
         (directory / ANALYSIS).write_text("{}")
 
     monkeypatch.setattr(record, "analyse", analyse)
+    monkeypatch.setattr(record, "take_picture", lambda page, picture: picture.touch())
     return analysed
 
 
-def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, quick_analysis):
+def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed):
     scratch, out = tmp_path / "scratch", tmp_path / "runs"
     (out / "tiny").mkdir(parents=True)
     for name in ("README.md", "figures"):
@@ -44,19 +45,20 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, quick_an
     assert run.manifest.thinned and run.manifest.scenario == TINY.scenario("tiny")
     assert run.evaluations.groupby("trial").size().tolist() == [12, 12]
     assert run.reevaluations["engine"].unique() == ["drake"]
-    assert {file.name for file in (out / "tiny").iterdir()} == {
-        *("README.md", "analysis.json", "manifest.json", "scenario.yaml", "trial_00", "trial_01"),
-        "replay.html",
+    files = {file.name for file in (out / "tiny").iterdir()}
+    assert files == {
+        *("README.md", "replay.html", "walking.png", "analysis.json", "manifest.json"),
+        *("scenario.yaml", "trial_00", "trial_01"),
     }
     assert 'src="../meshcat.js"' in read_page(out / "tiny/replay.html")
-    assert (out / "meshcat.js").is_file()
+    assert (out / record.VIEWER).is_file()
     (out / "tiny/manifest.json").unlink()
     record.record("tiny", TINY, scratch=scratch, out=out)
     assert not (out / "tiny/manifest.json").exists()
     (out / "tiny" / ANALYSIS).unlink()  # as if interrupted
     record.record("tiny", TINY, scratch=scratch, out=out)
     assert load_run(out / "tiny").evaluations.equals(run.evaluations)
-    assert quick_analysis == [scratch / "tiny"]
+    assert analysed == [scratch / "tiny"]
     assert set(json.loads((out / record.TIMES).read_text())) == {"tiny"}
 
 

@@ -8,7 +8,7 @@ import record
 import tables
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.report.run_page import REPLAY
+from tetra_drake.results.folder import REPLAY
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import load_gait
 
@@ -53,7 +53,7 @@ def test_a_run_has_its_pages(name):
     assert tables.made_again(folder / tables.README, runs()) == text
     assert "<!-- to be written -->" not in text
     assert ("The engines differ by more" in text) == ("## Why the engines differ" in text)
-    assert (folder / REPLAY).exists() and (folder / tables.PICTURE).exists()
+    assert (folder / REPLAY).exists() and (folder / record.PICTURE).exists()
     assert (tables.HERE / record.VIEWER).exists()
 
 
