@@ -22,25 +22,38 @@ from tetra_drake.evolution.thinning import thin
 from tetra_drake.report.run_page import write_report
 from tetra_drake.scenario.optimizers import QualityDiversity
 
+AGAIN, CHEAP, DEAR, ALONE, EDGE, BEYOND = range(20, 26)
+"""Evaluations that nothing else makes matter: reevaluated; the cheapest, and one that rounding
+would make cheaper; alone in its cell of the map, and one that rounding would put alone into the
+next cell, where it is not the fittest of its own."""
+
 GENERATOR = np.random.default_rng(3)
-FITNESS = GENERATOR.normal(8.0, 3.0, (2, 40)).tolist()
+RISING = [12.0 + i for i in range(2 * BEST_GAITS)]
+LOW = GENERATOR.uniform(1.0, 11.0, 31).tolist()
+FITNESS = [[*LOW[:6], *RISING, *LOW[6:]], GENERATOR.normal(8.0, 3.0, 41).tolist()]
+FITNESS[0][AGAIN : BEYOND + 1] = [2.5, 11.5, 11.4, 2.0, 3.0, 4.0]
 TRIALS = [
     [
         [(f, i) for i, f in enumerate(trial[:6])],
-        [(None, None), *((f, i % 6) for i, f in enumerate(trial[6:], 5))],
+        [*((f, i % 6) for i, f in enumerate(trial[6:])), (None, None)],
     ]
     for trial in FITNESS
 ]
-"""Six initial gaits, then a failure and 34 that take the places of one another."""
-
-AGAIN = 17
-"""An evaluation that only its reevaluation makes matter."""
+"""Six initial gaits, then 35 that take the places of one another, and a failure."""
 
 
-def metrics_of(fitness):
-    """More than a synthetic run has; the cheapest gait is another than the fittest."""
-    cost = 10.0 + (fitness - 9.0) ** 2 / 3.0
-    return {"cost_of_transport": cost, "travelling_index": fitness % 1.0, "lifted": 0.5 + 1e-13}
+def metrics_of(trial, i, fitness):
+    """More metrics than a synthetic run has."""
+    special = {
+        CHEAP: (5.0012, 0.9, 0.5),
+        DEAR: (5.0014, 0.9, 0.5),
+        ALONE: (30.0, 0.1, 0.45),
+        EDGE: (30.0, 1.00001 / 3.0, 0.59),
+        BEYOND: (30.0, 0.5, 0.59),
+    }
+    cost, index, lifted = special.get(i if trial == 0 else -1, (20.0 + fitness, 0.9, 0.5))
+    numbers = {"cost_of_transport": cost, "travelling_index": index, "lifted": lifted}
+    return numbers | {"lateral_drift": -1e-17}
 
 
 @pytest.fixture(scope="module")
@@ -49,11 +62,15 @@ def runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     kind = QualityDiversity(cells=[3, 3])
     changes = {"optimizer": kind, "simulation.engine": "compiled"}
-    metrics = {fitness: metrics_of(fitness) for trial in FITNESS for fitness in trial}
+    metrics = {
+        fitness: metrics_of(number, i, fitness)
+        for number, trial in enumerate(FITNESS)
+        for i, fitness in enumerate(trial)
+    }
     scenario = tiny_scenario().with_changes(changes)
     run = write_run(folder / "run", TRIALS, scenario=scenario, metrics=metrics)
-    entry = read_lines(run / "trial_01/evaluations.jsonl")[AGAIN]
-    append_lines(run / "trial_01/reevaluations.jsonl", [entry | {"engine": "drake"}])
+    entry = read_lines(run / "trial_00/evaluations.jsonl")[AGAIN]
+    append_lines(run / "trial_00/reevaluations.jsonl", [entry | {"engine": "drake"}])
     append_lines(run / "elites.jsonl", [{"trial": 0, "index": 1, "kept": 1, "mean_distance": 2.0}])
     thin(run, folder / "thinned")
     return load_run(run), load_run(folder / "thinned")
@@ -66,7 +83,7 @@ def test_every_evaluation_is_there_and_those_that_matter_are_whole(runs):
     fitness = run.evaluations.groupby("trial")["fitness"]
     rises = run.evaluations[run.evaluations["fitness"] == fitness.cummax()]
     last = pandas.concat([run.last_population(0), run.last_population(1)])
-    again = run.evaluations.query("trial == 1 and index == @AGAIN")
+    again = run.evaluations.query("trial == 0 and index == @AGAIN")
     assert AGAIN not in rises["index"].values and AGAIN not in last["index"].values
     champion = pandas.DataFrame(champions(run).values())
     for matter in (run.initial(), rises, run.best(BEST_GAITS), last, again, elites(run), champion):
@@ -83,6 +100,8 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     assert (loss >= 0.0).all() and (loss < 1e-4).all() and (loss > 0.0).any()
     cost = after["cost_of_transport"].dropna()
     assert [float(f"{x:.3g}") for x in before["cost_of_transport"].dropna()] == cost.tolist()
+    assert not np.signbit(after["lateral_drift"].dropna()).any()
+    assert set(after["lateral_drift"].dropna()) == {0.0}
     assert thinned.evaluations["failure"].equals(run.evaluations["failure"])
     trial, index = after.iloc[0][["trial", "index"]]
     with pytest.raises(Exception, match="genome"):
@@ -92,10 +111,14 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
 def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     run, thinned = runs
     assert thinned.fittest() == run.fittest()
+    assert thinned.best(99)["tau_a_s"].notna().all()
     assert summary(thinned).replace(str(thinned.directory), str(run.directory)) == summary(run)
     named = ({n: (g["trial"], g["index"]) for n, g in champions(r).items()} for r in runs)
     assert next(named) == next(named)
-    assert elites(thinned)["index"].tolist() == elites(run)["index"].tolist()
+    on_map = [table[["trial", "index"]].to_numpy().tolist() for table in map(elites, runs)]
+    assert on_map[0] == on_map[1]
+    assert [0, ALONE] in on_map[0] and [0, BEYOND] in on_map[0] and [0, EDGE] not in on_map[0]
+    assert champions(run)["cheapest"]["index"] == CHEAP
     assert gaits_of(thinned.directory)[1] == gaits_of(run.directory)[1]
     ours, theirs = (compare([r.directory], reach=0.01).trials for r in (thinned, run))
     assert ours.drop(columns="run").equals(theirs.drop(columns="run"))
