@@ -140,14 +140,14 @@ def load_all(directory: Path = HERE) -> dict[str, Recorded]:
 def gallery_table(runs: Runs) -> str:
     """All runs with the distances of their best gaits."""
     headings = ["", "experiment", "distance, in", "on the Drake diagram, in", "keeps"]
-    rows = [[*_picture(run), *_best_distances(run), run.command] for run in runs.values()]
-    return markdown_table([*headings, "makes it again"], rows, text_columns=(0, 1, 5))
+    rows = [[*_introduced(run), *_best_distances(run)] for run in runs.values()]
+    return markdown_table(headings, rows, text_columns=(0, 1))
 
 
-def _picture(run: Recorded) -> list[str]:
-    picture, page = f"![{run.name}]({run.name}/{PICTURE})", f"[page]({run.name}/{REPLAY})"
-    title = EXPERIMENTS[run.name].title
-    return [picture, f"[`{run.name}`]({run.name}/README.md): {title} ({page})"]
+def _introduced(run: Recorded) -> list[str]:
+    picture = f'<img src="{run.name}/{PICTURE}" width="240" alt="{run.name}">'
+    title = f"[`{run.name}`]({run.name}/{README}): {EXPERIMENTS[run.name].title}"
+    return [picture, f"{title}<br>[page]({run.name}/{REPLAY}), {run.command}"]
 
 
 def _best_distances(run: Recorded) -> list[str]:

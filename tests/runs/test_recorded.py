@@ -3,14 +3,16 @@
 import subprocess
 from functools import cache
 
+import numpy as np
 import pytest
 import record
 import tables
 
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.evolution.optimizers import optimizer_of
 from tetra_drake.results.folder import REPLAY
 from tetra_drake.results.result import versions
-from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.gait import ParameterSpace, load_gait
 
 TOLERANCE = 0.05
 """in; versions of Drake, numpy and numba differ in the last digits, which a walk enlarges."""
@@ -44,6 +46,15 @@ def test_the_best_gait_walks_as_recorded(name):
     distance = simulate(scenario=scenario, gait=gait).metrics.distance_in
     tolerance = 0.0 if run.analysis.versions == versions() else TOLERANCE
     assert distance == pytest.approx(run.undisturbed(trial), rel=0, abs=tolerance)
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_run_begins_as_its_scenario_and_seed_say(name):
+    run, scenario = runs()[name].record, runs()[name].scenario
+    seeds = np.random.SeedSequence(run.manifest.seed).spawn(scenario.evolution.trials)
+    space, generator = ParameterSpace.of(scenario), np.random.default_rng(seeds[0])
+    asked = optimizer_of(scenario.optimizer)(space, scenario.evolution, generator).ask()
+    assert np.array_equal(asked, [run.vector(0, i) for i in range(len(asked))])
 
 
 @pytest.mark.parametrize("name", FOLDERS)

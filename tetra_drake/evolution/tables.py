@@ -185,7 +185,8 @@ def _table(directory: Path, trials: int, name: str, columns: list[str]) -> panda
     kinds = dict.fromkeys(("placed", "best_evaluation"), "Int64")
     numbers = {column for column in table if column in _NUMBERS or column.endswith("fitness")}
     kinds |= dict.fromkeys(numbers - {"draws_fitness"}, "float")
-    return table.astype({column: kind for column, kind in kinds.items() if column in table})
+    kinds = {column: kind for column, kind in kinds.items() if column in table}
+    return table.astype(kinds).copy()  # in one piece, as astype() makes one of each column
 
 
 def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:
