@@ -28,6 +28,7 @@ from typing import Any
 from analyse import ANALYSIS, analyse
 
 from tetra_drake.engines.simulate import available_cores
+from tetra_drake.errors import InputError
 from tetra_drake.evolution.progress import Display
 from tetra_drake.evolution.record import MANIFEST
 from tetra_drake.evolution.reevaluation import reevaluate
@@ -181,8 +182,11 @@ def main() -> None:
     options = parser.parse_args()
     if unknown := {*options.names} - {*EXPERIMENTS}:
         parser.error(f"found {', '.join(sorted(unknown))}; there are {', '.join(EXPERIMENTS)}")
-    for name in options.names:
-        record(name, EXPERIMENTS[name], scratch=options.scratch, out=HERE)
+    try:
+        for name in options.names:
+            record(name, EXPERIMENTS[name], scratch=options.scratch, out=HERE)
+    except InputError as error:
+        sys.exit(f"record.py: {error}")
 
 
 if __name__ == "__main__":
