@@ -114,7 +114,7 @@ EXPERIMENTS = {
     "champion": Experiment(
         "the farthest: a long search",
         "thesis",
-        _by(CmaEs(population=20, starts=20, tryout=400), 2, 20000),
+        _by(CmaEs(population=16, starts=20), 3, 16000),
     ),
     "map": Experiment(
         "gaits that differ, the fittest of each kind",
