@@ -24,12 +24,13 @@ from analyse import ANALYSIS, LAWS, MUJOCO, TIGHT, Analysis, load_analysis
 from record import EXPERIMENTS, PICTURE, TIMES
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.comparison import compare
 from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.record import MANIFEST
 from tetra_drake.evolution.robustness import percents
 from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import duration, fixed, listed, markdown_table, signed
+from tetra_drake.formatting import duration, fixed, listed, markdown_table, ranged, signed
 from tetra_drake.results.folder import REPLAY
 from tetra_drake.results.measures import dominant_frequency
 from tetra_drake.robot.gait import Gait
@@ -45,6 +46,8 @@ INTENDED, LISTING, DIAGRAM = RUNS = ("thesis", "thesis-listing", "thesis-drake")
 """The repetitions of the thesis: tau_A mutated as intended, as by the listing, evolved on the
 diagram."""
 COULOMB = "coulomb"
+SEARCHES = ("cma", "de", "random")
+"""The same experiment as the first with other optimisers."""
 
 CLOSE, APART = 0.1, 0.3
 """in: distances on two engines that differ by less agree; where they differ by more, a page says
@@ -231,6 +234,21 @@ def laws_table(runs: Runs) -> str:
         rows.append([f"*`{name}`: median*", *map(fixed, table.median())])
         rows.append([f"*`{name}`: median share*", *(f"{share:.0f} %" for share in shares)])
     return markdown_table(["best gait, distance in inches", *settings], rows)
+
+
+def search_table(runs: Runs) -> str:
+    """How well the optimisers search on the thesis's scenario."""
+    compared = compare([HERE / name for name in (INTENDED, *SEARCHES) if name in runs])
+    rows = []
+    for name, row in compared.runs.iterrows():
+        cells = [ranged(*row[[f"fitness_{end}" for end in ("mean", "low", "high")]])]
+        ends = row[[f"distance_{end}" for end in ("mean", "low", "high")]] / INCH
+        there = f"{row['share'] * row['trials']:.0f} of {row['trials']:.0f}"
+        cost = f"{row['reached']:.0f}" if math.isfinite(row["reached"]) else "-"
+        rows.append([f"`{name}`", f"{row['cost']:.0f}", *cells, ranged(*ends), cost, there])
+    headings = ["run", "evaluations of a trial, median", "fitness", "distance, in"]
+    reach = f"{fixed((compared.reach or math.nan) / INCH)} in"
+    return markdown_table([*headings, f"evaluations to {reach}, median", "trials"], rows)
 
 
 def comparison_table(runs: Runs) -> str:
@@ -441,6 +459,7 @@ TABLES: dict[str, Callable[[Runs], str]] = {
     "comparison": comparison_table,
     "tau-mutation": tau_mutation_table,
     "engines": engines_table,
+    "search": search_table,
     "laws": laws_table,
 }
 RUN_TABLES: dict[str, Callable[[Recorded], str]] = {
