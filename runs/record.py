@@ -88,11 +88,13 @@ EXPERIMENTS = {
         "thesis",
         {"evolution.trials": 1, "evolution.max_iterations": 200},
     ),
-    "cma": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
-    "de": Experiment(
+    "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
+    "differential-evolution": Experiment(
         "the same by differential evolution", "thesis", _by(DifferentialEvolution(), 10, 4000)
     ),
-    "random": Experiment("the same at random, a baseline", "thesis", _by(RandomSearch(), 10, 4000)),
+    "random-search": Experiment(
+        "the same at random, a baseline", "thesis", _by(RandomSearch(), 10, 4000)
+    ),
     "coulomb": Experiment("the same under friction that grows with the load", "coulomb", _COMPILED),
     "incline": Experiment("up an incline of 5°", "incline", _by(CmaEs(), 3, 2000)),
     "steps": Experiment("up four steps of 0.25 in", "steps", _by(CmaEs(), 3, 2000)),

@@ -46,7 +46,7 @@ INTENDED, LISTING, DIAGRAM = RUNS = ("thesis", "thesis-listing", "thesis-drake")
 """The repetitions of the thesis: tau_A mutated as intended, as by the listing, evolved on the
 diagram."""
 COULOMB = "coulomb"
-SEARCHES = ("cma", "de", "random")
+SEARCHES = ("cma-es", "differential-evolution", "random-search")
 """The same experiment as the first with other optimisers."""
 
 CLOSE, APART = 0.1, 0.3

@@ -20,11 +20,12 @@ class CmaEs:
     population: int | None = setting(at_least=4, default=None)
     """Vectors in an iteration; 4 + 3 ln n, rounded down, of n parameters if not given."""
     sample: int = setting(at_least=0, default=40)
-    """Random gaits evaluated first. The mean of the best quarter is its start; 0: the middle
-    of the ranges."""
+    """Random gaits evaluated first."""
     starts: int = setting(at_least=1, default=5)
-    """Searches, each with a sample of its own, of which the one with the best gait goes on; fewer
-    where trying them out would take more than half of the evaluations."""
+    """Searches, of which the one with the best gait goes on: the first from the mean of the best
+    quarter of the sample, the others from its best gaits; without a sample, from the middle of the
+    ranges and random gaits. Fewer where trying them out would take more than half of the
+    evaluations, and one more than the sample at most."""
     tryout: int = setting(at_least=1, default=350)
     """Evaluations in which each of them is tried out."""
     sigma: float = setting(above=0, default=0.2)
