@@ -116,7 +116,7 @@ EXPERIMENTS = {
     "champion": Experiment(
         "the farthest: a long search",
         "thesis",
-        _by(CmaEs(population=16, starts=20), 3, 16000),
+        _by(CmaEs(population=16, sample=100, starts=12), 3, 16000),
     ),
     "map": Experiment(
         "gaits that differ, the fittest of each kind",
