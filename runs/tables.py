@@ -238,14 +238,18 @@ def laws_table(runs: Runs) -> str:
 
 def search_table(runs: Runs) -> str:
     """How well the optimisers search on the thesis's scenario."""
-    compared = compare([HERE / name for name in (INTENDED, *SEARCHES) if name in runs])
+    names = [name for name in (INTENDED, *SEARCHES) if name in runs]
+    compared = compare([runs[name].record.directory for name in names])
     rows = []
     for name, row in compared.runs.iterrows():
-        cells = [ranged(*row[[f"fitness_{end}" for end in ("mean", "low", "high")]])]
-        ends = row[[f"distance_{end}" for end in ("mean", "low", "high")]] / INCH
-        there = f"{row['share'] * row['trials']:.0f} of {row['trials']:.0f}"
+        fitness, distance = (
+            row[[f"{what}_{end}" for end in ("mean", "low", "high")]]
+            for what in ("fitness", "distance")
+        )
         cost = f"{row['reached']:.0f}" if math.isfinite(row["reached"]) else "-"
-        rows.append([f"`{name}`", f"{row['cost']:.0f}", *cells, ranged(*ends), cost, there])
+        there = f"{row['share'] * row['trials']:.0f} of {row['trials']:.0f}"
+        ends = [ranged(*fitness), ranged(*distance / INCH)]
+        rows.append([f"`{name}`", f"{row['cost']:.0f}", *ends, cost, there])
     headings = ["run", "evaluations of a trial, median", "fitness", "distance, in"]
     reach = f"{fixed((compared.reach or math.nan) / INCH)} in"
     return markdown_table([*headings, f"evaluations to {reach}, median", "trials"], rows)

@@ -44,10 +44,10 @@ class CmaEs(Generational):
         self._own = own = own or kinds.CmaEs()
         self._starts = min(own.starts, max(1, settings.budget // (2 * own.tryout)))
         self._searches: list[_Search] = []
-        """None during the sample."""
+        """Empty during the sample."""
         if not own.sample:
-            middle = np.full((1, self._ranges.size), MIDDLE)
-            self._begin(np.concatenate([middle, *map(self._random, [1] * (self._starts - 1))]))
+            middle = np.full(self._ranges.size, MIDDLE)
+            self._begin(np.vstack([middle, *self._random(self._starts - 1)]))
 
     def _begin(self, starts: Matrix) -> None:
         chosen = starts[: self._starts]
