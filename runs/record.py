@@ -3,8 +3,8 @@
     python runs/record.py [--scratch DIR] [NAME ...]
 
 Each experiment is evolved and analysed in a folder of DIR, out/runs by default, thinned into a
-folder here, and its best gait shown on a page and, by Chromium, in a picture there. Interrupted, it
-goes on; what is done is skipped.
+folder here, and its best gait shown on a page and, by Chromium, in a picture there; those that
+README.md shows are filmed, too. Interrupted, it goes on; what is done is skipped.
 
     times.json    how long each experiment took here, in s
     meshcat.js    the viewer that all pages share, of one version of Drake
@@ -49,7 +49,7 @@ from tetra_drake.scenario.optimizers import (
 from tetra_drake.scenario.schema import Scenario
 
 HERE = Path(__file__).parent
-TIMES, VIEWER, PICTURE = "times.json", "meshcat.js", "walking.png"
+TIMES, VIEWER, PICTURE, FILM = "times.json", "meshcat.js", "walking.png", "walking.gif"
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,8 @@ class Experiment:
     """By keys of the scenario, beside its name."""
     initial: bool = False
     """Whether its initial gaits are evaluated on the Drake diagram, too."""
+    film: bool = False
+    """Whether its best gait is filmed, for README.md."""
 
     def scenario(self, name: str) -> Scenario:
         """Of the run of this name."""
@@ -106,17 +108,22 @@ EXPERIMENTS = {
         "an oscillator for each bottom cable, so that the robot can undulate",
         "undulation",
         _by(CmaEs(), 3, 2000),
+        film=True,
     ),
     "turning": Experiment("turning on the spot, in 30 s", "turning", _by(CmaEs(), 3, 2000)),
     "robust": Experiment("far on eight disturbed robots", "robust", _by(CmaEs(), 3, 1000)),
     "efficient": Experiment("with little work", "efficient", _by(CmaEs(), 3, 2000)),
     "twelve": Experiment(
-        "twelve tetrahedra", "thesis", _by(CmaEs(), 2, 1000) | {"robot.tetrahedra": 12}
+        "twelve tetrahedra",
+        "coulomb",
+        _by(CmaEs(), 2, 1000) | {"robot.tetrahedra": 12},
+        film=True,
     ),
     "champion": Experiment(
-        "the farthest: a long search",
-        "thesis",
+        "the farthest: a long search, where friction grows with the load",
+        "coulomb",
         _by(CmaEs(population=16, sample=100, starts=12), 3, 16000),
+        film=True,
     ),
     "map": Experiment(
         "gaits that differ, the fittest of each kind",
@@ -143,18 +150,18 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
             reevaluate(made, initial=True, progress=progress)
         if not (made / ANALYSIS).exists():
             analyse(made, workers=available_cores())
-        for old in {*shown.glob("*")} - {shown / "README.md"}:
+        for old in {*shown.glob("*")} - {shown / "README.md", *shown.glob("*.png")}:
             shutil.rmtree(old) if old.is_dir() else old.unlink()
         thin(made, shown)
         write_replay(shown, shown / REPLAY, viewer=out / VIEWER)
-        take_picture(shown / REPLAY, shown / PICTURE)
+        take_pictures(shown / REPLAY, *[shown / FILM] * experiment.film, shown / PICTURE)
         shutil.copy(made / ANALYSIS, shown / ANALYSIS)
 
 
-def take_picture(page: Path, picture: Path) -> None:
-    """Draws the end of a page's motion, in a browser. Raises CalledProcessError."""
+def take_pictures(page: Path, *pictures: Path) -> None:
+    """Draws the end of a page's motion, or films it, in a browser. Raises CalledProcessError."""
     script = HERE.parent / "diagrams" / "animation.py"
-    subprocess.run([sys.executable, script, page, picture], check=True)
+    subprocess.run([sys.executable, script, page, *pictures], check=True)
 
 
 def _same(first: Path, second: Path) -> bool:

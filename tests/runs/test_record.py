@@ -18,6 +18,7 @@ TINY = record.Experiment(
         **{"simulation.steady_from": 0.1, "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)},
         **{"evolution.trials": 2, "evolution.max_evaluations": 12},
     },
+    film=True,
 )
 
 
@@ -31,14 +32,19 @@ def analysed(monkeypatch):
         (directory / ANALYSIS).write_text("{}")
 
     monkeypatch.setattr(record, "analyse", analyse)
-    monkeypatch.setattr(record, "take_picture", lambda page, picture: picture.touch())
+
+    def take_pictures(page, *pictures):
+        for picture in pictures:
+            picture.touch()
+
+    monkeypatch.setattr(record, "take_pictures", take_pictures)
     return analysed
 
 
 def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed):
     scratch, out = tmp_path / "scratch", tmp_path / "runs"
     (out / "tiny").mkdir(parents=True)
-    for name in ("README.md", "figures"):
+    for name in ("README.md", "map.png", "figures"):
         (out / "tiny" / name).write_text("of an older run")
     record.record("tiny", TINY, scratch=scratch, out=out)
     run = load_run(out / "tiny")
@@ -47,8 +53,8 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     assert run.reevaluations["engine"].unique() == ["drake"]
     files = {file.name for file in (out / "tiny").iterdir()}
     assert files == {
-        *("README.md", "replay.html", "walking.png", "analysis.json", "manifest.json"),
-        *("scenario.yaml", "trial_00", "trial_01"),
+        *("README.md", "map.png", "replay.html", "walking.png", "walking.gif", "analysis.json"),
+        *("manifest.json", "scenario.yaml", "trial_00", "trial_01"),
     }
     assert 'src="../meshcat.js"' in read_page(out / "tiny/replay.html")
     assert (out / record.VIEWER).is_file()
