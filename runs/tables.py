@@ -263,9 +263,14 @@ def comparison_table(runs: Runs) -> str:
 
 
 def summary_table(runs: Runs) -> str:
-    """The most important numbers of the thesis's repetition, for README.md."""
-    headings = ["distance in 15 s, inches", "thesis", "[`runs/thesis`](runs/thesis/README.md)"]
-    rows = [[what, theirs, ours(runs[INTENDED])] for what, theirs, ours in SUMMARY]
+    """The most important numbers of the thesis's repetition under both laws, for README.md."""
+    names = [name for name in (INTENDED, COULOMB) if name in runs]
+    headings = [
+        "distance in 15 s, inches",
+        "thesis",
+        *(f"[`{n}`](runs/{n}/{README})" for n in names),
+    ]
+    rows = [[what, theirs, *(ours(runs[n]) for n in names)] for what, theirs, ours in SUMMARY]
     return markdown_table(headings, rows)
 
 
@@ -378,7 +383,6 @@ SUMMARY: list[Row] = [
     ("best evolved gait", "14.34", _best_evolved),
     ("the same gait on the Drake diagram", "", _on_diagram),
     ("best evolved gait, mean of ten trials", "", lambda r: fixed(r.trials["distance_in"].mean())),
-    ("seconds per iteration (two simulations)", "22", _seconds_per_iteration),
 ]
 
 

@@ -107,6 +107,14 @@ def test_the_comparison_shows_each_run_beside_the_thesis(folder):
     assert off_ground == ["no number", "25, 50, 100", "-", "-"]
 
 
+def test_the_summary_shows_the_experiment_under_both_laws_of_friction(folder):
+    rows = cells("summary", folder)
+    assert rows["best evolved gait"][:2] == ["14.34", "20.00"]
+    assert rows["the same gait on the Drake diagram"][1:] == [
+        f"{tables.load_all(folder)[name].again(0, tables.TIGHT):.2f}" for name in ("thesis", "coulomb")
+    ]
+
+
 def test_a_runs_trials_are_shown_on_all_engines_and_disturbed(folder):
     rows = cells("trials", folder)
     kept = ["4.00", "50 % (40 to 61)"]
