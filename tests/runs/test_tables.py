@@ -111,7 +111,8 @@ def test_the_summary_shows_the_experiment_under_both_laws_of_friction(folder):
     rows = cells("summary", folder)
     assert rows["best evolved gait"][:2] == ["14.34", "20.00"]
     assert rows["the same gait on the Drake diagram"][1:] == [
-        f"{tables.load_all(folder)[name].again(0, tables.TIGHT):.2f}" for name in ("thesis", "coulomb")
+        f"{tables.load_all(folder)[name].again(0, tables.TIGHT):.2f}"
+        for name in ("thesis", "coulomb")
     ]
 
 
