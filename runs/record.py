@@ -91,7 +91,7 @@ EXPERIMENTS = {
     "thesis-drake": Experiment(
         "the same evolved on the Drake diagram itself",
         "thesis",
-        {"evolution.trials": 1, "evolution.max_iterations": 200},
+        {"evolution.trials": 1, "evolution.max_iterations": 150},
     ),
     "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
     "differential-evolution": Experiment(
@@ -113,10 +113,12 @@ EXPERIMENTS = {
         "an oscillator for each bottom cable, so that the robot can undulate",
         "undulation",
         _by(CmaEs(), 3, 2000) | _SOUND,
-        film=True,
     ),
     "turning": Experiment(
-        "turning on the spot, in 30 s", "turning", _by(CmaEs(), 3, 2000) | _SOUND
+        "turning on the spot, in 30 s",
+        "turning",
+        _by(CmaEs(), 3, 2000) | _SOUND,
+        film=True,
     ),
     "robust": Experiment("far on eight disturbed robots", "robust", _by(CmaEs(), 3, 1000)),
     "efficient": Experiment("with little work", "efficient", _by(CmaEs(), 3, 2000)),
