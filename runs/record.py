@@ -31,7 +31,6 @@ from tetra_drake.engines.simulate import available_cores
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.progress import Display
 from tetra_drake.evolution.record import MANIFEST
-from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.thinning import thin
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration
@@ -62,8 +61,6 @@ class Experiment:
     """A shipped scenario."""
     changes: Mapping[str, Any]
     """By keys of the scenario, beside its name."""
-    initial: bool = False
-    """Whether its initial gaits are evaluated on the Drake diagram, too."""
     film: bool = False
     """Whether its best gait is filmed, for README.md."""
 
@@ -84,7 +81,7 @@ def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, An
 
 
 EXPERIMENTS = {
-    "thesis": Experiment("the thesis's experiment, ten trials", "thesis", _COMPILED, initial=True),
+    "thesis": Experiment("the thesis's experiment, ten trials", "thesis", _COMPILED),
     "thesis-listing": Experiment(
         "the same with the listing's mutation, which never reaches τ_A", "thesis-listing", _COMPILED
     ),
@@ -155,8 +152,6 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     with _timed(name, out / TIMES, resume=resume):
         progress = Display(sys.stdout)
         evolve(experiment.scenario(name), made, resume=resume, report=False, progress=progress)
-        if experiment.initial:
-            reevaluate(made, initial=True, progress=progress)
         if not (made / ANALYSIS).exists():
             analyse(made, workers=available_cores())
         for old in {*shown.glob("*")} - {shown / "README.md", *shown.glob("*.png")}:

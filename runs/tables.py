@@ -418,26 +418,33 @@ def engines_table(runs: Runs) -> str:
     headings = ["gaits on both engines", "count", "failed on either", "median difference, in"]
     headings += ["95 % differ by less than, in", f"differ by less than {CLOSE:g} in"]
     rows = []
+    if {INTENDED, DIAGRAM} <= {*runs}:
+        both = initial_on_both(runs[INTENDED].record, runs[DIAGRAM].record)
+        rows.append([f"initial gaits of `{INTENDED}` and `{DIAGRAM}`", *_agreement(both)])
     for run in runs.values():
         both = distances_on_both(run.record)
-        for what, chosen in (
-            ("initial gaits", both[both["iteration"] == 0]),
-            ("best gaits", both[both["iteration"] > 0]),
-        ):
-            if len(chosen.dropna()):
-                rows.append([f"`{run.name}`, {what}", *_agreement(chosen)])
+        if len(both.dropna()):
+            rows.append([f"`{run.name}`, best gaits", *_agreement(both)])
     return markdown_table([*headings, "go the same way"], rows)
 
 
 def distances_on_both(run: Run) -> pandas.DataFrame:
     """Distances of the gaits that were evaluated again on the Drake diagram.
 
-    Columns: trial, index, iteration, compiled_in and drake_in (NaN where a gait failed).
+    Columns: trial, index, compiled_in and drake_in (NaN where a gait failed).
     """
-    key = ["trial", "index"]
-    compiled = run.evaluations[[*key, "iteration", "distance_in"]]
-    drake = run.reevaluations.reindex(columns=[*key, "distance_in"])
-    both = compiled.merge(drake, on=key, validate="one_to_one")
+    return _side_by_side(run.evaluations, run.reevaluations)
+
+
+def initial_on_both(compiled: Run, drake: Run) -> pandas.DataFrame:
+    """As distances_on_both, of the random gaits that begin the same trials of two runs."""
+    return _side_by_side(compiled.initial(), drake.initial())
+
+
+def _side_by_side(compiled: pandas.DataFrame, drake: pandas.DataFrame) -> pandas.DataFrame:
+    columns = ["trial", "index", "distance_in"]
+    first, second = (table.reindex(columns=columns) for table in (compiled, drake))
+    both = first.merge(second, on=columns[:2], validate="one_to_one")
     return both.rename(columns={"distance_in_x": "compiled_in", "distance_in_y": "drake_in"})
 
 
