@@ -53,7 +53,7 @@ def metrics_of(trial, i, fitness):
     }
     cost, index, lifted = special.get(i if trial == 0 else -1, (20.0 + fitness, 0.9, 0.5))
     numbers = {"cost_of_transport": cost, "travelling_index": index, "lifted": lifted}
-    return numbers | {"lateral_drift": -1e-17}
+    return numbers | {"lateral_drift": -1e-17, "clearance": 1.0}
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +100,7 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     assert (loss >= 0.0).all() and (loss < 1e-4).all() and (loss > 0.0).any()
     cost = after["cost_of_transport"].dropna()
     assert [float(f"{x:.3g}") for x in before["cost_of_transport"].dropna()] == cost.tolist()
+    assert thinned.whole["clearance"].notna().any() and after["clearance"].isna().all()
     assert not np.signbit(after["lateral_drift"].dropna()).any()
     assert set(after["lateral_drift"].dropna()) == {0.0}
     assert thinned.evaluations["failure"].equals(run.evaluations["failure"])

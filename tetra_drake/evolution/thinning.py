@@ -1,7 +1,8 @@
 """A recorded run in a tenth of its size, for publishing.
 
     manifest.json, scenario.yaml, trial_00/best_gait.json    as they are, and `thinned` in the first
-    trial_00/evaluations.jsonl.xz      genomes and all digits of the gaits that matter alone
+    trial_00/evaluations.jsonl.xz      genomes and all digits of the gaits that matter alone; of
+                                       others few digits of the metrics by which they are chosen
     trial_00/iterations.jsonl.xz, trial_00/reevaluations.jsonl.xz (without genomes), elites.jsonl.xz
 
 The gaits that matter are the first of each trial, each best so far, the last population, the best
@@ -13,13 +14,13 @@ from __future__ import annotations
 import decimal
 import json
 import lzma
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from tetra_drake.evolution.elites import ELITES, elites
 from tetra_drake.evolution.json_lines import compressed, read_lines
-from tetra_drake.evolution.pareto import champions
+from tetra_drake.evolution.pareto import COST, champions
 from tetra_drake.evolution.record import (
     BEST_GAIT,
     EVALUATIONS,
@@ -33,6 +34,7 @@ from tetra_drake.evolution.record import (
 from tetra_drake.evolution.reevaluation import BEST_GAITS
 from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.files import whole_file, write_whole
+from tetra_drake.scenario.schema import Scenario
 
 _DIGITS, _WALL_TIME_DIGITS = 3, 2
 """Significant ones of numbers of an evaluation without its genome, and of the time of all."""
@@ -49,10 +51,14 @@ def thin(source: Path, out: Path) -> None:
     run = load_run(source)
     manifest = json.loads((source / MANIFEST).read_text(encoding="utf-8")) | {"thinned": True}
     whole = {(int(trial), int(index)) for trial, index in _that_matter(run)}
+    metrics = _that_choose(run.manifest.scenario)
     for trial in range(run.manifest.scenario.evolution.trials):
         old, new = trial_folder(source, trial), trial_folder(out, trial)
         entries = read_entries(old / EVALUATIONS)
-        thinned = [_thinned(e, whole=(trial, e["index"]) in whole) for e in entries]
+        thinned = [e if (trial, e["index"]) in whole else _thinned(e, metrics) for e in entries]
+        thinned = [
+            e | {"wall_time_s": _rounded(e["wall_time_s"], _WALL_TIME_DIGITS)} for e in thinned
+        ]
         again = read_entries(old / REEVALUATIONS)
         _write(new / EVALUATIONS, thinned)
         _write(new / ITERATIONS, read_entries(old / ITERATIONS))
@@ -74,15 +80,20 @@ def _that_matter(run: Run) -> set[tuple[Any, Any]]:
     return {(row["trial"], row["index"]) for row in rows}
 
 
-def _thinned(entry: Mapping[str, Any], *, whole: bool) -> dict[str, Any]:
-    """An entry of evaluations as a thinned run has it."""
-    few = dict(entry) | {"wall_time_s": _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)}
-    if whole:
-        return few
-    few |= {key: _rounded(entry[key], _DIGITS) for key in ("metrics", "draws") if key in entry}
+def _that_choose(scenario: Scenario) -> set[str]:
+    """The metrics by which gaits of a run are compared."""
+    measures = getattr(scenario.optimizer, "measures", ())
+    return {"distance", COST.column, *scenario.objective, *scenario.require, *measures}
+
+
+def _thinned(entry: Mapping[str, Any], metrics: Container[str]) -> dict[str, Any]:
+    """An entry of evaluations that does not matter, with these metrics."""
+    few = dict(entry) | {"genome": None}
+    few["metrics"] = {name: value for name, value in few["metrics"].items() if name in metrics}
+    few |= {key: _rounded(few[key], _DIGITS) for key in ("metrics", "draws") if key in few}
     if entry["fitness"] is not None:
         few["fitness"] = float(_DOWN.create_decimal_from_float(float(entry["fitness"])))
-    return few | {"genome": None}
+    return few
 
 
 def _rounded(value: Any, digits: int) -> Any:
