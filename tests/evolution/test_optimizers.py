@@ -307,7 +307,7 @@ def test_elites_are_the_cells_of_gaits_above_the_floor_that_have_not_failed():
 def test_the_map_is_fuller_and_fitter_than_that_of_random_search():
     runs = (run(make(kind, budget=4000), walker) for kind in (DIVERSE, RandomSearch()))
     ours, theirs = (cells(batches) for batches, _ in runs)
-    assert len(ours) > 1.1 * len(theirs)  # 1.2 to 1.5, by which vectors fail
+    assert len(ours) > 1.2 * len(theirs)
     assert np.median([ours[cell] - theirs[cell] for cell in ours.keys() & theirs.keys()]) > 2.0
 
 

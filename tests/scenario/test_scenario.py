@@ -195,7 +195,9 @@ RECORDED = sorted((Path(__file__).parents[2] / "runs").glob("*/scenario.yaml"))
 
 @pytest.mark.parametrize("file", RECORDED, ids=lambda file: file.parent.name)
 def test_recorded_scenarios_load(file):
-    assert load_scenario(file).name == file.parent.name
+    loaded, text = load_scenario(file), file.read_text(encoding="utf-8")
+    assert f"name: {loaded.name}\n" in text
+    assert f"tetrahedra: {loaded.robot.tetrahedra}\n" in text
 
 
 def test_a_file_of_schema_1_means_what_it_meant(data, scenario):

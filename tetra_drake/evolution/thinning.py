@@ -56,9 +56,8 @@ def thin(source: Path, out: Path) -> None:
         old, new = trial_folder(source, trial), trial_folder(out, trial)
         entries = read_entries(old / EVALUATIONS)
         thinned = [e if (trial, e["index"]) in whole else _thinned(e, metrics) for e in entries]
-        thinned = [
-            e | {"wall_time_s": _rounded(e["wall_time_s"], _WALL_TIME_DIGITS)} for e in thinned
-        ]
+        for entry in thinned:
+            entry["wall_time_s"] = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
         again = read_entries(old / REEVALUATIONS)
         _write(new / EVALUATIONS, thinned)
         _write(new / ITERATIONS, read_entries(old / ITERATIONS))
