@@ -88,7 +88,7 @@ EXPERIMENTS = {
     "thesis-drake": Experiment(
         "the same evolved on the Drake diagram itself",
         "thesis",
-        {"evolution.trials": 1, "evolution.max_iterations": 150},
+        {"evolution.trials": 1, "evolution.max_iterations": 100},
     ),
     "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
     "differential-evolution": Experiment(
