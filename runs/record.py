@@ -38,13 +38,7 @@ from tetra_drake.report.replay_page import write_replay
 from tetra_drake.results.folder import REPLAY
 from tetra_drake.run import evolve
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.optimizers import (
-    CmaEs,
-    DifferentialEvolution,
-    OptimizerKind,
-    QualityDiversity,
-    RandomSearch,
-)
+from tetra_drake.scenario.optimizers import CmaEs, OptimizerKind, QualityDiversity
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
@@ -91,12 +85,6 @@ EXPERIMENTS = {
         {"evolution.trials": 1, "evolution.max_iterations": 100},
     ),
     "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
-    "differential-evolution": Experiment(
-        "the same by differential evolution", "thesis", _by(DifferentialEvolution(), 10, 4000)
-    ),
-    "random-search": Experiment(
-        "the same at random, a baseline", "thesis", _by(RandomSearch(), 10, 4000)
-    ),
     "coulomb": Experiment("the same under friction that grows with the load", "coulomb", _COMPILED),
     "incline": Experiment("up an incline of 5°", "incline", _by(CmaEs(), 3, 2000)),
     "steps": Experiment("up four steps of 0.25 in", "steps", _by(CmaEs(), 3, 2000)),

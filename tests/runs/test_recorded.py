@@ -37,9 +37,9 @@ def files_in_git():
     return [tables.HERE / name for name in listed.stdout.decode().split("\0") if name]
 
 
-def test_every_recorded_run_is_an_experiment():
+def test_every_experiment_is_recorded():
     folders = {file.parent.name for file in files_in_git() if file.name == "manifest.json"}
-    assert folders <= set(FOLDERS) == set(runs())
+    assert folders <= set(FOLDERS) == set(runs()) == set(record.EXPERIMENTS)
 
 
 @pytest.mark.parametrize("name", FOLDERS)
