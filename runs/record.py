@@ -163,15 +163,20 @@ def _same(first: Path, second: Path) -> bool:
 
 @contextmanager
 def _timed(name: str, file: Path, *, resume: bool) -> Iterator[None]:
-    """Prints how long the block takes and keeps it in a file, added to what is there already."""
-    begin = time.monotonic()
+    """Prints how long the block takes and keeps it in a file, where it goes on added to what is
+    there; not where the block refuses its input."""
+    begin, refused = time.monotonic(), False
     try:
         yield
+    except InputError:
+        refused = True
+        raise
     finally:
-        times = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-        times[name] = round(time.monotonic() - begin) + (times.get(name, 0) if resume else 0)
-        write_whole(file, json.dumps(times, indent=1) + "\n")
-        print(f"{name}: {duration(times[name])}", flush=True)
+        if not refused:
+            times = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+            times[name] = round(time.monotonic() - begin) + (times.get(name, 0) if resume else 0)
+            write_whole(file, json.dumps(times, indent=1) + "\n")
+            print(f"{name}: {duration(times[name])}", flush=True)
 
 
 def main() -> None:

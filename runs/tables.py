@@ -29,7 +29,7 @@ from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.record import MANIFEST
 from tetra_drake.evolution.robustness import percents
 from tetra_drake.evolution.tables import Run, load_run
-from tetra_drake.files import write_whole
+from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import duration, fixed, listed, markdown_table, ranged, signed
 from tetra_drake.results.folder import REPLAY
 from tetra_drake.results.measures import dominant_frequency
@@ -490,12 +490,12 @@ def pages(runs: Runs) -> list[Path]:
 
 
 def made_again(page: Path, runs: Runs) -> str:
-    """The text of a page with its tables made again."""
+    """The text of a page with its tables made again. Raises InputError if it cannot be read."""
 
     def table(name: str) -> str:
         return TABLES[name](runs) if name in TABLES else RUN_TABLES[name](runs[page.parent.name])
 
-    return filled(page.read_text(encoding="utf-8"), table)
+    return filled(read_text(page, "page"), table)
 
 
 def filled(text: str, make_table: Callable[[str], str]) -> str:

@@ -7,6 +7,7 @@ import record
 from analyse import ANALYSIS
 from helpers.meshcat_page import read_page
 
+from tetra_drake.errors import InputError
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.scenario.optimizers import CmaEs
 
@@ -79,6 +80,9 @@ def test_times_add_up_when_a_run_goes_on(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt), record._timed("b", file, resume=False):
         raise KeyboardInterrupt
     assert json.loads(file.read_text())["b"] == 0
+    with pytest.raises(InputError), record._timed("a", file, resume=False):
+        raise InputError(file, "", "holds a run of another scenario")
+    assert json.loads(file.read_text())["a"] == 10
 
 
 def test_every_experiment_is_a_scenario():
