@@ -46,7 +46,7 @@ INTENDED, LISTING, DIAGRAM = RUNS = ("thesis", "thesis-listing", "thesis-drake")
 """The repetitions of the thesis: tau_A mutated as intended, as by the listing, evolved on the
 diagram."""
 CMA_ES, COULOMB = "cma-es", "coulomb"
-"""The first repetition with another optimiser, under another law of friction."""
+"""The first of them with another optimiser, and under another law of friction."""
 
 CLOSE, APART = 0.1, 0.3
 """in: distances on two engines that differ by less agree; where they differ by more, a page says
