@@ -197,27 +197,26 @@ class _StepAimer:
             self._acceleration = (velocities - self._last_velocities) / step_taken
         self._last_time, self._last_velocities = context.get_time(), velocities
 
+        due, time_to_change = self._ground.NextModeChange(
+            self._ground_context, acceleration=self._acceleration, horizon=self._settings.max_step
+        )
         if self._settings.fresh_steps:
-            if self._ground.ModeChangeIsDue(self._ground_context):
+            if due:
                 self._longest, self._jacobian_is_old = _FIRST_STEP, True
             elif self._longest < self._settings.max_step:
                 self._longest = _GROWTH * max(step_taken, _FIRST_STEP)
-        step = min(self._settings.max_step, self._longest, self._step_to_change())
+        step = min(self._settings.max_step, self._longest, self._step_towards(time_to_change))
         if self._jacobian_is_old and step >= _RENEW_FROM:
             self._renew_jacobian()
         self._integrator.set_maximum_step_size(step)
 
-    def _step_to_change(self) -> float:
-        """The step (s) towards the next mode change."""
-        look_ahead, horizon = self._settings.look_ahead, self._settings.max_step
-        predicted = self._ground.TimeToModeChange(
-            self._ground_context, acceleration=self._acceleration, horizon=horizon
-        )
-        share, near = _APPROACH
-        if self._settings.fresh_steps and near < predicted < horizon:
-            return share * predicted
+    def _step_towards(self, time_to_change: float) -> float:
+        """The step (s) towards a mode change that is predicted in a time (s)."""
+        look_ahead, (share, near) = self._settings.look_ahead, _APPROACH
+        if self._settings.fresh_steps and near < time_to_change < self._settings.max_step:
+            return share * time_to_change
         margin = min(_AIM_BEYOND, 0.25 * look_ahead)
-        return max(look_ahead, _AIM_FACTOR * predicted + margin)
+        return max(look_ahead, _AIM_FACTOR * time_to_change + margin)
 
     def _renew_jacobian(self) -> None:
         self._work.keep()

@@ -218,14 +218,20 @@ def ground_forces(
     state: Table,
     modes: Table,
     p_BN: Table,
-    ground: Ground,
+    contacts: Table,
+    law: Table,
+    heights: Table,
+    flat: bool,
+    coulomb: bool,
     nodes: Table,
     frames: Table,
     pushes: Table,
     generalized_force: Table,
 ) -> None:
     """Writes [t_W; f_W] of the ground at each Bo, (6 bodies,), for a state of the bodies; also
-    `nodes`, `frames` and `pushes`."""
+    `nodes`, `frames` and `pushes`. From `contacts` to `coulomb`, the arguments are the fields of
+    Ground: a call from Python takes half a microsecond longer if it has to unpack them."""
+    ground = Ground(contacts, law, heights, flat, coulomb)
     meet_ground(state, p_BN, ground, nodes, frames)
     add_ground_forces(nodes, modes, ground, frames, True, pushes)
     gather_forces(nodes, generalized_force)
@@ -266,6 +272,16 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         changed = changed | (n_1 != m_1) | (n_2 != m_2)
         move_stick_point(nodes, ground, frames, i, resets_1, resets_2, slide, modes)
     return changed
+
+
+@compiled
+def modes_after_step(
+    state: Table, p_BN: Table, ground: Ground, nodes: Table, frames: Table, modes: Table
+) -> Truth:
+    """Brings `modes` up to date with a state of the bodies, as update_modes() does; writes `nodes`
+    and `frames`, too."""
+    meet_ground(state, p_BN, ground, nodes, frames)
+    return update_modes(state, nodes, ground, frames, modes)
 
 
 @compiled

@@ -7,7 +7,15 @@ import math
 import numpy as np
 
 from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.contact import CONTACT, Ground, Law, gap, law_of, sliding
+from tetra_drake.physics.contact import (
+    CONTACT,
+    Ground,
+    Law,
+    gap,
+    law_of,
+    modes_after_step,
+    sliding,
+)
 from tetra_drake.physics.friction import STICK, Slide, coulomb_pull, coulomb_size, sticks
 from tetra_drake.physics.kinematics import node_acceleration
 from tetra_drake.physics.lanes import Real, Table, Truth, any_lane, maximum, minimum, select
@@ -101,6 +109,26 @@ def time_to_mode_change(
             time = minimum(time, time_to_reset_change(v_1, x_1, m_1, a_1, touches, p_0, horizon))
             time = minimum(time, time_to_reset_change(v_2, x_2, m_2, a_2, touches, p_0, horizon))
     return time
+
+
+@compiled
+def next_mode_change(
+    state: Array,
+    acceleration: Array,
+    modes: Array,
+    p_BN: Array,
+    ground: Ground,
+    nodes: Array,
+    frames: Array,
+    horizon: float,
+) -> tuple[bool, float]:
+    """Whether a mode is due to change in a state of the bodies, and the time (s) to the next change
+    after that, as time_to_mode_change() predicts it.
+
+    Writes `nodes` and `frames`, and brings `modes` up to date.
+    """
+    due = modes_after_step(state, p_BN, ground, nodes, frames, modes)
+    return due, time_to_mode_change(state, acceleration, nodes, modes, ground, frames, horizon)
 
 
 @compiled

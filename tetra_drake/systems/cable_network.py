@@ -29,8 +29,10 @@ class CableNetwork(LeafSystem):
         self._p_BN, self._cables = structure.p_BN, structure.cables
         self._slack = slack
         bodies, count = len(structure.bodies), len(structure.cables)
-        self._size, self._pulls = 6 * bodies, (count, PULL_COLUMNS)
-        self._nodes = len(structure.node_names), NODE_COLUMNS
+        # Room for the kernel, which writes all of it at every call.
+        self._nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
+        self._pulls = np.empty((count, PULL_COLUMNS))
+        self._force = np.empty(6 * bodies)
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self._signals = self.DeclareVectorInputPort("signals", structure.signals)
         inputs = {self._state.ticket(), self._signals.ticket()}
@@ -38,19 +40,27 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
 
-    def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._pull(context, output.get_mutable_value())
+    def _pull(self, context: Context) -> None:
+        """Writes the generalized force and the cables' `pulls`."""
+        cable_forces(
+            self._state.Eval(context),
+            self._signals.Eval(context),
+            self._p_BN,
+            self._cables,
+            self._slack,
+            self._nodes,
+            self._pulls,
+            self._force,
+        )
 
-    def _pull(self, context: Context, force: np.ndarray) -> np.ndarray:
-        """Writes the generalized force; returns the cables' `pulls`."""
-        state, signals = self._state.Eval(context), self._signals.Eval(context)
-        nodes, pulls = np.empty(self._nodes), np.empty(self._pulls)
-        law = self._p_BN, self._cables, self._slack
-        cable_forces(state, signals, *law, nodes, pulls, force)
-        return pulls
+    def _calc_force(self, context: Context, output: BasicVector) -> None:
+        self._pull(context)
+        output.SetFromVector(self._force)
 
     def _calc_tensions(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._pull(context, np.empty(self._size))[:, TENSION])
+        self._pull(context)
+        output.SetFromVector(self._pulls[:, TENSION])
 
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._pull(context, np.empty(self._size))[:, LENGTH])
+        self._pull(context)
+        output.SetFromVector(self._pulls[:, LENGTH])

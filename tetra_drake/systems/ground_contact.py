@@ -20,10 +20,10 @@ from tetra_drake.physics.contact import (
     STICK_POINT,
     ground_forces,
     meet_ground,
-    update_modes,
+    modes_after_step,
 )
 from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
+from tetra_drake.physics.mode_change import mode_margin, next_mode_change
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure
@@ -59,7 +59,11 @@ class GroundContact(LeafSystem):
         super().__init__()
         self._p_BN, self._ground = structure.p_BN, make_ground(scenario, structure)
         bodies, count = len(structure.bodies), len(structure.contacts)
-        self._size, self._count, self._nodes = 6 * bodies, count, len(structure.node_names)
+        # Room for the kernels, which write what they need of it at every call.
+        self._nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
+        self._frames = np.empty((count, FRAME_COLUMNS))
+        self._pushes = np.empty((count, 3))
+        self._force = np.empty(6 * bodies)
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self.DeclareDiscreteState(MODE_COLUMNS * count)
         self.DeclareInitializationDiscreteUpdateEvent(self._start)
@@ -76,41 +80,33 @@ class GroundContact(LeafSystem):
         self.DeclareVectorOutputPort("friction_forces", 2 * count, self._calc_friction, sources)
         self.DeclareVectorOutputPort("modes", 3 * count, self._calc_modes, {self.xd_ticket()})
 
-    def TimeToModeChange(
+    def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
-    ) -> float:
-        """Predicted time (s) to the next mode change, at most `horizon` (s).
+    ) -> tuple[bool, float]:
+        """Whether a mode will change if a step ends here, and the predicted time (s) from here to
+        the next change after that, at most `horizon` (s).
 
         `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
-        Changes due right now count as made.
         """
-        state, rows, nodes, frames = self._at(context)
-        rows = rows.copy()
-        update_modes(state, nodes, self._ground, frames, rows)
-        ground = rows, self._ground, frames
-        return time_to_mode_change(state, acceleration, nodes, *ground, horizon)
-
-    def ModeChangeIsDue(self, context: Context) -> bool:
-        """Whether a mode will change if a step ends here."""
-        state, rows, nodes, frames = self._at(context)
-        return update_modes(state, nodes, self._ground, frames, rows.copy())
+        state, modes = self._state.Eval(context), self._modes(context).copy()
+        due, time = next_mode_change(
+            state,
+            acceleration,
+            modes,
+            self._p_BN,
+            self._ground,
+            self._nodes,
+            self._frames,
+            horizon,
+        )
+        return due, time
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """The one witness, if asked for."""
         return self._witnesses
 
-    def _rows(self, context: Context) -> np.ndarray:
+    def _modes(self, context: Context) -> np.ndarray:
         return context.get_discrete_state_vector().value().reshape(-1, MODE_COLUMNS)
-
-    def _at(self, context: Context) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """The state, the modes, the nodes and the frames."""
-        state = self._state.Eval(context)
-        nodes, frames = self._tables()
-        meet_ground(state, self._p_BN, self._ground, nodes, frames)
-        return state, self._rows(context), nodes, frames
-
-    def _tables(self) -> tuple[np.ndarray, np.ndarray]:
-        return np.empty((self._nodes, NODE_COLUMNS)), np.empty((self._count, FRAME_COLUMNS))
 
     def _start(self, context: Context, values: DiscreteValues) -> EventStatus:
         # From "nowhere in contact", an update makes every node in the ground stick where it is.
@@ -119,31 +115,41 @@ class GroundContact(LeafSystem):
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
-        rows = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
-        state, _, nodes, frames = self._at(context)
-        if update_modes(state, nodes, self._ground, frames, rows):
+        modes = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
+        state, room = self._state.Eval(context), (self._nodes, self._frames)
+        if modes_after_step(state, self._p_BN, self._ground, *room, modes):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
     def _margin(self, context: Context) -> float:
-        _, rows, nodes, frames = self._at(context)
-        return mode_margin(nodes, rows, self._ground, frames)
+        meet_ground(self._state.Eval(context), self._p_BN, self._ground, self._nodes, self._frames)
+        return mode_margin(self._nodes, self._modes(context), self._ground, self._frames)
+
+    def _push(self, context: Context) -> None:
+        """Writes the generalized force and, by contact, friction along t1 and t2 and the normal
+        force."""
+        ground_forces(
+            self._state.Eval(context),
+            self._modes(context),
+            self._p_BN,
+            *self._ground,
+            self._nodes,
+            self._frames,
+            self._pushes,
+            self._force,
+        )
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._push(context, output.get_mutable_value())
-
-    def _push(self, context: Context, force: np.ndarray) -> np.ndarray:
-        """Writes the generalized force; returns (m, 3): friction along t1 and t2, normal force."""
-        state, rows = self._state.Eval(context), self._rows(context)
-        pushes = np.empty((self._count, 3))
-        ground_forces(state, rows, self._p_BN, self._ground, *self._tables(), pushes, force)
-        return pushes
+        self._push(context)
+        output.SetFromVector(self._force)
 
     def _calc_normal(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._push(context, np.empty(self._size))[:, 2])
+        self._push(context)
+        output.SetFromVector(self._pushes[:, 2])
 
     def _calc_friction(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._push(context, np.empty(self._size))[:, :2].ravel())
+        self._push(context)
+        output.SetFromVector(self._pushes[:, :2].ravel())
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._rows(context)[:, :STICK_POINT].ravel())
+        output.SetFromVector(self._modes(context)[:, :STICK_POINT].ravel())

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    DiscreteValues,
+    InputPortIndex,
+    LeafSystem,
+)
+from pydrake.systems.primitives import ConstantVectorSource, PortSwitch
 
 _LONGER_THAN_ANY_SIMULATION = 1e9  # s; Drake has no one-time event, so its period is long
 
 
-class StartUpGate(LeafSystem):
+class StartUpGate(Diagram):
     """Passes signals on from the start-up time on, and zeros before it (thesis listing B.1).
 
     | port    | shape | unit | meaning                       |
@@ -16,25 +25,52 @@ class StartUpGate(LeafSystem):
     | ungated | (m,)  | N    | signals of the oscillators    |
     | signals | (m,)  | N    | zeros, later the same signals |
 
-    A discrete state holds whether the gate is open, and an event sets it at the start-up time.
-    So an integration step ends exactly at the jump, and no step smears it.
+    A timer changes over Drake's PortSwitch by an event at the start-up time. So an integration
+    step ends exactly at the jump, no step smears it, and no Python runs between such events.
     """
 
     def __init__(self, size: int, *, start_up: float) -> None:
         super().__init__()
-        self._ungated = self.DeclareVectorInputPort("ungated", size)
+        builder = DiagramBuilder()
+        switch = builder.AddNamedSystem("switch", PortSwitch(size))
+        off, on = switch.DeclareInputPort("off"), switch.DeclareInputPort("on")
+        zeros = builder.AddNamedSystem("zeros", ConstantVectorSource(np.zeros(size)))
+        timer = _Timer(start_up=start_up, before=off.get_index(), after=on.get_index())
+        builder.AddNamedSystem("timer", timer)
+        builder.Connect(zeros.get_output_port(), off)
+        builder.Connect(timer.get_output_port(), switch.get_port_selector_input_port())
+        builder.ExportInput(on, "ungated")
+        builder.ExportOutput(switch.get_output_port(), "signals")
+        builder.BuildInto(self)
+
+
+class _Timer(LeafSystem):
+    """The port that a PortSwitch passes on: `before` the start-up time, and `after` it.
+
+    | port     | type           | meaning            |
+    |----------|----------------|--------------------|
+    | selector | InputPortIndex | `before`, `after`  |
+    """
+
+    def __init__(self, *, start_up: float, before: InputPortIndex, after: InputPortIndex) -> None:
+        super().__init__()
+
+        # Drake never frees a system whose abstract port calls a bound method.
+        def select(context: Context, output: AbstractValue) -> None:
+            started = context.get_discrete_state_vector().value()[0] != 0.0
+            output.set_value(after if started else before)
+
         self.DeclareDiscreteState([0.0 if start_up > 0.0 else 1.0])
-        self.DeclareVectorOutputPort(
-            "signals", size, self._calc_signals, {self._ungated.ticket(), self.xd_ticket()}
+        self.DeclareAbstractOutputPort(
+            "selector",
+            alloc=lambda: Value(InputPortIndex(0)),
+            calc=select,
+            prerequisites_of_calc={self.xd_ticket()},
         )
         if start_up > 0.0:
             self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=_LONGER_THAN_ANY_SIMULATION, offset_sec=start_up, update=self._open
+                period_sec=_LONGER_THAN_ANY_SIMULATION, offset_sec=start_up, update=self._start
             )
 
-    def _open(self, context: Context, values: DiscreteValues) -> None:
+    def _start(self, context: Context, values: DiscreteValues) -> None:
         values.set_value([1.0])
-
-    def _calc_signals(self, context: Context, output: BasicVector) -> None:
-        is_open = context.get_discrete_state_vector().value()[0] != 0.0
-        output.SetFromVector(self._ungated.Eval(context) if is_open else np.zeros(output.size()))
