@@ -44,6 +44,10 @@ DIFFERENCE = 1e-7
 LEAST_STIFFNESS = 1e-9
 """Of a motion for it to count as stable, as a share of the ground's stiffness."""
 
+LENGTH_DIGITS = 9
+"""Digits of a settled length (m) behind the point. What follows depends on the processor, as the
+linear algebra does, and a walk with feedback would enlarge it."""
+
 
 class Resting(NamedTuple):
     """What the forces on bodies at rest depend on, in SI units, and room to compute them in."""
@@ -75,8 +79,9 @@ def settled_state(scenario: Scenario) -> np.ndarray:
 
 
 def settled_lengths(scenario: Scenario) -> np.ndarray:
-    """(cables,): the lengths of the cables (m) in the settled state. Raises as that does."""
-    return _settle(scenario)[1].pulls[:, LENGTH].copy()
+    """(cables,): the lengths of the cables in the settled state, in whole nm. Raises as that
+    does."""
+    return np.round(_settle(scenario)[1].pulls[:, LENGTH], LENGTH_DIGITS)
 
 
 def _settle(scenario: Scenario) -> tuple[np.ndarray, Resting]:

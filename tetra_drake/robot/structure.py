@@ -88,8 +88,10 @@ def MakeStructure(scenario: Scenario) -> Structure:
     terrain, slope = scenario.terrain, 0.0
     if isinstance(terrain, Incline) and terrain.start is None:
         slope = terrain.slope
+    # Written out, as a product of matrices is rounded differently on different processors.
     s, c = math.sin(slope), math.cos(slope)
-    p_WB = p_WB @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    forward, left, up = p_WB.T
+    p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
     actuation, names = Actuation.of(scenario), []
     rows: list[tuple[float, ...]] = []
     for i in range(n - 1):
