@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,20 +44,6 @@ def simulate_compiled(
         check_time()
     _, walk, course = ended[0]
     return make_outcome(walk, course)
-
-
-def ready_engine(
-    walk: Walk, width: int, *, say: Callable[[str], None] = lambda text: None
-) -> LaneEngine:
-    """An engine for walks like this one, compiled or loaded from numba's cache; `say` is told if
-    that takes longer than a moment."""
-    message = "compiling the engine, which takes some seconds the first time ..."
-    timer = threading.Timer(1.0, say, [message])
-    timer.start()
-    try:
-        return LaneEngine(walk, width=width)
-    finally:
-        timer.cancel()
 
 
 def make_outcome(walk: Walk, course: Course) -> SimulationResult:
