@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import os
@@ -15,6 +16,9 @@ from tetra_drake.robot.model import make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
+
+_BRIEF = 0.01
+"""Duration (s) of a simulation that only compiles."""
 
 
 def simulate(
@@ -119,10 +123,17 @@ def check_scenario(scenario: Scenario) -> None:
 
 def prepare(scenario: Scenario, *, many: bool = False) -> None:
     """Compiles the scenario's engine, so that no simulation, nor one of many gaits, has to wait for
-    that."""
+    that. Those of Drake and MuJoCo simulate a moment."""
     if scenario.simulation.engine == "compiled":
         from tetra_drake.engines.compiled.lane_engine import LaneEngine, Walk, lanes_for
 
         walk = Walk.of(scenario, seeded_gait(scenario), record=False)
         for width in {1, lanes_for(math.inf) if many else 1}:
             LaneEngine(walk, width=width)
+        return
+    brief = max(_BRIEF, scenario.cpg.listing_step)
+    if brief < scenario.simulation.duration:
+        times = {"simulation.duration": brief, "simulation.steady_from": 0.0}
+        scenario = scenario.with_changes(times)
+    with contextlib.suppress(SimulationFailure):
+        simulate(scenario=scenario, gait=seeded_gait(scenario))

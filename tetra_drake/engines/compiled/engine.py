@@ -29,8 +29,8 @@ from tetra_drake.scenario.schema import Scenario
 if TYPE_CHECKING:
     import xarray
 
-_ITERATIONS = 20_000
-"""Iterations, some 70 ms, after which signals of the operating system are heard."""
+_BODY_STEPS = 100_000
+"""Iterations times bodies, some 70 ms, after which signals of the operating system are heard."""
 
 
 def simulate_compiled(
@@ -40,7 +40,7 @@ def simulate_compiled(
     walk = Walk.of(scenario, gait, record=record, steering=steering)
     engine = LaneEngine(walk, width=1)
     engine.load(0, walk)
-    while not (ended := engine.advance(_ITERATIONS)):
+    while not (ended := engine.advance(_BODY_STEPS)):
         check_time()
     _, walk, course = ended[0]
     return make_outcome(walk, course)

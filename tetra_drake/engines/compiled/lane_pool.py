@@ -20,8 +20,9 @@ from tetra_drake.scenario.schema import Scenario
 _GATHERING = 1e-3
 """Time (s) that a thread without work waits for more than one walk to come."""
 
-_ITERATIONS = 5000
-"""Iterations, some 30 ms, after which a thread looks for time budgets and the pool's end."""
+_BODY_STEPS = 25_000
+"""Iterations times bodies, some 30 ms, after which a thread looks for time budgets and the pool's
+end."""
 
 _PREPARED = 32
 """Scenarios that are kept prepared, for gaits that are simulated on the same one."""
@@ -188,7 +189,7 @@ class _Crew:
         engine = self._engine
         if engine is None or not self.jobs:
             return
-        for lane, walk, course in engine.advance(_ITERATIONS):
+        for lane, walk, course in engine.advance(_BODY_STEPS):
             self.jobs.pop(lane).future.set_result((walk, course))
         now = time.perf_counter()
         for lane in [lane for lane, job in self.jobs.items() if now > job.deadline]:
