@@ -123,7 +123,7 @@ def check_scenario(scenario: Scenario) -> None:
 
 def prepare(scenario: Scenario, *, many: bool = False) -> None:
     """Compiles the scenario's engine, so that no simulation, nor one of many gaits, has to wait for
-    that. Those of Drake and MuJoCo simulate a moment."""
+    that. The kernels of `drake` and `mujoco` are compiled as a moment is simulated."""
     if scenario.simulation.engine == "compiled":
         from tetra_drake.engines.compiled.lane_engine import LaneEngine, Walk, lanes_for
 
