@@ -133,7 +133,7 @@ def prepare(scenario: Scenario, *, many: bool = False) -> None:
         return
     brief = max(_BRIEF, scenario.cpg.listing_step)
     if brief < scenario.simulation.duration:
-        times = {"simulation.duration": brief, "simulation.steady_from": 0.0}
-        scenario = scenario.with_changes(times)
-    with contextlib.suppress(SimulationFailure):
-        simulate(scenario=scenario, gait=seeded_gait(scenario))
+        times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}
+        scenario = scenario.with_changes({f"simulation.{key}": t for key, t in times.items()})
+    with contextlib.suppress(SimulationFailure):  # recorded, which takes samples within steps
+        simulate(scenario=scenario, gait=seeded_gait(scenario), record=True)
