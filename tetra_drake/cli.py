@@ -106,7 +106,7 @@ def _simulate(options: Options) -> None:
         scenario = scenario.with_changes({"simulation.engine": options.engine})
     gait = _chosen_gait(options, scenario)
     check_result_folder(options.out)
-    prepare(scenario, say=_say)
+    prepare(scenario)
     view = None
     if options.meshcat:
         from tetra_drake.visualization.live import open_view
@@ -331,7 +331,6 @@ def _robustness(options: Options) -> None:
         draws=options.draws,
         seed=options.seed,
         workers=options.workers,
-        say=_say,
     )
     print(describe(judgement))
     if options.out:

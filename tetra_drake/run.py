@@ -90,10 +90,10 @@ def evolve(
         with contextlib.ExitStack() as stack:
             at_a_time = workers
             if in_lanes:
-                lanes = stack.enter_context(LanePool(workers, say=progress.say))
+                lanes = stack.enter_context(LanePool(workers))
                 evaluate, at_a_time = GaitEvaluation(own, objective, lanes), lanes.capacity
             else:
-                prepare(own, many=True, say=progress.say)
+                prepare(own, many=True)
             run_trials(
                 record,
                 evaluate=evaluate,

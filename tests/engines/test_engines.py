@@ -3,12 +3,13 @@
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from tetra_drake.engines.mujoco import INSTALL, installed
-from tetra_drake.engines.simulate import simulate
+from tetra_drake.engines.simulate import prepare, simulate
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.results.measures import path_of_centre
 from tetra_drake.robot.gait import seeded_gait
@@ -91,3 +92,13 @@ def test_failures_cross_process_borders(kind):
     failure = pickle.loads(pickle.dumps(kind(time=1.5, reason="why")))
     assert type(failure) is kind
     assert (failure.time, failure.reason) == (1.5, "why")
+
+
+@pytest.mark.parametrize("changes", [{}, {"cpg.gain": 4e9, "cpg.start_up": 0.0}])
+def test_an_engine_is_prepared_by_a_moment_of_simulation(scenario, monkeypatch, changes):
+    simulated = Mock(wraps=simulate)
+    monkeypatch.setattr("tetra_drake.engines.simulate.simulate", simulated)
+    prepare(scenario.with_changes({"robot.tetrahedra": 2} | changes))
+    (call,) = simulated.call_args_list
+    assert call.kwargs["scenario"].simulation.duration < 0.1
+    assert call.kwargs["scenario"].simulation.engine == scenario.simulation.engine == "drake"

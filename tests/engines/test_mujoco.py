@@ -273,3 +273,16 @@ def test_stands_on_the_surface_of_the_terrain(short):
     along_z = normal * frames[:, N_Z] + friction[:, 0] * frames[:, T1_Z]
     upward = (along_z + friction[:, 1] * frames[:, T2_Z]).sum()
     assert upward == pytest.approx(weight_of(standing), rel=1e-3)
+
+
+@needs_mujoco
+def test_a_step_far_too_long_ends_the_simulation(short):
+    with pytest.raises(Diverged):
+        simulate(scenario=short.with_changes({"mujoco.step": "0.1 s"}), gait=seeded_gait(short))
+
+
+@needs_mujoco
+def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
+    light = short.with_changes({"robot.density": "1e-200 kg/m^3"})
+    with refused("thesis", "robot", "mjMINVAL"):
+        simulate(scenario=light, gait=seeded_gait(light))

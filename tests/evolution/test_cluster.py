@@ -3,9 +3,11 @@
 import importlib
 import os
 import signal
+import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
 from importlib import metadata
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -49,6 +51,14 @@ def test_only_what_ends_its_worker_fails_and_its_chunk_does_not(cluster, vectors
         found = dict(evaluate_all(Chunked(Deadly()), tasks, executor=executor))
     assert found.pop(12).failure == "its process died"
     assert found == {i: Bowl()(task) for i, task in enumerate(tasks) if i != 12}
+
+
+def test_only_this_machine_can_reach_the_cluster(cluster):
+    for address in (cluster.scheduler_address, cluster.dashboard_link):
+        port = urlsplit(address).port
+        socket.create_connection(("localhost", port)).close()
+        with pytest.raises(OSError):  # as another of the machine's addresses
+            socket.create_connection(("127.0.0.2", port), timeout=5.0)
 
 
 class Killer:

@@ -5,10 +5,12 @@ import itertools
 import json
 import math
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+from tetra_drake.robot.actuation import weight_names
 from tetra_drake.robot.gait import (
     TAU_A,
     TAU_B,
@@ -390,3 +392,10 @@ def test_the_seed_alone_decides_the_draw(scenario):
     np.testing.assert_array_equal(first, draw(scenario, seed=8, count=3))
     assert not np.any(first[0] == draw(scenario, seed=9, count=1)[0])
     assert not np.any(first[0] == first[1])
+
+
+def test_the_many_weights_of_a_large_robot_are_named_once(scenario, monkeypatch):
+    names = Mock(wraps=weight_names)
+    monkeypatch.setattr("tetra_drake.robot.actuation.weight_names", names)
+    ParameterSpace.of(scenario.with_changes({"robot.tetrahedra": 9}))
+    assert names.call_count == 1

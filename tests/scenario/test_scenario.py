@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario, shipped_scenarios
+from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
 from tetra_drake.scenario.schema import CABLES, PATHWAYS, Coulomb
 from tetra_drake.scenario.terrain import Flat, Incline, Rough, Steps
 
@@ -151,6 +152,48 @@ def test_shipped_networks_differ_from_their_bases_in_the_network_only(name):
 def test_a_network_that_cannot_be_is_refused(scenario, refused, changes, key, found):
     with refused("scenario thesis", key, found):
         scenario.with_changes(changes)
+
+
+TOO_LARGE = [
+    ({"robot.tetrahedra": 100_000}, "robot.tetrahedra", "100000"),
+    ({"cpg.listing_step": "5e-13 s"}, "cpg.listing_step", "5e-13 s"),
+    ({"cpg.listing_step": "1e-6 s", "simulation.duration": "100 s"}, "cpg.listing_step", "1e-06 s"),
+    ({"simulation.sample_period": "1e-9 s"}, "simulation.sample_period", "1e-09 s"),
+    ({"simulation.duration": "1e9 s"}, "simulation.duration", "1e9 s"),
+    ({"mujoco.step": "1e-7 s", "simulation.engine": "mujoco"}, "mujoco.step", "1e-07 s"),
+    ({"compiled.max_step": "1e5 s"}, "compiled.max_step", "1e5 s"),
+    ({"evolution.population": 10**9}, "evolution.population", "1000000000"),
+    ({"evolution.trials": 10**9}, "evolution.trials", "1000000000"),
+    ({"disturbances": {"draws": 10**9}}, "disturbances.draws", "1000000000"),
+    ({"optimizer": CmaEs(population=10**9)}, "optimizer.population", "1000000000"),
+    ({"optimizer": QualityDiversity(cells=[10**6, 20])}, "optimizer.cells[0]", "1000000"),
+]
+
+
+@pytest.mark.parametrize(("changes", "key", "found"), TOO_LARGE, ids=itertools.count())
+def test_what_no_memory_holds_is_refused(scenario, refused, changes, key, found):
+    with refused("scenario thesis", key, found):
+        scenario.with_changes(changes)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"robot.tetrahedra": 40},
+        {"simulation.duration": "1 h", "cpg.listing_step": "1 ms"},
+        {"cpg.listing_step": "4e-6 s", "simulation.sample_period": "0.1 ms"},
+        {"mujoco.step": "2e-6 s", "simulation.engine": "mujoco"},
+    ],
+)
+def test_what_is_large_but_fits_is_not_refused(scenario, changes):
+    assert scenario.with_changes(changes).with_changes({}) == scenario.with_changes(changes)
+
+
+def test_a_step_of_the_network_is_at_most_the_duration(scenario, refused):
+    times = {"simulation.duration": "2 s", "simulation.steady_from": "1 s"}
+    scenario.with_changes(times | {"cpg.listing_step": "2 s"})
+    with refused("scenario thesis", "cpg.listing_step", "3.0 s"):
+        scenario.with_changes(times | {"cpg.listing_step": "3 s"})
 
 
 SPREAD = (

@@ -1,5 +1,6 @@
 """Watching a simulation in Meshcat: when what is shown, and that it changes nothing."""
 
+import re
 import socket
 from unittest.mock import Mock
 
@@ -14,7 +15,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure, node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain import Incline
-from tetra_drake.visualization.live import FRAMES_PER_SECOND, ROOM, LiveView
+from tetra_drake.visualization.live import FRAMES_PER_SECOND, ROOM, LiveView, open_view
 from tetra_drake.visualization.replay import quiet_meshcat
 
 HANDSHAKE = (
@@ -92,6 +93,16 @@ def test_shows_where_the_robot_is_and_afterwards_the_recording(short, meshcat, v
     assert not commands(meshcat.StaticHtml(), "set_animation")
     view.replay(result.trajectory)
     assert commands(meshcat.StaticHtml(), "set_animation")
+
+
+def test_only_this_machine_can_watch(short):
+    told = []
+    view = open_view(short, say=told.append)
+    port = int(re.search(r"localhost:(\d+)", told[0])[1])
+    socket.create_connection(("localhost", port)).close()
+    with pytest.raises(OSError):  # as another of the machine's addresses
+        socket.create_connection(("127.0.0.2", port), timeout=5.0)
+    del view
 
 
 def test_waits_for_a_browser(short, meshcat):

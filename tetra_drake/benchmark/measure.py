@@ -181,7 +181,7 @@ def measure(
         Row(scenario.with_changes(own("drake") | SHORT)).simulate(gaits[0])
     for batch in in_turn:
         brief = batch.scenario.with_changes(SHORT)
-        simulate_many(scenario=brief, gaits=[seeded_gait(brief)] * batch.size, workers=1, say=say)
+        simulate_many(scenario=brief, gaits=[seeded_gait(brief)] * batch.size, workers=1)
     for i in range(len(gaits)):
         say(f"gait {i + 1} of {len(gaits)} with all settings")
         for row in rows:

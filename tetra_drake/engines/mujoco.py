@@ -189,7 +189,11 @@ class _Robot:
         self.structure = MakeStructure(scenario)
         self._robot = robot = make_model(scenario, self.structure)
         self.mass = float(robot.body.mass[0])
-        self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario, self.structure, robot))
+        try:
+            self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario, self.structure, robot))
+        except ValueError as error:
+            problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
+            raise InputError(scenario.name, "robot", problem) from error
         self._max_speed = min(scenario.simulation.max_speed, _MAX_SPEED)
         driven = self.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # the signal of each motor
@@ -240,6 +244,8 @@ class _Robot:
     def _observe(self, observer: Observer, states: Array, signals: Array, first: int) -> None:
         """Shows an observer every _OBSERVED-th of the states after step `first` and the next."""
         chosen = np.arange(_OBSERVED - 1, len(states), _OBSERVED)
+        if not chosen.size:
+            return
         steps = np.minimum(first + chosen + 1, len(signals) - 1)
         step = self._scenario.mujoco.step
         for k, (at, state) in enumerate(zip(steps, self.states(states[chosen]), strict=True)):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import InputError, SimulationFailure
@@ -15,6 +16,9 @@ from tetra_drake.robot.model import make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
+
+_BRIEF = 0.01
+"""Duration (s) of a simulation that only compiles."""
 
 
 def simulate(
@@ -63,7 +67,6 @@ def simulate_many(
     gaits: Sequence[Gait],
     record: bool = False,
     workers: int | None = None,
-    say: Callable[[str], None] = lambda text: None,
 ) -> list[SimulationResult | SimulationFailure]:
     """Simulates many gaits, on one scenario or each on its own, as simulate() does; the results
     in the order of the gaits, for one that fails its Diverged or StepBudgetExceeded.
@@ -71,7 +74,7 @@ def simulate_many(
     On the compiled engine, `workers` threads (one per core by default) simulate several gaits side
     by side in the registers of each core: the same numbers, bit for bit, several times as fast.
     Scenarios may differ; those with the same number of tetrahedra, `cables.slack` and kind of
-    signals share a core. `say` is told if the engine has to be compiled.
+    signals share a core.
 
     On the engine `mujoco`, MuJoCo's rollout simulates the gaits of one scenario on `workers`
     threads. Otherwise, as on the diagram, one gait is simulated after another.
@@ -89,7 +92,7 @@ def simulate_many(
         from tetra_drake.engines.compiled.lane_pool import simulate_in_lanes
 
         walks = list(zip(scenarios, gaits, strict=True))
-        return simulate_in_lanes(walks, record=record, threads=threads, say=say)
+        return simulate_in_lanes(walks, record=record, threads=threads)
     if isinstance(scenario, Scenario) and scenario.simulation.engine == "mujoco":
         from tetra_drake.engines.mujoco import simulate_in_rollouts
 
@@ -118,15 +121,19 @@ def check_scenario(scenario: Scenario) -> None:
         check_mujoco(scenario)
 
 
-def prepare(
-    scenario: Scenario, *, many: bool = False, say: Callable[[str], None] = lambda text: None
-) -> None:
+def prepare(scenario: Scenario, *, many: bool = False) -> None:
     """Compiles the scenario's engine, so that no simulation, nor one of many gaits, has to wait for
-    that; `say` is told if it takes longer than a moment."""
+    that. The kernels of `drake` and `mujoco` are compiled as a moment is simulated."""
     if scenario.simulation.engine == "compiled":
-        from tetra_drake.engines.compiled.engine import ready_engine
-        from tetra_drake.engines.compiled.lane_engine import Walk, lanes_for
+        from tetra_drake.engines.compiled.lane_engine import LaneEngine, Walk, lanes_for
 
         walk = Walk.of(scenario, seeded_gait(scenario), record=False)
         for width in {1, lanes_for(math.inf) if many else 1}:
-            ready_engine(walk, width, say=say)
+            LaneEngine(walk, width=width)
+        return
+    brief = max(_BRIEF, scenario.cpg.listing_step)
+    if brief < scenario.simulation.duration:
+        times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}
+        scenario = scenario.with_changes({f"simulation.{key}": t for key, t in times.items()})
+    with contextlib.suppress(SimulationFailure):  # recorded, which takes samples within steps
+        simulate(scenario=scenario, gait=seeded_gait(scenario), record=True)

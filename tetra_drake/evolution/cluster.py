@@ -90,7 +90,7 @@ def local_cluster(workers: int) -> LocalCluster:
         cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
-            dashboard_address=":0",
+            dashboard_address="localhost:0",
             silence_logs=logging.CRITICAL,  # of workers that die: the pool copes
         )
     cluster.adapt(minimum=workers, maximum=workers)  # also replaces one that died as it started

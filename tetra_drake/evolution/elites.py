@@ -86,9 +86,7 @@ def judge_elites(
     keys = [(int(trial), int(index)) for trial, index in missing[_KEY].to_numpy()]
     gaits = dict(enumerate(run.gait(*key) for key in keys))
     seed = run.manifest.seed
-    judgement = judge(
-        scenario, gaits, draws=kind.draws, seed=seed, alone=False, workers=workers, say=say
-    )
+    judgement = judge(scenario, gaits, draws=kind.draws, seed=seed, alone=False, workers=workers)
     table = by_gait(judgement)
     lines = [
         {"trial": trial, "index": index, "kept": kept, "mean_distance": json_number(mean)}

@@ -4,7 +4,7 @@ from the model."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -121,13 +121,12 @@ def judge(
     seed: int = 0,
     alone: bool = True,
     workers: int | None = None,
-    say: Callable[[str], None] = lambda text: None,
 ) -> Judgement:
     """Simulates gaits on the compiled engine: undisturbed, under fresh draws of the scenario's
     disturbances, the same for all gaits, and, if `alone`, under each change alone.
 
     Without disturbances in the scenario, or with `percent`, they are the default ones. No evolution
-    ever sees these draws, whatever its seed. `workers` and `say` are those of simulate_many().
+    ever sees these draws, whatever its seed. `workers` are those of simulate_many().
 
     Raises InputError where a gait is for another robot, or percent too large for the scenario.
     """
@@ -141,7 +140,7 @@ def judge(
     plan: list[tuple[dict[str, Any], Draw]] = [({"what": NOTHING}, Draw({}))]
     plan += [({"what": ALL, "draw": i, **each.factors}, each) for i, each in enumerate(fresh)]
     plan += _alone(settings, fresh) if alone else []
-    outcomes = _outcomes(scenario, [draw for _, draw in plan], gaits, workers=workers, say=say)
+    outcomes = _outcomes(scenario, [draw for _, draw in plan], gaits, workers=workers)
     labels = [{"gait": key} | label for label, _ in plan for key in gaits]
     rows = [a | b for a, b in zip(labels, outcomes, strict=True)]
     chosen = {what: [row for row in rows if row["what"] == what] for what in (NOTHING, ALL)}

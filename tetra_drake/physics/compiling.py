@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import inspect
+import logging
+import pickle
 import re
+import sys
+import threading
+import uuid
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import njit
+import numba
+from numba.core.caching import CompileResultCacheImpl, NullCache
+from numba.core.serialize import dumps
 
 F = TypeVar("F", bound=Callable[..., object])
+
+LOGGER = "tetra_drake"
+"""The logger that gets a warning, once, when compilation takes longer than a moment."""
+
+_MOMENT = 2.0  # s
 
 
 def compiled(function: F, *, nogil: bool = False) -> F:
@@ -25,20 +38,102 @@ def compiled(function: F, *, nogil: bool = False) -> F:
     Where no folder can hold the cache (say, a read-only installation without a home), the
     kernel is compiled anew each time.
     """
-    compile_ = functools.partial(
-        njit, error_model="numpy", fastmath={"contract"}, nogil=nogil, forceinline=not nogil
-    )
-    try:
-        kernel: Any = compile_(cache=True)(function)
-    except RuntimeError:
-        return cast(F, compile_()(function))
-    if not hasattr(kernel, "_cache"):  # compilation is switched off (NUMBA_DISABLE_JIT)
-        return cast(F, kernel)
-    # Numba looks for changes in the kernel's own file only; what it calls is compiled into it.
-    # Its version is compared before signatures are unpickled, whose classes may be gone.
-    file, stamp = kernel._cache._cache_file, source_stamp(inspect.getfile(function))
-    file._source_stamp, file._version = stamp, f"{file._version} {stamp}"
+    kernel: Any = numba.njit(
+        error_model="numpy", fastmath={"contract"}, nogil=nogil, forceinline=not nogil
+    )(function)
+    if hasattr(kernel, "_cache"):  # else compilation is switched off (NUMBA_DISABLE_JIT)
+        kernel._cache = KernelCache(function)
     return cast(F, kernel)
+
+
+class KernelCache(NullCache):
+    """The machine code of a kernel, in a file for each signature.
+
+    Numba's usual cache numbers the files in an index, which is wrong after two processes have
+    saved at once. Here a digest of the signature names the file, and the file begins with a digest
+    of its content and of all that the content depends on. A file that is damaged, out of date or
+    another kernel's is replaced.
+    """
+
+    def __init__(self, function: Callable[..., object]) -> None:
+        file = inspect.getfile(function)
+        self._kernel = f"{Path(file).stem}.{function.__qualname__}"
+        self._origin = f"{self._kernel} {numba.__version__} {sys.version} {source_stamp(file)} "
+        self._content: CompileResultCacheImpl | None = None
+        if not function.__closure__:  # whose values would be in the machine code
+            with contextlib.suppress(RuntimeError):  # there is no folder to write to
+                self._content = CompileResultCacheImpl(function)
+        self._timers: dict[object, threading.Timer] = {}
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder of the files, None if there is none."""
+        return str(self._content.locator.get_cache_path()) if self._content else None
+
+    def load_overload(self, sig: object, target_context: Any) -> Any:
+        """The kernel compiled for a signature earlier; None if it has to be compiled now."""
+        target_context.refresh()
+        if self._content:
+            path, key = self._entry(sig, target_context.codegen())
+            seal, data = _read(path)
+            if seal == _seal(key, data):
+                saved_sig, reduced = pickle.loads(data)
+                if saved_sig == sig:  # another type may have the same name
+                    return self._content.rebuild(target_context, reduced)
+        timer = threading.Timer(_MOMENT, announce, [self._content is not None])
+        timer.daemon = True
+        timer.start()
+        self._timers[sig] = timer
+        return None
+
+    def save_overload(self, sig: object, data: Any) -> None:
+        """Keeps what was compiled for a signature, if the folder can be written to."""
+        self._timers.pop(sig).cancel()
+        if self._content and self._content.check_cachable(data):
+            path, key = self._entry(sig, data.codegen)
+            content = dumps((sig, self._content.reduce(data)))
+            with contextlib.suppress(OSError):
+                _write(path, _seal(key, content) + content)
+
+    def _entry(self, sig: object, codegen: Any) -> tuple[Path, str]:
+        """The file of a signature, and a text with all that its content depends on."""
+        variant = f"{sig} {codegen.magic_tuple()} {sys.implementation.cache_tag}"
+        digest = hashlib.sha256(variant.encode()).hexdigest()[:16]
+        return Path(str(self.cache_path), f"{self._kernel}.{digest}.nbc"), self._origin + variant
+
+
+def _seal(key: str, content: bytes) -> bytes:
+    return hashlib.sha256(key.encode() + content).digest()
+
+
+def _read(path: Path) -> tuple[bytes, bytes]:
+    """The seal and the content of a file, empty if it cannot be read."""
+    try:
+        whole = path.read_bytes()
+    except OSError:
+        whole = b""
+    size = hashlib.sha256().digest_size
+    return whole[:size], whole[size:]
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Writes a file by rename, so that no process ever reads half of it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex[:16]}")
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@functools.cache
+def announce(kept: bool) -> None:
+    """Logs, once a process, that kernels are compiled, and whether that is `kept`."""
+    often = "once" if kept else "each time, as no folder can be written to: set NUMBA_CACHE_DIR"
+    logging.getLogger(LOGGER).warning(
+        "tetra_drake is compiling for this processor, which may take a minute, %s", often
+    )
 
 
 def source_stamp(file: str) -> str:

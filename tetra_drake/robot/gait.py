@@ -105,7 +105,7 @@ class ParameterSpace:
         if scenario.gait_bounds.mirrored:
             images = np.minimum(images, actuation.images)
         chosen, places = np.unique(images, return_inverse=True)
-        weights = [actuation.weight_names[i] for i in chosen]
+        weights = np.array(actuation.weight_names)[chosen].tolist()
         names, low, high, steps, floors = zip(*_parameters(scenario, weights), strict=True)
         return cls(
             names=names,

@@ -17,11 +17,11 @@ class CmaEs:
     normal distribution that learns from them. Where it has converged, it begins anew around the
     best gait, larger."""
 
-    population: int | None = setting(at_least=4, default=None)
+    population: int | None = setting(at_least=4, at_most=100_000, default=None)
     """Vectors in an iteration; 4 + 3 ln n, rounded down, of n parameters if not given."""
-    sample: int = setting(at_least=0, default=40)
+    sample: int = setting(at_least=0, at_most=100_000, default=40)
     """Random gaits evaluated first."""
-    starts: int = setting(at_least=1, default=5)
+    starts: int = setting(at_least=1, at_most=1000, default=5)
     """Searches, of which the one with the best gait goes on: the first from the mean of the best
     quarter of the sample, the others from its best gaits; without a sample, from the middle of the
     ranges and random gaits. Fewer where trying them out would take more than half of the
@@ -41,7 +41,7 @@ class CmaEs:
 class DifferentialEvolution:
     """Differential evolution that adapts itself: L-SHADE (Tanabe and Fukunaga, CEC 2014)."""
 
-    population: int = setting(at_least=8, default=50)
+    population: int = setting(at_least=8, at_most=100_000, default=50)
     """Vectors in the first iteration; falls evenly to 4 in the last one."""
     greed: float = setting(above=0, at_most=1, default=0.11)
     """Share of the population, the best, towards which each vector is moved."""
@@ -63,19 +63,19 @@ class QualityDiversity:
     )
     """Two metrics and the range of each on the map. What lies outside counts to the cells at the
     edge."""
-    cells: list[int] = setting(at_least=2, length=2, default=[20, 20])
+    cells: list[int] = setting(at_least=2, at_most=1000, length=2, default=[20, 20])
     """Of each metric."""
     floor: float = setting(default=0.0)
     """The fitness that gaits on the map exceed: the level of all cells at the start."""
     learning_rate: float = setting(above=0, at_most=1, default=0.01)
     """Share of the way to a better gait's fitness by which it raises the level of its cell."""
-    emitters: int = setting(at_least=1, default=4)
+    emitters: int = setting(at_least=1, at_most=1000, default=4)
     """Runs of CMA-ES side by side."""
-    batch: int = setting(at_least=2, default=15)
+    batch: int = setting(at_least=2, at_most=100_000, default=15)
     """Vectors of each in an iteration."""
     sigma: float = setting(above=0, default=0.5)
     """As of !CmaEs; starts are random gaits and, where one begins anew, gaits of the map."""
-    draws: int = setting(at_least=0, default=10)
+    draws: int = setting(at_least=0, at_most=10_000, default=10)
     """In the end, each gait of the map is simulated in as many draws of disturbances."""
 
 

@@ -7,7 +7,7 @@ field existed.
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -33,6 +33,15 @@ CABLES = (
 """The cables of a junction, from one tetrahedron to the next: outer ones join base nodes of the
 same name, inner ones join the tip to base nodes."""
 
+SHORTEST_STEP = 1e-9
+"""No step of the engine `compiled` (s) is as short."""
+
+MOST_SIGNALS = {"drake": 20_000_000, "compiled": 100_000_000, "mujoco": 100_000_000}
+"""Values of all signals in one simulation, by engine: some 3 GB."""
+
+MOST_SAMPLES = 2_000_000
+"""Recorded poses of all tetrahedra in one simulation: some 2 GB."""
+
 SIDES = ("left", "right")
 """How the names of cables on one side of the robot end."""
 
@@ -48,7 +57,7 @@ class RobotScenario:
     if it changes strut length or the cables' stiffness or free length of its base, but no spacing.
     """
 
-    tetrahedra: int = setting(at_least=2)
+    tetrahedra: int = setting(at_least=2, at_most=200)
     strut_length: float = quantity("m", above=0)
     strut_diameter: float = quantity("m", above=0)
     node_diameter: float = quantity("m", above=0)
@@ -146,7 +155,7 @@ class CpgScenario:
     gain: float = quantity("N")  # force per unit of y_extensor - y_flexor
     start_up: float = quantity("s", at_least=0)  # until then the cables are not actuated
     signals: str = setting(choices=("listing", "recorded", "live"))
-    listing_step: float = quantity("s", above=0)
+    listing_step: float = quantity("s", at_least=1e-6)
     reach: int | None = setting(at_least=0, default=None)
     """Oscillators of junctions at most so far apart inhibit each other; all if not given."""
     feedback: list[str] = setting(choices=PATHWAYS, default=[])
@@ -180,7 +189,7 @@ class SimulationScenario:
     """
 
     engine: str = setting(choices=ENGINES)
-    duration: float = quantity("s", above=0)
+    duration: float = quantity("s", above=0, at_most=1e5)
     steady_from: float = quantity("s", at_least=0)  # the fitness counts from here (section 2.3)
     scheme: str = setting(choices=SCHEMES)
     accuracy: float = setting(above=0)  # per step; unused by schemes without an error estimate
@@ -204,8 +213,8 @@ class CompiledScenario:
 
     tolerance: float = quantity("m/s", above=0)
     """Error of a body's velocity, or of its strut tips' by rotation, allowed per step."""
-    max_step: float = quantity("s", above=0)
-    look_ahead: float = quantity("s", above=0)
+    max_step: float = quantity("s", above=SHORTEST_STEP, at_most=1)
+    look_ahead: float = quantity("s", above=SHORTEST_STEP, at_most=1)
     """Time from a predicted mode change to the end of the step that aims at it."""
 
 
@@ -214,7 +223,7 @@ class MujocoScenario:
     """How the engine `mujoco` simulates, and its friction, which is not that of Table 2."""
 
     integrator: str = setting(choices=MUJOCO_INTEGRATORS, default="implicitfast")
-    step: float = quantity("s", above=0, default=0.125e-3)
+    step: float = quantity("s", at_least=1e-7, at_most=1, default=0.125e-3)
     friction: float = setting(above=0, default=0.5)  # coefficient, as of metal on a floor
 
 
@@ -228,7 +237,7 @@ class DisturbancesScenario:
     selection goes from the mean, in the first iteration, to `tail`, in the last one.
     """
 
-    draws: int = setting(at_least=1)
+    draws: int = setting(at_least=1, at_most=10_000)
     spreads: dict[str, float] = setting(above=0, at_most=0.5, default={})
     """By scenario keys: each draw multiplies the number by 1 + up to +-spread, uniformly. Keys
     joined by commas get the same factor."""
@@ -249,9 +258,9 @@ class EvolutionScenario:
     before iteration `stop_after`. With `tau_mutation: listing`, mutation never changes tau_A.
     """
 
-    population: int = setting(at_least=2)
-    tournament: int = setting(at_least=1)
-    trials: int = setting(at_least=1)
+    population: int = setting(at_least=2, at_most=100_000)
+    tournament: int = setting(at_least=1, at_most=100_000)
+    trials: int = setting(at_least=1, at_most=1000)
     max_iterations: int = setting(at_least=1)
     max_evaluations: int | None = setting(at_least=1, default=None)
     """Of a trial by an optimiser other than !SteadyState; if not given, as many as there are in
@@ -387,7 +396,7 @@ def _check_relations(scenario: Scenario, source: object) -> None:
     """Checks values of a scenario against each other; raises InputError."""
     bounds, simulation, n = scenario.gait_bounds, scenario.simulation, scenario.robot.tetrahedra
     offsets, start, end = len(scenario.robot.offsets), simulation.steady_from, simulation.duration
-    law = scenario.friction
+    law, step = scenario.friction, scenario.cpg.listing_step
     mu, most = (law.kinetic, law.static) if isinstance(law, Coulomb) else (0.0, 0.0)
     ranges = {
         name: (getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max"))
@@ -401,6 +410,8 @@ def _check_relations(scenario: Scenario, source: object) -> None:
         (start >= end, "simulation.steady_from", f"{start} s", f"less than the duration, {end} s"),
         (mu > most, "friction.kinetic", mu, f"at most static, {most}"),
         (offsets not in (0, n), "robot.offsets", f"{offsets} items", f"none or {n}, one each"),
+        (step > end, "cpg.listing_step", f"{step} s", f"at most the duration, {end} s"),
+        *_size_relations(scenario),
         *_network_relations(scenario),
         *_map_relations(scenario),
     ):
@@ -438,6 +449,20 @@ def _number(scenario: Scenario, name: str, key: str, source: object) -> float:
     if name not in known:
         raise InputError(source, key, f"'{name}' is no number of the scenario; {hint(name, known)}")
     return float(sections[section][rest])
+
+
+def _size_relations(scenario: Scenario) -> Iterator[tuple[bool, str, Any, str]]:
+    """As _network_relations(), of what has to fit in memory."""
+    simulation = scenario.simulation
+    signals = simulation.duration * scenario.oscillators / MOST_SIGNALS[simulation.engine]
+    samples = simulation.duration * scenario.robot.tetrahedra / MOST_SAMPLES
+    for key, period, least in (
+        ("cpg.listing_step", scenario.cpg.listing_step, signals),
+        ("mujoco.step", scenario.mujoco.step, signals * (simulation.engine == "mujoco")),
+        ("simulation.sample_period", simulation.sample_period, samples),
+    ):
+        expected = f"at least {least:.3g} s for this duration and robot, to fit in memory"
+        yield period < least, key, f"{period} s", expected
 
 
 def _network_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:

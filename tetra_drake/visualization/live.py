@@ -81,6 +81,6 @@ class LiveView:
 
 def open_view(scenario: Scenario, *, say: Callable[[str], None]) -> LiveView:
     """A view in a new Meshcat, whose address `say` is told."""
-    meshcat = quiet_meshcat(MeshcatParams())
+    meshcat = quiet_meshcat(MeshcatParams(host="localhost"))
     say(f"open {meshcat.web_url()} in a browser, which starts the simulation")
     return LiveView(meshcat, scenario)

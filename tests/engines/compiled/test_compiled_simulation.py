@@ -1,9 +1,13 @@
 """The compiled engine against the Drake diagram."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import xarray
 from helpers.converged import FINE
+from pydrake.multibody.tree import SpatialInertia, UnitInertia
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import WALKING_SEED, load_gait, seeded_gait
@@ -48,6 +52,37 @@ def trajectories_on_both(scenario: Scenario, seed: int = WALKING_SEED) -> list[x
     return [simulate(scenario=each, gait=gait, record=True).trajectory for each in both]
 
 
+EXTREME = """
+import tetra_drake as td
+from tetra_drake.engines.time_limit import time_limit
+from tetra_drake.errors import SimulationFailure, TimeBudgetExceeded
+from tetra_drake.robot.gait import seeded_gait
+
+times = {"simulation.duration": 0.2, "simulation.steady_from": 0.1, "cpg.start_up": 0.05}
+small = times | {"robot.tetrahedra": 2, "simulation.engine": "compiled"}
+scenario = td.load_scenario("thesis").with_changes(small)
+for key, value in (
+    *(("look_ahead", value) for value in ("0.2 s", "1 s", "2e-9 s")),
+    *(("max_step", value) for value in ("1 s", "2e-9 s")),
+    *(("tolerance", value) for value in ("1e-200 m/s", "1e200 m/s")),
+):
+    changed = scenario.with_changes({"compiled." + key: value, "simulation.max_evaluations": 9000})
+    try:
+        with time_limit(30.0):
+            td.simulate(scenario=changed, gait=seeded_gait(changed))
+            print("done")
+    except SimulationFailure as failure:
+        print(type(failure).__name__)
+"""
+
+
+def test_extreme_settings_come_to_an_end():
+    command = [sys.executable, "-c", EXTREME]
+    ended = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, timeout=200)
+    wanted = "done done done done StepBudgetExceeded Diverged done"
+    assert ended.stdout.split() == wanted.split()
+
+
 @pytest.mark.slow
 def test_nine_of_ten_well_conditioned_random_gaits_end_where_the_diagrams_do(compiled):
     # The diagram's default settings are themselves off by 0.2 in and more in every fourth gait.
@@ -89,5 +124,18 @@ def test_signals_integrated_with_error_control_are_those_of_the_diagram(compiled
 
 def test_structures_the_engine_cannot_simulate_are_refused(scenario, structure):
     structure.cables[0]["node_b"] += 4  # from T1 to T3
+    with pytest.raises(ValueError):
+        make_model(scenario, structure)
+
+
+@pytest.mark.parametrize(("lengthwise", "possible"), [(1.0 + 1e-14, True), (1.0 + 1e-9, False)])
+def test_bodies_that_turn_more_easily_about_one_axis_are_refused(
+    scenario, structure, monkeypatch, lengthwise, possible
+):
+    inertia = SpatialInertia(0.02, np.zeros(3), UnitInertia(3e-3, 3e-3, 3e-3 * lengthwise))
+    monkeypatch.setattr("tetra_drake.robot.model.tetrahedron_inertia", lambda structure: inertia)
+    if possible:
+        assert make_model(scenario, structure).body.moment[0] == pytest.approx(6e-5, rel=1e-12)
+        return
     with pytest.raises(ValueError):
         make_model(scenario, structure)

@@ -11,7 +11,7 @@ import xarray
 
 from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk
 from tetra_drake.engines.compiled.lane_pool import LanePool
-from tetra_drake.engines.compiled.walk import DONE, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
+from tetra_drake.engines.compiled.walk import DONE, ROUND, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import (
     Diverged,
@@ -187,6 +187,18 @@ def test_a_gait_that_takes_too_long_leaves_its_lane_to_others(short):
             pool.simulate(scenario=endless, gait=gait, time_budget=0.05)
         found = pool.simulate(scenario=short, gait=gait)
     assert found.metrics == simulate(scenario=short, gait=gait).metrics
+
+
+@pytest.mark.parametrize(("tetrahedra", "rounds"), [(2, 10), (5, 4), (200, 1)])
+def test_of_a_large_robot_fewer_steps_are_made_without_a_look_at_the_time(
+    short, monkeypatch, tetrahedra, rounds
+):
+    scenario = short.with_changes({"robot.tetrahedra": tetrahedra})
+    engine = LaneEngine(Walk.of(scenario, seeded_gait(scenario), record=False), width=1)
+    asked = []
+    monkeypatch.setattr(engine, "_advance", lambda *arguments: asked.append(arguments[-1]))
+    assert engine.advance(20 * ROUND) == []
+    assert asked == [rounds]
 
 
 def test_an_error_of_the_engine_reaches_those_who_wait(short, monkeypatch):

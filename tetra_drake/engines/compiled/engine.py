@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,8 +29,8 @@ from tetra_drake.scenario.schema import Scenario
 if TYPE_CHECKING:
     import xarray
 
-_ITERATIONS = 20_000
-"""Iterations, some 70 ms, after which signals of the operating system are heard."""
+_BODY_STEPS = 100_000
+"""Iterations times bodies, some 70 ms, after which signals of the operating system are heard."""
 
 
 def simulate_compiled(
@@ -42,24 +40,10 @@ def simulate_compiled(
     walk = Walk.of(scenario, gait, record=record, steering=steering)
     engine = LaneEngine(walk, width=1)
     engine.load(0, walk)
-    while not (ended := engine.advance(_ITERATIONS)):
+    while not (ended := engine.advance(_BODY_STEPS)):
         check_time()
     _, walk, course = ended[0]
     return make_outcome(walk, course)
-
-
-def ready_engine(
-    walk: Walk, width: int, *, say: Callable[[str], None] = lambda text: None
-) -> LaneEngine:
-    """An engine for walks like this one, compiled or loaded from numba's cache; `say` is told if
-    that takes longer than a moment."""
-    message = "compiling the engine, which takes some seconds the first time ..."
-    timer = threading.Timer(1.0, say, [message])
-    timer.start()
-    try:
-        return LaneEngine(walk, width=width)
-    finally:
-        timer.cancel()
 
 
 def make_outcome(walk: Walk, course: Course) -> SimulationResult:

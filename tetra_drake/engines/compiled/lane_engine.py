@@ -164,6 +164,7 @@ class LaneEngine:
         self._heights = robot.ground.heights.array.reshape(width, -1)
         self._walks = _tables(first, robot, width)
         structure = first.structure
+        self._bodies = len(structure.bodies)
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
             marks=np.full((width, 5), math.inf),
@@ -242,7 +243,8 @@ class LaneEngine:
         log.states[lane, 0], log.modes[lane, 0], log.signals[lane, 0] = start, modes, 0.0
         log.kept[lane], log.passed[lane] = 1, 0
         clock[:, lane] = 0.0
-        clock[STATUS, lane], clock[STEP, lane] = WALKING, compiled.look_ahead
+        first_step = min(compiled.look_ahead, compiled.max_step)
+        clock[STATUS, lane], clock[STEP, lane] = WALKING, first_step
         clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
         self._in_lane[lane], self._wall_times[lane] = each, 0.0
 
@@ -252,11 +254,12 @@ class LaneEngine:
         self._walks.clock.array[STATUS, lane] = IDLE
         return self._wall_times[lane]
 
-    def advance(self, iterations: int) -> list[tuple[int, Walk, Course]]:
-        """Lets the lanes walk until one of them ends, or for about a number of iterations; returns
-        lanes and walks that have ended, which are idle then. Other threads run meanwhile."""
+    def advance(self, body_steps: int) -> list[tuple[int, Walk, Course]]:
+        """Lets the lanes walk until one of them ends, or for about so many iterations times bodies;
+        returns lanes and walks that have ended, which are idle then. Other threads run meanwhile.
+        """
         started = time.perf_counter()
-        self._advance(*self._arguments, max(1, iterations // ROUND))
+        self._advance(*self._arguments, max(1, body_steps // (ROUND * self._bodies)))
         walks = [(lane, each) for lane, each in enumerate(self._in_lane) if each is not None]
         share = (time.perf_counter() - started) / max(len(walks), 1)
         ended = []

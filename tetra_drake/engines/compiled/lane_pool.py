@@ -6,11 +6,11 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
-from tetra_drake.engines.compiled.engine import make_outcome, ready_engine
+from tetra_drake.engines.compiled.engine import make_outcome
 from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk, lanes_for
 from tetra_drake.errors import InputError, SimulationFailure, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
@@ -20,8 +20,9 @@ from tetra_drake.scenario.schema import Scenario
 _GATHERING = 1e-3
 """Time (s) that a thread without work waits for more than one walk to come."""
 
-_ITERATIONS = 5000
-"""Iterations, some 30 ms, after which a thread looks for time budgets and the pool's end."""
+_BODY_STEPS = 25_000
+"""Iterations times bodies, some 30 ms, after which a thread looks for time budgets and the pool's
+end."""
 
 _PREPARED = 32
 """Scenarios that are kept prepared, for gaits that are simulated on the same one."""
@@ -41,11 +42,10 @@ class LanePool:
     """Simulates gaits on the compiled engine, in so many threads and as many lanes in each as the
     waiting gaits fill. At the end of its `with` block, what is under way is cancelled."""
 
-    def __init__(self, threads: int, *, say: Callable[[str], None] = lambda text: None) -> None:
-        """`say` is told when the engine has to be compiled. Raises InputError without threads."""
+    def __init__(self, threads: int) -> None:
+        """Raises InputError without threads."""
         if threads < 1:
             raise InputError("workers", "", f"found {threads}, expected at least 1")
-        self._say = say
         self._waiting: deque[_Job] = deque()
         self._changed = threading.Condition()
         self._closing = False
@@ -102,7 +102,7 @@ class LanePool:
 
     def _work(self) -> None:
         """What each thread does: fills idle lanes, lets them walk, hands over what has ended."""
-        crew = _Crew(self._prepare, self._say)
+        crew = _Crew(self._prepare)
         while (jobs := self._take(crew)) is not None:
             for job in jobs:
                 if not crew.load(job, among=len(jobs)):
@@ -152,11 +152,10 @@ class _Preparation:
 class _Crew:
     """The lanes of one thread and the jobs in them."""
 
-    def __init__(self, prepare: _Preparation, say: Callable[[str], None]) -> None:
+    def __init__(self, prepare: _Preparation) -> None:
         self.jobs: dict[int, _Job] = {}
         """By lane."""
         self._prepare = prepare
-        self._say = say
         self._engine: LaneEngine | None = None
         self._engines: dict[int, LaneEngine] = {}
         """By width."""
@@ -190,7 +189,7 @@ class _Crew:
         engine = self._engine
         if engine is None or not self.jobs:
             return
-        for lane, walk, course in engine.advance(_ITERATIONS):
+        for lane, walk, course in engine.advance(_BODY_STEPS):
             self.jobs.pop(lane).future.set_result((walk, course))
         now = time.perf_counter()
         for lane in [lane for lane, job in self.jobs.items() if now > job.deadline]:
@@ -208,7 +207,7 @@ class _Crew:
     def _engine_for(self, walk: Walk, width: int) -> LaneEngine:
         engine = self._engines.get(width)
         if engine is None or not engine.accepts(walk):
-            engine = self._engines[width] = ready_engine(walk, width, say=self._say)
+            engine = self._engines[width] = LaneEngine(walk, width=width)
         return engine
 
 
@@ -217,11 +216,10 @@ def simulate_in_lanes(
     *,
     record: bool,
     threads: int,
-    say: Callable[[str], None] = lambda text: None,
 ) -> list[SimulationResult | SimulationFailure]:
     """The results of many gaits, each with its scenario, or their failures."""
     found: list[SimulationResult | SimulationFailure] = []
-    with LanePool(threads, say=say) as pool:
+    with LanePool(threads) as pool:
         for future in pool.submit(walks, record=record):
             try:
                 found.append(pool.result(future))
