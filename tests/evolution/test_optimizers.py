@@ -311,19 +311,6 @@ def test_the_map_is_fuller_and_fitter_than_that_of_random_search():
     assert np.median([ours[cell] - theirs[cell] for cell in ours.keys() & theirs.keys()]) > 2.0
 
 
-def test_a_map_learns_from_the_vectors_that_it_follows():
-    leader, follower = make(DIVERSE, budget=2000), make(DIVERSE, seed=4, budget=2000)
-    first = leader.ask()
-    for batch in [first, *(None for _ in range(40))]:
-        batch = batch or leader.ask()
-        follower.ask()
-        follower.follow(batch)
-        told = [bowl(vector) for vector in batch]
-        assert leader.tell(told).report["elites"] == follower.tell(told).report["elites"]
-    ours, theirs = fitnesses([leader.ask()]).mean(), fitnesses([follower.ask()]).mean()
-    assert min(ours, theirs) > fitnesses([first]).mean() / 2.0
-
-
 def test_without_pyribs_it_is_refused(monkeypatch, refused):
     monkeypatch.setitem(sys.modules, "ribs", None)
     with refused("optimizer", "", "tetra_drake[qd]"):
