@@ -155,8 +155,9 @@ def read_manifest(directory: Path) -> Manifest:
     path, scenario_file = directory / MANIFEST, directory / SCENARIO
     if not path.exists():
         raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
+    text = read_text(path, "manifest of a run")
     try:
-        raw = json.loads(read_text(path, "manifest of a run"))
+        raw = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     schema = raw.get("schema") if isinstance(raw, dict) else None
