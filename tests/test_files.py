@@ -1,5 +1,6 @@
 """Files are written whole or not at all."""
 
+import contextlib
 import os
 import resource
 import signal
@@ -104,15 +105,17 @@ def test_what_a_killed_writer_left_is_removed_by_the_next_but_not_that_of_a_livi
     assert set(os.listdir(tmp_path)) == {"a [1].svg", "b.svg", ".a.svg"}
 
 
-@pytest.fixture
+@contextlib.contextmanager
 def little_room():
-    """No file becomes larger than 4096 bytes, as if the disk were full."""
+    """A block in which no file becomes larger than 4096 bytes, as if the disk were full."""
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    signal.signal(signal.SIGXFSZ, ignored)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, before)
 
 
 def big_dataset(path):
@@ -136,12 +139,10 @@ def big_figure(path):
         ("a.png", big_figure),
     ],
 )
-def test_a_full_disk_is_told_in_a_line_and_the_old_file_kept(
-    tmp_path, little_room, refused, name, write
-):
+def test_a_full_disk_is_told_in_a_line_and_the_old_file_kept(tmp_path, refused, name, write):
     file = tmp_path / name
     file.write_text("old")
-    with refused(file, "", "cannot be written"):
+    with refused(file, "", "cannot be written"), little_room():
         write(file)
     assert file.read_text() == "old"
     assert os.listdir(tmp_path) == [name]
