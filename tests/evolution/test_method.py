@@ -27,13 +27,15 @@ class Weighted:
         return self.factor * result.fitness
 
 
-HERE = __name__
+HERE, TYPED = __name__, {"__name__": None}
+exec("def typed(result):\n    return 1.0", TYPED)
 
 
 @pytest.mark.parametrize(
     ("objective", "name"),
     [
         (scaled, f"{HERE}.scaled"),
+        (TYPED["typed"], "__main__.typed"),
         (Weighted, f"{HERE}.Weighted"),
         (Weighted(2.5), f'{HERE}.Weighted {{"factor": 2.5, "table": null}}'),
         (Weighted(1.0, np.ones(3)), f'{HERE}.Weighted {{"factor": 1.0, "table": "ndarray"}}'),

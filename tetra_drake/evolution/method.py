@@ -73,9 +73,10 @@ def _name(given: object) -> str:
     """What a function, a class or an instance is called: with its module, unless that is of this
     package, and with the fields of a user's dataclass."""
     kind: Any = given if isinstance(given, (type, types.FunctionType)) else type(given)
-    if kind.__module__.startswith("tetra_drake."):
+    module = kind.__module__ or "__main__"  # code that was executed from a text has none
+    if module.startswith("tetra_drake."):
         return str(kind.__qualname__)
-    name = f"{kind.__module__}.{kind.__qualname__}"
+    name = f"{module}.{kind.__qualname__}"
     if not dataclasses.is_dataclass(given) or isinstance(given, type):
         return name
     fields = {field.name: getattr(given, field.name) for field in dataclasses.fields(given)}
