@@ -195,7 +195,7 @@ def facts_table(run: Recorded) -> str:
     failed = int(evaluations["failure"].notna().sum())
     rows = [
         ["engine", run.scenario.simulation.engine],
-        ["optimiser", manifest.method.optimizer.name],
+        ["optimiser", manifest.method.optimizer],
         ["trials", f"{len(run.trials)}, {run.trials['ended'].sum()} of them ended"],
         ["evaluations", f"{len(evaluations)}, of which {failed} failed"],
         ["simulation took (h:mm:ss)", duration(float(evaluations["wall_time_s"].sum()))],

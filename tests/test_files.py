@@ -1,12 +1,22 @@
 """Files are written whole or not at all."""
 
+import contextlib
 import os
+import resource
+import signal
 import stat
+import subprocess
+import sys
 
+import matplotlib.pyplot as plt
+import numpy as np
 import pytest
+import xarray
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import whole_file, write_whole
+from tetra_drake.figures.style import save_figure
+from tetra_drake.files import read_text, whole_file, write_whole
+from tetra_drake.results.trajectory import save_dataset
 
 
 @pytest.mark.parametrize("old", [None, "old and longer"])
@@ -73,3 +83,79 @@ def test_what_cannot_be_written_is_refused(tmp_path, place, refused):
         write_whole(tmp_path / place, "new")
     assert (tmp_path / "a.txt").read_text() == "old"
     assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_what_a_killed_writer_left_is_removed_by_the_next_but_not_that_of_a_living_one(tmp_path):
+    program = (
+        "import os, signal, sys\n"
+        "from tetra_drake.files import whole_file\n"
+        "with whole_file(sys.argv[1]) as temporary:\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    file = tmp_path / "a [1].svg"
+    killed = subprocess.run([sys.executable, "-c", program, file])
+    assert killed.returncode == -signal.SIGKILL
+    (left,) = os.listdir(tmp_path)
+    (tmp_path / ".a.svg").touch()  # not ours
+    with whole_file(tmp_path / "b.svg"):
+        assert (tmp_path / left).exists()  # of another file
+    with whole_file(file) as first, whole_file(file) as second:
+        assert first.exists() and second.exists()
+        assert not (tmp_path / left).exists()
+    assert set(os.listdir(tmp_path)) == {"a [1].svg", "b.svg", ".a.svg"}
+
+
+@contextlib.contextmanager
+def little_room():
+    """A block in which no file becomes larger than 4096 bytes, as if the disk were full."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, before)
+
+
+def big_dataset(path):
+    values = np.random.default_rng(0).normal(size=4096)
+    save_dataset(xarray.Dataset({"a": ("time", values)}), path)
+
+
+def big_figure(path):
+    figure, axes = plt.subplots()
+    axes.plot(np.random.default_rng(0).normal(size=500))
+    save_figure(figure, path.parent, path.stem, kinds=[path.suffix[1:]])
+    plt.close(figure)
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("a.html", lambda path: write_whole(path, 5000 * "x")),
+        ("a.nc", big_dataset),
+        ("a.svg", big_figure),
+        ("a.png", big_figure),
+    ],
+)
+def test_a_full_disk_is_told_in_a_line_and_the_old_file_kept(tmp_path, refused, name, write):
+    file = tmp_path / name
+    file.write_text("old")
+    with refused(file, "", "cannot be written"), little_room():
+        write(file)
+    assert file.read_text() == "old"
+    assert os.listdir(tmp_path) == [name]
+
+
+def test_what_never_ends_or_is_too_large_is_not_read(tmp_path, refused):
+    pipe, large = tmp_path / "pipe", tmp_path / "large"
+    os.mkfifo(pipe)
+    with large.open("wb") as file:
+        file.truncate(2**20 + 1)
+    for path, problem in ((pipe, "pipe"), ("/dev/zero", "device"), (tmp_path, "directory")):
+        with refused(path, "", problem):
+            read_text(path, "gait file")
+    with refused(large, "", "1 MB"):
+        read_text(large, "gait file", most=2**20)
+    assert len(read_text(large, "gait file")) == 2**20 + 1

@@ -1,5 +1,7 @@
 """evolve(): what the command does, from Python; and the commands evolve and reevaluate."""
 
+import contextlib
+import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -12,10 +14,10 @@ import tetra_drake
 from tetra_drake import cli
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.elites import elites
-from tetra_drake.evolution.method import Part
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import read_manifest
+from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
 from tetra_drake.scenario.terrain import Steps
@@ -159,7 +161,7 @@ def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
     )
     assert whole.reevaluations.empty and reports == []
     assert whole.iterations["note"].tolist() == ["wide", "wide"]
-    assert whole.manifest.method.objective.settings == {"factor": 2.0}
+    assert whole.manifest.method.objective == f'{__name__}.Heaviest {{"factor": 2.0}}'
 
     run = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
@@ -182,6 +184,46 @@ def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
     assert read_record(run) == read_record(tmp_path / "whole")
 
 
+def make_objective(factor):
+    """Objectives of the same name."""
+
+    def objective(result):
+        return factor * (1.0 + result.metrics.distance)
+
+    return objective
+
+
+def test_no_record_holds_fitnesses_of_two_objectives_of_the_same_name(
+    tiny, tmp_path, refused, interrupting
+):
+    run, own = tmp_path / "run", {"reevaluate": False, "report": False}
+    ways = ({"executor": interrupting}, {})
+    for way, ended in zip(ways, (KeyboardInterrupt, None), strict=True):
+        begin = {"scenario": tiny} if ended else {"scenario": None, "resume": True}
+        with pytest.raises(ended) if ended else contextlib.nullcontext():
+            tetra_drake.evolve(out=run, objective=make_objective(2.0), **begin, **own, **way)
+        begun = read_record(run)
+        for make in (make_objective(3.0), make_objective(-2.0)):
+            with refused(run, "objective", "evaluation 0"):
+                tetra_drake.evolve(None, run, resume=True, objective=make, **own)
+        with refused(run, "objective", "evaluation 0"):
+            reevaluate(run, objective=make_objective(3.0), executor=ThreadPoolExecutor)
+        assert read_record(run) == begun
+
+
+def test_a_run_whose_manifest_forgets_its_objective_is_refused_by_a_fitness(
+    tiny, tmp_path, refused, interrupting
+):
+    run, own = tmp_path / "run", {"reevaluate": False, "report": False}
+    with pytest.raises(KeyboardInterrupt):
+        tetra_drake.evolve(tiny, run, objective=Heaviest(), executor=interrupting, **own)
+    manifest = run / "manifest.json"
+    name = json.loads(manifest.read_text())["objective"]
+    manifest.write_text(manifest.read_text().replace(json.dumps(name), '"fitness"'))
+    with refused(run, "objective", "evaluation 0"):
+        tetra_drake.evolve(None, run, resume=True, **own)
+
+
 def test_the_scenarios_optimiser_is_used_recorded_and_resumed(
     tiny, tmp_path, interrupting, refused
 ):
@@ -193,7 +235,7 @@ def test_the_scenarios_optimiser_is_used_recorded_and_resumed(
     evolved = tetra_drake.evolve(scenario, whole, **own)
     assert evolved.iterations["population"].tolist() == [4, 4, 4]
     assert len(evolved.evaluations) == 10
-    assert evolved.manifest.method.optimizer == Part("CmaEs")
+    assert evolved.manifest.method.optimizer == "CmaEs"
     with pytest.raises(KeyboardInterrupt):
         tetra_drake.evolve(scenario, run, executor=interrupting, **own)
     with refused(run, "optimizer", ""):

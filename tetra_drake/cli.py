@@ -9,11 +9,13 @@ import json
 import math
 import os
 import shutil
+import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from tetra_drake.benchmark.settings import SETS
 from tetra_drake.errors import InputError, SimulationFailure
@@ -22,7 +24,7 @@ from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, read_gait, see
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import ENGINES, Scenario
 
-BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
+BAD_INPUT, FAILED, INTERRUPTED, TERMINATED = 2, 1, 130, 143
 """Exit statuses."""
 
 FIRST_SCENARIO = "quick"
@@ -38,17 +40,39 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
     options = make_parser().parse_args(argv)
     try:
-        options.run(options)
+        with _ends_on_sigterm():
+            options.run(options)
     except (InputError, SimulationFailure) as error:
         print(f"tetra-drake: {error}", file=sys.stderr)
         return BAD_INPUT if isinstance(error, InputError) else FAILED
     except BrokenPipeError:  # the reader of our output has closed it, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         print("tetra-drake: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        return TERMINATED if isinstance(error, _Terminated) else INTERRUPTED
     return 0
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM, which ends a command as Ctrl-C does."""
+
+
+@contextlib.contextmanager
+def _ends_on_sigterm() -> Iterator[None]:
+    """A block that a SIGTERM interrupts; signals reach the main thread only."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> NoReturn:
+        raise _Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -4,6 +4,10 @@ long."""
 from __future__ import annotations
 
 import functools
+import re
+
+_QUOTED, _LONGEST, _LONGEST_PATH = 200, 600, 4096
+"""Characters of anything quoted, of a problem and of a source, at most."""
 
 
 class InputError(ValueError):
@@ -16,9 +20,22 @@ class InputError(ValueError):
     def __init__(self, source: object, key: str, problem: str) -> None:
         self.source = str(source)
         self.key = key
-        self.problem = problem
-        message = f"{source}: {key}: {problem}" if key else f"{source}: {problem}"
-        super().__init__(" ".join(message.split()))
+        self.problem = _shortened(problem)
+        place = f"{_cut(self.source, _LONGEST_PATH)}: {_cut(key, _QUOTED)}".removesuffix(": ")
+        super().__init__(" ".join(f"{place}: {self.problem}".split()))
+
+
+def _shortened(problem: str) -> str:
+    """The problem on one line, without most of what it quotes, if that is long: it may be a whole
+    file."""
+    problem = " ".join(problem.split())
+    problem = re.sub(rf"'([^']{{{_QUOTED}}})[^']+'", r"'\1 ...'", problem)
+    problem = re.sub(rf"([^\s']{{{_QUOTED}}})[^\s']+", r"\1 ...", problem)
+    return problem if len(problem) <= _LONGEST else _cut(problem, _QUOTED)
+
+
+def _cut(text: str, length: int) -> str:
+    return text if len(text) <= length else f"{text[:length]} ..."
 
 
 class SimulationFailure(RuntimeError):

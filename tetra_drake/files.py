@@ -1,10 +1,13 @@
-"""Text files: read with one-line errors, written whole or not at all; numbers for JSON."""
+"""Files: read with one-line errors, written whole or not at all; numbers for JSON."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import math
 import os
+import re
+import stat
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,24 +15,30 @@ from typing import Any
 
 from tetra_drake.errors import InputError
 
+MOST_BYTES = 64 * 2**20
+"""Size of a file that is read whole, at most, where nothing less is said."""
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Numbers of errors of a disk that takes nothing more."""
+
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Yields the path of a temporary file that becomes `path` if the block succeeds.
 
+    Temporary files of the same file that a process left behind when it was killed are removed.
     Raises InputError if `path` cannot be written.
     """
     path = Path(path)
     if os.path.isdir(path):
         raise InputError(path, "", "is a directory, expected a file to write")
+    make_folder(path.parent, source=path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        _remove_stale(path)
         handle, name = tempfile.mkstemp(
-            dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix
+            dir=path.parent, prefix=f".{path.stem}.{os.getpid()}.", suffix=path.suffix
         )
         os.close(handle)
-    except (FileExistsError, NotADirectoryError) as error:
-        raise InputError(path, "", "cannot be written: its folder is a file") from error
     except (OSError, ValueError) as error:
         raise InputError(path, "", f"cannot be written: {error}") from error
     temporary = Path(name)
@@ -38,8 +47,43 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         os.umask(mask := os.umask(0))  # can be read by setting it only
         temporary.chmod(0o666 & ~mask)
         temporary.replace(path)
+    except OSError as error:
+        if error.errno not in _FULL:
+            raise
+        raise InputError(path, "", f"cannot be written: {error.strerror}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _remove_stale(path: Path) -> None:
+    """Removes temporary files of `path` whose processes have ended."""
+    ours = re.compile(rf"\.{re.escape(path.stem)}\.(\d+)\.\w{{8}}{re.escape(path.suffix)}")
+    for name in os.listdir(path.parent):
+        match = ours.fullmatch(name)
+        if match and not _is_alive(int(match[1])):
+            (path.parent / name).unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # somebody else's
+        return True
+    return True
+
+
+def make_folder(folder: Path, *, source: Path | None = None) -> None:
+    """Makes a folder unless it exists; InputError, of `source` if that is given, if it cannot."""
+    source = source or folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        what = "is a file" if source == folder else "cannot be written: its folder is a file"
+        raise InputError(source, "", what) from error
+    except (OSError, ValueError) as error:
+        raise InputError(source, "", f"cannot be written: {error}") from error
 
 
 def check_folder(folder: str | Path) -> None:
@@ -60,19 +104,42 @@ def json_number(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def read_text(path: str | Path, what: str) -> str:
-    """The text of a file; `what` says in errors what was expected. Raises InputError."""
+def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:
+    """The text of a file; as read_bytes()."""
     try:
-        return Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise InputError(path, "", f"no such {what}") from error
-    except IsADirectoryError as error:
-        raise InputError(path, "", f"is a directory, expected a {what}") from error
-    except (OSError, ValueError) as error:
+        return read_bytes(path, what, most=most).decode("utf-8")
+    except UnicodeDecodeError as error:
         raise InputError(path, "", f"cannot be read as text: {error}") from error
 
 
-def write_whole(path: str | Path, text: str) -> None:
-    """Writes a text file by rename, so that no reader ever sees half of it."""
+def read_bytes(path: str | Path, what: str, *, most: int = MOST_BYTES) -> bytes:
+    """What a file of at most so many bytes holds; `what` says in errors what was expected.
+
+    Raises InputError, also for what is no regular file, as a device or a pipe, which may never end.
+    """
+    try:
+        mode = os.stat(path).st_mode
+        # Not opened otherwise: a pipe would wait for a writer.
+        content = _first_bytes(path, most + 1) if stat.S_ISREG(mode) else b""
+    except FileNotFoundError as error:
+        raise InputError(path, "", f"no such {what}") from error
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", f"cannot be read: {error}") from error
+    if not stat.S_ISREG(mode):
+        kind = "directory" if stat.S_ISDIR(mode) else "device or a pipe"
+        raise InputError(path, "", f"is a {kind}, expected a {what}")
+    if len(content) > most:
+        limit = f"{most // 2**20} MB"
+        raise InputError(path, "", f"is larger than {limit}, expected a {what} of at most {limit}")
+    return content
+
+
+def _first_bytes(path: str | Path, count: int) -> bytes:
+    with Path(path).open("rb") as file:
+        return file.read(count)
+
+
+def write_whole(path: str | Path, content: str | bytes) -> None:
+    """Writes a file, a text as UTF-8, by rename, so that no reader ever sees half of it."""
     with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)

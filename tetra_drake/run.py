@@ -18,14 +18,14 @@ from tetra_drake.evolution.executors import (
     process_executor,
     thread_executor,
 )
-from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.method import FITNESS, Method
 from tetra_drake.evolution.optimizers import optimizer_of
 from tetra_drake.evolution.optimizers.base import MakeOptimizer
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import Manifest, RunRecord, read_manifest
-from tetra_drake.evolution.reevaluation import reevaluate as reevaluate_gaits
+from tetra_drake.evolution.reevaluation import evaluate_again, on_diagram
 from tetra_drake.evolution.tables import Run, load_run
-from tetra_drake.evolution.trials import run_trials
+from tetra_drake.evolution.trials import check_fitness, run_trials
 from tetra_drake.results.result import versions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -50,7 +50,7 @@ def evolve(
     seed: 0 by default. The record depends on scenario, method and seed only.
     workers: one per core by default; a Dask cluster's are as many as it has.
     resume: goes on with the run in `out`; then `scenario` may be None, and what is given must be
-        what the run began with.
+        what the run began with: a recorded gait is evaluated again and must get its fitness again.
     optimizer: optimizer(space, scenario.evolution, generator) makes the optimiser of a trial
         (see optimizers.base); by default the scenario's.
     objective: objective(result) -> float, to be maximised; by default the scenario's fitness.
@@ -94,6 +94,8 @@ def evolve(
                 evaluate, at_a_time = GaitEvaluation(own, objective, lanes), lanes.capacity
             else:
                 prepare(own, many=True)
+            if resume:
+                check_fitness(out, record.manifest, evaluate=evaluate, executor=where)
             run_trials(
                 record,
                 evaluate=evaluate,
@@ -104,18 +106,18 @@ def evolve(
             )
         if reevaluate and own.simulation.engine != "drake":
             try:
-                reevaluate_gaits(
+                evaluate_again(
                     out,
+                    GaitEvaluation(on_diagram(own), objective),
                     workers=workers,
                     executor=executor or process_executor,
-                    objective=objective,
                     progress=progress,
                 )
             except EvaluationImpossible as error:
                 progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
         if reevaluate:
             try:
-                judge_elites(out, workers=workers, say=progress.say)
+                judge_elites(out, workers=workers)
             except InputError as error:
                 progress.warn(
                     f"the gaits of the map were not simulated on disturbed robots: {error}"
@@ -130,10 +132,10 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
     scenario, method = manifest.scenario, manifest.method
     among = scenario.disturbances
     draws = f", each gait among {among.draws} draws of disturbances" if among else ""
-    own = f", objective {method.objective.name}" if method.objective.digest else ""
+    own = "" if method.objective == FITNESS else f", objective {method.objective}"
     text = (
         f"{directory}: scenario {scenario.name}, seed {manifest.seed}, optimiser "
-        f"{method.optimizer.name}, trials {scenario.evolution.trials}, each of at most "
+        f"{method.optimizer}, trials {scenario.evolution.trials}, each of at most "
         f"{manifest.longest_trial}, engine {scenario.simulation.engine}, workers {workers}{draws}"
         f"{own}"
     )

@@ -28,7 +28,7 @@ from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.record import RunRecord
-from tetra_drake.evolution.reevaluation import reevaluate
+from tetra_drake.evolution.reevaluation import evaluate_again
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.evolution.trials import run_trials
 from tetra_drake.robot.gait import ParameterSpace
@@ -307,7 +307,7 @@ def test_a_run_in_lanes_has_the_record_of_one_on_other_executors(tiny, tmp_path)
 
 def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn):
     directory, evaluate = run_drawn("run"), DrawnBowl()
-    run = reevaluate(directory, evaluate=evaluate, workers=1, executor=ThreadPoolExecutor)
+    run = evaluate_again(directory, evaluate, workers=1, executor=ThreadPoolExecutor)
     again = run.reevaluations.set_index(["trial", "index"])
     first = run.evaluations.set_index(["trial", "index"]).loc[again.index]
     assert len(again) == 2, "the best of each trial: 5 gaits would be 15 simulations"

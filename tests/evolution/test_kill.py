@@ -108,3 +108,28 @@ def test_a_ctrl_c_ends_the_run_at_once_and_it_can_be_resumed(tmp_path, uninterru
     wait_until_gone(session)
     assert run_and_kill(tmp_path / "run", "threads")[0] == 0
     assert read_record(tmp_path / "run") == uninterrupted
+
+
+@pytest.mark.parametrize("engine", ["drake", "compiled"])
+def test_sigterm_ends_the_command_as_ctrl_c_does(tmp_path, engine):
+    program = PROGRAM.with_name("terminated_run.py")
+    options = ["--engine", engine, "--workers", "2", "--out", tmp_path / "run"]
+    with subprocess.Popen(
+        [sys.executable, program, *options],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+    ) as process:
+        progress, deadline = tmp_path / "run/trial_00/in_progress.jsonl", time.monotonic() + 60.0
+        while not progress.exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        process.terminate()
+        _, messages = process.communicate(timeout=60)
+    wait_until_gone(process.pid)
+    assert process.returncode == 143
+    assert "--resume" in messages
+    assert "leaked" not in messages and "Traceback" not in messages
+    with RunRecord.resume(tmp_path / "run"):
+        pass

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+import re
 import subprocess
 import sys
 
@@ -11,10 +12,13 @@ import pytest
 from helpers.analytic import Bowl, read_record, small_scenario
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.json_lines import json_line
 from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, read_manifest
+from tetra_drake.evolution.tables import load_run
 from tetra_drake.results.result import versions
+from tetra_drake.scenario.fields import TAG
 
 
 def cut(path, lost):
@@ -55,7 +59,15 @@ def test_the_manifest_holds_seed_versions_and_method_and_the_scenario_its_own_fi
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("seed", "x"), ("schema", 3), ("versions", []), ("objective", 7)]
+    ("key", "value"),
+    [
+        ("seed", "x"),
+        ("seed", -1),
+        ("thinned", "no"),
+        ("schema", 2),
+        ("versions", []),
+        ("objective", 7),
+    ],
 )
 def test_a_damaged_manifest_is_reported(run_small, refused, key, value):
     run = run_small(population=4, iterations=1)
@@ -99,11 +111,12 @@ def test_no_run_is_resumed_where_there_is_none_and_none_begun_in_a_used_director
 
 
 def test_what_a_kill_in_the_first_moment_leaves_is_an_empty_directory(tmp_path):
+    leftover = tmp_path / f".manifest.{2**22 + 1}.abcd_123.json"  # of no process
     (tmp_path / ".lock").touch()
-    (tmp_path / ".manifest.x1.json").touch()
+    leftover.touch()
     with create(tmp_path):
         pass
-    assert not (tmp_path / ".manifest.x1.json").exists()
+    assert not leftover.exists()
 
 
 def test_another_seed_scenario_or_method_is_refused(run_small, refused):
@@ -165,15 +178,24 @@ def with_line(number, change):
 
 
 def with_value(number, key, value):
-    return with_line(number, lambda line: json.dumps(json.loads(line) | {key: value}).encode())
+    """The line as it would have been written with another value: its checksum is right."""
+
+    def change(line):
+        entry = json.loads(line)
+        del entry["crc"]
+        return json_line(entry | {key: value}).encode().strip()
+
+    return with_line(number, change)
 
 
 def with_one_more(content):
-    return content + content.splitlines()[-1].replace(b'"index": 41', b'"index": 42') + b"\n"
+    entry = json.loads(content.splitlines()[-1])
+    del entry["crc"]
+    return content + json_line(entry | {"index": 42}).encode()
 
 
 NO_OBJECTS = [b"{nonsense", b"", b"\xff\xfe", b"[1, 2]", b"\0" * 30, b'{"index": 4}']
-VALUES = [("genome", [2.0] * 26), ("placed", 77), ("index", 77), ("fitness", "high")]
+VALUES = [("genome", [2.0] * 26), ("placed", 7), ("index", 77), ("fitness", "high")]
 
 
 @pytest.mark.parametrize(
@@ -193,6 +215,117 @@ def test_a_damaged_or_changed_line_is_reported(run_small, refused, name, line, p
     path = run_small(trials=1) / "trial_00" / f"{name}.jsonl"
     path.write_bytes(damage(path.read_bytes()))
     with refused(path, f"line {line}", problem):
+        run_small(resume=True)
+
+
+def unsealed(line, changes):
+    entry = json.loads(line)
+    del entry["crc"]
+    return json.dumps(entry | changes).encode()
+
+
+def other(value):
+    """Another value of the same kind."""
+    if isinstance(value, str):
+        return value + "x"
+    if isinstance(value, list):
+        return [other(value[0]), *value[1:]]
+    if isinstance(value, dict):
+        return {key: other(number) for key, number in value.items()} or {"distance": 1.0}
+    return 1 if value is None else value + 1
+
+
+def with_changed(number, key):
+    """A line with another value and the checksum that it had."""
+
+    def change(line):
+        entry = json.loads(line)
+        return json.dumps(entry | {key: other(entry[key])}).encode()
+
+    return with_line(number, change)
+
+
+@pytest.mark.parametrize("kind", ["SteadyState", "CmaEs", "QualityDiversity", "RandomSearch"])
+def test_no_optimiser_takes_over_a_value_that_was_changed(run_small, refused, kind):
+    changes = {"optimizer": {TAG: f"!{kind}"}, "evolution.max_evaluations": 40}
+    run = run_small(population=4, iterations=3, trials=1, changes=changes)
+    whole = read_record(run)
+    for path in sorted(run.glob("trial_00/*.jsonl")):
+        content = path.read_bytes()
+        lines = content.splitlines(keepends=True)
+        for number in {1, len(lines)}:
+            for key in json.loads(lines[number - 1]):
+                path.write_bytes(with_changed(number, key)(content))
+                with refused(path, f"line {number}", "checksum"):
+                    run_small(resume=True)
+                with refused(path, f"line {number}", ""):
+                    load_run(run)
+        # What the message says: cut there, the record is made good.
+        path.write_bytes(b"".join(lines[: len(lines) // 2]))
+        run_small(resume=True)
+        assert read_record(run) == whole
+
+
+def test_a_line_without_checksum_is_read_but_not_resumed(run_small, refused):
+    run = run_small(trials=1)
+    whole, path = load_run(run), run / "trial_00" / "iterations.jsonl"
+    path.write_text(re.sub(', "crc": "\\w+"', "", path.read_text()))
+    assert load_run(run).iterations.equals(whole.iterations)
+    with refused(path, "line 1", "checksum"):
+        run_small(resume=True)
+
+
+def test_an_evaluation_in_progress_that_was_changed_is_refused(run_small, tmp_path, refused):
+    with pytest.raises(InterruptedError):
+        run_small(evaluate=Counted(4), workers=1, trials=1)
+    path = tmp_path / "run" / "trial_00" / "in_progress.jsonl"
+    for key in ("fitness", "failure", "metrics"):
+        content = path.read_bytes()
+        path.write_bytes(with_changed(2, key)(content))
+        with refused(path, "line 2", "checksum"):
+            run_small(resume=True)
+        path.write_bytes(content)
+    assert run_small(resume=True)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("metrics", {"distance": "far"}),
+        ("metrics", {"distance": None}),
+        ("metrics", {"distance": 1.0, "speed": [1.0]}),
+        ("metrics", {"distance": 1.0, "lifted_shares": 1.0}),
+        ("genome", [1.0, None]),
+        ("genome", [1.0] * 25),
+        ("fitness", 10**400),
+        ("draws", {"fitness": [1.0]}),
+        ("draws", {"fitness": [1.0], "distance": []}),
+        ("placed", "first"),
+        ("index", 2.0),
+    ],
+)
+def test_a_run_with_a_value_of_another_kind_is_not_loaded(run_small, refused, key, value):
+    path = run_small(population=4, iterations=1, trials=1) / "trial_00" / "evaluations.jsonl"
+    path.write_bytes(with_line(3, lambda line: unsealed(line, {key: value}))(path.read_bytes()))
+    with refused(path, "line 3", key):
+        load_run(path.parents[1])
+
+
+def test_a_folder_where_a_file_belongs_is_reported(run_small, refused):
+    run = run_small(population=4, iterations=1, trials=1)
+    for name in ("trial_00/evaluations.jsonl", "trial_00/iterations.jsonl", "manifest.json"):
+        (run / name).rename(run / "away")
+        (run / name).mkdir()
+        with pytest.raises(InputError) as caught:
+            load_run(run)
+        assert caught.value.source == str(run / name)
+        assert "is a directory" in caught.value.problem.lower()
+        assert str(run) not in caught.value.problem
+        (run / name).rmdir()
+        (run / "away").rename(run / name)
+    (run / "trial_00").rename(run / "away")
+    (run / "trial_00").touch()
+    with refused(run / "trial_00", "", "is a file"):
         run_small(resume=True)
 
 
@@ -224,5 +357,5 @@ def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, 
     record = TrialRecord(tmp_path)
     assert record.recall(3, genome) == failed
     assert record.recall(4, genome) is None
-    with refused(tmp_path / "in_progress.jsonl", "line 1", "the genome is not the one"):
+    with refused(tmp_path / "in_progress.jsonl", "line 1", "genome"):
         record.recall(3, genome + 1.0)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from helpers.analytic import Bowl
 
-from tetra_drake.evolution.reevaluation import best_distances, reevaluate
+from tetra_drake.evolution.reevaluation import best_distances, evaluate_again, reevaluate
 from tetra_drake.evolution.tables import load_run
 
 
@@ -24,8 +24,8 @@ class Slope:
 
 
 def again(directory, evaluate=None, **options):
-    return reevaluate(
-        directory, workers=2, evaluate=evaluate or Slope(), executor=ThreadPoolExecutor, **options
+    return evaluate_again(
+        directory, evaluate or Slope(), workers=2, executor=ThreadPoolExecutor, **options
     )
 
 
@@ -51,7 +51,7 @@ def test_all_initial_gaits_can_be_evaluated_again_but_not_by_another_objective(r
     assert list(run.reevaluations.groupby("trial").size()) == [12, 12]
     assert (run.reevaluations["iteration"] == 0).all()
     with refused(directory, "objective", "Bowl"):
-        again(directory, objective=Bowl())
+        reevaluate(directory, objective=Bowl())
 
 
 def test_what_is_recorded_whole_is_not_evaluated_again(run_small):

@@ -1,11 +1,10 @@
-"""A recorded run as tables: columns, best gaits, populations, states of trials, schema 1."""
+"""A recorded run as tables: columns, best gaits, populations, states of trials."""
 
 import dataclasses
 import json
 import lzma
 import math
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -120,6 +119,12 @@ def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(
     assert run.gait(0, 3).name == "tiny, seed 7, trial 0, evaluation 3"
 
 
+def test_the_initial_gaits_are_those_of_the_first_iteration_of_every_trial(tmp_path):
+    trials = [[[(5.0, 0), (None, 1)], [(6.0, 0)], [(7.0, 1)]], [[(2.0, 0)], [(3.0, 0)]]]
+    initial = load_run(write_run(tmp_path / "run", trials)).initial()
+    assert initial[["trial", "index"]].to_numpy().tolist() == [[0, 0], [0, 1], [1, 0]]
+
+
 def test_best_gait_and_last_population_are_those_kept_by_hand(run_small, scenario):
     directory = run_small()
     run = load_run(directory)
@@ -172,45 +177,3 @@ def test_the_reference_stands_beside_our_numbers_where_there_is_one(tmp_path):
     scenario.reference = None
     without = load_run(write_run(tmp_path / "b", [[[(5.0, 0)]]], scenario=scenario))
     assert {row.reference for row in comparisons(without)} == {""}
-
-
-# Runs of schema 1
-
-RECORDED = Path(__file__).parents[1] / "data" / "run_schema_1"
-
-
-@pytest.fixture
-def first_lines(tmp_path):
-    """The recorded run's first trial, ended after 56 evaluations, and all lines there are."""
-    run = tmp_path / "run"
-    (run / "trial_00").mkdir(parents=True)
-    for name in ("manifest.json", "scenario.yaml"):
-        (run / name).write_bytes((RECORDED / name).read_bytes())
-    content = lzma.decompress((RECORDED / "trial_00" / "evaluations.jsonl.xz").read_bytes())
-    lines = content.splitlines(keepends=True)
-    (run / "trial_00" / "evaluations.jsonl").write_bytes(b"".join(lines[:56]))
-    return run, [json.loads(line) for line in lines]
-
-
-def test_a_recorded_run_of_schema_1_loads_with_its_inches_to_the_last_digit(first_lines):
-    path, entries = first_lines
-    run = load_run(path)
-    assert run.manifest.method.evaluator.name == "compiled"
-    inches = [entry["metrics"]["distance_in"] for entry in entries[:56]]
-    assert run.evaluations["distance_in"].tolist() == inches
-    assert run.evaluations["twist"].notna().all()
-
-
-def test_a_recorded_run_of_schema_1_is_resumed_where_it_ended(first_lines):
-    """The optimiser must ask for what the record holds: 50 gaits and 2 per iteration."""
-    path, entries = first_lines
-    asked = []
-
-    def evaluate(vector):
-        asked.append(vector.tolist())
-        raise InterruptedError
-
-    with RunRecord.resume(path) as record, pytest.raises(InterruptedError):
-        run_trials(record, evaluate=evaluate, workers=1, executor=ThreadPoolExecutor)
-    assert asked[0] == entries[56]["genome"]
-    assert len(load_run(path).iterations) == 4

@@ -14,7 +14,7 @@ from tetra_drake.evolution.elites import elites
 from tetra_drake.evolution.json_lines import append_lines, read_lines
 from tetra_drake.evolution.pareto import champions
 from tetra_drake.evolution.record import RunRecord
-from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
+from tetra_drake.evolution.reevaluation import BEST_GAITS, evaluate_again
 from tetra_drake.evolution.robustness import gaits_of
 from tetra_drake.evolution.summary import summary
 from tetra_drake.evolution.tables import load_run
@@ -131,7 +131,7 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
 
 def test_a_thinned_run_is_reevaluated_but_not_resumed(runs, refused):
     _, thinned = runs
-    again = reevaluate(thinned.directory, evaluate=Bowl(), executor=ThreadPoolExecutor)
+    again = evaluate_again(thinned.directory, Bowl(), executor=ThreadPoolExecutor)
     assert len(again.reevaluations) == 1 + 2 * BEST_GAITS
     with refused(thinned.directory, "", "thinned"):
         RunRecord.resume(thinned.directory)

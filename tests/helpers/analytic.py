@@ -118,7 +118,7 @@ def read_record(directory: Path) -> dict[str, object]:
         if path.name == "evaluations.jsonl":
             entries = [json.loads(line) for line in path.read_text().splitlines()]
             for entry in entries:
-                del entry["wall_time_s"]
+                del entry["wall_time_s"], entry["crc"]
             record[name] = [json.dumps(entry) for entry in entries]
     return record
 

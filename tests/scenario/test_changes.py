@@ -71,7 +71,6 @@ def axial_force(scenario: Scenario) -> float:
         ("simulation: {engine: compiled, accuracy: 0.1}\nrobot: {tetrahedra: 5}", False, True),
         ("reference:", False, False),
         ("simulation: {duration: 10 s}", False, False),
-        ("fitness: {drift: 0}", False, False),
         ("objective: {speed: 1 s/m}", False, False),
         ("require: {twist: 0 m}", False, False),
         ("robot: {tetrahedra: 7, density: 5 g/cm^3}", False, False),

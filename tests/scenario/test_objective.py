@@ -39,14 +39,6 @@ def test_objective_and_requirements_have_units_and_replace_the_base(
     assert load_scenario(tmp_path / "full.yaml") == scenario
 
 
-def test_an_older_fitness_is_the_objective_it_was(tmp_path, scenario):
-    full = "fitness: {distance: 1, twist: -10, direction: 0, drift: -1}"
-    assert loaded(tmp_path, full).objective == scenario.objective
-    partly = loaded(tmp_path, "fitness: {direction: 2, drift: 0}").objective
-    expected = {"steady_distance": 1 / IN, "twist": -10 / IN, "lead": 2 / IN}
-    assert partly == approx(expected, rel=1e-15)
-
-
 SPREADS = """
 disturbances:
   draws: 4
@@ -112,8 +104,6 @@ BAD = [
     ("objective: {}", "objective", "no metric"),
     ("require: {twits: 1 in}", "require.twits", "'twist'"),
     ("require: {twist: 1 lbf}", "require.twist", "'1 lbf'"),
-    ("fitness: {twits: 1}", "fitness.twits", "'twist'"),
-    ("fitness: {twist: 1}\nobjective: {lead: 1 /m}", "fitness", "objective"),
     ("disturbances: {draws: 0}", "disturbances.draws", "0"),
     ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
     ("disturbances: {draws: 2, aggregation: best}", "disturbances.aggregation", "'best'"),

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tetra_drake.errors import InputError
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario, shipped_scenarios
 from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
 from tetra_drake.scenario.schema import CABLES, PATHWAYS, Coulomb
@@ -243,23 +244,6 @@ def test_recorded_scenarios_load(file):
     assert f"tetrahedra: {loaded.robot.tetrahedra}\n" in text
 
 
-def test_a_file_of_schema_1_means_what_it_meant(data, scenario):
-    file = data / "scenario_schema_1.yaml"
-    loaded = load_scenario(file)
-    assert differences(loaded, scenario) == [
-        ("simulation.engine", "compiled"),
-        ("simulation.look_ahead", "0.00025 s"),
-        ("simulation.fresh_steps", "false"),
-    ]
-    assert (loaded.reference, loaded.robot.offsets) == (None, [])
-    # All but the constants of Eq. 10, which are the objective now.
-    before, _, rest = file.read_text().partition("fitness:")
-    dumped = dump_scenario(loaded)
-    assert dumped.startswith(before)
-    assert dumped.endswith(rest.partition("evolution:")[2])
-    assert loaded.objective == scenario.objective
-
-
 # Files based on files
 
 
@@ -354,7 +338,6 @@ def test_differences_are_keys_and_readable_values(scenario):
 
 BAD = [
     ("robot: {tetrahedron: 4}", "robot.tetrahedron", "'tetrahedra'"),
-    ("fitness: {qqq: 1}", "fitness.qqq", "distance, twist, direction, drift"),
     ("robot:", "robot", "nothing"),
     ("robot: {spacing: 3}", "robot.spacing", "3 without a unit"),
     ("reference: {best_distance: 3}", "reference.best_distance", "3 without a unit"),
@@ -378,9 +361,9 @@ BAD_FILES = [
     ("base: theses", "base", "'theses'"),
     ("base: 5", "base", "5"),
     ("base: mine.yaml", "base", "itself"),
-    ("", "", "nothing"),
-    ("- 1", "", "a list"),
-    ("robot: [1\n", "", "YAML"),
+    ("", "", "mapping"),
+    ("- 1", "", "mapping"),
+    ("robot: [1\n", "", "YAML, line 2, column 1"),
     ("base: thesis\nrobot: {\n  spacing: 3 in\n", "", "YAML"),
     ("base: thesis\nrobot: {spacing: 2 in, spacing: 3 in}", "", "'spacing'"),
     ("!!python/object/apply:os.getcwd []", "", "YAML"),
@@ -429,3 +412,31 @@ def test_what_is_no_text_file_is_refused(tmp_path, refused, name):
     (tmp_path / "binary.yaml").write_bytes(b"\x89PNG\r\n\x1a\n\x00\xff")
     with refused(tmp_path / name, "", ""):
         load_scenario(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "root:x:0:0:secret:/root:/bin/sh\ndaemon:x:1:1:secret:/:/bin/sh\n",  # YAML: a text
+        "a: [1, 2\nsecret: {x: 1\n  secret\n",
+        "key: 'secret\n",
+        "secret: *secret\n",
+        "- secret\n",
+        "\tsecret: {}\n",
+    ],
+)
+def test_a_base_that_is_no_scenario_is_not_shown(tmp_path, content):
+    (tmp_path / "any").write_text(content)
+    file = write(tmp_path, "base: any\n")
+    with pytest.raises(InputError) as caught:
+        load_scenario(file)
+    assert caught.value.source == str(tmp_path / "any")
+    assert "secret" not in caught.value.problem.replace("alias 'secret'", "")
+
+
+def test_files_that_never_end_or_are_too_large_are_refused(tmp_path, refused):
+    (tmp_path / "large.yaml").write_text("#" * (2**20 + 1))
+    for base, problem in (("/dev/zero", "device"), (tmp_path / "large.yaml", "1 MB")):
+        file = write(tmp_path, f"base: {base}\n")
+        with refused(base, "", problem):
+            load_scenario(file)

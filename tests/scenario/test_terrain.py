@@ -310,6 +310,7 @@ def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, mon
     ("text", "key", "found"),
     [
         ("!HeightField {file: none.csv, cell: 1 in}", "file", "none.csv"),
+        ("!HeightField {file: /dev/zero, cell: 1 in}", "file", "device"),
         ("!HeightField {file: none.csv, cell: 1}", "cell", "1 without a unit"),
         ("!HeightField {file: none.csv, cell: 1 m, corner: [1 m]}", "corner", "1 items"),
         ("!Incline {slope: 95 deg}", "slope", "1.047 rad"),

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.method import Part
+from tetra_drake.evolution.method import FITNESS
 from tetra_drake.evolution.statistics import interquartile_mean, interval
 from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.files import json_number
@@ -235,9 +235,9 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
     return notes
 
 
-def _objective(run: Run) -> tuple[Part, Mapping[str, float]]:
-    part, own = run.manifest.method.objective, run.manifest.scenario.objective
-    return part, own if part.digest is None else {}
+def _objective(run: Run) -> tuple[str, Mapping[str, float]]:
+    name, terms = run.manifest.method.objective, run.manifest.scenario.objective
+    return name, terms if name == FITNESS else {}
 
 
 def to_json(compared: Compared) -> dict[str, Any]:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
-from tetra_drake.evolution.record import read_manifest
+from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
+from tetra_drake.evolution.record import ELITES, read_entries, read_manifest
 from tetra_drake.evolution.robustness import by_gait, judge
 from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.files import json_number
@@ -22,8 +22,6 @@ from tetra_drake.scenario.optimizers import QualityDiversity
 
 if TYPE_CHECKING:
     import pandas
-
-ELITES = "elites.jsonl"
 
 LUCKY = 0.5
 """A gait of the map that keeps a smaller share of the draws of disturbances is there by luck."""
@@ -44,7 +42,7 @@ def elites(run: Run) -> pandas.DataFrame:
     import pandas
 
     table, kind = run.whole, run.manifest.scenario.optimizer
-    judged = pandas.DataFrame(read_lines(run.directory / ELITES), columns=[*_KEY, *_JUDGED])
+    judged = pandas.DataFrame(read_entries(run.directory / ELITES), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > kind.floor].dropna(subset=list(kind.measures))
         table = table.assign(**dict(zip(CELLS, cells(table, kind), strict=True)))

@@ -1,6 +1,6 @@
 """A run's record on disk: its files, their checks, and how a run is resumed.
 
-    manifest.json             seed, versions, method (evaluator, objective, optimiser), SHA-256 of
+    manifest.json             seed, versions, method (objective, optimiser), SHA-256 of
     scenario.yaml             the scenario in full
     .lock                     locked while a process is at work on the run
     trial_00/
@@ -12,8 +12,8 @@
 
 Evaluations become final lines iteration by iteration, so the record does not depend on
 which of them was ready first. A run is resumed by repeating it from the start with recorded
-fitnesses in place of simulations; every vector and every line must come out as recorded. Only an
-optimiser that can follow takes over vectors that, on another processor, come out differently.
+fitnesses in place of simulations; every vector and every line must come out as recorded. So it goes
+on with the same versions of the packages and on the same kind of processor only.
 """
 
 from __future__ import annotations
@@ -24,62 +24,105 @@ import fcntl
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
-
-import numpy as np
-import yaml
+from typing import Any, BinaryIO, NoReturn
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.json_lines import append_lines, read_lines, repair_torn_line
-from tetra_drake.evolution.method import Method, Part
+from tetra_drake.evolution.json_lines import REMEDY, append_lines, read_lines, repair_torn_line
+from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers.base import Evaluation
-from tetra_drake.files import check_folder, json_number, write_whole
+from tetra_drake.files import check_folder, json_number, make_folder, read_text, write_whole
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizers import SteadyState
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import INCH
 
 _Lines = Sequence[dict[str, Any]]
 
-SCHEMA, FIRST_SCHEMA = 2, 1
+SCHEMA = 3
 MANIFEST, SCENARIO, LOCK = "manifest.json", "scenario.yaml", ".lock"
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
-REEVALUATIONS = "reevaluations.jsonl"
+REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
 
-_ITERATION_KEYS = {
-    "iteration": int,
-    "evaluations": int,
-    "best_fitness": float | int | None,
-    "best_evaluation": int | None,
-    "stop": str | None,
+
+def _is_count(value: Any) -> bool:
+    return type(value) is int and 0 <= value < 2**63
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) < 1e300
+
+
+def _are_numbers(value: Any) -> bool:
+    return isinstance(value, list) and all(_is_number(item) for item in value)
+
+
+def _are_metrics(value: Any) -> bool:
+    return isinstance(value, dict) and all(_is_metric(*item) for item in value.items())
+
+
+def _is_metric(name: str, value: Any) -> bool:
+    if name == "lifted_shares":
+        return _are_numbers(value)
+    return _is_number(value) or (value is None and name != "distance")
+
+
+def _are_draws(value: Any) -> bool:
+    return isinstance(value, dict) and all(
+        _are_numbers(value.get(key)) and value[key] for key in _DRAWS
+    )
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _or_none(check: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: value is None or check(value)
+
+
+_DRAWS = ("fitness", "distance")
+_ITERATION: dict[str, Callable[[Any], bool]] = {
+    "iteration": _is_count,
+    "evaluations": _is_count,
+    "best_fitness": _or_none(_is_number),
+    "best_evaluation": _or_none(_is_count),
+    "stop": _or_none(_is_text),
 }
-_EVALUATION_KEYS = {
-    "index": int,
-    "iteration": int,
-    "genome": list | None,
-    "metrics": dict,
-    "fitness": float | int | None,
-    "failure": str | None,
-    "wall_time_s": float | int,
-    "engine": str,
-    "draws": dict | None,
+_EVALUATION: dict[str, Callable[[Any], bool]] = {
+    "index": _is_count,
+    "iteration": _is_count,
+    "genome": _or_none(_are_numbers),
+    "metrics": _are_metrics,
+    "fitness": _or_none(_is_number),
+    "failure": _or_none(_is_text),
+    "wall_time_s": _is_number,
+    "engine": _is_text,
 }
-_OPTIONAL = {"draws": None}
-"""What a line may lack: there are draws among disturbances only."""
-_FIRST_METRICS = {
-    "distance_in": "distance",
-    "steady_distance_in": "steady_distance",
-    "heading_error_in": "twist",
-    "direction_in": "lead",
-    "lateral_drift_in": "lateral_drift",
+_ELITE: dict[str, Callable[[Any], bool]] = {
+    "trial": _is_count,
+    "index": _is_count,
+    "kept": _is_number,
+    "mean_distance": _or_none(_is_number),
 }
-"""Metrics of schema 1, in inches, by their names today."""
+_OPTIONAL: dict[str, Callable[[Any], bool]] = {
+    "draws": _are_draws,
+    "placed": _or_none(_is_count),
+    "mean_fitness": _or_none(_is_number),
+}
+"""What a line may have besides: draws where there are disturbances, the others by optimiser."""
+_WANTED = {ITERATIONS: _ITERATION, ELITES: _ELITE}
+_NUMBERED = {EVALUATIONS: "index", ITERATIONS: "iteration"}
+"""What counts the lines of a file."""
+_MANIFEST: dict[str, Callable[[Any], bool]] = {
+    "seed": lambda value: type(value) is int and value >= 0,
+    "versions": lambda value: isinstance(value, dict),
+    "thinned": lambda value: value in (None, False, True),
+}
 
 
 def trial_folder(directory: Path, number: int) -> Path:
@@ -102,7 +145,7 @@ class Manifest:
     def longest_trial(self) -> str:
         """How long a trial is that does not end early, in words."""
         settings, kind = self.scenario.evolution, type(self.scenario.optimizer)
-        if kind is SteadyState or self.method.optimizer != Part(kind.__name__):
+        if kind is SteadyState or self.method.optimizer != kind.__name__:
             return f"{settings.max_iterations} iterations, population {settings.population}"
         return f"{settings.budget} evaluations"
 
@@ -110,28 +153,24 @@ class Manifest:
 def read_manifest(directory: Path) -> Manifest:
     """The manifest of a run directory; InputError if there is none or it is damaged."""
     path, scenario_file = directory / MANIFEST, directory / SCENARIO
+    if not path.exists():
+        raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
+    text = read_text(path, "manifest of a run")
     try:
-        raw = json.loads(path.read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError) as error:
-        raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run") from error
-    except (OSError, ValueError, RecursionError) as error:
+        raw = json.loads(text)
+    except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
     schema = raw.get("schema") if isinstance(raw, dict) else None
-    if schema not in (SCHEMA, FIRST_SCHEMA):
-        raise InputError(path, "schema", f"found {schema!r}, expected {FIRST_SCHEMA} or {SCHEMA}")
-    for key, kind in (("seed", int), ("versions", dict)):
-        if not isinstance(raw.get(key), kind):
+    if schema != SCHEMA:
+        raise InputError(path, "schema", f"found {schema!r}, expected {SCHEMA}")
+    for key, holds in _MANIFEST.items():
+        if not holds(raw.get(key)):
             raise InputError(path, key, "is missing or damaged")
     scenario = load_scenario(scenario_file)
-    text = scenario_file.read_text(encoding="utf-8")
-    if schema == FIRST_SCHEMA:
-        unchanged, method = raw.get("scenario") == yaml.safe_load(text), Method.of(scenario)
-    else:
-        unchanged = raw.get("scenario_sha256") == _sha256(text)
-        method = Method.from_json(raw, path)
-    if not unchanged:
+    if raw.get("scenario_sha256") != _sha256(read_text(scenario_file, "scenario file")):
         raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
-    return Manifest(scenario, raw["seed"], raw["versions"], method, raw.get("thinned", False))
+    method = Method.from_json(raw, path)
+    return Manifest(scenario, raw["seed"], raw["versions"], method, raw.get("thinned") is True)
 
 
 @dataclass(frozen=True)
@@ -151,12 +190,10 @@ class RunRecord:
         manifest = Manifest(scenario, seed, now, method or Method.of(scenario))
         check_folder(directory)
         _refuse_a_used(directory)
-        directory.mkdir(parents=True, exist_ok=True)
+        make_folder(directory)
         with contextlib.ExitStack() as undo:
             lock = undo.enter_context(_lock(directory))
             _refuse_a_used(directory)  # Another process may have been faster.
-            for leftover in (*directory.glob(".manifest.*"), *directory.glob(".scenario.*")):
-                leftover.unlink()
             _write_manifest(directory, manifest)
             undo.pop_all()
         return cls(directory, manifest, lock)
@@ -191,35 +228,24 @@ class RunRecord:
         self._lock.close()
 
 
+_NOT_REPEATED = (
+    "{} is not what scenario and seed lead to here; resume the run with the versions of the "
+    "packages and on the kind of processor it was begun with"
+)
+
+
 class TrialRecord:
     """The files of one trial. What is recorded already is checked instead of written."""
 
     def __init__(self, folder: Path) -> None:
-        folder.mkdir(exist_ok=True)
+        make_folder(folder)
         self._folder = folder
-        for leftover in folder.glob(f".{Path(BEST_GAIT).stem}.*"):
-            leftover.unlink()
         for name in (EVALUATIONS, ITERATIONS, IN_PROGRESS):
             repair_torn_line(folder / name)
-        self._evaluations = read_entries(folder / EVALUATIONS)
-        for row, entry in enumerate(self._evaluations):
-            if entry["index"] != row:
-                self._refuse(EVALUATIONS, row, f"index is {entry['index']}, expected {row}")
-        self._iterations = read_entries(folder / ITERATIONS)
-        in_progress = read_entries(folder / IN_PROGRESS)
+        self._evaluations = read_entries(folder / EVALUATIONS, checksums=True)
+        self._iterations = read_entries(folder / ITERATIONS, checksums=True)
+        in_progress = read_entries(folder / IN_PROGRESS, checksums=True)
         self._in_progress = {entry["index"]: (i, entry) for i, entry in enumerate(in_progress)}
-        self._follows = False
-
-    def vector(self, index: int, vector: Vector) -> Vector:
-        """The recorded vector of this index in place of another one, as a following optimiser takes
-        it; then, what the optimiser reports is no longer compared. `vector` itself if it is the
-        recorded one, or none is."""
-        _, _, entry = self._find(index)
-        genome = vector.tolist() if entry is None else entry["genome"]
-        if genome == vector.tolist() or [*map(type, genome)] != [float] * len(vector):
-            return vector
-        self._follows = True
-        return np.array(genome)
 
     def recall(self, index: int, vector: Vector) -> Evaluation | None:
         """The recorded evaluation of this index, None if there is none; InputError if it is of
@@ -228,7 +254,7 @@ class TrialRecord:
         if entry is None:
             return None
         if entry["genome"] != vector.tolist():
-            self._refuse(name, row, "the genome is not the one that scenario and seed lead to")
+            self._refuse(name, row, _NOT_REPEATED.format("the genome"))
         fitness = -math.inf if entry["fitness"] is None else entry["fitness"]
         rest = [entry[key] for key in ("metrics", "failure", "wall_time_s", "engine")]
         return dataclasses.replace(Evaluation(fitness, *rest), draws=entry.get("draws"))
@@ -263,15 +289,14 @@ class TrialRecord:
 
     def _write(self, name: str, recorded: _Lines, entries: _Lines, *, first: int) -> None:
         for row, (there, entry) in enumerate(zip(recorded[first:], entries, strict=False), first):
-            keys = _ITERATION_KEYS if self._follows and name == ITERATIONS else there | entry
-            key = next((key for key in keys if there.get(key) != entry.get(key)), None)
+            key = next((key for key in there | entry if there.get(key) != entry.get(key)), None)
             if key is not None:
-                self._refuse(name, row, f"{key} is not what scenario and seed lead to")
+                self._refuse(name, row, _NOT_REPEATED.format(key))
         if missing := entries[max(0, len(recorded) - first) :]:
             append_lines(self._folder / name, missing)
 
     def _refuse(self, name: str, row: int, problem: str) -> None:
-        raise InputError(self._folder / name, f"line {row + 1}", f"is damaged: {problem}")
+        raise InputError(self._folder / name, f"line {row + 1}", problem)
 
 
 def evaluation_entry(
@@ -292,27 +317,33 @@ def evaluation_entry(
     }
 
 
-def read_entries(path: Path) -> list[dict[str, Any]]:
-    """The lines of a file of evaluations or iterations in today's form, whatever their schema;
-    InputError, naming file and line, where one is damaged."""
-    keys = _ITERATION_KEYS if path.name == ITERATIONS else _EVALUATION_KEYS
-    entries = read_lines(path)
-    for line, entry in enumerate(entries, start=1):
-        for key, kind in keys.items():
-            if not isinstance(entry.get(key, _OPTIONAL.get(key, NotImplemented)), kind):
-                raise InputError(path, f"line {line}", f"is damaged: {key} is missing or invalid")
-        entry.pop("best_distance_in", None)
-        if "distance_in" in entry.get("metrics", {}):
-            inches = entry["metrics"]
-            entry["metrics"] = {_FIRST_METRICS[name]: _from_inches(inches[name]) for name in inches}
+def first_with_fitness(directory: Path, trials: int) -> tuple[int, dict[str, Any]] | None:
+    """Trial and entry of the first recorded evaluation that has a fitness; None without any."""
+    for trial in range(trials):
+        for name in (EVALUATIONS, IN_PROGRESS):
+            for entry in read_entries(trial_folder(directory, trial) / name):
+                if entry["fitness"] is not None and entry["genome"] is not None:
+                    return trial, entry
+    return None
+
+
+def read_entries(path: Path, *, checksums: bool = False) -> list[dict[str, Any]]:
+    """The lines of a file of a record; InputError, naming file and line, where one is damaged; with
+    `checksums`, also where it lacks that."""
+    wanted = _WANTED.get(path.name, _EVALUATION)
+    entries, counter = read_lines(path, checksums=checksums), _NUMBERED.get(path.name)
+    for row, entry in enumerate(entries):
+        checks = wanted | {key: check for key, check in _OPTIONAL.items() if key in entry}
+        for key, check in checks.items():
+            if key not in entry or not check(entry[key]):
+                _refuse(path, row, f"{key} is missing or invalid")
+        if counter and entry[counter] != row:
+            _refuse(path, row, f"{counter} is {entry[counter]}, expected {row}")
     return entries
 
 
-def _from_inches(value: float) -> float:
-    """The length in m that gives this number of inches to the last digit, where there is one."""
-    near = value * INCH
-    nearest = (near, math.nextafter(near, -math.inf), math.nextafter(near, math.inf))
-    return next((length for length in nearest if length / INCH == value), near)
+def _refuse(path: Path, row: int, problem: str) -> NoReturn:
+    raise InputError(path, f"line {row + 1}", f"is damaged: {problem}; {REMEDY}")
 
 
 def _write_manifest(directory: Path, manifest: Manifest) -> None:

@@ -16,8 +16,15 @@ from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
 from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.optimizers.base import Evaluate
 from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.record import REEVALUATIONS, evaluation_entry, trial_folder
+from tetra_drake.evolution.record import (
+    REEVALUATIONS,
+    evaluation_entry,
+    read_manifest,
+    trial_folder,
+)
 from tetra_drake.evolution.tables import Run, load_run
+from tetra_drake.evolution.trials import check_fitness
+from tetra_drake.scenario.schema import Scenario
 
 BEST_GAITS = 5
 """Number of best gaits per trial that are evaluated once more; among disturbances fewer, but one,
@@ -31,7 +38,6 @@ def reevaluate(
     workers: int | None = None,
     executor: MakeExecutor = process_executor,
     objective: Objective | None = None,
-    evaluate: Evaluate | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """Evaluates a run's best gaits, or all initial ones, on the Drake diagram, adds them to its
@@ -39,11 +45,41 @@ def reevaluate(
 
     Raises InputError where `objective` is not the run's, or where there is no run.
     """
-    run = load_run(directory)
-    scenario, method = run.manifest.scenario, run.manifest.method
-    scenario = scenario.with_changes({"simulation.engine": "drake"})
+    directory = Path(directory)
+    manifest = read_manifest(directory)
+    scenario, method = manifest.scenario, manifest.method
     given = Method.of(scenario, objective=objective).objective
-    method.check_same(dataclasses.replace(method, objective=given), run.directory)
+    method.check_same(dataclasses.replace(method, objective=given), directory)
+    if objective is not None:
+        ours = GaitEvaluation(scenario, objective)
+        check_fitness(directory, manifest, evaluate=ours, executor=executor)
+    return evaluate_again(
+        directory,
+        GaitEvaluation(on_diagram(scenario), objective),
+        initial=initial,
+        workers=workers,
+        executor=executor,
+        progress=progress,
+    )
+
+
+def on_diagram(scenario: Scenario) -> Scenario:
+    """The scenario with the Drake diagram as its engine."""
+    return scenario.with_changes({"simulation.engine": "drake"})
+
+
+def evaluate_again(
+    directory: Path,
+    evaluate: Evaluate,
+    *,
+    initial: bool = False,
+    workers: int | None = None,
+    executor: MakeExecutor = process_executor,
+    progress: Progress | None = None,
+) -> Run:
+    """As reevaluate(), by an evaluation that has the run's objective."""
+    run = load_run(directory)
+    scenario = run.manifest.scenario
     for trial in range(scenario.evolution.trials):
         repair_torn_line(trial_folder(run.directory, trial) / REEVALUATIONS)
     done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
@@ -54,7 +90,6 @@ def reevaluate(
     progress = progress or Progress()
     title = f"{'initial' if initial else 'best'} gaits on the Drake diagram"
     progress.stage(title, 0, len(missing))
-    evaluate = evaluate or GaitEvaluation(scenario, objective)
     tasks = [
         task_of(scenario, vector, (run.manifest.seed, trial, iteration))
         for vector, (trial, _, iteration) in zip(vectors, missing, strict=True)

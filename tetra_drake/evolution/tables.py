@@ -41,7 +41,7 @@ class Run:
 
     directory: Path
     manifest: Manifest
-    """Scenario, seed, versions, and the method: evaluator, objective, optimiser."""
+    """Scenario, seed, versions, and the method: objective, optimiser."""
     evaluations: pandas.DataFrame
     """One row per evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
     wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
@@ -179,7 +179,7 @@ def _table(directory: Path, trials: int, name: str, columns: list[str]) -> panda
     rows = [
         {"trial": trial, **(_flat(entry, columns) if "genome" in entry else entry)}
         for trial in range(trials)
-        for entry in read_entries(trial_folder(directory, trial) / name)
+        for entry in _entries(trial_folder(directory, trial) / name, len(columns))
     ]
     table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
     kinds = dict.fromkeys(("placed", "best_evaluation"), "Int64")
@@ -187,6 +187,17 @@ def _table(directory: Path, trials: int, name: str, columns: list[str]) -> panda
     kinds |= dict.fromkeys(numbers - {"draws_fitness"}, "float")
     kinds = {column: kind for column, kind in kinds.items() if column in table}
     return table.astype(kinds).copy()  # in one piece, as astype() makes one of each column
+
+
+def _entries(path: Path, parameters: int) -> list[dict[str, Any]]:
+    """The lines of a file; InputError for a genome of another number of parameters."""
+    entries = read_entries(path)
+    for line, entry in enumerate(entries, start=1):
+        genome = entry.get("genome")
+        if genome is not None and len(genome) != parameters:
+            problem = f"is damaged: the genome has {len(genome)} numbers, expected {parameters}"
+            raise InputError(path, f"line {line}", problem)
+    return entries
 
 
 def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:

@@ -18,11 +18,12 @@ from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tetra_drake.evolution.elites import ELITES, elites
-from tetra_drake.evolution.json_lines import compressed, read_lines
+from tetra_drake.evolution.elites import elites
+from tetra_drake.evolution.json_lines import compressed
 from tetra_drake.evolution.pareto import COST, champions
 from tetra_drake.evolution.record import (
     BEST_GAIT,
+    ELITES,
     EVALUATIONS,
     ITERATIONS,
     MANIFEST,
@@ -33,7 +34,7 @@ from tetra_drake.evolution.record import (
 )
 from tetra_drake.evolution.reevaluation import BEST_GAITS
 from tetra_drake.evolution.tables import Run, load_run
-from tetra_drake.files import whole_file, write_whole
+from tetra_drake.files import write_whole
 from tetra_drake.scenario.schema import Scenario
 
 _DIGITS, _WALL_TIME_DIGITS = 3, 2
@@ -64,7 +65,7 @@ def thin(source: Path, out: Path) -> None:
         _write(new / REEVALUATIONS, [entry | {"genome": None} for entry in again])
         if (old / BEST_GAIT).exists():
             write_whole(new / BEST_GAIT, (old / BEST_GAIT).read_text(encoding="utf-8"))
-    _write(out / ELITES, read_lines(source / ELITES))
+    _write(out / ELITES, read_entries(source / ELITES))
     write_whole(out / SCENARIO, (source / SCENARIO).read_text(encoding="utf-8"))
     write_whole(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
 
@@ -110,5 +111,5 @@ def _write(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
     """Writes lines compressed, if there are any."""
     text = "".join(json.dumps(entry, allow_nan=False) + "\n" for entry in entries)
     if text:
-        with whole_file(compressed(path)) as temporary:
-            temporary.write_bytes(lzma.compress(text.encode(), preset=9 | lzma.PRESET_EXTREME))
+        packed = lzma.compress(text.encode(), preset=9 | lzma.PRESET_EXTREME)
+        write_whole(compressed(path), packed)

@@ -11,18 +11,30 @@ from typing import Any
 
 import numpy as np
 
+from tetra_drake.errors import InputError
 from tetra_drake.evolution.draws import SeededVector, score_at, task_of, worst_share
-from tetra_drake.evolution.executors import EvaluationPool, MakeExecutor, process_executor
+from tetra_drake.evolution.executors import (
+    EvaluationPool,
+    MakeExecutor,
+    evaluate_all,
+    process_executor,
+)
 from tetra_drake.evolution.optimizers import optimizer_of
 from tetra_drake.evolution.optimizers.base import (
     Evaluate,
     Evaluation,
-    Following,
     MakeOptimizer,
     Optimizer,
     Rescoring,
 )
-from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, trial_folder
+from tetra_drake.evolution.record import (
+    Manifest,
+    RunRecord,
+    TrialRecord,
+    evaluation_entry,
+    first_with_fitness,
+    trial_folder,
+)
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
@@ -122,7 +134,6 @@ class Trial:
         while self.status.stop is None:
             self._rescore()
             batch = dict(enumerate(self._optimizer.ask(), start=self.status.evaluations))
-            batch = self._follow(batch)
             self._results = {}
             for index, vector in batch.items():
                 recorded = self._record.recall(index, vector)
@@ -136,16 +147,6 @@ class Trial:
             self._complete(batch)
         self._record.finish(self.status.evaluations)
         self._save_best()
-
-    def _follow(self, batch: dict[int, Vector]) -> dict[int, Vector]:
-        """The batch with what the record has in its place, which the optimiser is told if it can
-        go on with that."""
-        if not isinstance(self._optimizer, Following):
-            return batch
-        followed = {i: self._record.vector(i, vector) for i, vector in batch.items()}
-        if any(followed[i] is not vector for i, vector in batch.items()):
-            self._optimizer.follow(list(followed.values()))
-        return followed
 
     def _rescore(self) -> None:
         """Where the score goes from mean to tail, tells the optimiser that of the iteration."""
@@ -234,6 +235,28 @@ def run_trials(
             waiting = [trial for (trial, index), found in done if trial.take(index, found)]
             show(statuses)
     return statuses
+
+
+def check_fitness(
+    directory: Path, manifest: Manifest, *, evaluate: Evaluate, executor: MakeExecutor
+) -> None:
+    """Evaluates the first recorded gait that has a fitness once more; InputError if its fitness is
+    another now, so that no record ever holds two objectives."""
+    first = first_with_fitness(directory, manifest.scenario.evolution.trials)
+    if first is None:
+        return
+    trial, entry = first
+    seed = manifest.seed, trial, entry["iteration"]
+    task = task_of(manifest.scenario, np.array(entry["genome"]), seed)
+    ((_, again),) = evaluate_all(evaluate, [task], workers=1, executor=executor)
+    if again.fitness != entry["fitness"]:
+        found = again.failure or f"fitness {again.fitness!r}"
+        problem = (
+            f"trial {trial}, evaluation {entry['index']} has fitness {entry['fitness']!r}, and "
+            f"evaluated again {found}; resume the run with the objective, the versions of "
+            "the packages and the kind of processor it was begun with"
+        )
+        raise InputError(directory, "objective", problem)
 
 
 def _number(value: Any) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import check_folder, write_whole
+from tetra_drake.results.trajectory import DIMENSIONS, labels
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario
@@ -63,7 +64,8 @@ def save_result_folder(
     trajectory = result.trajectory
     assert trajectory is not None
     # Written last and removed first: where there is a result.json, the other files belong to it.
-    (folder / RESULT).unlink(missing_ok=True)
+    if (folder / RESULT).is_file():
+        (folder / RESULT).unlink()
     write_whole(folder / SCENARIO, dump_scenario(scenario))
     save_dataset(trajectory, folder / TRAJECTORY)
     title = replay_title(gait.name, trajectory)
@@ -97,17 +99,16 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
         trajectory = xarray.load_dataset(path, engine="h5netcdf")
     except Exception as error:  # what HDF5 raises for damaged files has no common ancestor
         raise InputError(path, "", f"cannot be read as netCDF: {error}") from error
-    contacts = [structure.node_names[node] for node in structure.contacts]
-    labels = {"tetrahedron": structure.bodies, "cable": structure.cable_names, "contact": contacts}
-    for name, expected in labels.items():
-        if name not in trajectory.coords or trajectory[name].values.tolist() != list(expected):
+    for name, (_, expected) in labels(structure).items():
+        if name not in trajectory.coords or trajectory[name].values.tolist() != expected:
             raise InputError(path, name, f"is not that of the robot in {SCENARIO}")
-    forces = ("tension", "signal", "normal_force", "friction_force")
-    for name in ("time", "p_WN", "p_WB", "q_WB", *forces):
-        if name not in trajectory or trajectory[name].dims[0] != "time":
-            raise InputError(path, name, "is missing, or not over time")
-        if trajectory[name].size == 0 or not np.isfinite(trajectory[name].values).all():
-            raise InputError(path, name, "is empty, or holds numbers that are not finite")
-    if not (np.diff(trajectory["time"].values) > 0.0).all():
-        raise InputError(path, "time", "does not ascend")
+    for name, dimensions in {"time": ("time",), **DIMENSIONS}.items():
+        if name not in trajectory or trajectory[name].dims != dimensions:
+            raise InputError(path, name, f"is missing, or not over {', '.join(dimensions)}")
+        values = trajectory[name].values
+        if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+            raise InputError(path, name, "holds what is no finite number")
+    times = trajectory["time"].values
+    if len(times) < 2 or not (np.diff(times) > 0.0).all():
+        raise InputError(path, "time", "has fewer than two samples, or does not ascend")
     return trajectory

@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.files import whole_file
+from tetra_drake.files import write_whole
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.robot.structure import NODES, Structure, node_positions, node_velocities
 
 if TYPE_CHECKING:
     import xarray
+
+
+DIMENSIONS = {
+    "p_WN": ("time", "tetrahedron", "node", "axis"),
+    "v_WN": ("time", "tetrahedron", "node", "axis"),
+    "p_WB": ("time", "tetrahedron", "axis"),
+    "q_WB": ("time", "tetrahedron", "quaternion"),
+    "tension": ("time", "cable"),
+    "length": ("time", "cable"),
+    "signal": ("time", "oscillator"),
+    "normal_force": ("time", "contact"),
+    "friction_force": ("time", "contact", "horizontal"),
+    "in_contact": ("time", "contact"),
+    "friction_mode": ("time", "contact", "horizontal"),
+}
+"""Those of each variable."""
 
 
 def sample_times(duration: float, period: float) -> np.ndarray:
@@ -44,61 +61,58 @@ def assemble_dataset(
 
     bodies, contacts = len(structure.bodies), len(structure.contacts)
     modes = np.sign(modes).reshape(-1, contacts, 3).astype(np.int8)
-    friction = friction_forces.reshape(-1, contacts, 2)
     positions = np.array([node_positions(structure, state) for state in states])
     velocities = np.array([node_velocities(structure, state) for state in states])
     q = states[:, : 7 * bodies].reshape(-1, bodies, 7)
-    oscillators = structure.actuation.names
-    driving = ["" if i == PASSIVE else oscillators[i] for i in structure.cables["signal"]]
-    slip = "0 sticks, +1 or -1 slips in that direction"
-    horizontal = ("time", "contact", "horizontal")
-    node_dims = ("time", "tetrahedron", "node", "axis")
     node_shape = (-1, bodies, len(NODES), 3)
+    slip = "0 sticks, +1 or -1 slips in that direction"
     variables = {
-        "p_WN": (node_dims, positions.reshape(node_shape), "m", "node position"),
-        "v_WN": (node_dims, velocities.reshape(node_shape), "m/s", "node velocity"),
-        "p_WB": (("time", "tetrahedron", "axis"), q[..., 4:], "m", "position of the body's origin"),
-        "q_WB": (("time", "tetrahedron", "quaternion"), q[..., :4], "1", "orientation of the body"),
-        "tension": (("time", "cable"), tensions, "N", "cable tension"),
-        "length": (("time", "cable"), lengths, "m", "cable length"),
-        "signal": (("time", "oscillator"), signals, "N", "actuation signal"),
-        "normal_force": (
-            ("time", "contact"),
-            normal_forces,
-            "N",
-            "force along the normal of the ground",
-        ),
-        "friction_force": (horizontal, friction, "N", "friction force"),
-        "in_contact": (("time", "contact"), modes[..., 0], "1", "1 on the ground"),
-        "friction_mode": (horizontal, modes[..., 1:], "1", slip),
+        "p_WN": (positions.reshape(node_shape), "m", "node position"),
+        "v_WN": (velocities.reshape(node_shape), "m/s", "node velocity"),
+        "p_WB": (q[..., 4:], "m", "position of the body's origin"),
+        "q_WB": (q[..., :4], "1", "orientation of the body"),
+        "tension": (tensions, "N", "cable tension"),
+        "length": (lengths, "m", "cable length"),
+        "signal": (signals, "N", "actuation signal"),
+        "normal_force": (normal_forces, "N", "force along the normal of the ground"),
+        "friction_force": (friction_forces.reshape(-1, contacts, 2), "N", "friction force"),
+        "in_contact": (modes[..., 0], "1", "1 on the ground"),
+        "friction_mode": (modes[..., 1:], "1", slip),
     }
-    names = np.array(structure.node_names)
     return xarray.Dataset(
         {
-            name: (dims, values, {"units": unit, "long_name": meaning})
-            for name, (dims, values, unit, meaning) in variables.items()
+            name: (DIMENSIONS[name], values, {"units": unit, "long_name": meaning})
+            for name, (values, unit, meaning) in variables.items()
         },
-        coords={
-            "time": ("time", times, {"units": "s"}),
-            "tetrahedron": list(structure.bodies),
-            "node": list(NODES),
-            "cable": list(structure.cable_names),
-            "contact": names[structure.contacts].tolist(),
-            "cable_junction": ("cable", [name.split()[0] for name in structure.cable_names]),
-            "cable_role": ("cable", [name.split()[1] for name in structure.cable_names]),
-            "cable_signal": ("cable", driving),
-            "oscillator": list(oscillators),
-            "oscillator_side": ("oscillator", structure.actuation.sides),
-            "oscillator_junction": ("oscillator", [name.split()[0] for name in oscillators]),
-            "axis": ["x", "y", "z"],
-            "horizontal": ["x", "y"],
-            "quaternion": ["w", "x", "y", "z"],
-        },
+        coords={"time": ("time", times, {"units": "s"}), **labels(structure)},
     )
+
+
+def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
+    """By coordinate, but for the time, its dimension and its values."""
+    oscillators = structure.actuation.names
+    driving = ["" if i == PASSIVE else oscillators[i] for i in structure.cables["signal"]]
+    contacts = [structure.node_names[node] for node in structure.contacts]
+    return {
+        "tetrahedron": ("tetrahedron", list(structure.bodies)),
+        "node": ("node", list(NODES)),
+        "cable": ("cable", list(structure.cable_names)),
+        "contact": ("contact", contacts),
+        "cable_junction": ("cable", [name.split()[0] for name in structure.cable_names]),
+        "cable_role": ("cable", [name.split()[1] for name in structure.cable_names]),
+        "cable_signal": ("cable", driving),
+        "oscillator": ("oscillator", list(oscillators)),
+        "oscillator_side": ("oscillator", list(structure.actuation.sides)),
+        "oscillator_junction": ("oscillator", [name.split()[0] for name in oscillators]),
+        "axis": ("axis", ["x", "y", "z"]),
+        "horizontal": ("horizontal", ["x", "y"]),
+        "quaternion": ("quaternion", ["w", "x", "y", "z"]),
+    }
 
 
 def save_dataset(dataset: xarray.Dataset, path: str | Path) -> None:
     """Writes the dataset as compressed netCDF (readable with xarray.open_dataset)."""
     encoding = {name: {"zlib": True, "complevel": 4} for name in dataset.data_vars}
-    with whole_file(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    content = io.BytesIO()  # in memory, as HDF5 fails on a full disk with errors of its own
+    dataset.to_netcdf(content, engine="h5netcdf", encoding=encoding)
+    write_whole(path, content.getvalue())

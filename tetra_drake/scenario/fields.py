@@ -227,6 +227,11 @@ def parse_yaml(content: str, source: object) -> Any:
     """What YAML text holds; raises InputError if it is not YAML."""
     try:
         return yaml.load(content, _Loader)
+    except yaml.MarkedYAMLError as error:
+        # Without the lines that the error shows: the file may be any.
+        mark = error.problem_mark or error.context_mark
+        place = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        raise InputError(source, "", f"is not YAML{place}: {error.problem}") from error
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise InputError(source, "", f"is not YAML: {error}") from error
 
@@ -243,12 +248,14 @@ class _Loader(yaml.SafeLoader):
         keys = [self.construct_object(key, deep=True) for key, _ in node.value]
         for key in keys:
             if keys.count(key) > 1:
-                raise yaml.MarkedYAMLError(f"found the key '{key}' twice", node.start_mark)
+                problem = f"found the key '{key}' twice"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
         return super().construct_mapping(node, deep)
 
     def construct_kind(self, name: str, node: Any) -> dict[Any, Any]:
         if node.value and not isinstance(node, yaml.MappingNode):
-            raise yaml.MarkedYAMLError(f"found !{name} without a mapping of keys", node.start_mark)
+            problem = f"found !{name} without a mapping of keys"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
         return {TAG: f"!{name}"} | (self.construct_mapping(node, deep=True) if node.value else {})
 
 
@@ -281,7 +288,7 @@ def _tag(value: Tree, kinds: Mapping[str, Any]) -> str:
 def _describe(value: Any) -> str:
     """What was found, for a message."""
     if isinstance(value, dict):
-        return str(value.get(TAG, "a mapping"))
+        return str(value.get(TAG, "a mapping"))[:40]
     kinds = {types.NoneType: "nothing", list: "a list", bool: str(value).lower()}
     return kinds.get(type(value), f"'{value}'" if isinstance(value, str) else str(value)[:40])
 

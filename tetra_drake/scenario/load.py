@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
@@ -14,15 +13,9 @@ from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import TAG, Check, Tree, dump_yaml, parse_yaml, tree_of
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain import make_grid
-from tetra_drake.scenario.units import INCH
 
-_EQUATION_10 = {
-    "distance": "steady_distance",
-    "twist": "twist",
-    "direction": "lead",
-    "drift": "lateral_drift",
-}
-"""The metrics by the names that older files have for them."""
+MOST_BYTES = 2**20
+"""Of a scenario file."""
 
 
 def shipped_scenarios() -> list[str]:
@@ -77,33 +70,23 @@ def _file(name: str, folder: Path) -> Path:
 def _load_tree(file: Path, seen: tuple[Path, ...] = ()) -> Tree:
     """The SI tree of a scenario file with its bases merged in."""
     expected = f"scenario file (shipped: {', '.join(shipped_scenarios())})"
-    content = read_text(file, expected)
+    content = read_text(file, expected, most=MOST_BYTES)
     if file.resolve() in seen:
         raise InputError(file, "base", "the scenario is based on itself")
     raw = parse_yaml(content, file)
-    base = raw.pop("base", None) if isinstance(raw, dict) else None
-    fitness = raw.pop("fitness", {}) if isinstance(raw, dict) else {}
+    if not isinstance(raw, dict):  # which may be any file: nothing of it is shown
+        raise InputError(file, "", "holds no mapping of keys, expected a scenario")
+    base = raw.pop("base", None)
     given: Tree = Check(file).value(Scenario, raw)
-    if fitness and "objective" in given:
-        raise InputError(file, "fitness", "found beside objective, which replaces it; give one")
     terrain = given.get("terrain", {})
     if "file" in terrain:
         terrain["file"] = os.path.abspath(file.parent / terrain["file"])
     if base is None:
-        return given | _older_objective(fitness, {}, file)
+        return given
     if not isinstance(base, str) or not base:
         raise InputError(file, "base", f"found {base!r}, expected the name of a scenario")
     base_file = _file(base, file.parent)
     if not os.path.exists(base_file):
         raise InputError(file, "base", f"'{base}': no such {expected}")
     tree = _load_tree(base_file, (*seen, file.resolve()))
-    return rules.on_base(tree, given | _older_objective(fitness, tree["objective"], file))
-
-
-def _older_objective(fitness: Any, base: Tree, file: Path) -> Tree:
-    """The objective in a file of before there was one: the constants of Eq. 10, in section fitness,
-    of which a file may give those that differ from its base's."""
-    limits = {"units": dict.fromkeys(_EQUATION_10, "")}
-    terms = Check(file).value(dict[str, float], fitness, "fitness", limits)
-    ours = {_EQUATION_10[name]: constant / INCH for name, constant in terms.items()}
-    return {"objective": {k: v for k, v in (base | ours).items() if v}} if terms else {}
+    return rules.on_base(tree, given)

@@ -8,15 +8,16 @@ height around, with edges rounded by a cell; outside the grid it goes on as it i
 (The annotations below are read as types, so they are not postponed.)
 """
 
+import io
 import math
 import re
 import warnings
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from tetra_drake.errors import InputError
+from tetra_drake.files import read_bytes
 from tetra_drake.scenario.fields import quantity, setting
 from tetra_drake.scenario.units import INCH
 
@@ -209,17 +210,20 @@ def _height_field(field: HeightField, source: object) -> Grid:
 def _read_heights(file: str, source: object) -> np.ndarray:
     """What a file holds, as floats of any shape."""
     try:
+        content = read_bytes(file, "height file")
         if file.endswith(".npy"):
-            with Path(file).open("rb") as stream:
-                return np.lib.format.read_array(stream).astype(float, casting="same_kind")
-        text = re.sub("#.*", "", Path(file).read_text(encoding="utf-8"))
+            heights = np.lib.format.read_array(io.BytesIO(content))
+            return heights.astype(float, casting="same_kind")
+        text = re.sub("#.*", "", content.decode("utf-8"))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that it holds nothing
             return np.loadtxt(text.splitlines(), delimiter="," if "," in text else None, ndmin=2)
-    except FileNotFoundError as error:
-        raise _file_error(source, f"'{file}': no such height file") from error
-    except (OSError, ValueError, TypeError, MemoryError) as error:
-        raise _file_error(source, f"'{file}' cannot be read as heights: {error}") from error
+    except InputError as error:
+        raise _file_error(source, f"'{file}': {error.problem}") from error
+    except (ValueError, TypeError, MemoryError) as error:
+        # Without what stands there: the file may be any.
+        problem = re.sub("string '.*' to float64", "text to a number", str(error))
+        raise _file_error(source, f"'{file}' cannot be read as heights: {problem}") from error
 
 
 def _file_error(source: object, problem: str) -> InputError:

@@ -78,15 +78,6 @@ class Rescoring(Protocol):
         What is reported of fitnesses stays so."""
 
 
-@runtime_checkable
-class Following(Protocol):
-    """An Optimizer that asks for other vectors on another kind of processor, as its libraries'
-    linear algebra differs there. It goes on with those of a record nevertheless."""
-
-    def follow(self, vectors: Sequence[Vector]) -> None:
-        """Takes these vectors in place of those that it asked for."""
-
-
 MakeOptimizer = Callable[[ParameterSpace, EvolutionScenario, np.random.Generator], Optimizer]
 """Makes the optimiser of one trial from the space to search, the scenario's `evolution` section
 and the trial's own generator."""

@@ -83,10 +83,6 @@ class Generational:
         self._points = self._draw()
         return [self._ranges.vector(point) for point in self._points[: self._left]]
 
-    def follow(self, vectors: Sequence[Vector]) -> None:
-        """Takes these vectors in place of those asked for."""
-        self._points[: len(vectors)] = [self._ranges.point(vector) for vector in vectors]
-
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes the evaluations of a batch."""
         self._left -= len(evaluations)

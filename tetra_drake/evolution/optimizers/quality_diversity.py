@@ -33,7 +33,6 @@ class QualityDiversity(Generational):
     ) -> None:
         from ribs.archives import GridArchive
         from ribs.emitters import EvolutionStrategyEmitter
-        from ribs.emitters.opt import CMAEvolutionStrategy
 
         super().__init__(space, settings, generator)
         self._own = own = own or kinds.QualityDiversity()
@@ -49,19 +48,11 @@ class QualityDiversity(Generational):
             learning_rate=own.learning_rate,
             seed=self._seed(),
         )
-        self._strategies: list[Any] = []
-        """Of the emitters."""
-
-        def make_strategy(**settings: Any) -> CMAEvolutionStrategy:
-            self._strategies.append(CMAEvolutionStrategy(**settings))
-            return self._strategies[-1]
-
         self._emitters = [
             EvolutionStrategyEmitter(
                 self._archive,
                 x0=self._ranges.roots(self._random(1))[0],
                 sigma0=own.sigma,
-                es=make_strategy,
                 ranker="imp",
                 selection_rule="mu",
                 restart_rule="basic",
@@ -73,13 +64,6 @@ class QualityDiversity(Generational):
 
     def _seed(self) -> int:
         return int(self._generator.integers(2**63))
-
-    def follow(self, vectors: Sequence[Vector]) -> None:
-        """Takes these vectors in place of those asked for."""
-        super().follow(vectors)
-        self._roots = np.copysign(self._ranges.roots(self._points), self._roots)
-        for i, strategy in enumerate(self._strategies):
-            strategy._solutions = self._roots[i * self._own.batch :][: self._own.batch].copy()
 
     def _draw(self) -> Matrix:
         self._roots = np.concatenate([emitter.ask() for emitter in self._emitters])

@@ -1,0 +1,11 @@
+"""The command evolve on a cheap fitness: terminated_run.py ARGUMENTS."""
+
+import sys
+
+import tetra_drake.run
+from helpers.analytic import Bowl
+from tetra_drake.cli import main
+
+if __name__ == "__main__":
+    tetra_drake.run.GaitEvaluation = lambda *_: Bowl(delay=0.2)
+    sys.exit(main(["evolve", *sys.argv[1:]]))

@@ -1,0 +1,31 @@
+"""Messages say what was found, but not all of it."""
+
+import pytest
+
+from tetra_drake.errors import InputError
+
+LONG = 100_000 * "x"
+
+
+@pytest.mark.parametrize(
+    ("problem", "kept"),
+    [
+        (f"found '{LONG}', expected a number", "', expected a number"),
+        (f"found {LONG}, expected a number", "expected a number"),
+        (f"found '{LONG.replace('xx', 'x ')}', expected a number", "', expected a number"),
+        ("found " + LONG.replace("xx", "' x"), "found"),
+        ("word " * 20_000, "word"),
+    ],
+)
+def test_little_is_quoted_of_what_is_long(problem, kept):
+    error = InputError(LONG[:4000], LONG, problem)
+    place, key, told = str(error).split(": ")
+    assert place == LONG[:4000]
+    assert key == f"{LONG[:200]} ..."
+    assert len(told) < 260 and kept in told
+    assert " ".join(error.problem.split()) == told
+
+
+def test_a_usual_problem_is_told_in_full():
+    problem = f"found '{LONG[:200]}', expected one of " + ", ".join(f"name_{i}" for i in range(30))
+    assert str(InputError("a.yaml", "key", problem)) == f"a.yaml: key: {problem}"
