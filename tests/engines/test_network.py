@@ -117,7 +117,7 @@ def test_engines_agree_with_each_feedback_and_it_matters(scenario, pathway):
 @pytest.mark.parametrize("signals", ["listing", "recorded", "live"])
 def test_engines_agree_on_a_steering_signal(signals):
     scenario = load_scenario("turning").with_changes({"gait_bounds.turn": 0.0})
-    changes = FINE | {"cpg.signals": signals, "cpg.listing_step": 1e-4}
+    changes = FINE | {"cpg.signals": signals, "cpg.listing_step": "1e-4 s"}
     short = shortly(scenario, 0.4, **changes)
     gait = seeded_gait(short)
 

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pandas
 import pytest
+from helpers.quantities import with_unit
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import main
@@ -92,7 +93,7 @@ def test_every_change_is_also_made_alone(judgement, gaits):
         TERRAIN: few,
     }
     (softer,) = alone.query("what == 'ground.stiffness' and spread < 0")["distance"]
-    stiffness = 0.95 * judgement.scenario.ground.stiffness
+    stiffness = with_unit(0.95 * judgement.scenario.ground.stiffness, "N/m")
     changed = judgement.scenario.with_changes({"ground.stiffness": stiffness, "disturbances": None})
     assert softer == simulate(scenario=changed, gait=gaits["b"]).metrics.distance
     draw = draw_disturbances(judgement.scenario, fresh_seed(5, 1))
@@ -115,7 +116,7 @@ def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits,
 
 def test_the_scenarios_own_disturbances_are_used_unless_a_percentage_is_given(scenario, gaits):
     own = DisturbancesScenario(draws=4, spreads={"cables.damping": 0.2})
-    disturbing = scenario.with_changes({"disturbances": own, "require": {"distance": 1.0}})
+    disturbing = scenario.with_changes({"disturbances": own, "require": {"distance": "1 m"}})
     found = judge(disturbing, gaits, draws=2)
     assert set(found.alone["what"]) == {"cables.damping"}
     assert found.draws["cables.damping"].between(0.8, 1.2).all()

@@ -40,7 +40,9 @@ def recorded(scenario):
 
 @pytest.fixture(scope="module")
 def scenario():
-    return load_scenario().with_changes({"simulation.duration": 0.2, "simulation.steady_from": 0.1})
+    return load_scenario().with_changes(
+        {"simulation.duration": "0.2 s", "simulation.steady_from": "0.1 s"}
+    )
 
 
 @pytest.fixture(scope="module")
