@@ -120,6 +120,11 @@ def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(
     assert run.gait(0, 3).name == "tiny, seed 7, trial 0, evaluation 3"
 
 
+def test_the_best_gait_of_a_run_is_that_of_its_best_trial(tmp_path):
+    run = load_run(write_run(tmp_path / "run", [[[(5.0, 0), (4.0, 1)]], [[(3.0, 2), (6.0, 3)]]]))
+    assert run.best_gait() == run.gait(1, 1) != run.gait(0, 0)
+
+
 def test_best_gait_and_last_population_are_those_kept_by_hand(run_small, scenario):
     directory = run_small()
     run = load_run(directory)

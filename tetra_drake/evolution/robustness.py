@@ -13,7 +13,7 @@ import numpy as np
 
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.evolution.statistics import interval
+from tetra_drake.evolution.statistics import interval, share_interval
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.files import json_number
 from tetra_drake.formatting import aligned, fixed, ranged, signed
@@ -230,14 +230,14 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
 
     rows = {}
     for gait, draws in judgement.compared(judgement.draws).groupby("gait", sort=False):
-        distance, kept = draws["distance"], draws["kept"].astype(float)
+        distance, kept = draws["distance"], draws["kept"]
         rows[gait] = {
             "undisturbed": draws["undisturbed"].iloc[0],
             **{name: distance.quantile(share) for name, share in QUANTILES.items()},
             "mean": distance.mean(),
             **dict(zip(("mean_low", "mean_high"), interval(distance), strict=True)),
             "kept": kept.mean(),
-            **dict(zip(("kept_low", "kept_high"), interval(kept), strict=True)),
+            **dict(zip(("kept_low", "kept_high"), share_interval(int(kept.sum()), len(kept)), strict=True)),
             "failed": int(draws["failure"].notna().sum()),
             "missed": int((draws["missed"] != "").sum()),
         }
@@ -363,5 +363,6 @@ def inches(value: float, low: float, high: float) -> str:
 
 
 def percents(value: float, low: float, high: float) -> str:
-    """A share with its confidence interval."""
-    return f"{100.0 * value:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f})"
+    """A share with its confidence interval, which is left out where it has no width."""
+    text = f"{100.0 * value:.0f} %"
+    return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"

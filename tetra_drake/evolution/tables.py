@@ -69,7 +69,11 @@ class Run:
         return [self._status(trial) for trial in range(self.manifest.scenario.evolution.trials)]
 
     def best(self, count: int = 1) -> pandas.DataFrame:
-        """The fittest different gaits of each trial, best first: rows of `evaluations`."""
+        """The fittest different gaits of each trial: rows of `evaluations`.
+
+        Trial after trial, within a trial the best first. So the first row is the best of trial 0,
+        not of the run: that is best_gait().
+        """
         ranked = self.whole.dropna(subset="fitness").sort_values(
             ["trial", "fitness", "index"], ascending=[True, False, True]
         )
@@ -82,6 +86,10 @@ class Run:
             raise InputError(self.directory, "", "no gait of this run has a fitness yet")
         row = best.loc[best["fitness"].idxmax()]
         return int(row["trial"]), int(row["index"])
+
+    def best_gait(self) -> Gait:
+        """The run's fittest gait, of all trials; InputError while no gait has a fitness."""
+        return self.gait(*self.fittest())
 
     def initial_best(self, trial: int) -> int:
         """Index of the fittest gait of a trial's first iteration in which not all failed."""

@@ -50,7 +50,7 @@ def load_recording(source: Path, *, scenario: str | None = None) -> Recording:
         raise InputError("--scenario", "", f"is for gait files; {source} has one of its own")
     if (source / RUN_MANIFEST).exists():
         run = load_run(source)
-        return _simulate(run.gait(*run.fittest()), run.manifest.scenario)
+        return _simulate(run.best_gait(), run.manifest.scenario)
     if (source / RESULT).exists():
         return load_result_folder(source)
     if not source.is_file():
