@@ -237,7 +237,13 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
             "mean": distance.mean(),
             **dict(zip(("mean_low", "mean_high"), interval(distance), strict=True)),
             "kept": kept.mean(),
-            **dict(zip(("kept_low", "kept_high"), share_interval(int(kept.sum()), len(kept)), strict=True)),
+            **dict(
+                zip(
+                    ("kept_low", "kept_high"),
+                    share_interval(int(kept.sum()), len(kept)),
+                    strict=True,
+                )
+            ),
             "failed": int(draws["failure"].notna().sum()),
             "missed": int((draws["missed"] != "").sum()),
         }
