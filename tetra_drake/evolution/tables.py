@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -126,7 +126,8 @@ class Run:
         """The gait of an evaluation."""
         scenario = self.manifest.scenario
         name = f"{scenario.name}, seed {self.manifest.seed}, trial {trial}, evaluation {index}"
-        return ParameterSpace.of(scenario).gait(self.vector(trial, index), name=name)
+        gait = ParameterSpace.of(scenario).gait(self.vector(trial, index), name=name)
+        return replace(gait, scenario=scenario.name)
 
     @property
     def _columns(self) -> list[str]:
