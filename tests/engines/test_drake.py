@@ -43,8 +43,8 @@ def test_settles_where_the_independent_simulation_does(scenario, structure, gait
 def test_a_live_network_walks_as_its_recording_does(scenario, gait):
     # A second of actuation at an accuracy of 1e-5: the live network's signals carry the
     # robot's error control, the recording's are exact, so they agree to about that accuracy.
-    tight = {"scheme": "runge_kutta3", "accuracy": 1e-5, "max_step": 1e-4}
-    tight |= {"duration": 1.1, "steady_from": 0.5}
+    tight = {"scheme": "runge_kutta3", "accuracy": 1e-5, "max_step": "0.1 ms"}
+    tight |= {"duration": "1.1 s", "steady_from": "0.5 s"}
     changes = {"cpg.start_up": "0.1 s"} | {f"simulation.{key}": tight[key] for key in tight}
     live, recorded = (
         simulate(scenario=scenario.with_changes({**changes, "cpg.signals": signals}), gait=gait)

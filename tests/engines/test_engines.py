@@ -20,7 +20,7 @@ MUJOCO = pytest.param("mujoco", marks=pytest.mark.skipif(not installed(), reason
 
 def shortly(scenario: Scenario, engine: str, **settings: Any) -> Scenario:
     """The scenario cut to 1 s on an engine, driven from 0.2 s on."""
-    settings = {"engine": engine, "duration": 1.0, "steady_from": 0.5, **settings}
+    settings = {"engine": engine, "duration": "1 s", "steady_from": "0.5 s", **settings}
     changes = {f"simulation.{key}": value for key, value in settings.items()}
     return scenario.with_changes({"cpg.start_up": "0.2 s", **changes})
 

@@ -1,5 +1,6 @@
 """What a result says of its simulation."""
 
+import dataclasses
 import json
 import math
 
@@ -106,6 +107,23 @@ def test_the_path_is_written_and_summed_up(scenario, structure, tmp_path):
     assert json.loads((tmp_path / "result.json").read_text())["path_radius_in"] is None
     lines = {line[2:17].strip(): line for line in summary(scenario, gait, standing).splitlines()}
     assert "straight" in lines["path radius"]
+
+
+@pytest.mark.parametrize(
+    ("engine", "words", "others"),
+    [
+        ("drake", {"accuracy 0.000125", "7 steps", "9 derivative"}, {"tolerance"}),
+        ("compiled", {"tolerance 0.000125 m/s", "7 steps", "9 derivative"}, {"accuracy"}),
+        ("mujoco", {"7 steps of 0.125 ms"}, {"accuracy", "tolerance", "derivative"}),
+    ],
+)
+def test_the_work_of_an_engine_is_called_by_its_name(scenario, structure, engine, words, others):
+    result = result_of(scenario, structure, on_a_circle(scenario, structure, per_second=0.5))
+    work = IntegratorWork("scheme", accuracy=0.125e-3, steps=7, derivative_evaluations=9)
+    result = dataclasses.replace(result, engine=engine, integrator=work)
+    line = summary(scenario, seeded_gait(scenario), result).splitlines()[-1]
+    assert all(word in line for word in words)
+    assert not any(word in line for word in others)
 
 
 @pytest.mark.parametrize(

@@ -194,7 +194,7 @@ def _listed(values: Mapping[str, Any]) -> str:
 
 def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     """Metrics, lengths in inches, and what the simulation took, as lines for the terminal."""
-    metrics, work = result.metrics, result.integrator
+    metrics = result.metrics
     after = f"from {scenario.simulation.steady_from:g} s on"
     side = "to the left" if metrics.path_curvature > 0.0 else "to the right"
     diameter = shown(scenario.robot.strut_diameter, "m")
@@ -231,8 +231,17 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
         lines.append(f"  {reference.source}: best distances {', '.join(texts)}")
     speed = fixed(result.duration / result.wall_time, 1)
     lines.append(
-        f"  simulated in {fixed(result.wall_time, 1)} s, {speed} times real time: {work.scheme}, "
-        f"accuracy {work.accuracy:g}, {work.steps} steps, "
-        f"{work.derivative_evaluations} derivative evaluations"
+        f"  simulated in {fixed(result.wall_time, 1)} s, {speed} times real time: "
+        f"{_work_text(result)}"
     )
     return "\n".join(lines)
+
+
+def _work_text(result: SimulationResult) -> str:
+    """What the integrator of an engine was asked for, and what it took."""
+    work = result.integrator
+    if result.engine == "mujoco":
+        return f"{work.scheme}, {work.steps} steps of {1e3 * work.accuracy:g} ms"
+    asked = "accuracy {:g}" if result.engine == "drake" else "tolerance {:g} m/s"
+    evaluations = f"{work.derivative_evaluations} derivative evaluations"
+    return f"{work.scheme}, {asked.format(work.accuracy)}, {work.steps} steps, {evaluations}"
