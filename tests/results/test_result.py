@@ -98,6 +98,10 @@ def test_the_path_is_written_and_summed_up(scenario, structure, tmp_path):
     assert lines["path radius"].split()[2] == f"{RADIUS / INCH:.2f}"
     assert "right" in lines["path radius"] and "left" not in lines["path radius"]
     assert "requirement" not in summary(scenario, gait, result)
+    first, second = (list(lines)[i] for i in (1, 2))
+    assert (first, second) == ("distance", "steady distance")
+    turning = scenario.with_changes({"objective": {"heading_change": "1 /rad"}})
+    assert summary(turning, gait, result).splitlines()[1].split()[:2] == ["heading", "change"]
     strict = scenario.with_changes({"require": {"distance": "4000 in", "twist": "0 in"}})
     (line,) = [line for line in summary(strict, gait, result).splitlines() if "requir" in line]
     assert line.split()[0] == "distance" and "4000 in" in line

@@ -10,7 +10,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.source import load_source
 from tetra_drake.files import check_folder
 from tetra_drake.results.folder import RESULT, RUN_MANIFEST, Recording, load_result_folder
-from tetra_drake.visualization.replay import replay_title, save_replay
+from tetra_drake.visualization.replay import save_replay
 
 
 def write_replay(
@@ -32,15 +32,14 @@ def write_replay(
             raise InputError(file, "", "is a directory, expected a file to write")
         check_folder(file.parent)
     recording = load_recording(source, scenario=scenario, warn=warn)
-    title = replay_title(recording.gait.name, recording.trajectory)
     save_replay(
         out,
         scenario=recording.scenario,
         trajectory=recording.trajectory,
-        title=title,
+        title=recording.title,
         viewer=viewer,
     )
-    return title
+    return recording.title
 
 
 def load_recording(
@@ -63,6 +62,6 @@ def load_recording(
     if not source.is_file() and not is_run:
         raise InputError(source, "", "expected a folder of `simulate` or `evolve`, or a gait file")
     loaded = load_source(source, scenario=scenario, warn=warn)
-    trajectory = simulate(scenario=loaded.scenario, gait=loaded.best, record=True).trajectory
-    assert trajectory is not None
-    return Recording(scenario=loaded.scenario, gait=loaded.best, trajectory=trajectory)
+    result = simulate(scenario=loaded.scenario, gait=loaded.best, record=True)
+    assert result.trajectory is not None
+    return Recording(loaded.scenario, loaded.best, result.trajectory, vars(result.metrics))
