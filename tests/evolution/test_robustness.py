@@ -24,6 +24,7 @@ from tetra_drake.evolution.robustness import (
     fresh_seed,
     judge,
     over_gaits,
+    percents,
     rank_correlations,
 )
 from tetra_drake.evolution.statistics import share_interval
@@ -209,6 +210,11 @@ def test_the_summary_of_gaits(made):
     assert over.to_dict() == pytest.approx(
         {"undisturbed": 0.0, "mean": (29.9 / 3.0 - 29.1 / 4.0) / 2.0, "kept": 0.5}
     )
+
+
+def test_an_interval_without_width_is_not_shown():
+    assert percents(1.0, 0.91, 1.0) == "100 % (91 to 100)"
+    assert percents(1.0, 1.0, 1.0) == "100 %"
 
 
 def test_the_summary_of_changes_begins_with_what_hurts_most_alone(made):

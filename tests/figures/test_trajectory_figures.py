@@ -266,6 +266,11 @@ def test_shaded_intervals_are_those_off_the_ground(walk):
         assert int(shown) == pytest.approx(percent, abs=1)
 
 
+@pytest.mark.parametrize("draw", [*FIGURES, before_and_after])
+def test_captions_name_no_parameters(draw):
+    assert draw.__doc__ and "`" not in draw.__doc__
+
+
 def test_landings_are_marked_and_impacts_do_not_set_the_scale_of_forces(walk):
     four = walk.sel(time=slice(0.0, 4 * PERIOD)).copy(deep=True)
     calm = ground_forces(four, FLAT, seconds=4.0).axes
