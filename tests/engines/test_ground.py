@@ -100,7 +100,7 @@ def test_contact_never_gives_energy(scenario, friction):
     # Kinetic energy, weight, cables and the springs of contacts (k d^2 / 2); a bristle's spring
     # can only hold what it has taken.
     friction = scenario.friction if friction == "reset" else friction
-    fall = {"robot__offsets": [[0.0, 0.0, 0.005]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
+    fall = {"robot__offsets": [[0.0, 0.0, "5 mm"]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
     rough = Rough(0.25 * INCH, 4.0 * INCH, seed=5)
     falling = converged(scenario, 0.6, terrain=rough, friction=friction, **fall)
     structure, gravity = MakeStructure(falling), falling.robot.gravity
