@@ -33,6 +33,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.engines.recorder import Recorder, make_dataset
 from tetra_drake.figures.block_diagram import save_block_diagram
+from tetra_drake.results.measures import distance_walked
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.bodies import AddTetrahedra
 from tetra_drake.robot.gait import Gait, load_gait
@@ -40,8 +41,9 @@ from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 from tetra_drake.systems import CableNetwork, GroundContact, StartUpGate
-from tetra_drake.visualization.replay import replay_title, save_replay
+from tetra_drake.visualization.replay import save_replay
 
 DIAGRAMS = Path(__file__).parent
 BEST_GAIT = DIAGRAMS.parent / "runs" / "thesis" / "trial_05" / "best_gait.json"
@@ -114,7 +116,8 @@ def main() -> None:
     simulator.AdvanceTo(options.duration)
 
     trajectory = make_dataset(diagram, structure, recorder.samples)
-    title = replay_title(gait.name, trajectory)
+    inches = float(distance_walked(trajectory)[-1]) / INCH
+    title = f"{gait.name}: {inches:.2f} inches in {options.duration:g} s"
     save_replay(options.out / "robot.html", scenario=scenario, trajectory=trajectory, title=title)
     print(title)
     print(f"open {options.out / 'robot.html'} in a browser to see it walk")

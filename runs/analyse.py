@@ -139,7 +139,7 @@ def resimulate(
 
 def settings_of(scenario: Scenario) -> dict[str, Scenario]:
     """The scenario with each setting, by names; without those that cannot simulate it."""
-    explicit = {"scheme": "runge_kutta3", "accuracy": 1e-3, "max_step": 2e-3}
+    explicit = {"scheme": "runge_kutta3", "accuracy": 1e-3, "max_step": "2 ms"}
     tight = {f"simulation.{key}": value for key, value in explicit.items()}
     changes: dict[str, dict[str, Any]] = {
         TIGHT: {"simulation.engine": "drake", "simulation.mode_changes": "witness"} | tight,

@@ -40,7 +40,6 @@ from tetra_drake.run import evolve
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizers import CmaEs, OptimizerKind, QualityDiversity
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import INCH
 
 HERE = Path(__file__).parent
 TIMES, VIEWER, PICTURE, FILM = "times.json", "meshcat.js", "walking.png", "walking.gif"
@@ -64,7 +63,7 @@ class Experiment:
 
 
 _COMPILED = {"simulation.engine": "compiled"}
-_SOUND = {"require": {"clearance": 0.125 * INCH, "tension": 0.0}}
+_SOUND = {"require": {"clearance": "0.125 in", "tension": 0.0}}
 """Struts do not touch, and cables need not push."""
 
 

@@ -226,7 +226,7 @@ def test_the_result_holds_what_was_asked_for_and_done(simulated, result, scenari
 
 
 def test_a_gait_file_gives_the_numbers_of_the_seed_it_was_drawn_with(work, gait_3, result, capsys):
-    save_gait(gait_3, "gait.json", load_scenario())
+    save_gait(gait_3, "gait.json", load_scenario("short.yaml"))
     assert main(["simulate", "--scenario", "short.yaml", "--gait", "gait.json"]) == 0
     assert capsys.readouterr().err == ""
     again = json.loads(Path("out/result.json").read_text())  # the default folder
@@ -237,7 +237,7 @@ def test_a_gait_file_gives_the_numbers_of_the_seed_it_was_drawn_with(work, gait_
 def test_replay_makes_the_page_of_simulate_from_its_recording_and_from_the_gait(
     simulated, work, gait_3, capsys
 ):
-    save_gait(gait_3, "gait.json", load_scenario())
+    save_gait(gait_3, "gait.json", load_scenario("short.yaml"))
     for source in ([str(simulated[0])], ["gait.json", "--scenario", "short.yaml"]):
         assert main(["replay", *source, "--out", "sub/again.html"]) == 0
         page = (work / "sub/again.html").read_bytes()

@@ -59,7 +59,7 @@ def shortened(monkeypatch: pytest.MonkeyPatch) -> None:
         td,
         "load_scenario",
         lambda name: loaded(name).with_changes(
-            {"simulation.duration": 1.0, "simulation.steady_from": 0.1}
+            {"simulation.duration": "1.0 s", "simulation.steady_from": "0.1 s"}
         ),
         raising=False,
     )

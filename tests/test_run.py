@@ -29,8 +29,8 @@ def tiny():
     return small_scenario(population=4, iterations=2, trials=1).with_changes(
         {
             "simulation.engine": "compiled",
-            "simulation.duration": 0.3,
-            "simulation.steady_from": 0.1,
+            "simulation.duration": "0.3 s",
+            "simulation.steady_from": "0.1 s",
             "cpg.start_up": 0.0,
         }
     )
@@ -100,7 +100,7 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
 
 @pytest.mark.parametrize("bodies", [2, 7])
 def test_a_robot_of_any_length_is_evolved_and_drawn(tiny, tmp_path, bodies):
-    scenario = tiny.with_changes({"robot.tetrahedra": bodies, "simulation.duration": 2.0})
+    scenario = tiny.with_changes({"robot.tetrahedra": bodies, "simulation.duration": "2.0 s"})
     run = tetra_drake.evolve(scenario, tmp_path / "run", workers=1, reevaluate=False)
     trial, index = run.fittest()
     m = bodies - 1

@@ -32,6 +32,9 @@ FIRST_SCENARIO = "quick"
 
 BENCHMARK_GAITS = 12
 
+_OF_GAIT = "that of the run in whose folder the gait is, else thesis"
+"""The default scenario of commands that take a gait."""
+
 Options = argparse.Namespace
 Command = argparse.ArgumentParser
 
@@ -102,7 +105,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _simulate_options(command: Command) -> None:
-    _add_scenario(command)
+    _add_scenario(command, default=None, note=_OF_GAIT)
     _add_gait(command)
     _add_engine(command)
     _add_path(command, "--out", "DIR", "the folder to write to (default: out)", default=Path("out"))
@@ -125,10 +128,9 @@ def _simulate(options: Options) -> None:
     from tetra_drake.results.folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.results.result import summary
 
-    scenario = load_scenario(options.scenario)
+    scenario, gait = _chosen_gait(options)
     if options.engine:
         scenario = scenario.with_changes({"simulation.engine": options.engine})
-    gait = _chosen_gait(options, scenario)
     check_result_folder(options.out)
     prepare(scenario)
     view = None
@@ -270,7 +272,7 @@ def _reevaluate(options: Options) -> None:
 def _replay_options(command: Command) -> None:
     source = "a folder written by `simulate`, a gait file, or a folder written by `evolve`"
     _add_path(command, "source", "RESULT_DIR|GAIT|RUN_DIR", source)
-    _add_scenario(command, default=None, note="thesis; for gait files only")
+    _add_scenario(command, default=None, note="the run's, else thesis; for gait files only")
     _add_path(command, "--out", "FILE", "the HTML file to write", required=True)
     _add_path(
         command,
@@ -291,7 +293,7 @@ def _replay(options: Options) -> None:
     from tetra_drake.report.replay_page import write_replay
 
     title = write_replay(
-        options.source, options.out, scenario=options.scenario, viewer=options.viewer
+        options.source, options.out, scenario=options.scenario, viewer=options.viewer, warn=_warn
     )
     print(f"{title}\nto watch the robot, open in a browser: {options.out}")
 
@@ -318,7 +320,7 @@ def _figures(options: Options) -> None:
 
 def _robustness_options(command: Command) -> None:
     _add_path(command, "source", "GAIT|RUN", "a gait file, or a folder written by `evolve`")
-    _add_scenario(command, default=None, note="the run's, thesis for a gait file")
+    _add_scenario(command, default=None, note=_OF_GAIT)
     _add_count(command, "--draws", "number of draws (default: 200)", default=200)
     command.add_argument(
         "--percent",
@@ -343,14 +345,15 @@ def _robustness(options: Options) -> None:
     distance), and what hurts most. Writes draws.csv, alone.csv, summary.json and the figure
     robustness, if asked for.
     """
-    from tetra_drake.evolution.robustness import describe, gaits_of, judge
+    from tetra_drake.evolution.robustness import describe, judge
+    from tetra_drake.evolution.source import load_source
 
-    scenario, gaits = gaits_of(options.source, scenario=options.scenario)
+    source = load_source(options.source, scenario=options.scenario, warn=_warn)
     if options.out:
         check_folder(options.out)
     judgement = judge(
-        scenario,
-        gaits,
+        source.scenario,
+        source.gaits,
         percent=options.percent,
         draws=options.draws,
         seed=options.seed,
@@ -471,7 +474,7 @@ def _gait(options: Options) -> None:
 
 
 def _cpg_options(command: Command) -> None:
-    _add_scenario(command)
+    _add_scenario(command, default=None, note=_OF_GAIT)
     _add_gait(command)
     _add_path(command, "--out", "FILE", "the CSV file to write", required=True)
     command.add_argument(
@@ -501,10 +504,9 @@ def _cpg(options: Options) -> None:
     """
     from tetra_drake.robot.signals import save_signals
 
-    scenario = load_scenario(options.scenario)
+    scenario, gait = _chosen_gait(options)
     if options.signals:
         scenario = scenario.with_changes({"cpg.signals": options.signals})
-    gait = _chosen_gait(options, scenario)
     save_signals(options.out, scenario, gait, unit=options.unit, rate=options.rate, raw=options.raw)
 
 
@@ -559,7 +561,8 @@ def _add_workers(command: Command) -> None:
 
 def _add_gait(command: Command) -> None:
     group = command.add_mutually_exclusive_group()
-    group.add_argument("--gait", metavar="FILE", type=Path, help="a gait file (JSON)")
+    what = "a gait file (JSON), or a folder written by `evolve`, whose best gait it is"
+    group.add_argument("--gait", metavar="FILE|RUN", type=Path, help=what)
     group.add_argument(
         "--seed",
         metavar="N",
@@ -569,10 +572,15 @@ def _add_gait(command: Command) -> None:
     )
 
 
-def _chosen_gait(options: Options, scenario: Scenario) -> Gait:
-    if options.gait is not None:
-        return load_gait(options.gait, scenario)
-    return seeded_gait(scenario, options.seed)
+def _chosen_gait(options: Options) -> tuple[Scenario, Gait]:
+    """The scenario and the gait to simulate on it."""
+    if options.gait is None:
+        scenario = load_scenario(options.scenario or "thesis")
+        return scenario, seeded_gait(scenario, options.seed)
+    from tetra_drake.evolution.source import load_source
+
+    source = load_source(options.gait, scenario=options.scenario, warn=_warn)
+    return source.scenario, source.best
 
 
 def _integer(least: int) -> Callable[[str], int]:
@@ -603,6 +611,10 @@ def _length(text: str) -> float:
 
 def _say(text: str) -> None:
     print(text, flush=True)
+
+
+def _warn(text: str) -> None:
+    print(f"tetra-drake: {text}", file=sys.stderr, flush=True)
 
 
 _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ...] = (

@@ -31,7 +31,11 @@ from tetra_drake.scenario.schema import Scenario
 @pytest.fixture
 def short(scenario: Scenario) -> Scenario:
     """0.3 s, driven from 0.1 s on."""
-    times = {"simulation.duration": 0.3, "simulation.steady_from": 0.2, "cpg.start_up": 0.1}
+    times = {
+        "simulation.duration": "0.3 s",
+        "simulation.steady_from": "0.2 s",
+        "cpg.start_up": "0.1 s",
+    }
     return scenario.with_changes(times)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.quantities import with_unit
 from helpers.states import body_velocities
 
 from tetra_drake.engines.simulate import simulate
@@ -12,16 +13,16 @@ from tetra_drake.robot.structure import MakeStructure
 G = 9.80665
 FALLING = {
     # Bodies are off their balance by some 5 mm, a metre above the ground.
-    "robot.offsets": np.random.default_rng(0).normal([0, 0, 1], 0.005, (5, 3)).tolist(),
-    "robot.gravity": G,
+    "robot.offsets": with_unit(np.random.default_rng(0).normal([0, 0, 1], 0.005, (5, 3)), "m"),
+    "robot.gravity": with_unit(G, "m/s^2"),
     "cables.damping": 0.0,
     "cpg.gain": 0.0,
-    "simulation.duration": 0.4,
-    "simulation.steady_from": 0.2,
+    "simulation.duration": "0.4 s",
+    "simulation.steady_from": "0.2 s",
     "simulation.scheme": "runge_kutta3",
     "simulation.accuracy": 1e-9,
-    "simulation.max_step": 1e-3,
-    "compiled.tolerance": 1e-7,
+    "simulation.max_step": "1e-3 s",
+    "compiled.tolerance": "1e-7 m/s",
 }
 
 

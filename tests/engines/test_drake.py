@@ -25,7 +25,7 @@ def gait(scenario: Scenario, data: Path) -> Gait:
 
 
 def test_settles_where_the_independent_simulation_does(scenario, structure, gait, data):
-    still = scenario.with_changes({"cpg.start_up": 100.0, "simulation.max_step": 1e-3})
+    still = scenario.with_changes({"cpg.start_up": "100.0 s", "simulation.max_step": "1e-3 s"})
     diagram = MakeTensegrityDiagram(still, gait)
     simulator = MakeSimulator(diagram, still.simulation)
     simulator.AdvanceTo(8.0)
@@ -43,9 +43,9 @@ def test_settles_where_the_independent_simulation_does(scenario, structure, gait
 def test_a_live_network_walks_as_its_recording_does(scenario, gait):
     # A second of actuation at an accuracy of 1e-5: the live network's signals carry the
     # robot's error control, the recording's are exact, so they agree to about that accuracy.
-    tight = {"scheme": "runge_kutta3", "accuracy": 1e-5, "max_step": 1e-4}
-    tight |= {"duration": 1.1, "steady_from": 0.5}
-    changes = {"cpg.start_up": 0.1} | {f"simulation.{key}": tight[key] for key in tight}
+    tight = {"scheme": "runge_kutta3", "accuracy": 1e-5, "max_step": "0.1 ms"}
+    tight |= {"duration": "1.1 s", "steady_from": "0.5 s"}
+    changes = {"cpg.start_up": "0.1 s"} | {f"simulation.{key}": tight[key] for key in tight}
     live, recorded = (
         simulate(scenario=scenario.with_changes({**changes, "cpg.signals": signals}), gait=gait)
         for signals in ("live", "recorded")
@@ -79,7 +79,9 @@ class _Counter:
 
 def test_the_work_counts_all_steps_from_the_start(scenario, gait):
     # New Jacobians after mode changes clear the integrator's own counts.
-    brief = scenario.with_changes({"simulation.duration": 2.0, "simulation.steady_from": 1.0})
+    brief = scenario.with_changes(
+        {"simulation.duration": "2.0 s", "simulation.steady_from": "1.0 s"}
+    )
     counter = _Counter()
     work = simulate(scenario=brief, gait=gait, viewer=counter).integrator
     assert work.steps == len(counter.times)  # AdvanceTo(0) counts as a step, of no length
@@ -122,7 +124,7 @@ def test_random_gaits_walk_as_far_as_converged_ones(scenario):
 
 @pytest.mark.parametrize("tetrahedra", [2, 3, 8])
 def test_any_number_of_tetrahedra_walks(scenario, tetrahedra):
-    changes = {"simulation.duration": 4.0, "simulation.steady_from": 2.0}
+    changes = {"simulation.duration": "4.0 s", "simulation.steady_from": "2.0 s"}
     other = scenario.with_changes({"robot.tetrahedra": tetrahedra, **changes})
     count = 2 * (tetrahedra - 1) * (tetrahedra - 2)
     weights = (0.0,) * count  # so that every oscillator oscillates

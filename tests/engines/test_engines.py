@@ -21,9 +21,9 @@ MUJOCO = pytest.param("mujoco", marks=pytest.mark.skipif(not installed(), reason
 
 def shortly(scenario: Scenario, engine: str, **settings: Any) -> Scenario:
     """The scenario cut to 1 s on an engine, driven from 0.2 s on."""
-    settings = {"engine": engine, "duration": 1.0, "steady_from": 0.5, **settings}
+    settings = {"engine": engine, "duration": "1 s", "steady_from": "0.5 s", **settings}
     changes = {f"simulation.{key}": value for key, value in settings.items()}
-    return scenario.with_changes({"cpg.start_up": 0.2, **changes})
+    return scenario.with_changes({"cpg.start_up": "0.2 s", **changes})
 
 
 @pytest.mark.parametrize("engine", ["drake", "compiled", MUJOCO])
@@ -45,7 +45,7 @@ def test_recording_changes_nothing(scenario, engine, mode_changes):
 
 @pytest.mark.parametrize("engine", ["drake", "compiled", MUJOCO])
 def test_the_path_is_that_of_the_trajectory(scenario, engine):
-    beside = [[0.0, y, 0.0] for y in (0.004, 0.0, -0.003, 0.001, 0.006)]
+    beside = [[0.0, f"{y} mm", 0.0] for y in (4, 0, -3, 1, 6)]
     short = shortly(scenario, engine).with_changes({"robot.offsets": beside})
     result = simulate(scenario=short, gait=seeded_gait(short), record=True)
     path, whole = result.path, path_of_centre(result.trajectory)
@@ -72,10 +72,14 @@ def test_a_gait_is_not_influenced_by_company_or_threads(scenario, engine):
     ("engine", "changes", "kind"),
     [
         # Explicit Euler at 2 ms is far beyond its stability limit of about 0.15 ms.
-        ("drake", {"simulation.scheme": "explicit_euler", "simulation.max_step": 2e-3}, Diverged),
+        (
+            "drake",
+            {"simulation.scheme": "explicit_euler", "simulation.max_step": "2e-3 s"},
+            Diverged,
+        ),
         ("drake", {"simulation.max_evaluations": 1000}, StepBudgetExceeded),
-        ("compiled", {"simulation.max_speed": 1e-3}, Diverged),
-        ("compiled", {"cpg.gain": 4e9}, Diverged),  # a pull that grows without bound
+        ("compiled", {"simulation.max_speed": "1e-3 m/s"}, Diverged),
+        ("compiled", {"cpg.gain": "4e9 N"}, Diverged),  # a pull that grows without bound
         ("compiled", {"simulation.max_evaluations": 100}, StepBudgetExceeded),
     ],
 )

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray
 from helpers.converged import FINE, shortly
+from helpers.quantities import with_unit
 from helpers.states import body_velocities
 from pydrake.systems.analysis import Simulator
 
@@ -99,12 +100,12 @@ def test_contact_never_gives_energy(scenario, friction):
     # Kinetic energy, weight, cables and the springs of contacts (k d^2 / 2); a bristle's spring
     # can only hold what it has taken.
     friction = scenario.friction if friction == "reset" else friction
-    fall = {"robot__offsets": [[0.0, 0.0, 0.005]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
+    fall = {"robot__offsets": [[0.0, 0.0, "5 mm"]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
     rough = Rough(0.25 * INCH, 4.0 * INCH, seed=5)
     falling = converged(scenario, 0.6, terrain=rough, friction=friction, **fall)
     structure, gravity = MakeStructure(falling), falling.robot.gravity
     body = make_model(falling, structure).body
-    walk = trajectory(falling.with_changes({"simulation.sample_period": 2e-3}), "compiled")
+    walk = trajectory(falling.with_changes({"simulation.sample_period": "2e-3 s"}), "compiled")
     v_WB, w_WB = body_velocities(walk, structure)
     energy = 0.5 * (body.mass[0] * v_WB**2 + body.moment[0] * w_WB**2).sum(axis=(1, 2))
     energy += body.mass[0] * gravity * walk.p_WB.values[:, :, 2].sum(axis=1)
@@ -120,8 +121,12 @@ def test_contact_never_gives_energy(scenario, friction):
 
 def test_on_a_rough_grid_without_relief_the_robot_walks_as_on_flat_ground(scenario):
     # The same forces, by frames whose axes are World's.
-    changes = {"simulation.duration": 2.0, "simulation.engine": "compiled", "cpg.start_up": 0.1}
-    flat = scenario.with_changes({**changes, "simulation.steady_from": 1.0})
+    changes = {
+        "simulation.duration": "2.0 s",
+        "simulation.engine": "compiled",
+        "cpg.start_up": "0.1 s",
+    }
+    flat = scenario.with_changes({**changes, "simulation.steady_from": "1.0 s"})
     for friction in (scenario.friction, FIRM):
         both = [
             flat.with_changes({"terrain": t, "friction": friction})
@@ -133,7 +138,11 @@ def test_on_a_rough_grid_without_relief_the_robot_walks_as_on_flat_ground(scenar
 
 def test_the_robot_stands_on_what_is_under_it(scenario):
     # Settled on rough ground: contacts press by their depth, and together bear the weight.
-    times = {"simulation.duration": 2.5, "simulation.steady_from": 2.0, "cpg.start_up": 2.5}
+    times = {
+        "simulation.duration": "2.5 s",
+        "simulation.steady_from": "2.0 s",
+        "cpg.start_up": "2.5 s",
+    }
     rough = {"terrain": Rough(0.25 * INCH, 6.0 * INCH), "friction": FIRM, "robot.contacts": "all"}
     resting = scenario.with_changes({**times, **rough})
     end = trajectory(resting, "compiled").isel(time=-1)
@@ -150,17 +159,21 @@ def test_the_robot_stands_on_what_is_under_it(scenario):
 SLOWLY = {
     # At which errors are below 0.001 in (Coulomb), 0.005 in (reset integrator). With longer steps a
     # witness misses nodes that leave uneven ground and land again within a step.
-    "coulomb": {"simulation.accuracy": 1e-4, "simulation.max_step": 2e-3},
+    "coulomb": {"simulation.accuracy": 1e-4, "simulation.max_step": "2e-3 s"},
     "reset": {
         "simulation.scheme": "runge_kutta3",
         "simulation.accuracy": 1e-4,
-        "simulation.max_step": 3e-4,
+        "simulation.max_step": "3e-4 s",
         "simulation.mode_changes": "witness",
-        "simulation.witness_window": 1e-6,
+        "simulation.witness_window": "1e-6 s",
         "simulation.max_evaluations": 10**8,
     },
 }
-CONVERGED = {"compiled.tolerance": 1e-6, "compiled.max_step": 5e-4, "compiled.look_ahead": 1e-6}
+CONVERGED = {
+    "compiled.tolerance": "1e-6 m/s",
+    "compiled.max_step": "5e-4 s",
+    "compiled.look_ahead": "1e-6 s",
+}
 
 
 def distances(scenario: Scenario, gaits: list[Gait]) -> np.ndarray:
@@ -182,8 +195,8 @@ def test_random_gaits_end_where_the_diagrams_do(scenario, terrain, law, height_f
     ours = walking.with_changes({"simulation.engine": "compiled"})
     gaits = [seeded_gait(walking, seed) for seed in range(80)]
     # Under the reset integrator, distances hang on nanometres where a foot just slips or does not.
-    finer = {"compiled.tolerance": 5e-7, "compiled.look_ahead": 5e-7}
-    nudge = {"robot.offsets": [[i * 1e-8, -(i**2) * 1e-8, 0.0] for i in range(5)]}
+    finer = {"compiled.tolerance": "5e-7 m/s", "compiled.look_ahead": "5e-7 s"}
+    nudge = {"robot.offsets": with_unit([[i * 1e-8, -(i**2) * 1e-8, 0.0] for i in range(5)], "m")}
     nudged = ours.with_changes(finer | nudge)
     spread = np.abs(distances(ours, gaits) - distances(nudged, gaits))
     gaits = [gait for gait, each in zip(gaits, spread, strict=True) if each < 0.02][:20]

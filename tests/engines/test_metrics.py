@@ -17,8 +17,12 @@ from tetra_drake.scenario.metrics import METRICS
 @pytest.fixture(scope="module")
 def short():
     """Three tetrahedra on Coulomb friction, where small errors stay small."""
-    changes = {"robot.tetrahedra": 3, "simulation.duration": 2.0, "simulation.steady_from": 0.5}
-    changes |= {"cpg.start_up": 0.2, "simulation.sample_period": 1e-3, "cpg.gain": "3 lbf"}
+    changes = {
+        "robot.tetrahedra": 3,
+        "simulation.duration": "2.0 s",
+        "simulation.steady_from": "0.5 s",
+    }
+    changes |= {"cpg.start_up": "0.2 s", "simulation.sample_period": "1e-3 s", "cpg.gain": "3 lbf"}
     return load_scenario("coulomb").with_changes(changes | {"simulation.engine": "compiled"})
 
 

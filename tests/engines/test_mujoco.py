@@ -27,7 +27,11 @@ needs_mujoco = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
 @pytest.fixture
 def short(scenario: Scenario) -> Scenario:
     """0.4 s on the engine `mujoco`, driven from between the samples at 0.10 and 0.11 s on."""
-    times = {"simulation.duration": 0.4, "simulation.steady_from": 0.2, "cpg.start_up": 0.105}
+    times = {
+        "simulation.duration": "0.4 s",
+        "simulation.steady_from": "0.2 s",
+        "cpg.start_up": "0.105 s",
+    }
     return scenario.with_changes({"simulation.engine": "mujoco", **times})
 
 
@@ -50,12 +54,16 @@ def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(short, tetra
     # Bodies, cables and motors are the same; only the ground differs. MuJoCo's error is of first
     # order in the step, so that two steps give the limit.
     floating = {"robot.tetrahedra": tetrahedra, "robot.gravity": 0.0}
-    floating |= {"robot.offsets": [[0.0, 0.0, 1.0]] * tetrahedra}
-    fine = {"compiled.tolerance": 1e-6, "compiled.max_step": 0.5e-3, "compiled.look_ahead": 1e-6}
+    floating |= {"robot.offsets": [[0.0, 0.0, "1 m"]] * tetrahedra}
+    fine = {
+        "compiled.tolerance": "1e-6 m/s",
+        "compiled.max_step": "0.5e-3 s",
+        "compiled.look_ahead": "1e-6 s",
+    }
     fine |= {"simulation.engine": "compiled"}
     ours, coarse, halved = (
         trajectory_of(short.with_changes(floating | changes))
-        for changes in (fine, {"mujoco.step": 4e-5}, {"mujoco.step": 2e-5})
+        for changes in (fine, {"mujoco.step": "4e-5 s"}, {"mujoco.step": "2e-5 s"})
     )
     limit = 2.0 * halved - coarse
     assert np.ptp(ours["q_WB"].sel(quaternion="y").values) > 0.01
@@ -67,7 +75,7 @@ def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(short, tetra
 
 @needs_mujoco
 def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, structure, data):
-    times = {"simulation.duration": 1.2, "simulation.steady_from": 1.0}
+    times = {"simulation.duration": "1.2 s", "simulation.steady_from": "1.0 s"}
     resting = scenario.with_changes({"simulation.engine": "mujoco", **times})
     end = trajectory_of(resting).isel(time=-1)
     settled = json.loads((data / "expected.json").read_text())["settled"]
@@ -86,7 +94,7 @@ def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, struc
 
 @needs_mujoco
 def test_friction_opposes_motion_within_the_cone(short, structure):
-    trajectory = trajectory_of(short.with_changes({"simulation.duration": 1.0}))
+    trajectory = trajectory_of(short.with_changes({"simulation.duration": "1.0 s"}))
     friction = trajectory["friction_force"].values
     limit = short.mujoco.friction * trajectory["normal_force"].values
     assert (np.linalg.norm(friction, axis=2) <= limit + 1e-6).all()
@@ -112,7 +120,7 @@ def test_the_integrators_of_mujoco_agree(short):
     gait = seeded_gait(short)
     implicit = simulate(scenario=short, gait=gait)
     for integrator in ("Euler", "discrete"):
-        finer = short.with_changes({"mujoco.integrator": integrator, "mujoco.step": 0.0625e-3})
+        finer = short.with_changes({"mujoco.integrator": integrator, "mujoco.step": "0.0625e-3 s"})
         distance = simulate(scenario=finer, gait=gait).metrics.distance_in
         assert distance == pytest.approx(implicit.metrics.distance_in, abs=0.02)
 
@@ -122,8 +130,8 @@ def test_the_integrators_of_mujoco_agree(short):
 def test_too_long_a_step_diverges_without_a_log_file(short, integrator, tmp_path, monkeypatch):
     # With implicitfast the robot jumps for ever, but nothing overflows; Euler's state does.
     monkeypatch.chdir(tmp_path)
-    steps = {"mujoco.integrator": integrator, "mujoco.step": 4e-3}
-    unstable = short.with_changes({"simulation.duration": 3.0, **steps})
+    steps = {"mujoco.integrator": integrator, "mujoco.step": "4e-3 s"}
+    unstable = short.with_changes({"simulation.duration": "3.0 s", **steps})
     with pytest.raises(Diverged) as caught:
         simulate(scenario=unstable, gait=seeded_gait(unstable, 0))
     assert 0.0 < caught.value.time <= 3.0
@@ -132,7 +140,7 @@ def test_too_long_a_step_diverges_without_a_log_file(short, integrator, tmp_path
 
 @needs_mujoco
 def test_where_mujoco_starts_again_the_simulation_has_failed_when_it_did(short):
-    thrown = short.with_changes({"cpg.gain": 4e9})
+    thrown = short.with_changes({"cpg.gain": "4e9 N"})
     with pytest.raises(Diverged, match="warns of instability") as caught:
         simulate(scenario=thrown, gait=seeded_gait(thrown))
     assert caught.value.time == pytest.approx(short.cpg.start_up, abs=2.5 * short.mujoco.step)
@@ -217,7 +225,7 @@ def test_nodes_that_do_not_touch_the_ground_change_nothing(short):
 def test_walks_on_an_incline_as_the_compiled_engine_does(short):
     # The damping of the normal force differs, so that the robot lands a little differently.
     slope = {"terrain": Incline(slope=math.radians(5.0)), "friction": Coulomb()}
-    walk = short.with_changes(slope | {"simulation.duration": 1.0})
+    walk = short.with_changes(slope | {"simulation.duration": "1.0 s"})
     ours = trajectory_of(walk.with_changes({"simulation.engine": "compiled"}))
     theirs = trajectory_of(walk)
     assert np.ptp(ours["p_WB"].sel(axis="x").values, axis=0).max() > 3e-3
@@ -226,7 +234,7 @@ def test_walks_on_an_incline_as_the_compiled_engine_does(short):
 
 @needs_mujoco
 def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure):
-    angle, times = math.radians(3.0), {"simulation.duration": 1.2, "cpg.start_up": 1.25}
+    angle, times = math.radians(3.0), {"simulation.duration": "1.2 s", "cpg.start_up": "1.25 s"}
     creeping = {"terrain": Incline(slope=angle), "friction": Coulomb(), **times}
     scenario = short.with_changes(creeping)
     end = trajectory_of(scenario).isel(time=-1)
@@ -257,7 +265,7 @@ def test_a_height_field_that_is_level_is_flat_ground(short, tmp_path):
 @needs_mujoco
 def test_stands_on_the_surface_of_the_terrain(short):
     rough = Rough(amplitude=0.25 * INCH, wavelength=6.0 * INCH)
-    times = {"simulation.duration": 1.2, "cpg.start_up": 1.25}
+    times = {"simulation.duration": "1.2 s", "cpg.start_up": "1.25 s"}
     changes = {"terrain": rough, "robot.contacts": "all", "friction": Coulomb(), **times}
     standing = short.with_changes(changes)
     structure = MakeStructure(standing)

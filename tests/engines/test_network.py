@@ -10,6 +10,7 @@ from helpers.converged import FINE, shortly
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.errors import InputError
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
 from tetra_drake.robot.network import SteeringSignal
@@ -117,7 +118,7 @@ def test_engines_agree_with_each_feedback_and_it_matters(scenario, pathway):
 @pytest.mark.parametrize("signals", ["listing", "recorded", "live"])
 def test_engines_agree_on_a_steering_signal(signals):
     scenario = load_scenario("turning").with_changes({"gait_bounds.turn": 0.0})
-    changes = FINE | {"cpg.signals": signals, "cpg.listing_step": 1e-4}
+    changes = FINE | {"cpg.signals": signals, "cpg.listing_step": "1e-4 s"}
     short = shortly(scenario, 0.4, **changes)
     gait = seeded_gait(short)
 
@@ -154,6 +155,34 @@ def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
         simulator.AdvanceTo(0.2)
         states.append(simulator.get_context().get_continuous_state_vector().CopyToVector())
     np.testing.assert_array_equal(*states)
+
+
+def test_a_constant_number_steers_as_the_gaits_turn_does(refused):
+    changes = {"simulation.engine": "compiled", "simulation.duration": "0.4 s"}
+    short = load_scenario("turning").with_changes(changes | {"simulation.steady_from": "0.2 s"})
+    gait = dataclasses.replace(seeded_gait(short), turn=0.0)
+    turned = simulate(scenario=short, gait=dataclasses.replace(gait, turn=0.5))
+    for turn in (0.5, np.float64(0.5)):
+        assert simulate(scenario=short, gait=gait, steering=turn).metrics == turned.metrics
+    for wrong in ("left", True, [0.5]):
+        with refused("steering", "", repr(wrong)):
+            simulate(scenario=short, gait=gait, steering=wrong)
+    with refused("steering", "at 0 s", "1.5"):
+        simulate(scenario=short, gait=gait, steering=1.5)
+
+
+def test_a_scenario_is_simulated_by_its_name_and_by_its_file(tmp_path):
+    file = tmp_path / "short.yaml"
+    times = "{engine: compiled, duration: 0.2 s, steady_from: 0.1 s}"
+    file.write_text(f"base: turning\nname: short\nsimulation: {times}\n")
+    short = load_scenario(file)
+    gait = seeded_gait(short)
+    expected = simulate(scenario=short, gait=gait).metrics
+    assert simulate(scenario=file, gait=gait).metrics == expected
+    (found,) = simulate_many(scenario=str(file), gaits=[gait])
+    assert found.metrics == expected
+    with pytest.raises(InputError, match="missing"):
+        simulate(scenario="missing", gait=gait)
 
 
 def test_one_gait_walks_straight_on_and_turns_either_way(data):

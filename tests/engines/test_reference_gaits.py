@@ -77,7 +77,7 @@ def test_the_robot_walks_straight_by_its_symmetry(results):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
-    [{"scheme": "runge_kutta3"}, {"mode_changes": "witness", "max_step": 2e-3}],
+    [{"scheme": "runge_kutta3"}, {"mode_changes": "witness", "max_step": "2 ms"}],
     ids=["explicit", "witness"],
 )
 @pytest.mark.parametrize("name", WELL_CONDITIONED)

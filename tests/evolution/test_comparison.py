@@ -117,7 +117,7 @@ def test_only_search_may_differ_without_a_note(run):
 
 def test_different_objectives_and_wrong_labels_are_refused(run, refused):
     base = run("a", trial(1.0))
-    other = run("b", trial(1.0), changes={"objective": {"speed": 1.0}})
+    other = run("b", trial(1.0), changes={"objective": {"speed": "1 s/m"}})
     with refused(other, "objective", "a"):
         compare([base, other])
     for labels in (["x"], ["x", "x"]):

@@ -16,6 +16,7 @@ from helpers.analytic import (
     read_record,
     small_scenario,
 )
+from helpers.quantities import with_unit
 from pytest import approx
 
 from tetra_drake import evolve
@@ -46,8 +47,8 @@ def tiny():
     return small_scenario(oscillators=2, population=4, iterations=2, trials=2).with_changes(
         {
             "simulation.engine": "compiled",
-            "simulation.duration": 0.3,
-            "simulation.steady_from": 0.1,
+            "simulation.duration": "0.3 s",
+            "simulation.steady_from": "0.1 s",
             "cpg.start_up": 0.0,
             "disturbances": DisturbancesScenario(draws=3, spreads=STIFFNESS, start=0.02),
         }
@@ -161,7 +162,7 @@ def test_a_requirement_missed_in_one_draw_is_missed(tiny, vector):
     distances = [result.metrics.distance for result in by_hand(tiny, vector)]
     least = sorted(distances)[1]
     missed = distances.index(min(distances))
-    strict = tiny.with_changes({"require": {"distance": least}})
+    strict = tiny.with_changes({"require": {"distance": with_unit(least, "m")}})
     failed = GaitEvaluation(strict)(SeededVector(vector, SEED))
     assert failed.failure.startswith(f"draw {missed}: requirement: distance is ")
     assert (failed.fitness, failed.draws) == (-math.inf, None)

@@ -25,7 +25,7 @@ from tetra_drake.scenario.schema import DisturbancesScenario
 def tiny():
     """0.3 s from a standing start, actuated at once so that gaits differ."""
     return small_scenario().with_changes(
-        {"simulation.duration": 0.3, "simulation.steady_from": 0.1, "cpg.start_up": 0.0}
+        {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s", "cpg.start_up": 0.0}
     )
 
 
@@ -55,8 +55,12 @@ def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vect
     ("changes", "objective", "kind"),
     [
         ({"simulation.max_evaluations": 50}, None, "step budget: "),
-        ({"simulation.max_speed": 1e-6}, None, "diverged: "),
-        ({"simulation.duration": 15.0, "evolution.time_budget": 0.3}, None, "time budget: "),
+        ({"simulation.max_speed": "1e-6 m/s"}, None, "diverged: "),
+        (
+            {"simulation.duration": "15.0 s", "evolution.time_budget": "0.3 s"},
+            None,
+            "time budget: ",
+        ),
         ({}, lambda result: math.nan, "diverged: "),
     ],
 )
@@ -70,7 +74,7 @@ def test_failures_say_why_and_have_the_worst_fitness(tiny, vectors, changes, obj
 
 def test_evaluations_in_lanes_are_those_of_single_gaits_and_keep_their_budgets(tiny, vectors):
     compiled = tiny.with_changes({"simulation.engine": "compiled"})
-    endless = {"simulation.duration": "1 h", "evolution.time_budget": 0.05}
+    endless = {"simulation.duration": "1 h", "evolution.time_budget": "0.05 s"}
     with LanePool(1) as lanes:
         for vector in vectors:
             alone, found = (
@@ -81,7 +85,7 @@ def test_evaluations_in_lanes_are_those_of_single_gaits_and_keep_their_budgets(t
             assert 0.0 < found.wall_time < alone.wall_time + 1.0
         for changes, kind in (
             ({"simulation.max_evaluations": 50}, "step budget: "),
-            ({"simulation.max_speed": 1e-6}, "diverged: "),
+            ({"simulation.max_speed": "1e-6 m/s"}, "diverged: "),
             (endless, "time budget: "),
         ):
             failed = GaitEvaluation(compiled.with_changes(changes), None, lanes)(vectors[0])
@@ -102,8 +106,8 @@ def test_the_reason_of_a_failed_simulation_is_kept(tiny, vectors, monkeypatch):
 def test_time_budgets_hold_in_any_thread_and_end_with_their_evaluation(tiny, vectors, engine):
     if engine == "mujoco":
         pytest.importorskip("mujoco")
-    changes = {"simulation.engine": engine, "simulation.duration": 60.0}
-    late = GaitEvaluation(tiny.with_changes(changes | {"evolution.time_budget": 0.01}))
+    changes = {"simulation.engine": engine, "simulation.duration": "60.0 s"}
+    late = GaitEvaluation(tiny.with_changes(changes | {"evolution.time_budget": "0.01 s"}))
     with ThreadPoolExecutor(1) as thread:
         failed = thread.submit(late, vectors[0]).result()
         assert failed.failure == "time budget: not done after 0.01 s"

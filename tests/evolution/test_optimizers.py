@@ -116,7 +116,7 @@ def test_no_vector_is_below_a_floor_and_none_is_asked_for_twice(kind):
 
 @pytest.mark.parametrize("kind", BUDGETED)
 def test_parameters_with_equal_bounds_stay_and_tau_b_may_go_its_own_way(kind):
-    fixed = {"gait_bounds.tau_a_min": 0.3, "gait_bounds.tau_a_max": 0.3}
+    fixed = {"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}
     vectors = np.concatenate(run(make(kind, **fixed))[0])
     assert (vectors[:, -2:] == [0.3, 0.6]).all()
     if kind in LEARNING:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from helpers.analytic import Bowl
 
+from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import best_distances, evaluate_again, reevaluate
 from tetra_drake.evolution.tables import load_run
 
@@ -52,6 +53,20 @@ def test_all_initial_gaits_can_be_evaluated_again_but_not_by_another_objective(r
     assert (run.reevaluations["iteration"] == 0).all()
     with refused(directory, "objective", "Bowl"):
         reevaluate(directory, objective=Bowl())
+
+
+def test_a_stage_without_gaits_is_not_shown(run_small):
+    titles = []
+
+    class Stages(Progress):
+        def stage(self, title, done, total, text=""):
+            titles.append(title)
+
+    directory = run_small()
+    again(directory, progress=Stages())
+    shown = len(titles)
+    again(directory, progress=Stages())
+    assert shown > 0 and len(titles) == shown
 
 
 def test_what_is_recorded_whole_is_not_evaluated_again(run_small):

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pandas
 import pytest
+from helpers.quantities import with_unit
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import main
@@ -23,8 +24,10 @@ from tetra_drake.evolution.robustness import (
     fresh_seed,
     judge,
     over_gaits,
+    percents,
     rank_correlations,
 )
+from tetra_drake.evolution.statistics import share_interval
 from tetra_drake.robot.gait import save_gait, seeded_gait
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
@@ -92,7 +95,7 @@ def test_every_change_is_also_made_alone(judgement, gaits):
         TERRAIN: few,
     }
     (softer,) = alone.query("what == 'ground.stiffness' and spread < 0")["distance"]
-    stiffness = 0.95 * judgement.scenario.ground.stiffness
+    stiffness = with_unit(0.95 * judgement.scenario.ground.stiffness, "N/m")
     changed = judgement.scenario.with_changes({"ground.stiffness": stiffness, "disturbances": None})
     assert softer == simulate(scenario=changed, gait=gaits["b"]).metrics.distance
     draw = draw_disturbances(judgement.scenario, fresh_seed(5, 1))
@@ -115,7 +118,7 @@ def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits,
 
 def test_the_scenarios_own_disturbances_are_used_unless_a_percentage_is_given(scenario, gaits):
     own = DisturbancesScenario(draws=4, spreads={"cables.damping": 0.2})
-    disturbing = scenario.with_changes({"disturbances": own, "require": {"distance": 1.0}})
+    disturbing = scenario.with_changes({"disturbances": own, "require": {"distance": "1 m"}})
     found = judge(disturbing, gaits, draws=2)
     assert set(found.alone["what"]) == {"cables.damping"}
     assert found.draws["cables.damping"].between(0.8, 1.2).all()
@@ -200,14 +203,18 @@ def test_the_summary_of_gaits(made):
     )
     assert a[["undisturbed", "mean", "kept"]].tolist() == pytest.approx([10.0, 29.9 / 3.0, 0.5])
     assert found[["failed", "missed"]].to_numpy().tolist() == [[1, 0], [0, 1]]
-    # Four draws, of which two are kept: with the chance 1/16, none of a resample is.
-    assert a[["kept_low", "kept_high"]].tolist() == [0.0, 1.0]
+    assert a[["kept_low", "kept_high"]].tolist() == list(share_interval(2, 4))
     assert b["mean"] == pytest.approx(-29.1 / 4.0)
     assert b["mean_low"] < b["mean"] < b["mean_high"]
     over = over_gaits(made)["median"]
     assert over.to_dict() == pytest.approx(
         {"undisturbed": 0.0, "mean": (29.9 / 3.0 - 29.1 / 4.0) / 2.0, "kept": 0.5}
     )
+
+
+def test_an_interval_without_width_is_not_shown():
+    assert percents(1.0, 0.91, 1.0) == "100 % (91 to 100)"
+    assert percents(1.0, 1.0, 1.0) == "100 %"
 
 
 def test_the_summary_of_changes_begins_with_what_hurts_most_alone(made):

@@ -242,7 +242,7 @@ def test_with_the_listings_slip_tau_a_is_only_ever_passed_on():
 
 
 def test_a_fixed_tau_stays():
-    for vectors in vectors_of({"gait_bounds.tau_a_min": 0.3, "gait_bounds.tau_a_max": 0.3}):
+    for vectors in vectors_of({"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}):
         np.testing.assert_array_equal(vectors[:, TAU_A], 0.3)
         np.testing.assert_array_equal(vectors[:, TAU_B], 0.6)
 

@@ -125,6 +125,11 @@ def test_the_initial_gaits_are_those_of_the_first_iteration_of_every_trial(tmp_p
     assert initial[["trial", "index"]].to_numpy().tolist() == [[0, 0], [0, 1], [1, 0]]
 
 
+def test_the_best_gait_of_a_run_is_that_of_its_best_trial(tmp_path):
+    run = load_run(write_run(tmp_path / "run", [[[(5.0, 0), (4.0, 1)]], [[(3.0, 2), (6.0, 3)]]]))
+    assert run.best_gait() == run.gait(1, 1) != run.gait(0, 0)
+
+
 def test_best_gait_and_last_population_are_those_kept_by_hand(run_small, scenario):
     directory = run_small()
     run = load_run(directory)
@@ -165,7 +170,24 @@ def test_an_unfinished_run_says_how_far_it_has_come(tmp_path):
     assert (second.failures, second.best_fitness) == (1, -math.inf)
     assert (third.iteration, third.evaluations) == (-1, 0)
     ours = [row.ours for row in comparisons(run)]
-    assert ours == ["0.50 in", "2.00 in", "300.00 %", "300.00 %", "1.00 s"]
+    assert ours == ["0.50 in", "2.00 in", "+1.50 in", "+1.50 in", "1.00 s"]
+
+
+def test_improvements_are_percents_only_of_distances_that_are_not_near_nothing(tmp_path):
+    # By trials, in inches: from 2 to 3, from 5 to 6, from 0.25 to 4.
+    trials = [[[(4.0, 0)], [(6.0, 0)]], [[(10.0, 0)], [(12.0, 0)]]]
+    *_, mean, best, _ = comparisons(load_run(write_run(tmp_path / "far", trials)))
+    assert (mean.ours, best.ours) == ("+1.00 in (35 %)", "+1.00 in (20 %)")
+    trials.append([[(0.5, 0)], [(8.0, 0)]])
+    *_, mean, best, _ = comparisons(load_run(write_run(tmp_path / "near", trials)))
+    assert (mean.ours, best.ours) == ("+1.92 in", "+1.00 in (20 %)")
+
+
+def test_the_best_evolved_gait_is_the_fittest_of_the_run(tmp_path):
+    far = {3.0: {"distance": 9.0 * INCH}}
+    path = write_run(tmp_path / "run", [[[(2.0, 0)], [(3.0, 0)]], [[(4.0, 0)]]], metrics=far)
+    _, best, *_ = comparisons(load_run(path))
+    assert best.ours == "2.00 in"
 
 
 def test_the_reference_stands_beside_our_numbers_where_there_is_one(tmp_path):

@@ -15,7 +15,7 @@ from tetra_drake.evolution.json_lines import append_lines, read_lines
 from tetra_drake.evolution.pareto import champions
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.reevaluation import BEST_GAITS, evaluate_again
-from tetra_drake.evolution.robustness import gaits_of
+from tetra_drake.evolution.source import load_source
 from tetra_drake.evolution.summary import summary
 from tetra_drake.evolution.tables import load_run
 from tetra_drake.evolution.thinning import thin
@@ -120,7 +120,7 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     assert on_map[0] == on_map[1]
     assert [0, ALONE] in on_map[0] and [0, BEYOND] in on_map[0] and [0, EDGE] not in on_map[0]
     assert champions(run)["cheapest"]["index"] == CHEAP
-    assert gaits_of(thinned.directory)[1] == gaits_of(run.directory)[1]
+    assert load_source(thinned.directory).gaits == load_source(run.directory).gaits
     ours, theirs = (compare([r.directory], reach=0.01).trials for r in (thinned, run))
     assert ours.drop(columns="run").equals(theirs.drop(columns="run"))
     assert thinned.reevaluations["distance"].equals(run.reevaluations["distance"])

@@ -245,7 +245,7 @@ def test_ground_forces_are_those_of_the_last_seconds(walk):
     names = [f"T{i} bottom left" for i in range(1, 6)]
     assert [panel.get_title("left") for panel in panels] == [*names, "T5 tip"]
     end = walk.sel(time=slice(6.0, None))
-    normal, friction = panels[0].lines
+    normal, friction, _ = panels[0].lines
     expected = end.normal_force.sel(contact="T1 bottom_left") / POUND_FORCE
     np.testing.assert_allclose(normal.get_xdata(), end.time)
     np.testing.assert_allclose(normal.get_ydata(), expected)
@@ -264,6 +264,26 @@ def test_shaded_intervals_are_those_off_the_ground(walk):
         np.testing.assert_allclose(spans, expected, atol=0.011)
         (shown,) = (word for word in panel.get_title(loc="right").split() if word.isdigit())
         assert int(shown) == pytest.approx(percent, abs=1)
+
+
+@pytest.mark.parametrize("draw", [*FIGURES, before_and_after])
+def test_captions_name_no_parameters(draw):
+    assert draw.__doc__ and "`" not in draw.__doc__
+
+
+def test_landings_are_marked_and_impacts_do_not_set_the_scale_of_forces(walk):
+    four = walk.sel(time=slice(0.0, 4 * PERIOD)).copy(deep=True)
+    calm = ground_forces(four, FLAT, seconds=4.0).axes
+    four.normal_force[int(np.argmin(np.abs(four.time.values - 5.5))), 0] = 100.0 * LOAD
+    struck = ground_forces(four, FLAT, seconds=4.0).axes
+    for panels in (calm, struck):
+        *_, landings = panels[0].lines
+        np.testing.assert_allclose(landings.get_xdata(), [5.0, 7.0], atol=0.011)
+        low, high = panels[0].get_ylim()
+        assert low < -0.5 * LOAD / POUND_FORCE
+        assert LOAD / POUND_FORCE < high < 2.0 * LOAD / POUND_FORCE
+    assert max(struck[0].lines[0].get_ydata()) > 50.0 * struck[0].get_ylim()[1]
+    assert len(struck[-1].lines[-1].get_xdata()) == 0, "the tip never lands"
 
 
 def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):

@@ -6,12 +6,12 @@ FINE = {
     "cpg.start_up": 0.0,
     "simulation.scheme": "runge_kutta3",
     "simulation.accuracy": 1e-6,
-    "simulation.max_step": 1e-4,
+    "simulation.max_step": "1e-4 s",
     "simulation.mode_changes": "witness",
-    "simulation.witness_window": 1e-8,
-    "compiled.tolerance": 1e-8,
-    "compiled.max_step": 3e-5,
-    "compiled.look_ahead": 1e-8,
+    "simulation.witness_window": "1e-8 s",
+    "compiled.tolerance": "1e-8 m/s",
+    "compiled.max_step": "3e-5 s",
+    "compiled.look_ahead": "1e-8 s",
 }
 """Settings at which both engines have converged, mode changes placed to 1e-8 s, for short walks
 that are driven from the start."""
@@ -19,6 +19,9 @@ that are driven from the start."""
 
 def shortly(scenario: Scenario, duration: float, **changes: object) -> Scenario:
     """A short simulation, driven from the start; `cpg__reach=1` changes cpg.reach."""
-    times = {"simulation.duration": duration, "simulation.steady_from": 0.5 * duration}
+    times = {
+        "simulation.duration": f"{duration} s",
+        "simulation.steady_from": f"{0.5 * duration} s",
+    }
     given = {key.replace("__", "."): value for key, value in changes.items()}
     return scenario.with_changes({**times, "cpg.start_up": 0.0, **given})

@@ -25,7 +25,7 @@ PER_DISTANCE = 2.0
 
 def tiny_scenario(*, name: str = "tiny") -> Scenario:
     """A robot of three tetrahedra that walks for a moment."""
-    times = {"simulation.duration": 0.3, "simulation.steady_from": 0.1}
+    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
     return load_scenario("thesis").with_changes({"name": name, "robot.tetrahedra": 3} | times)
 
 

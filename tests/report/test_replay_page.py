@@ -10,12 +10,32 @@ from helpers.synthetic_run import write_run
 from tetra_drake.errors import InputError
 from tetra_drake.report.replay_page import load_recording, write_replay
 from tetra_drake.results.folder import check_result_folder, save_result_folder
+from tetra_drake.results.metrics import headline
+from tetra_drake.scenario.load import dump_scenario
+from tetra_drake.scenario.units import shown
 
 
 def test_a_result_folder_holds_what_its_replay_needs(folder, tiny, gait, result):
     recording = load_recording(folder.rename(folder.with_name("elsewhere")))
     assert (recording.scenario, recording.gait) == (tiny, gait)
     xarray.testing.assert_equal(recording.trajectory, result.trajectory)
+
+
+def test_the_title_is_by_the_scenarios_objective(folder, tiny, gait, result):
+    assert load_recording(folder).title == f"{gait.name}: {headline(tiny, vars(result.metrics))}"
+    (folder / "scenario.yaml").write_text(
+        dump_scenario(tiny.with_changes({"objective": {"heading_change": "1 /rad"}}))
+    )
+    turned = shown(result.metrics.heading_change, "rad")
+    assert load_recording(folder).title == f"{gait.name}: heading change {turned} after 0.3 s"
+
+
+def test_a_result_without_a_metric_is_refused(folder, refused):
+    content = json.loads((folder / "result.json").read_text())
+    del content["metrics"]["twist"]
+    (folder / "result.json").write_text(json.dumps(content))
+    with refused(folder / "result.json", "metrics.twist", "missing"):
+        load_recording(folder)
 
 
 def test_of_a_run_the_fittest_gait_is_simulated(run, tiny):

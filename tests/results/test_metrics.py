@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 from helpers.totals import make_totals
 
-from tetra_drake.results.metrics import compute_fitness, compute_metrics, unmet_requirements
+from tetra_drake.results.metrics import (
+    compute_fitness,
+    compute_metrics,
+    headline,
+    unmet_requirements,
+)
 from tetra_drake.results.path import CentrePath
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, Metrics, inverse
@@ -123,6 +128,22 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
     assert compute_fitness(metrics, scenario.objective) == pytest.approx(-1.25)
     lead = scenario.with_changes({"objective.lead": "2 /in", "objective.speed": "3 s/m"})
     assert compute_fitness(metrics, lead.objective) == pytest.approx(12.75 + 3.0)
+
+
+@pytest.mark.parametrize(
+    ("objective", "text"),
+    [
+        ({"steady_distance": 1.0, "twist": -1000.0}, "2.00 inches in 15 s"),
+        ({"speed": 1.0, "heading_change": 9.0}, "2.00 inches in 15 s"),
+        ({"heading_change": 1.0}, "heading change 180 deg after 15 s"),
+        ({"cost_of_transport": -1.0, "twist": -1.0}, "cost of transport 4 after 15 s"),
+        ({"cost_of_transport": -1.0, "twist": -1000.0}, "twist 0.5 in after 15 s"),
+    ],
+)
+def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text):
+    metrics = dict.fromkeys(METRICS, 0.0) | {"distance": 2.0 * INCH, "twist": 0.5 * INCH}
+    metrics |= {"heading_change": math.pi, "cost_of_transport": 4.0, "speed": 0.1}
+    assert headline(dataclasses.replace(scenario, objective=objective), metrics) == text
 
 
 def test_the_constants_of_equation_10_are_those_of_the_thesis_to_the_last_digit(

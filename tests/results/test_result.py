@@ -1,5 +1,6 @@
 """What a result says of its simulation."""
 
+import dataclasses
 import json
 import math
 
@@ -97,6 +98,10 @@ def test_the_path_is_written_and_summed_up(scenario, structure, tmp_path):
     assert lines["path radius"].split()[2] == f"{RADIUS / INCH:.2f}"
     assert "right" in lines["path radius"] and "left" not in lines["path radius"]
     assert "requirement" not in summary(scenario, gait, result)
+    first, second = (list(lines)[i] for i in (1, 2))
+    assert (first, second) == ("distance", "steady distance")
+    turning = scenario.with_changes({"objective": {"heading_change": "1 /rad"}})
+    assert summary(turning, gait, result).splitlines()[1].split()[:2] == ["heading", "change"]
     strict = scenario.with_changes({"require": {"distance": "4000 in", "twist": "0 in"}})
     (line,) = [line for line in summary(strict, gait, result).splitlines() if "requir" in line]
     assert line.split()[0] == "distance" and "4000 in" in line
@@ -106,6 +111,23 @@ def test_the_path_is_written_and_summed_up(scenario, structure, tmp_path):
     assert json.loads((tmp_path / "result.json").read_text())["path_radius_in"] is None
     lines = {line[2:17].strip(): line for line in summary(scenario, gait, standing).splitlines()}
     assert "straight" in lines["path radius"]
+
+
+@pytest.mark.parametrize(
+    ("engine", "words", "others"),
+    [
+        ("drake", {"accuracy 0.000125", "7 steps", "9 derivative"}, {"tolerance"}),
+        ("compiled", {"tolerance 0.000125 m/s", "7 steps", "9 derivative"}, {"accuracy"}),
+        ("mujoco", {"7 steps of 0.125 ms"}, {"accuracy", "tolerance", "derivative"}),
+    ],
+)
+def test_the_work_of_an_engine_is_called_by_its_name(scenario, structure, engine, words, others):
+    result = result_of(scenario, structure, on_a_circle(scenario, structure, per_second=0.5))
+    work = IntegratorWork("scheme", accuracy=0.125e-3, steps=7, derivative_evaluations=9)
+    result = dataclasses.replace(result, engine=engine, integrator=work)
+    line = summary(scenario, seeded_gait(scenario), result).splitlines()[-1]
+    assert all(word in line for word in words)
+    assert not any(word in line for word in others)
 
 
 @pytest.mark.parametrize(

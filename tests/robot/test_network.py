@@ -70,7 +70,7 @@ def test_a_turn_strengthens_the_left_by_what_it_weakens_the_right(scenario):
 
 
 def test_a_steering_signal_is_sampled_and_checked(scenario):
-    both = scenario.with_changes(SIDES | {"simulation.duration": 4.0})
+    both = scenario.with_changes(SIDES | {"simulation.duration": "4.0 s"})
     gait = dataclasses.replace(seeded_gait(both), turn=0.3)
     assert sample_turns(both, MakeStructure(both), gait, None).tolist() == [0.3]
     turns = sample_turns(both, MakeStructure(both), gait, lambda time: time / 4.0)

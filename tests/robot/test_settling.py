@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from helpers.quantities import with_unit
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot import settling
@@ -47,15 +48,22 @@ def test_rests_where_the_independent_simulation_does(scenario, structure, data):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"robot.tetrahedra": 3, "robot.offsets": [[0, 0, 0], [0.002, 0.001, 0.001], [0, 0, 0.003]]},
+        {
+            "robot.tetrahedra": 3,
+            "robot.offsets": [[0, 0, 0], ["2 mm", "1 mm", "1 mm"], [0, 0, "3 mm"]],
+        },
         {"robot.tetrahedra": 4, "robot.contacts": "all"},
         # Base triangles so near that the robot tips forward, onto the lead's tip.
-        {"robot.tetrahedra": 2, "robot.spacing": 0.055, "cables.inner_stiffness": 26.0},
+        {"robot.tetrahedra": 2, "robot.spacing": "0.055 m", "cables.inner_stiffness": "26.0 N/m"},
     ],
 )
 def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     # Feet creep under stiction: an error of 3 mm at the start falls to 2e-7 of a length in 20 s.
-    still = {"cpg.start_up": 100.0, "simulation.duration": 20.0, "simulation.engine": "compiled"}
+    still = {
+        "cpg.start_up": "100.0 s",
+        "simulation.duration": "20.0 s",
+        "simulation.engine": "compiled",
+    }
     scenario = scenario.with_changes(still | changes)
     walk = simulate(scenario=scenario, gait=seeded_gait(scenario, 0), record=True).trajectory
     np.testing.assert_allclose(walk.length[-1], settled_lengths(scenario), rtol=1e-6)
@@ -69,9 +77,9 @@ def test_the_ground_bears_the_weight_whatever_the_stiffnesses(scenario, tetrahed
     choices = [*itertools.product(factors, factors, factors)]
     for outer, inner, hard in choices if tetrahedra < 12 else [(1.0, 1.0, 1.0), (1.0, 1.5, 0.5)]:
         changes = {
-            "cables.outer_stiffness": outer * cables.outer_stiffness,
-            "cables.inner_stiffness": inner * cables.inner_stiffness,
-            "ground.stiffness": hard * ground.stiffness,
+            "cables.outer_stiffness": with_unit(outer * cables.outer_stiffness, "N/m"),
+            "cables.inner_stiffness": with_unit(inner * cables.inner_stiffness, "N/m"),
+            "ground.stiffness": with_unit(hard * ground.stiffness, "N/m"),
         }
         changed = scenario.with_changes(changes)
         assert normal_forces(changed).sum() == pytest.approx(weight(changed), rel=1e-9)
@@ -80,10 +88,10 @@ def test_the_ground_bears_the_weight_whatever_the_stiffnesses(scenario, tetrahed
 @pytest.mark.parametrize(
     ("changes", "slack"),
     [
-        ({"robot.strut_length": 0.1}, 0),
-        ({"robot.strut_length": 0.25, "robot.gravity": 1.6}, 0),
+        ({"robot.strut_length": "0.1 m"}, 0),
+        ({"robot.strut_length": "0.25 m", "robot.gravity": "1.6 m/s^2"}, 0),
         # Cables of 0.12 m: the tetrahedra lean forward, and only those from tips to tops hold them.
-        ({"robot.spacing": 0.08, "cables.free_length": 0.12, "robot.contacts": "all"}, 20),
+        ({"robot.spacing": "0.08 m", "cables.free_length": "0.12 m", "robot.contacts": "all"}, 20),
     ],
 )
 def test_no_force_is_left_on_any_body(scenario, changes, slack):
@@ -110,9 +118,7 @@ def test_no_force_is_left_on_any_body(scenario, changes, slack):
 def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario):
     # It gets there in other last digits on another processor, and so it does from another start.
     elsewhere = scenario.with_changes({"robot.spacing": 1.01 * scenario.robot.spacing})
-    spacings = [
-        np.diff(settled_state(each)[4:35:7]).tolist() for each in (scenario, elsewhere)
-    ]
+    spacings = [np.diff(settled_state(each)[4:35:7]).tolist() for each in (scenario, elsewhere)]
     assert spacings[0] != spacings[1]
     assert np.array_equal(settled_lengths(elsewhere), settled_lengths(scenario))
 
@@ -129,7 +135,7 @@ def test_neither_terrain_nor_offsets_nor_friction_matter(scenario):
         {
             "terrain": Incline(slope=0.2, start=None),
             "friction": Coulomb(stiffness=100.0),
-            "robot.offsets": [[0.01 * i, 0.01, 0.1] for i in range(5)],
+            "robot.offsets": with_unit([[0.01 * i, 0.01, 0.1] for i in range(5)], "m"),
         }
     )
     assert np.array_equal(settled_state(elsewhere), settled_state(scenario))

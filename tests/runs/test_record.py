@@ -15,8 +15,8 @@ TINY = record.Experiment(
     "two tetrahedra",
     "thesis",
     {
-        **{"simulation.engine": "compiled", "simulation.duration": 0.4},
-        **{"simulation.steady_from": 0.1, "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)},
+        **{"simulation.engine": "compiled", "simulation.duration": "0.4 s"},
+        **{"simulation.steady_from": "0.1 s", "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)},
         **{"evolution.trials": 2, "evolution.max_evaluations": 12},
     },
     film=True,

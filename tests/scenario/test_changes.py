@@ -1,5 +1,6 @@
 """Scenarios made from others: changed values, balanced spacing, references."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.fields import dump_yaml, tree_of
 from tetra_drake.scenario.load import differences, load_scenario
+from tetra_drake.scenario.optimizers import QualityDiversity
 from tetra_drake.scenario.schema import Coulomb, ReferenceScenario, Scenario
 
 IN = 0.0254
@@ -35,12 +37,18 @@ def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
     [
         ({"robot.tetrahedrons": 7}, "robot.tetrahedrons", "'tetrahedra'"),
         ({"robots.tetrahedra": 7}, "robots", "'robot'"),
-        ({"robot.spacing.x": 1.0}, "robot.spacing.x", "'spacing'"),
-        ({"robot.spacing": -1.0}, "robot.spacing", "-1.0"),
+        ({"robot.spacing.x": "1 m"}, "robot.spacing", "a mapping"),
+        ({"cables.outer_stiffness": 40}, "cables.outer_stiffness", "40 without a unit"),
+        ({"robot.offsets": np.ones((5, 3))}, "robot.offsets[0][0]", "1.0 without a unit"),
+        ({"engine": "compiled"}, "engine", "'simulation.engine'"),
+        ({"damping": "1 N*s/m"}, "damping", "'cables.damping'"),
+        ({"static": 0.5}, "static", "'friction.static'"),
+        ({"robot": {"tetrahedra": 7}, "robot.tetrahedra": 7}, "robot.tetrahedra", "twice"),
+        ({"friction.static": 0.5, "friction": Coulomb()}, "friction", "twice"),
+        ({"robot.spacing": "-1.0 m"}, "robot.spacing", "-1.0"),
         ({"robot.spacing": "3 s"}, "robot.spacing", "'3 s'"),
-        ({"simulation.duration": 2.0}, "simulation.steady_from", "3.0 s"),
-        ({"robot": {}}, "robot.tetrahedra", "missing"),
-        ({"reference.duration": 3.0, "reference.source": 5}, "reference.source", "5"),
+        ({"simulation.duration": "2.0 s"}, "simulation.steady_from", "3.0 s"),
+        ({"reference.duration": "3.0 s", "reference.source": 5}, "reference.source", "5"),
     ],
 )
 def test_bad_changes_are_refused(scenario, changes, key, found, refused):
@@ -102,17 +110,43 @@ def test_the_balance_is_computed_again_from_file_to_file(tmp_path, scenario):
     assert second.robot.spacing == pytest.approx(scenario.robot.spacing, rel=2e-3)
 
 
-def test_a_changed_scenario_keeps_its_spacing_unless_it_is_given(scenario):
+def test_what_python_changes_decides_on_the_spacing_as_in_a_file(tmp_path, scenario):
     stiff = {"cables.outer_stiffness": "0.4 lbf/in"}
-    assert scenario.with_changes(stiff).robot.spacing == scenario.robot.spacing
-    assert axial_force(scenario.with_changes(stiff | {"robot.spacing": "balanced"})) < 1e-9
+    balanced = scenario.with_changes(stiff).robot.spacing
+    assert balanced == derived(tmp_path, STIFF).robot.spacing != scenario.robot.spacing
+    assert scenario.with_changes(stiff | {"robot.spacing": "2.5 in"}).robot.spacing == 2.5 * IN
+    stiffer = scenario.with_changes({"cables": replace(scenario.cables, outer_stiffness=70.0)})
+    assert abs(axial_force(stiffer)) < 1e-9
+
+
+def test_a_mapping_changes_what_it_names_as_in_a_file(tmp_path, scenario):
+    changed = scenario.with_changes({"simulation": {"engine": "compiled"}, "name": "mine"})
+    assert changed == derived(tmp_path, "name: mine\nsimulation: {engine: compiled}")
+    assert changed.simulation == replace(scenario.simulation, engine="compiled")
+    coulomb = scenario.with_changes({"friction": Coulomb(static=0.7)})
+    assert coulomb.with_changes({"friction": {"kinetic": 0.3}}).friction == Coulomb(
+        static=0.7, kinetic=0.3
+    )
+
+
+def test_a_dataclass_replaces_its_section_as_a_whole(scenario):
+    other = QualityDiversity(measures={"distance": [0.0, 1.0], "lifted": [0.0, 1.0]}, sigma=0.3)
+    mapped = scenario.with_changes({"optimizer": other})
+    twist = QualityDiversity(measures={"twist": [0.0, 0.1], "lifted": [0.0, 1.0]})
+    assert mapped.with_changes({"optimizer": twist}).optimizer == twist
+
+
+def test_a_metric_joins_the_objective_where_a_mapping_replaces_it(scenario):
+    joined = scenario.with_changes({"objective.lead": "2 /m"}).objective
+    assert joined == scenario.objective | {"lead": 2.0}
+    assert scenario.with_changes({"objective": {"lead": "2 /m"}}).objective == {"lead": 2.0}
 
 
 def test_a_balanced_robot_stays_where_it_stands_until_it_is_actuated(scenario):
     # At 2.94 in, seven tetrahedra with outer cables twice as stiff shrink: T1 moves 1.96 in.
     changes = {"robot.tetrahedra": 7, "robot.spacing": "balanced", "simulation.engine": "compiled"}
     changes |= {"cables.outer_stiffness": "0.4 lbf/in", "simulation.steady_from": 0.0}
-    robot = scenario.with_changes(changes | {"simulation.duration": scenario.cpg.start_up})
+    robot = scenario.with_changes(changes | {"simulation.duration": f"{scenario.cpg.start_up} s"})
     distance = simulate(scenario=robot, gait=seeded_gait(robot, 0)).metrics.distance
     assert abs(distance) < 0.005 * IN
 
@@ -146,7 +180,7 @@ def test_a_difference_to_a_base_with_other_than_default_values_is_seen(scenario)
 @pytest.mark.parametrize(
     "changes",
     [
-        {"robot.tetrahedra": 3, "robot.offsets": [[0.0, 0.0, 0.1]] * 3},
+        {"robot.tetrahedra": 3, "robot.offsets": [[0.0, 0.0, "0.1 m"]] * 3},
         {"friction": Coulomb(lateral=2.0)},  # not kinds with required keys: Drake starts from none
     ],
 )

@@ -17,7 +17,7 @@ from tetra_drake.scenario.fields import (
     quantity,
     setting,
     tree_of,
-    with_values,
+    tree_of_changes,
 )
 
 
@@ -189,16 +189,18 @@ def test_a_file_is_merged_with_its_base(base, changes, result):
     [
         ({"terrain": Flat()}, "terrain", Flat()),
         ({"terrain": Cells(cells=[1.0])}, "terrain", Cells(cells=[1.0])),
-        ({"terrain.slope": 0.2}, "terrain", Incline(slope=0.2)),
+        ({"terrain.slope": "0.2 rad"}, "terrain", Incline(slope=0.2)),
         ({"terrain": {"_tag": "!Incline", "slope": "180 deg"}}, "terrain", Incline(slope=np.pi)),
         ({"ramps": (Flat(), Incline(slope=1))}, "ramps", [Flat(), Incline(slope=1.0)]),
-        ({"probe.at": np.array([1, 2, 3])}, "probe", Probe(at=[1.0, 2.0, 3.0])),
+        ({"probe": Probe(at=np.array([1, 2, 3]))}, "probe", Probe(at=[1.0, 2.0, 3.0])),
         ({"count": np.int64(3)}, "count", 3),
         ({"weights.twist": 2}, "weights", {"distance": 1.0, "twist": 2.0}),
     ],
 )
 def test_values_may_be_changed_from_python(changes, name, value):
     inclined = load("terrain: !Incline {slope: 1 rad}")
-    tree = with_values(tree_of(inclined), changes, "changes")
-    assert getattr(Check("changes", complete=True).value(Settings, tree), name) == value
+    base = tree_of(inclined)
+    given = Check("changes").value(Settings, tree_of_changes(changes, base, "changes"))
+    changed = Check("changes", complete=True).value(Settings, merge(base, given))
+    assert getattr(changed, name) == value
     assert inclined.terrain == Incline(slope=1.0)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.quantities import with_unit
 from pytest import approx
 
 from tetra_drake.errors import InputError
@@ -82,7 +83,7 @@ def test_a_draw_is_that_of_its_seed_and_leaves_the_scenario_as_it_is(tmp_path):
 
 def test_displaced_starts_add_to_the_offsets_of_the_scenario(tmp_path):
     offsets = [[0.0, 0.0, 0.01 * i] for i in range(5)]
-    scenario = loaded(tmp_path, SPREADS).with_changes({"robot.offsets": offsets})
+    scenario = loaded(tmp_path, SPREADS).with_changes({"robot.offsets": with_unit(offsets, "m")})
     draw = draw_disturbances(scenario, (1,))
     assert np.allclose(disturbed(scenario, draw).robot.offsets, draw.moves + offsets, atol=1e-15)
 

@@ -104,8 +104,8 @@ NETWORKS = {
             "cpg.signals": "live",
             "gait_bounds.mirrored": True,
             "gait_bounds.turn": 1.0,
-            "simulation.duration": 30.0,
-            "objective": {"heading_change": 1.0},
+            "simulation.duration": "30.0 s",
+            "objective": {"heading_change": "1 /rad"},
         },
     ),
     "all-cables": (
@@ -250,15 +250,17 @@ def test_recorded_scenarios_load(file):
 def test_a_file_changes_only_what_it_gives(tmp_path, scenario):
     given = "base: thesis\nname: damped\ncables: {damping: 1 N*s/m, slack: true}"
     file = write(tmp_path, f"{given}\nsimulation: {{steady_from: 500 ms}}")
-    changes = {"name": "damped", "cables.damping": 1, "cables.slack": True}
-    assert load_scenario(file) == scenario.with_changes(changes | {"simulation.steady_from": 0.5})
+    changes = {"name": "damped", "cables.damping": "1 N*s/m", "cables.slack": True}
+    assert load_scenario(file) == scenario.with_changes(
+        changes | {"simulation.steady_from": "0.5 s"}
+    )
 
 
 def test_a_base_file_is_found_beside_the_file_that_names_it(tmp_path, scenario):
     write(tmp_path, "base: thesis\nrobot: {spacing: 3 m, gravity: 1 m/s^2}\n", "common/low.yaml")
     write(tmp_path, "base: common/low.yaml\nrobot: {spacing: 2 m}\n", "middle.yaml")
     file = write(tmp_path, "base: ../middle.yaml\nname: top\n", "mine/top.yaml")
-    changes = {"name": "top", "robot.spacing": 2.0, "robot.gravity": 1.0}
+    changes = {"name": "top", "robot.spacing": "2.0 m", "robot.gravity": "1.0 m/s^2"}
     assert load_scenario(str(file)) == scenario.with_changes(changes)
 
 
@@ -302,7 +304,10 @@ def test_friction_changes_from_python(scenario):
     assert changed.with_changes({"friction.kinetic": 0.3}).friction == Coulomb(
         static=0.7, kinetic=0.3
     )
-    assert scenario.with_changes({"friction.stiction_damping": 3}).friction.stiction_damping == 3.0
+    assert (
+        scenario.with_changes({"friction.stiction_damping": "3 N*s/m"}).friction.stiction_damping
+        == 3.0
+    )
 
 
 # Dumping and comparing
@@ -324,7 +329,7 @@ def test_a_dumped_scenario_keeps_every_bit_and_needs_no_base(tmp_path, scenario)
 def test_differences_are_keys_and_readable_values(scenario):
     changes = {"cables.slack": True, "cpg.signals": "live", "evolution.stop_rise": 0.1 + 0.2}
     changes |= {"name": "other", "friction.stiction_damping": "0.3 lbf*s/in"}
-    changed = scenario.with_changes(changes | {"robot.offsets": [[0.001, 0, 0]] * 5})
+    changed = scenario.with_changes(changes | {"robot.offsets": [["1 mm", 0, 0]] * 5})
     assert differences(changed, scenario) == [
         ("robot.offsets", f"[{', '.join(['[0.001 m, 0 m, 0 m]'] * 5)}]"),
         ("friction.stiction_damping", "52.5381 N*s/m"),

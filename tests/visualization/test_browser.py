@@ -23,7 +23,7 @@ from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.visualization.replay import frame_samples, replay_title, save_replay
+from tetra_drake.visualization.replay import frame_samples, save_replay
 from tetra_drake.visualization.scene import COLOURS
 
 if not os.environ.get("CI"):
@@ -38,7 +38,7 @@ WINDOW = 600, 400  # small, as it is drawn again and again in software
 @pytest.fixture(scope="module")
 def trajectory(data):
     """5 s, long enough to get somewhere."""
-    changes = {"simulation.duration": 5.0, "simulation.engine": "compiled"}
+    changes = {"simulation.duration": "5.0 s", "simulation.engine": "compiled"}
     scenario = load_scenario("thesis").with_changes(changes)
     gait = load_gait(data / "gait_g.json", scenario)
     return simulate(scenario=scenario, gait=gait, record=True).trajectory
@@ -47,7 +47,7 @@ def trajectory(data):
 @pytest.fixture(scope="module")
 def replay(trajectory, tmp_path_factory):
     path = tmp_path_factory.mktemp("replay") / "replay.html"
-    title = replay_title("a gait", trajectory)
+    title = "a gait: 1.00 inches"
     save_replay(path, scenario=load_scenario("thesis"), trajectory=trajectory, title=title)
     return path
 
@@ -118,7 +118,7 @@ def pixels_of(image, name):
 
 
 def test_the_page_has_its_title_and_real_speed(page, trajectory):
-    title = replay_title("a gait", trajectory)
+    title = "a gait: 1.00 inches"
     assert [page.title(), page.locator("h1").text_content()] == [title, title]
     speed = page.evaluate("[viewer.animator.mixer.timeScale, viewer.animator.duration]")
     assert speed == pytest.approx([1.0, 5.0])

@@ -41,7 +41,9 @@ class FakeTime:
 
 @pytest.fixture
 def short(scenario):
-    return scenario.with_changes({"simulation.duration": 0.3, "simulation.steady_from": 0.1})
+    return scenario.with_changes(
+        {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
+    )
 
 
 @pytest.fixture

@@ -44,7 +44,7 @@ LANES = 8  # gaits at a time for the cost per step
 GROUND_BATCH = 30  # gaits at a time on each ground
 ROUNDS = 3  # measurements of batches and costs, of which the medians count
 
-SHORT = {"simulation.duration": 0.02, "simulation.steady_from": 0.01}
+SHORT = {"simulation.duration": "0.02 s", "simulation.steady_from": "0.01 s"}
 """For simulations that only load or compile what is timed later."""
 
 Array = np.ndarray

@@ -22,7 +22,7 @@ def grounds() -> dict[str, Changes]:
     rough = {"terrain": shipped.terrain, "robot.contacts": shipped.robot.contacts}
     coulomb = {
         "friction": shipped.friction,
-        "compiled.tolerance": shipped.compiled.tolerance,
+        "compiled.tolerance": f"{shipped.compiled.tolerance!r} m/s",
     }
     return {
         "the scenario's": {},

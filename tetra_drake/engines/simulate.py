@@ -7,14 +7,16 @@ import dataclasses
 import math
 import os
 from collections.abc import Sequence
+from pathlib import Path
 
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.model import make_model
-from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.robot.network import SteeringSignal, constant_steering
 from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 
 _BRIEF = 0.01
@@ -23,16 +25,17 @@ _BRIEF = 0.01
 
 def simulate(
     *,
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     gait: Gait,
     record: bool = False,
     viewer: Viewer | None = None,
-    steering: SteeringSignal | None = None,
+    steering: SteeringSignal | float | None = None,
 ) -> SimulationResult:
     """Simulates the scenario's robot walking by a gait for the scenario's duration, on the
     engine that the scenario names.
 
-    `steering`, the turn from -1 to 1 by the time in s, acts in place of the gait's turn.
+    `scenario` may be the name of a shipped one or a file. `steering`, the turn from -1 to 1, or a
+    function of the time in s that gives it, acts in place of the gait's turn.
 
     Pure: the same scenario and gait give the same numbers, bit for bit, wall time aside,
     whether or not a trajectory is recorded and whoever watches.
@@ -40,6 +43,10 @@ def simulate(
     Raises Diverged or StepBudgetExceeded, which say when and why, and InputError if the gait or
     the steering does not fit the scenario.
     """
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    if steering is not None and not callable(steering):
+        steering = constant_steering(steering)
     if scenario.simulation.engine == "drake":
         from tetra_drake.engines.drake import simulate_drake
 
@@ -63,7 +70,7 @@ def simulate(
 
 def simulate_many(
     *,
-    scenario: Scenario | Sequence[Scenario],
+    scenario: Scenario | str | Path | Sequence[Scenario],
     gaits: Sequence[Gait],
     record: bool = False,
     workers: int | None = None,
@@ -81,6 +88,8 @@ def simulate_many(
 
     Raises InputError if there is not one scenario or as many as gaits, or if a gait does not fit.
     """
+    if isinstance(scenario, (str, Path)):
+        scenario = load_scenario(scenario)
     scenarios = [scenario] * len(gaits) if isinstance(scenario, Scenario) else list(scenario)
     if len(scenarios) != len(gaits):
         problem = f"found {len(scenarios)}, expected one, or one for each of {len(gaits)} gaits"

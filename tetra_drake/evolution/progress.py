@@ -13,9 +13,12 @@ from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.formatting import duration, fixed
 
 if TYPE_CHECKING:
-    from rich.progress import TaskID
+    from rich.progress import Task, TaskID
 
 _LINE_PERIOD = 10.0  # s, between plain lines
+
+_LEAST_MADE = 5
+"""What a stage has made before its time left is estimated: single evaluations vary too much."""
 
 
 class Progress:
@@ -48,13 +51,22 @@ class Display(Progress):
     def __init__(self, stream: TextIO) -> None:
         from rich import progress
         from rich.console import Console
+        from rich.text import Text
+
+        class TimeLeft(progress.ProgressColumn):
+            """The time left of a stage, as plain lines have it."""
+
+            max_refresh = 0.5
+
+            def render(self, task: progress.Task) -> Text:
+                return Text(_time_left(task), style="progress.remaining")
 
         self._plain = not stream.isatty()
         self._bars = progress.Progress(
             progress.TextColumn("{task.description}"),
             progress.BarColumn(bar_width=20),
             progress.MofNCompleteColumn(),
-            progress.TimeRemainingColumn(),
+            TimeLeft(),
             progress.TextColumn("{task.fields[text]}"),
             console=Console(file=stream),
             refresh_per_second=4,
@@ -92,17 +104,26 @@ class Display(Progress):
         """Moves the stage's bar, or prints a line where one is due."""
         begins = title not in self._tasks
         if begins:  # with what is done, so that the speed counts only what is made now
-            self._tasks[title] = self._bars.add_task(title, completed=done, total=total, text=text)
+            self._tasks[title] = self._bars.add_task(
+                title, completed=done, total=total, text=text, begun=done
+            )
         self._bars.update(self._tasks[title], completed=done, total=total, text=text)
         if self._plain:
-            left = self._bars.tasks[self._tasks[title]].time_remaining
+            left = _time_left(self._bars.tasks[self._tasks[title]])
             line = f"{title}: {done} of {total}" + (f", {text}" if text else "")
-            line += f", {duration(left)} left" if left else ""
+            line += f", {left} left" if left else ""
             (printed, last), now = self._last, time.monotonic()
             due = begins or done == total or now - printed >= _LINE_PERIOD
             if due and line != last:
                 self._last = now, line
                 self.say(line)
+
+
+def _time_left(task: Task) -> str:
+    """The time left of a stage; "" before it is known, and at the end."""
+    made = task.completed - task.fields["begun"]
+    seconds = task.time_remaining if made >= _LEAST_MADE else None
+    return duration(seconds) if seconds else ""
 
 
 def overview(statuses: Sequence[TrialStatus]) -> str:

@@ -86,6 +86,8 @@ def evaluate_again(
     chosen = run.initial() if initial else run.best(max(1, BEST_GAITS // scenario.draws))
     rows = chosen[["trial", "index", "iteration"]].itertuples(index=False, name=None)
     missing = [row for row in rows if row[:2] not in done]
+    if not missing:
+        return run
     vectors = [run.vector(trial, index) for trial, index, _ in missing]
     progress = progress or Progress()
     title = f"{'initial' if initial else 'best'} gaits on the Drake diagram"
@@ -100,7 +102,7 @@ def evaluate_again(
         entry = evaluation_entry(index, iteration, vectors[i], evaluation)
         append_lines(trial_folder(run.directory, trial) / REEVALUATIONS, [entry])
         progress.stage(title, finished, len(missing))
-    return load_run(directory) if missing else run
+    return load_run(directory)
 
 
 def best_distances(run: Run) -> list[tuple[int, float, float]]:

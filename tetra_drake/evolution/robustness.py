@@ -6,23 +6,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.evolution.statistics import interval
-from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.statistics import interval, share_interval
 from tetra_drake.files import json_number
 from tetra_drake.formatting import aligned, fixed, ranged, signed
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult, versions
-from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.disturbances import Draw, disturbed, draw_disturbances, key_groups
 from tetra_drake.scenario.fields import tree_of
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.schema import DisturbancesScenario, Scenario
 from tetra_drake.scenario.units import INCH
@@ -79,19 +76,6 @@ class Judgement:
         change = table["distance"] - before
         kept = (change >= -LOSS * before.abs()) & (table["missed"] == "")  # False where NaN
         return table.assign(undisturbed=before, change=change, kept=kept)
-
-
-def gaits_of(source: Path, *, scenario: str | None = None) -> tuple[Scenario, dict[Any, Gait]]:
-    """The gait of a file, or the best gait of each trial of a run, and the scenario to use: this
-    one, a name or file, instead of the run's, or the thesis's for a gait file."""
-    if not source.is_dir():
-        loaded = load_scenario(scenario or "thesis")
-        return loaded, {source.stem: load_gait(source, loaded)}
-    run = load_run(source)
-    run.fittest()  # raises InputError if there is none
-    loaded = load_scenario(scenario) if scenario else run.manifest.scenario
-    best = run.best()[["trial", "index"]].to_numpy()
-    return loaded, {f"trial {trial}": run.gait(trial, index) for trial, index in best}
 
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> DisturbancesScenario:
@@ -229,14 +213,20 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
 
     rows = {}
     for gait, draws in judgement.compared(judgement.draws).groupby("gait", sort=False):
-        distance, kept = draws["distance"], draws["kept"].astype(float)
+        distance, kept = draws["distance"], draws["kept"]
         rows[gait] = {
             "undisturbed": draws["undisturbed"].iloc[0],
             **{name: distance.quantile(share) for name, share in QUANTILES.items()},
             "mean": distance.mean(),
             **dict(zip(("mean_low", "mean_high"), interval(distance), strict=True)),
             "kept": kept.mean(),
-            **dict(zip(("kept_low", "kept_high"), interval(kept), strict=True)),
+            **dict(
+                zip(
+                    ("kept_low", "kept_high"),
+                    share_interval(int(kept.sum()), len(kept)),
+                    strict=True,
+                )
+            ),
             "failed": int(draws["failure"].notna().sum()),
             "missed": int((draws["missed"] != "").sum()),
         }
@@ -362,5 +352,6 @@ def inches(value: float, low: float, high: float) -> str:
 
 
 def percents(value: float, low: float, high: float) -> str:
-    """A share with its confidence interval."""
-    return f"{100.0 * value:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f})"
+    """A share with its confidence interval, which is left out where it has no width."""
+    text = f"{100.0 * value:.0f} %"
+    return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,21 @@ def interval(values: npt.ArrayLike, statistic: Callable[..., Any] = np.mean) -> 
     picks = np.random.default_rng(0).integers(len(numbers), size=(RESAMPLES, len(numbers)))
     low, high = np.quantile(statistic(numbers[picks], axis=1), [0.025, 0.975])
     return float(low), float(high)
+
+
+def share_interval(count: int, total: int) -> tuple[float, float]:
+    """Wilson score interval, at 95 % confidence, of the share of `count` in `total`.
+
+    It has a width where the share is 0 or 1, too: 40 of 40 give 91 to 100 %. From Wilson (1927),
+    "Probable inference, the law of succession, and statistical inference", J. Am. Stat. Assoc. 22.
+    """
+    if total == 0:
+        return math.nan, math.nan
+    z = NormalDist().inv_cdf(0.975)
+    share, scale = count / total, 1.0 / (1.0 + z * z / total)
+    centre = scale * (share + 0.5 * z * z / total)
+    reach = scale * z * math.sqrt(share * (1.0 - share) / total + 0.25 * (z / total) ** 2)
+    return max(0.0, centre - reach), min(1.0, centre + reach)
 
 
 def interquartile_mean(values: npt.ArrayLike, axis: int = -1) -> Any:

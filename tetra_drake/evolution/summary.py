@@ -13,7 +13,7 @@ from tetra_drake.evolution.optimizers.steady_state import CHILDREN
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.tables import Run, gait_label
 from tetra_drake.evolution.trials import TrialStatus
-from tetra_drake.formatting import duration, fixed
+from tetra_drake.formatting import aligned, duration, fixed, signed
 from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, customary
@@ -66,7 +66,7 @@ def summary(run: Run) -> str:
     reference = run.manifest.scenario.reference
     source = reference.source if reference else ""
     rows = [Comparison("", "this run", source), *comparisons(run)]
-    lines += [f"{name:<32}{ours:>10}   {theirs}".rstrip() for name, ours, theirs in rows]
+    lines += [line.rstrip() for line in aligned(rows).splitlines()]
     lines += _metrics_of_the_best(run)
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
@@ -113,27 +113,44 @@ def whole_experiment(scenario: Scenario, *, seconds: float) -> str:
 
 
 def comparisons(run: Run) -> list[Comparison]:
-    """The results of a run beside the reference's. Distances are those of the fittest gaits; the
-    best trial is the one with the fittest gait of all."""
-    statuses, reference = run.statuses, run.manifest.scenario.reference
-    rises = [status.improvement_percent for status in statuses]
-    best_trial = max(statuses, key=lambda status: status.best_fitness)
+    """The results of a run beside the reference's.
 
-    def row(name: str, values: Sequence[float], key: str, unit: str) -> Comparison:
+    Distances are those of the fittest gaits; the best gait is the fittest of all. Improvements are
+    in inches, and in percent where the initial distances are long enough to compare with.
+    """
+    statuses, reference = run.statuses, run.manifest.scenario.reference
+    best = max(statuses, key=lambda status: status.best_fitness)
+    initial = [status.initial_best_distance_in for status in statuses]
+    evaluations = sum(status.evaluations for status in statuses)
+    wall_time = sum(status.wall_time for status in statuses)
+    iteration_time = CHILDREN * wall_time / max(evaluations, 1)
+
+    def row(name: str, ours: str, key: str, unit: str) -> Comparison:
         theirs = getattr(reference, key, None)
         shown = "" if theirs is None else f"{theirs / (INCH if unit == 'in' else 1.0):.4g} {unit}"
-        finite = [value for value in values if math.isfinite(value)] or [math.nan]
-        ours = max(finite) if unit == "in" else float(np.mean(finite))
-        return Comparison(name, f"{fixed(ours)} {unit}", shown)
+        return Comparison(name, ours, shown)
 
-    evaluations = sum(status.evaluations for status in statuses)
-    times = [CHILDREN * status.wall_time / max(evaluations, 1) for status in statuses]
-    initial = [status.initial_best_distance_in for status in statuses]
-    best = [status.best_distance_in for status in statuses]
     return [
-        row("best initial gait", initial, "best_initial_distance", "in"),
-        row("best evolved gait", best, "best_distance", "in"),
-        row("improvement, mean of trials", rises, "mean_improvement", "%"),
-        row("improvement, best trial", [best_trial.improvement_percent], "best_improvement", "%"),
-        row("time per two evaluations", [sum(times)], "iteration_time", "s"),
+        row(
+            "best initial gait",
+            f"{fixed(_finite(initial).max())} in",
+            "best_initial_distance",
+            "in",
+        ),
+        row("best evolved gait", f"{fixed(best.best_distance_in)} in", "best_distance", "in"),
+        row("improvement, mean of trials", _improvement(statuses), "mean_improvement", "%"),
+        row("improvement, best gait's trial", _improvement([best]), "best_improvement", "%"),
+        row("time per two evaluations", f"{fixed(iteration_time)} s", "iteration_time", "s"),
     ]
+
+
+def _improvement(statuses: Sequence[TrialStatus]) -> str:
+    """Mean gain of trials in inches, and in percent if all trials have one."""
+    gain = f"{signed(_finite([status.gain_in for status in statuses]).mean())} in"
+    percent = float(np.mean([status.gain_percent for status in statuses]))
+    return f"{gain} ({fixed(percent, 0)} %)" if math.isfinite(percent) else gain
+
+
+def _finite(values: Sequence[float]) -> np.ndarray:
+    """The finite ones of the values; NaN alone if there is none."""
+    return np.array([value for value in values if math.isfinite(value)] or [math.nan])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,7 +69,11 @@ class Run:
         return [self._status(trial) for trial in range(self.manifest.scenario.evolution.trials)]
 
     def best(self, count: int = 1) -> pandas.DataFrame:
-        """The fittest different gaits of each trial, best first: rows of `evaluations`."""
+        """The fittest different gaits of each trial: rows of `evaluations`.
+
+        Trial after trial, within a trial the best first. So the first row is the best of trial 0,
+        not of the run: that is best_gait().
+        """
         ranked = self.whole.dropna(subset="fitness").sort_values(
             ["trial", "fitness", "index"], ascending=[True, False, True]
         )
@@ -82,6 +86,10 @@ class Run:
             raise InputError(self.directory, "", "no gait of this run has a fitness yet")
         row = best.loc[best["fitness"].idxmax()]
         return int(row["trial"]), int(row["index"])
+
+    def best_gait(self) -> Gait:
+        """The run's fittest gait, of all trials; InputError while no gait has a fitness."""
+        return self.gait(*self.fittest())
 
     def initial_best(self, trial: int) -> int:
         """Index of the fittest gait of a trial's first iteration in which not all failed."""
@@ -118,7 +126,8 @@ class Run:
         """The gait of an evaluation."""
         scenario = self.manifest.scenario
         name = f"{scenario.name}, seed {self.manifest.seed}, trial {trial}, evaluation {index}"
-        return ParameterSpace.of(scenario).gait(self.vector(trial, index), name=name)
+        gait = ParameterSpace.of(scenario).gait(self.vector(trial, index), name=name)
+        return replace(gait, scenario=scenario.name)
 
     @property
     def _columns(self) -> list[str]:

@@ -41,6 +41,9 @@ from tetra_drake.scenario.units import INCH
 
 _SHOW_PERIOD = 1.0  # s
 
+LEAST_BASE = 1.0
+"""in: a gain in percent of a shorter distance says nothing."""
+
 
 @dataclass
 class TrialStatus:
@@ -66,10 +69,16 @@ class TrialStatus:
     """Why the trial ended; None while it goes on."""
 
     @property
-    def improvement_percent(self) -> float:
-        """Rise of the best distance, in %; NaN where the best initial gait did not walk forward."""
+    def gain_in(self) -> float:
+        """Rise of the best distance, in inches."""
+        return self.best_distance_in - self.initial_best_distance_in
+
+    @property
+    def gain_percent(self) -> float:
+        """The gain in % of the best initial distance; NaN where that is too short to compare with,
+        below LEAST_BASE."""
         initial = self.initial_best_distance_in
-        return 100.0 * (self.best_distance_in / initial - 1.0) if initial > 0.0 else math.nan
+        return 100.0 * self.gain_in / initial if initial >= LEAST_BASE else math.nan
 
     def count(self, evaluations: int, *, failures: int, wall_time: float) -> None:
         """Adds evaluations."""

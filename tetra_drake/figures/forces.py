@@ -21,6 +21,14 @@ from tetra_drake.scenario.units import POUND_FORCE
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
 _SECOND: Any = {"color": OKABE_ITO["vermillion"], "linestyle": (0, (4, 1.2))}
+_LANDING: Any = {"color": "black", "marker": "v", "markersize": 4.0, "linestyle": ""}
+
+_TOP = 0.94
+"""Where landings are marked, as a share of a panel's height."""
+
+_IMPACTS, _MARGIN = 0.01, 0.25
+"""Share of the samples at either end of their range that does not count for the scale of forces,
+and the margin beside the rest, as a share of it."""
 
 _ROWS, _COLUMNS = 10, 4
 """Panels one below the other before there is another column, and the most columns."""
@@ -52,12 +60,14 @@ def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
 
 @common_style()
 def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float = 5.0) -> Figure:
-    """Normal force and friction along x (lbf) over the last `seconds` of time (s).
+    """Normal force and friction along x (lbf) over the last seconds of time (s).
 
     On uneven ground, friction along the forward tangent, which is x projected on the slope. One
     panel per tetrahedron, for its bottom left node, one for each right one that is not its mirror
     image, and one for each other node that touches. Shaded: intervals without normal force, with
-    their share of the time shown.
+    their share of the time shown. Triangles: landings. An impact is shorter than the time between
+    two samples, so a sample may show or miss its peak. The scale is that of the forces between
+    impacts: peaks beyond it are cut off.
     """
     end = trajectory.sel(time=slice(trajectory.time[-1] - seconds, None))
     forces = end[["normal_force", "friction_force"]] / POUND_FORCE
@@ -68,16 +78,36 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
     figure, panels = _panels_over_time(shown, groups=2 if both else 1)
     for contact, panel in panels.items():
         node, off = forces.sel(contact=contact), off_ground(end.sel(contact=contact))
-        for interval in intervals(off.time.values, off.values):
+        lifted = intervals(off.time.values, off.values)
+        for interval in lifted:
             panel.axvspan(*interval, color=SHADE, linewidth=0.0)
         panel.plot(node.time, node.normal_force, **_FIRST)
         panel.plot(node.time, node.friction_force.sel(horizontal="x"), **_SECOND)
+        landings = [stop for _, stop in lifted if stop < off.time[-1]]
+        above = panel.get_xaxis_transform()
+        panel.plot(landings, [_TOP] * len(landings), transform=above, **_LANDING)
         share = fixed(100 * share_of_time(off), 0)
         panel.set_title(f"lifted {share} %", loc="right")
-    lines = {"normal force": _FIRST, f"friction force {along}": _SECOND}
+        panel.set_ylim(_limits_between_impacts(forces))
+    lines = {"normal force": _FIRST, f"friction force {along}": _SECOND, "landing": _LANDING}
     legend_below(figure, lines, Patch(color=SHADE, label="no normal force"))
-    figure.suptitle("Forces of the ground on each tetrahedron")
+    period = 1e3 * float(end.time[1] - end.time[0])
+    figure.suptitle(
+        "Forces of the ground on each tetrahedron\n"
+        f"every {period:.3g} ms: peaks of impacts, which are shorter, are missed or cut off"
+    )
     return figure
+
+
+def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | None:
+    """The range of the forces of nodes that touch, without the hundredth at either end, where
+    impacts are, and with a margin; None if no node touches."""
+    touching = forces.where(forces.normal_force > 0.0)
+    normal, friction = touching.normal_force, touching.friction_force.sel(horizontal="x")
+    values = np.concatenate([normal.values.ravel(), friction.values.ravel(), [0.0]])
+    low, high = np.nanquantile(values, [_IMPACTS, 1.0 - _IMPACTS])
+    margin = _MARGIN * (high - low)
+    return (low - margin, high + margin) if margin > 0.0 else None
 
 
 def _contacts_to_show(trajectory: xarray.Dataset) -> list[str]:

@@ -90,15 +90,18 @@ def relative_distances(trajectory: xarray.Dataset) -> Figure:
 def before_and_after(
     walks: Sequence[tuple[str, xarray.Dataset]], reference: ReferenceScenario | None = None
 ) -> Figure:
-    """Distance walked over time by the best gait before and after evolution."""
+    """Distance walked over time by a run's best gait and the best initial one of its trial."""
     # `walks`: label and trajectory of each.
     figure, [panels] = make_figure(width_in=8.0, height_in=4.0, columns=2, sharey=True)
-    kinds = {"initial": "best_initial_distance", "evolved": "best_distance"}
+    kinds = {
+        "best initial gait of the trial": "best_initial_distance",
+        "best evolved gait": "best_distance",
+    }
     for panel, kind, (label, trajectory) in zip(panels, kinds, walks, strict=True):
         walked = measures.distance_walked(trajectory) / INCH
         panel.plot(walked.time, walked, color=OKABE_ITO["blue"])
         draw_reference(panel, reference, kinds[kind])
-        title = f"best {kind} gait: {fixed(float(walked[-1]))} in\n{textwrap.shorten(label, 60)}"
+        title = f"{kind}: {fixed(float(walked[-1]))} in\n{textwrap.shorten(label, 60)}"
         panel.set_title(title, parse_math=False)  # a name may hold a dollar sign
         panel.set_xlabel("time (s)")
     panels[0].margins(y=0.08)

@@ -10,6 +10,7 @@ import xarray
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.tables import Run, gait_label
 from tetra_drake.results.measures import distance_walked
+from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.units import INCH
 
@@ -22,6 +23,8 @@ class Walk:
     recorded: pandas.Series
     """Its row of the run's evaluations."""
     trajectory: xarray.Dataset
+    headline: str
+    """What the gait does, simulated again."""
 
     @property
     def label(self) -> str:
@@ -62,7 +65,12 @@ def study_run(run: Run) -> Study:
 
 def walk_again(run: Run, trial: int, index: int) -> Walk:
     """A gait of a run, simulated again. Raises SimulationFailure."""
-    gait = run.gait(trial, index)
-    trajectory = simulate(scenario=run.manifest.scenario, gait=gait, record=True).trajectory
-    assert trajectory is not None
-    return Walk(gait=gait, recorded=run.evaluation(trial, index), trajectory=trajectory)
+    gait, scenario = run.gait(trial, index), run.manifest.scenario
+    result = simulate(scenario=scenario, gait=gait, record=True)
+    assert result.trajectory is not None
+    return Walk(
+        gait=gait,
+        recorded=run.evaluation(trial, index),
+        trajectory=result.trajectory,
+        headline=headline(scenario, vars(result.metrics)),
+    )

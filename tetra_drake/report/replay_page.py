@@ -2,64 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.source import load_source
 from tetra_drake.files import check_folder
 from tetra_drake.results.folder import RESULT, RUN_MANIFEST, Recording, load_result_folder
-from tetra_drake.robot.gait import Gait, load_gait
-from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.visualization.replay import replay_title, save_replay
+from tetra_drake.visualization.replay import save_replay
 
 
 def write_replay(
-    source: Path, out: Path, *, scenario: str | None = None, viewer: Path | None = None
+    source: Path,
+    out: Path,
+    *,
+    scenario: str | None = None,
+    viewer: Path | None = None,
+    warn: Callable[[str], None] = lambda text: None,
 ) -> str:
     """Writes the replay page of what load_recording() finds; returns the page's title.
 
-    With `viewer`, a file, the page shares Meshcat's script with others (see save_replay).
+    With `viewer`, a file, the page shares Meshcat's script with others (see save_replay); `warn` as
+    of load_source().
     Raises InputError, before anything is simulated, if the files cannot be written.
     """
     for file in (out,) if viewer is None else (out, viewer):
         if file.is_dir():
             raise InputError(file, "", "is a directory, expected a file to write")
         check_folder(file.parent)
-    recording = load_recording(source, scenario=scenario)
-    title = replay_title(recording.gait.name, recording.trajectory)
+    recording = load_recording(source, scenario=scenario, warn=warn)
     save_replay(
         out,
         scenario=recording.scenario,
         trajectory=recording.trajectory,
-        title=title,
+        title=recording.title,
         viewer=viewer,
     )
-    return title
+    return recording.title
 
 
-def load_recording(source: Path, *, scenario: str | None = None) -> Recording:
+def load_recording(
+    source: Path,
+    *,
+    scenario: str | None = None,
+    warn: Callable[[str], None] = lambda text: None,
+) -> Recording:
     """The motion in a result folder, or of a gait file or a run's fittest gait, simulated.
 
-    A gait file is simulated on `scenario` (default: thesis); folders have their own scenarios.
+    `scenario` is for gait files, `warn` as of load_source(); folders have their own scenarios.
     Raises InputError if there is no motion, or if a scenario is given for a folder, and
     SimulationFailure.
     """
     if source.is_dir() and scenario is not None:
         raise InputError("--scenario", "", f"is for gait files; {source} has one of its own")
-    if (source / RUN_MANIFEST).exists():
-        run = load_run(source)
-        return _simulate(run.gait(*run.fittest()), run.manifest.scenario)
-    if (source / RESULT).exists():
+    is_run = (source / RUN_MANIFEST).exists()
+    if (source / RESULT).exists() and not is_run:
         return load_result_folder(source)
-    if not source.is_file():
+    if not source.is_file() and not is_run:
         raise InputError(source, "", "expected a folder of `simulate` or `evolve`, or a gait file")
-    given = load_scenario(scenario or "thesis")
-    return _simulate(load_gait(source, given), given)
-
-
-def _simulate(gait: Gait, scenario: Scenario) -> Recording:
-    trajectory = simulate(scenario=scenario, gait=gait, record=True).trajectory
-    assert trajectory is not None
-    return Recording(scenario=scenario, gait=gait, trajectory=trajectory)
+    loaded = load_source(source, scenario=scenario, warn=warn)
+    result = simulate(scenario=loaded.scenario, gait=loaded.best, record=True)
+    assert result.trajectory is not None
+    return Recording(loaded.scenario, loaded.best, result.trajectory, vars(result.metrics))

@@ -22,12 +22,13 @@ from tetra_drake.figures.study import Study, study_run, walk_again
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import render
 from tetra_drake.results.folder import RESULT, RUN_MANIFEST, load_result_folder
+from tetra_drake.results.metrics import headline
 from tetra_drake.results.result import ground_text, versions
 from tetra_drake.robot.gait import ParameterSpace, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.metrics import METRICS, inverse
 from tetra_drake.scenario.units import shown
-from tetra_drake.visualization.replay import replay_title, save_replay
+from tetra_drake.visualization.replay import save_replay
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
 CHAMPIONS, ELITES, ELITES_CSV = "champions", "elites", "elites.csv"
@@ -70,7 +71,7 @@ def write_report(directory: Path) -> list[Path]:
         gait = study.run.gait(row["trial"], row["index"])
         save_gait(gait, directory / _champion(name), scenario)
     _write_map(study, directory)
-    title = replay_title(study.best.gait.name, trajectory)
+    title = f"{study.best.gait.name}: {study.best.headline}"
     save_replay(replay, scenario=scenario, trajectory=trajectory, title=title)
     write_whole(report, render_report(study, captions, folder=figures))
     return [figures, replay, report]
@@ -93,7 +94,7 @@ def _write_map(study: Study, directory: Path) -> None:
         file, page = (directory / each for each in _map_files(names, row, study))
         save_gait(walk.gait, file, run.manifest.scenario)
         if page != directory / REPLAY:
-            title, trajectory = replay_title(walk.gait.name, walk.trajectory), walk.trajectory
+            title, trajectory = f"{walk.gait.name}: {walk.headline}", walk.trajectory
             save_replay(page, scenario=run.manifest.scenario, trajectory=trajectory, title=title)
 
 
@@ -119,6 +120,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         manifest=manifest,
         ground=ground_text(manifest.scenario),
         best=study.best,
+        walked=headline(manifest.scenario, study.best.recorded),
         again={label: walk.distance_in for label, walk in walks.items()},
         changed={label: inches for label, inches in changes.items() if inches > 1e-6},
         versions=versions(),

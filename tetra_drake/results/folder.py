@@ -8,6 +8,9 @@ result.json       the numbers, the gait, and the path of the centre
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,11 +18,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import check_folder, write_whole
+from tetra_drake.files import check_folder, read_text, write_whole
+from tetra_drake.results.metrics import headline
 from tetra_drake.results.trajectory import DIMENSIONS, labels
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -41,6 +46,13 @@ class Recording:
     gait: Gait
     trajectory: xarray.Dataset
     """See results.trajectory.assemble_dataset."""
+    metrics: Mapping[str, float]
+    """By the names of METRICS, in SI."""
+
+    @property
+    def title(self) -> str:
+        """The gait's name and what it did."""
+        return f"{self.gait.name}: {headline(self.scenario, self.metrics)}"
 
 
 def check_result_folder(folder: Path) -> None:
@@ -59,7 +71,7 @@ def save_result_folder(
     """
     from tetra_drake.results.result import save_result
     from tetra_drake.results.trajectory import save_dataset
-    from tetra_drake.visualization.replay import replay_title, save_replay
+    from tetra_drake.visualization.replay import save_replay
 
     trajectory = result.trajectory
     assert trajectory is not None
@@ -68,7 +80,7 @@ def save_result_folder(
         (folder / RESULT).unlink()
     write_whole(folder / SCENARIO, dump_scenario(scenario))
     save_dataset(trajectory, folder / TRAJECTORY)
-    title = replay_title(gait.name, trajectory)
+    title = Recording(scenario, gait, trajectory, vars(result.metrics)).title
     save_replay(folder / REPLAY, scenario=scenario, trajectory=trajectory, title=title)
     save_result(folder / RESULT, scenario, gait, result)
 
@@ -88,7 +100,17 @@ def load_result_folder(folder: Path) -> Recording:
         scenario=scenario,
         gait=load_gait(folder / RESULT, scenario, key="gait"),
         trajectory=_load_trajectory(folder / TRAJECTORY, structure),
+        metrics=_load_metrics(folder / RESULT),
     )
+
+
+def _load_metrics(path: Path) -> dict[str, float]:
+    """The metrics in result.json, NaN where one is null; InputError if one is missing."""
+    numbers = json.loads(read_text(path, "result")).get("metrics")
+    for name in METRICS:
+        if not isinstance(numbers, dict) or not isinstance(numbers.get(name, ""), float | None):
+            raise InputError(path, f"metrics.{name}", "is missing, or no number")
+    return {name: math.nan if numbers[name] is None else numbers[name] for name in METRICS}
 
 
 def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:

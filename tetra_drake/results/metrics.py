@@ -9,6 +9,7 @@ from typing import Self
 
 import numpy as np
 
+from tetra_drake.formatting import fixed
 from tetra_drake.physics.tally import Tally
 from tetra_drake.results.measures import travelling_index
 from tetra_drake.results.path import CentrePath, curvature
@@ -99,6 +100,27 @@ def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:
         unit = INCH if METRICS[name] == "m" else 1.0
         total += (weight * unit) * (getattr(metrics, name) / unit)
     return total
+
+
+_WALKED = ("distance", "steady_distance", "speed")
+"""Metrics of which an objective that looks for far walks has one."""
+
+
+def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]) -> str:
+    """The metric that says most about a gait: the distance if the objective looks for it, else the
+    one with the largest part in the fitness."""
+    if any(objective.get(name, 0.0) > 0.0 for name in _WALKED):
+        return "distance"
+    parts = {name: abs(weight * metrics[name]) for name, weight in objective.items()}
+    return max(parts, key=lambda name: -1.0 if math.isnan(parts[name]) else parts[name])
+
+
+def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
+    """The metric that says most about a gait, as "14.34 inches in 15 s"."""
+    name, seconds = headline_metric(scenario.objective, metrics), scenario.simulation.duration
+    if name == "distance":
+        return f"{fixed(metrics[name] / INCH)} inches in {seconds:g} s"
+    return f"{name.replace('_', ' ')} {shown(metrics[name], METRICS[name])} after {seconds:g} s"
 
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:

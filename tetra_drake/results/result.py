@@ -20,6 +20,7 @@ from tetra_drake.results.metrics import (
     Totals,
     compute_fitness,
     compute_metrics,
+    headline_metric,
     unmet_requirements,
 )
 from tetra_drake.results.path import PERIOD, CentrePath, follow
@@ -194,7 +195,7 @@ def _listed(values: Mapping[str, Any]) -> str:
 
 def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     """Metrics, lengths in inches, and what the simulation took, as lines for the terminal."""
-    metrics, work = result.metrics, result.integrator
+    metrics = result.metrics
     after = f"from {scenario.simulation.steady_from:g} s on"
     side = "to the left" if metrics.path_curvature > 0.0 else "to the right"
     diameter = shown(scenario.robot.strut_diameter, "m")
@@ -208,20 +209,22 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
         ("heading change", math.degrees(metrics.heading_change), "deg", "positive to the left"),
         ("path radius", metrics.path_radius / INCH, "in", f"{bends}, {after}"),
         ("actuator work", metrics.actuator_work, "J", after),
-        ("transport cost", metrics.cost_of_transport, "", "work over weight and way"),
+        ("cost of transport", metrics.cost_of_transport, "", "work over weight and way"),
         ("signal rate", metrics.signal_rate / POUND_FORCE, "lbf/s", "root mean square"),
         ("lifted", 100.0 * metrics.lifted, "%", "of the time, mean of the tetrahedra"),
         ("clearance", metrics.clearance / INCH, "in", clearance),
         ("tension", metrics.tension / POUND_FORCE, "lbf", "least of a cable"),
         ("travelling", metrics.travelling_index, "", "index of the signals: 0 stand, 1 travel"),
     ]
+    first = headline_metric(scenario.objective, vars(metrics)).replace("_", " ")
+    rows.sort(key=lambda row: row[0] != first)
     lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
     if ground := ground_text(scenario):
         lines.append(f"  ground: {ground}")
     for name, value, unit, note in rows:
-        line = f"  {name:<16}{fixed(value):>8} {unit:<5} {f'({note})' if note else ''}"
+        line = f"  {name:<17}{fixed(value):>7} {unit:<5} {f'({note})' if note else ''}"
         lines.append(line.rstrip())
-    lines.append(f"  {'fitness':<16}{fixed(result.fitness):>8}")
+    lines.append(f"  {'fitness':<17}{fixed(result.fitness):>7}")
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"  {text} (requirement not met)" for text in unmet]
     reference = scenario.reference
@@ -231,8 +234,17 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
         lines.append(f"  {reference.source}: best distances {', '.join(texts)}")
     speed = fixed(result.duration / result.wall_time, 1)
     lines.append(
-        f"  simulated in {fixed(result.wall_time, 1)} s, {speed} times real time: {work.scheme}, "
-        f"accuracy {work.accuracy:g}, {work.steps} steps, "
-        f"{work.derivative_evaluations} derivative evaluations"
+        f"  simulated in {fixed(result.wall_time, 1)} s, {speed} times real time: "
+        f"{_work_text(result)}"
     )
     return "\n".join(lines)
+
+
+def _work_text(result: SimulationResult) -> str:
+    """What the integrator of an engine was asked for, and what it took."""
+    work = result.integrator
+    if result.engine == "mujoco":
+        return f"{work.scheme}, {work.steps} steps of {1e3 * work.accuracy:g} ms"
+    asked = "accuracy {:g}" if result.engine == "drake" else "tolerance {:g} m/s"
+    evaluations = f"{work.derivative_evaluations} derivative evaluations"
+    return f"{work.scheme}, {asked.format(work.accuracy)}, {work.steps} steps, {evaluations}"

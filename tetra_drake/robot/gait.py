@@ -54,11 +54,15 @@ class Gait:
     gains: Gains = Gains()
     time_scales: tuple[float, ...] = ()
     """Factors on both time constants, by junction; none if all are 1."""
+    scenario: str = dataclasses.field(default="", compare=False)
+    """Name of the scenario that the gait was made for; "" if that is not known."""
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
-        """The content of a gait file; `scenario` is one that the gait fits."""
+        """The content of a gait file; `scenario` is one that the gait fits, and was made for unless
+        it says another."""
         names = Actuation.of(scenario).weight_names
         content: dict[str, Any] = {"schema": SCHEMA, "name": self.name}
+        content["scenario"] = self.scenario or scenario.name
         content["weights"] = dict(zip(names, self.weights, strict=True))
         content["tau_a_s"] = self.tau_a
         if self.tau_b != TAU_B_PER_TAU_A * self.tau_a:
@@ -200,6 +204,7 @@ class GaitFile:
 
     schema: int = setting(at_least=1, at_most=SCHEMA)
     name: str = setting(default="")
+    scenario: str = setting(default="")
     weights: dict[str, float] | list[float] = setting(at_least=0)
     """By Actuation.weight_names, in any order; a list, which schema 1 has, in their order."""
     tau_a_s: float = setting(above=0)
@@ -244,6 +249,7 @@ def read_gait(path: str | Path, *, key: str = "") -> tuple[Gait, tuple[str, ...]
         turn=file.turn,
         gains=file.gains,
         time_scales=tuple(file.time_scales),
+        scenario=file.scenario,
     )
     return gait, tuple(weights) if isinstance(weights, dict) else ()
 

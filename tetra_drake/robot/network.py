@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Callable
 
 import numpy as np
@@ -18,6 +19,14 @@ from tetra_drake.scenario.schema import CpgScenario, Scenario
 
 SteeringSignal = Callable[[float], float]
 """The turn, from -1 to 1, at a time in s."""
+
+
+def constant_steering(turn: float) -> SteeringSignal:
+    """The signal of a constant turn; InputError if it is not a number."""
+    if isinstance(turn, bool) or not isinstance(turn, numbers.Real):
+        expected = "a number from -1 to 1, or a function of the time in s"
+        raise InputError("steering", "", f"found {turn!r}, expected {expected}")
+    return lambda time: turn
 
 
 def make_network(scenario: Scenario, structure: Structure, gait: Gait) -> Network:

@@ -69,8 +69,9 @@ def quantity(unit: str, **limits: Any) -> Any:
 class Check:
     """Checks raw values, as YAML holds them, against types; raises InputError.
 
-    Quantities are texts with units, in the resulting tree SI. If `complete`, dataclasses result:
-    every required field must be there, and quantities may be numbers, in SI.
+    Quantities are texts with units, in the resulting tree SI. Dataclasses hold SI numbers, and
+    replace what they change as a whole. If `complete`, dataclasses result: every required field
+    must be there, and quantities may be numbers, in SI.
     """
 
     source: object
@@ -90,6 +91,9 @@ class Check:
     def _value(self, kind: Any, value: Any, key: str, limits: Limits) -> Any:
         if dataclasses.is_dataclass(value) and not isinstance(value, type):
             value = {TAG: f"!{type(value).__name__}", **tree_of(value)}
+            if not self.complete:
+                checked = Check(self.source, complete=True).value(kind, value, key, limits)
+                return Whole(_tree(kind, checked, limits, None, sparse=False))
         elif hasattr(value, "tolist"):  # numpy's arrays and numbers
             value = value.tolist()
         if value is None and types.NoneType in typing.get_args(kind):
@@ -135,7 +139,8 @@ class Check:
         path = {name: f"{key}.{name}" if key else str(name) for name in (*raw, *fields)}
         for name in raw:
             if name not in fields and name != TAG:
-                raise InputError(self.source, path[name], f"unknown key; {hint(name, fields)}")
+                advice = _sections_with(name, fields.values()) or hint(name, fields)
+                raise InputError(self.source, path[name], f"unknown key; {advice}")
         tree: Tree = {}
         for name, f in fields.items():
             required = self.complete and f.default_factory is dataclasses.MISSING
@@ -152,7 +157,7 @@ class Check:
             return value
         if unit and isinstance(value, str):
             value = quantity_to_si(value, unit)
-        elif unit and not self.complete:
+        elif unit and value != 0 and not self.complete:
             wanted = f"a quantity that converts to {unit}"
             raise ValueError(f"found {found} without a unit, expected {wanted}")
         elif kind is float and isinstance(value, str) and "e" in value:  # YAML 1.1: 1e-3 is text
@@ -169,6 +174,10 @@ class Check:
                 limit = f"{limits[name]:.4g} {unit or ''}".strip()
                 raise ValueError(f"found {found}, expected {words} {limit}")
         return kind(value)
+
+
+class Whole(Tree):
+    """A tree that replaces another one as a whole; see merge()."""
 
 
 def tree_of(node: Any, show: Show | None = None, *, sparse: bool = False) -> Tree:
@@ -199,26 +208,53 @@ def _tree(kind: Any, value: Any, limits: Limits, show: Show | None, sparse: bool
     return show(value, unit) if show and unit and isinstance(value, float) else value
 
 
-def with_values(tree: Tree, values: Mapping[str, Any], source: str) -> Tree:
-    """A copy of the tree with other values, unchecked, for dotted keys."""
+def tree_of_changes(changes: Mapping[str, Any], base: Tree, source: object) -> Tree:
+    """Changes by dotted keys, and mappings of keys, as the tree that a file would hold.
+
+    A tagged kind whose tag is not given is that of the base.
+    """
+    tree: Tree = {}
+    for key, value in changes.items():
+        for name in reversed(key.split(".")):
+            value = {name: value}
+        tree = _joined(tree, value, key, source)
+    return _tagged(tree, base)
+
+
+def _joined(first: Tree, second: Tree, key: str, source: object) -> Tree:
+    """Both trees in one; InputError, naming `key`, where both give a value."""
+    tree = dict(first)
+    for name, value in second.items():
+        if name in tree:
+            if not (isinstance(tree[name], dict) and isinstance(value, dict)):
+                raise InputError(source, key, "is given twice")
+            value = _joined(tree[name], value, key, source)
+        tree[name] = value
+    return tree
+
+
+def _tagged(tree: Tree, base: Tree) -> Tree:
+    """The tree with the tags of the base where it gives none."""
+    tagged = {TAG: base[TAG]} | tree if TAG in base else dict(tree)
+    for name, value in tree.items():
+        if isinstance(value, dict) and isinstance(base.get(name), dict):
+            tagged[name] = _tagged(value, base[name])
+    return tagged
+
+
+def with_values(tree: Tree, values: Mapping[str, float]) -> Tree:
+    """A copy of the tree with other SI numbers, unchecked, by dotted keys that it has."""
     tree = copy.deepcopy(tree)
     for key, value in values.items():
         *sections, name = key.split(".")
-        node = tree
-        for section in sections:
-            if node.get(section) is None:
-                node[section] = {}
-            node = node[section]
-            if not isinstance(node, dict):
-                raise InputError(source, key, f"unknown key; '{section}' is not a section")
-        node[name] = value
+        functools.reduce(operator.getitem, sections, tree)[name] = value
     return tree
 
 
 def merge(base: Any, changes: Any) -> Any:
     """The base with what `changes` gives; lists, and kinds of another tag, are replaced."""
     both = isinstance(base, dict) and isinstance(changes, dict)
-    if not both or base.get(TAG) != changes.get(TAG):
+    if not both or isinstance(changes, Whole) or base.get(TAG) != changes.get(TAG):
         return changes
     return base | {k: merge(base[k], v) if k in base else v for k, v in changes.items()}
 
@@ -291,6 +327,17 @@ def _describe(value: Any) -> str:
         return str(value.get(TAG, "a mapping"))[:40]
     kinds = {types.NoneType: "nothing", list: "a list", bool: str(value).lower()}
     return kinds.get(type(value), f"'{value}'" if isinstance(value, str) else str(value)[:40])
+
+
+def _sections_with(name: Any, fields: Iterable[dataclasses.Field[Any]]) -> str:
+    """Which keys of sections may be meant by a name without its section; "" if none has it."""
+    keys = [
+        f"'{f.name}.{name}'"
+        for f in fields
+        for kind in _kinds(f.type)
+        if dataclasses.is_dataclass(kind) and name in {g.name for g in dataclasses.fields(kind)}
+    ]
+    return f"did you mean {' or '.join(dict.fromkeys(keys))}?" if keys else ""
 
 
 def hint(name: Any, known: Iterable[str]) -> str:

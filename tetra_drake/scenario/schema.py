@@ -13,7 +13,16 @@ from typing import Any, Self
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario import rules
-from tetra_drake.scenario.fields import Check, hint, quantity, setting, tree_of, with_values
+from tetra_drake.scenario.fields import (
+    Check,
+    Tree,
+    hint,
+    quantity,
+    setting,
+    tree_of,
+    tree_of_changes,
+    with_values,
+)
 from tetra_drake.scenario.metrics import METRICS, inverse
 from tetra_drake.scenario.optimizers import OptimizerKind, QualityDiversity, SteadyState
 from tetra_drake.scenario.terrain import Flat, Terrain
@@ -345,16 +354,17 @@ class Scenario:
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
         """A checked copy with other values: {"robot.tetrahedra": 7, "cables.damping": "8 N*s/m"}.
 
-        Values are SI numbers, text with units, or dataclasses for tagged kinds. The spacing stays
-        what it is unless it is given; it may be "balanced". As in files, changes of robot or
-        experiment drop the reference. Raises InputError, naming the key.
+        The same rules hold as in a file that is based on this scenario: quantities have units,
+        mappings are merged, and the spacing and the reference follow what is changed. Dataclasses,
+        whose numbers are SI, replace their section or kind as a whole: {"friction": Coulomb()}.
+        Raises InputError, naming the key.
         """
         source, base = f"scenario {self.name}", tree_of(self)
-        changed = self.from_tree(with_values(base, changes, source), source)
-        given = any(key.split(".")[0] == "reference" for key in changes)
-        if not given and not rules.same_experiment(tree_of(changed), base):
-            changed.reference = None
-        return changed
+        given: Tree = Check(source).value(type(self), tree_of_changes(changes, base, source))
+        for section in rules.WHOLE:
+            if section in given and section not in changes:  # as {"objective.lead": "2 /in"}
+                given[section] = base[section] | given[section]
+        return self.from_tree(rules.on_base(base, given), source)
 
     @classmethod
     def from_tree(cls, tree: dict[str, Any], source: object) -> Self:
@@ -435,7 +445,7 @@ def _check_disturbances(scenario: Scenario, tree: dict[str, Any], source: object
         for factor in (1.0 - spread, 1.0 + spread):
             changed = {name: factor * number for name, number in numbers.items()}
             try:
-                Scenario.from_tree(with_values(tree, changed, str(source)), source)
+                Scenario.from_tree(with_values(tree, changed), source)
             except InputError as error:
                 problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
                 raise InputError(source, key, problem) from error

@@ -21,11 +21,10 @@ from pydrake.math import RigidTransform
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
-from tetra_drake.formatting import fixed, render
+from tetra_drake.formatting import render
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, MakeStructure
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.scene import (
     ASPECT,
     CABLE_KINDS,
@@ -141,13 +140,6 @@ def save_replay(
         page, script = _without_viewer(page, address=_relative(viewer, Path(path).parent))
         _write_once(viewer, script)
     write_whole(path, pack_page(_with_overlay(page, title, legend, film), title=title))
-
-
-def replay_title(gait: str, trajectory: xarray.Dataset) -> str:
-    """Name of a gait, and the distance and duration of its trajectory."""
-    x1 = trajectory["p_WN"].values[[0, -1], 0, BOTTOM_LEFT, 0]
-    times = trajectory["time"].values
-    return f"{gait}: {fixed((x1[1] - x1[0]) / INCH)} inches in {times[-1] - times[0]:g} s"
 
 
 def show_replay(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset) -> None:

@@ -36,7 +36,10 @@ after 0.5 s. Some such changes may add up.
     [(5, 2, 0.5), (5, 3, 0.5), (2, 1, 0.3), (3, 1, 0.3), (8, 1, 0.3)],
 )
 def test_nodes_go_where_the_diagrams_nodes_go(scenario, tetrahedra, seed, duration):
-    times = {"simulation.duration": duration, "simulation.steady_from": 0.5 * duration}
+    times = {
+        "simulation.duration": f"{duration} s",
+        "simulation.steady_from": f"{0.5 * duration} s",
+    }
     fine = scenario.with_changes({"robot.tetrahedra": tetrahedra, **times, **FINE})
     trajectories = trajectories_on_both(fine, seed)
     ours, drakes = (trajectory["p_WN"].values[-1] for trajectory in trajectories)
@@ -87,10 +90,14 @@ def test_extreme_settings_come_to_an_end():
 def test_nine_of_ten_well_conditioned_random_gaits_end_where_the_diagrams_do(compiled):
     # The diagram's default settings are themselves off by 0.2 in and more in every fourth gait.
     fine = {"engine": "drake", "scheme": "runge_kutta3", "accuracy": 1e-5}
-    fine |= {"max_step": 5e-5, "look_ahead": 0.0}
+    fine |= {"max_step": "5e-5 s", "look_ahead": 0.0}
     diagram = compiled.with_changes({f"simulation.{key}": fine[key] for key in fine})
-    coarser = compiled.with_changes({"compiled.tolerance": 5e-6, "compiled.look_ahead": 2e-6})
-    finer = compiled.with_changes({"compiled.tolerance": 2e-6, "compiled.look_ahead": 1e-6})
+    coarser = compiled.with_changes(
+        {"compiled.tolerance": "5e-6 m/s", "compiled.look_ahead": "2e-6 s"}
+    )
+    finer = compiled.with_changes(
+        {"compiled.tolerance": "2e-6 m/s", "compiled.look_ahead": "1e-6 s"}
+    )
     well_conditioned = [
         seed
         for seed in range(200, 230)
@@ -106,7 +113,9 @@ def distance(scenario: Scenario, seed: int) -> float:
 
 def test_the_recording_has_the_forces_of_the_diagrams(scenario):
     # Before the actuation both robots come to rest: the same tensions and normal forces.
-    short = scenario.with_changes({"simulation.duration": 0.8, "simulation.steady_from": 0.2})
+    short = scenario.with_changes(
+        {"simulation.duration": "0.8 s", "simulation.steady_from": "0.2 s"}
+    )
     ours, drakes = trajectories_on_both(short)
     assert set(ours.variables) == set(drakes.variables)
     for name in ("tension", "length", "normal_force", "in_contact", "friction_mode"):

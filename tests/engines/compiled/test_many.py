@@ -26,17 +26,21 @@ from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.schema import Coulomb, Scenario
 from tetra_drake.scenario.terrain import Rough
 
-FAR_TOO_STRONG = {"cpg.gain": 4e9}
+FAR_TOO_STRONG = {"cpg.gain": "4e9 N"}
 """A pull that throws the robot about at the first step."""
 
-TOO_STRONG = {"cpg.gain": 300.0, "simulation.max_evaluations": 20_000}
+TOO_STRONG = {"cpg.gain": "300.0 N", "simulation.max_evaluations": 20_000}
 """One that winds it up until steps are tiny."""
 
 
 @pytest.fixture
 def short(scenario: Scenario) -> Scenario:
     """One second on the compiled engine, driven from 0.2 s on."""
-    times = {"simulation.duration": 1.0, "simulation.steady_from": 0.5, "cpg.start_up": 0.2}
+    times = {
+        "simulation.duration": "1.0 s",
+        "simulation.steady_from": "0.5 s",
+        "cpg.start_up": "0.2 s",
+    }
     return scenario.with_changes({"simulation.engine": "compiled", **times})
 
 
@@ -106,12 +110,12 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
     scenarios = [
         short,
         short.with_changes({"cables.outer_stiffness": "0.21 lbf/in"}),
-        short.with_changes({"robot.offsets": [[1e-3 * i, 0.0, 1e-3] for i in range(5)]}),
-        short.with_changes({"simulation.duration": 0.8, "compiled.tolerance": 5e-5}),
+        short.with_changes({"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}),
+        short.with_changes({"simulation.duration": "0.8 s", "compiled.tolerance": "5e-5 m/s"}),
         short.with_changes({"robot.tetrahedra": 3}),
         short.with_changes({"cpg.signals": "recorded", "cpg.gain": "1 lbf"}),
         short.with_changes({"cables.slack": True, "cpg.listing_step": "0.1 ms"}),
-        short.with_changes({"robot.gravity": 1.6, "ground.stiffness": "20 lbf/in"}),
+        short.with_changes({"robot.gravity": "1.6 m/s^2", "ground.stiffness": "20 lbf/in"}),
     ]
     gaits = [seeded_gait(each, 3) for each in scenarios]
     found = simulate_many(scenario=scenarios, gaits=gaits, workers=1)
@@ -122,8 +126,8 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
 
 def test_failures_stand_in_the_place_of_results(short):
     failing = {
-        "a body's velocity": {"simulation.max_speed": 1e-3},
-        "no step": {"compiled.tolerance": 1e-300},
+        "a body's velocity": {"simulation.max_speed": "1e-3 m/s"},
+        "no step": {"compiled.tolerance": "1e-300 m/s"},
         "force evaluations": {"simulation.max_evaluations": 100},
         "": {},
     }

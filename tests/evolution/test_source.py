@@ -1,0 +1,80 @@
+"""Gaits for commands: from a file or a run, with the scenario that they are simulated on."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from helpers.synthetic_run import tiny_scenario, write_run
+
+from tetra_drake.cli import main
+from tetra_drake.evolution.source import load_source
+from tetra_drake.evolution.tables import load_run
+from tetra_drake.robot.gait import load_gait, save_gait, seeded_gait
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A run of two trials, the second with the best gait, which is saved in its folder."""
+    path = write_run(tmp_path / "run", [[[(2.0, 0)]], [[(4.0, 0), (3.0, 1)]]])
+    save_gait(load_run(path).best_gait(), path / "trial_01" / "best_gait.json", tiny_scenario())
+    return path
+
+
+def test_the_gaits_of_a_run_come_with_its_scenario(run):
+    recorded, source = load_run(run), load_source(run)
+    assert source.scenario == recorded.manifest.scenario
+    assert source.best == recorded.gait(1, 0)
+    assert source.gaits == {"trial 0": recorded.gait(0, 0), "trial 1": recorded.gait(1, 0)}
+
+
+def test_a_gait_file_in_a_run_is_simulated_on_the_runs_scenario(run):
+    told = []
+    source = load_source(run / "trial_01" / "best_gait.json", warn=told.append)
+    assert (source.scenario.name, source.best) == ("tiny", load_run(run).best_gait())
+    assert source.gaits == {"best_gait": source.best}
+    assert told == []
+
+
+def test_another_scenario_than_the_gaits_is_said_once_with_both_names(run, tmp_path):
+    other = tmp_path / "other.yaml"
+    other.write_text(dump_scenario(tiny_scenario(name="other")))
+    file, told = run / "trial_01" / "best_gait.json", []
+    copied = Path(shutil.copy(file, tmp_path / "copied.json"))
+    for source in (file, run, copied):
+        assert load_source(source, scenario=str(other), warn=told.append).scenario.name == "other"
+    assert len(told) == 3
+    assert all("tiny" in text and "other" in text for text in told)
+
+
+def test_a_gait_file_keeps_the_scenario_that_it_was_made_for(tmp_path):
+    thesis, coulomb = load_scenario("thesis"), load_scenario("coulomb")
+    save_gait(seeded_gait(coulomb), tmp_path / "gait.json", coulomb)
+    gait = load_gait(tmp_path / "gait.json", thesis)
+    assert gait.scenario == "coulomb"
+    save_gait(gait, tmp_path / "again.json", thesis)
+    assert json.loads((tmp_path / "again.json").read_text())["scenario"] == "coulomb"
+
+
+def test_nothing_is_said_of_a_file_without_a_scenario(tmp_path):
+    content = {"schema": 1, "weights": [1.5] * 24, "tau_a_s": 0.3}
+    (tmp_path / "gait.json").write_text(json.dumps(content))
+    told = []
+    source = load_source(tmp_path / "gait.json", scenario="coulomb", warn=told.append)
+    assert (source.scenario.name, source.best.scenario, told) == ("coulomb", "", [])
+
+
+def test_commands_take_a_run_for_its_best_gait_and_warn_in_one_line(run, tmp_path, capsys):
+    assert main(["cpg", "--gait", str(run), "--out", str(tmp_path / "run.csv")]) == 0
+    assert capsys.readouterr().err == ""
+    three = tmp_path / "three.yaml"
+    three.write_text(
+        "base: thesis\nname: three\nrobot: {tetrahedra: 3}\nsimulation: {duration: 4 s}"
+    )
+    command = ["cpg", "--gait", str(run), "--scenario", str(three)]
+    assert main([*command, "--out", str(tmp_path / "three.csv")]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "tiny" in line and "three" in line
+    short, long = ((tmp_path / f"{name}.csv").read_text().count("\n") for name in ("run", "three"))
+    assert 0 < short < long
