@@ -149,7 +149,7 @@ def test_a_simulation_that_fails_says_when_and_why_with_status_1(unchanged, caps
 
 COMMANDS = (
     *("simulate", "evolve", "reevaluate", "replay", "figures"),
-    *("robustness", "compare", "benchmark", "gait", "cpg", "diagram"),
+    *("robustness", "compare", "gait", "cpg", "diagram"),
 )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import inspect
-import json
 import math
 import os
 import shutil
@@ -15,9 +14,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from tetra_drake.benchmark.settings import SETS
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import check_folder, whole_file
+from tetra_drake.files import check_folder
 from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, read_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import ENGINES, Scenario
@@ -27,8 +25,6 @@ BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
 
 FIRST_SCENARIO = "quick"
 """The scenario that `evolve` starts without another: it ends in minutes."""
-
-BENCHMARK_GAITS = 12
 
 Options = argparse.Namespace
 Command = argparse.ArgumentParser
@@ -373,59 +369,6 @@ def _compare(options: Options) -> None:
         print(f"wrote {', '.join(save_comparison(compared, options.out))} to {options.out}/")
 
 
-def _benchmark_options(command: Command) -> None:
-    _add_path(command, "gaits", "GAIT", "gait files (default: random gaits)", nargs="*")
-    gaits = f"number of random gaits, of seeds 0, 1 ... (default: {BENCHMARK_GAITS})"
-    _add_count(command, "--gaits", gaits, dest="number")
-    command.add_argument(
-        "--settings",
-        metavar="SET",
-        nargs="+",
-        choices=SETS,
-        default=["default"],
-        help="sets of settings: default (a few for each engine), integrators (many for the "
-        "diagram), compiled or mujoco (many for that engine)",
-    )
-    sizes = (
-        "numbers of tetrahedra to measure the cost per step for (default: 5 10 20 40 with the "
-        "default settings, else none)"
-    )
-    _add_count(command, "--sizes", sizes, nargs="*")
-    _add_scenario(command)
-    _add_path(command, "--json", "FILE", "also write a JSON file")
-
-
-def _benchmark(options: Options) -> None:
-    """Measure speed and accuracy of the engines and their settings.
-
-    Simulates gaits on the engines with different settings and prints how many times faster than
-    real time each is, the errors of its distances against converged ones, the speed of batches
-    of gaits on one core and on all, and the compiled engine's cost per step by number of
-    tetrahedra. Takes some five minutes; the set integrators takes longer. Times are meaningful
-    on an idle machine only.
-    """
-    scenario = load_scenario(options.scenario)
-    if options.gaits and options.number is not None:
-        raise InputError("--gaits", "", "not allowed with gait files")
-    gaits = [load_gait(path, scenario) for path in options.gaits] or [
-        seeded_gait(scenario, seed) for seed in range(options.number or BENCHMARK_GAITS)
-    ]
-    with contextlib.ExitStack() as stack:
-        # Opened first: a path that cannot be written is refused before minutes are spent.
-        file = stack.enter_context(whole_file(options.json)) if options.json else None
-
-        from tetra_drake.benchmark.measure import SIZES, measure
-        from tetra_drake.benchmark.tables import to_markdown
-
-        sizes = options.sizes
-        if sizes is None:
-            sizes = SIZES if options.settings == ["default"] else ()
-        found = measure(scenario, gaits, sets=options.settings, sizes=sizes, say=_say)
-        print(to_markdown(found))
-        if file is not None:
-            file.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-
-
 def _gait_options(command: Command) -> None:
     _add_path(command, "file", "FILE", "a gait file (JSON)")
     _add_scenario(command)
@@ -590,7 +533,6 @@ _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ..
     (_figures, _figures_options),
     (_robustness, _robustness_options),
     (_compare, _compare_options),
-    (_benchmark, _benchmark_options),
     (_gait, _gait_options),
     (_cpg, _cpg_options),
     (_diagram, _diagram_options),

@@ -1,0 +1,251 @@
+"""Measures the speed and the accuracy of the engines.
+
+    python runs/benchmark.py [--scenario NAME|FILE] [--gaits N] [TABLE ...]
+
+Prints the tables of tetra_drake/engines/README.md in Markdown, of random gaits of seeds 0, 1 ...:
+
+    engines        speed and error of the engines, each with a few settings
+    integrators    the same for settings of the diagram; takes longest
+    batches        speed with many gaits at a time, on one core and on all
+    sizes          cost of a step of the compiled engine by the number of tetrahedra
+    grounds        speed by ground, friction and network
+
+Errors are of distances, against converged runs of the compiled engine (MuJoCo's against its own,
+as its ground differs). Times are meaningful on an idle machine only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tetra_drake.engines.mujoco import installed
+from tetra_drake.engines.simulate import available_cores, simulate_many
+from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.formatting import fixed, markdown_table
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+
+Changes = Mapping[str, object]
+
+BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time on the compiled engine
+MUJOCO_BATCH = 4  # gaits at a time in MuJoCo, for each core
+SIZES = (5, 10, 20, 40)  # numbers of tetrahedra
+LANES = 8  # gaits at a time for the cost of a step
+GROUND_BATCH = 30  # gaits at a time on each ground
+ROUNDS = 3  # measurements, of which the medians count
+
+DRAKE = {"simulation.engine": "drake"}
+COMPILED = {"simulation.engine": "compiled"}
+MUJOCO = {"simulation.engine": "mujoco"}
+FINE = {"tolerance": "0.001 mm/s", "max_step": "0.5 ms", "look_ahead": "0.001 ms"}
+CONVERGED = COMPILED | {f"compiled.{key}": value for key, value in FINE.items()}
+MUJOCO_CONVERGED = MUJOCO | {"mujoco.integrator": "implicitfast", "mujoco.step": "0.0625 ms"}
+FAST_MUJOCO = MUJOCO | {"mujoco.integrator": "implicitfast", "mujoco.step": "2 ms"}
+EXPLICIT = {
+    "simulation.scheme": "runge_kutta3",
+    "simulation.accuracy": 1e-3,
+    "simulation.max_step": "2 ms",
+}
+STEP_END, WITNESS = {"simulation.look_ahead": "0 s"}, {"simulation.mode_changes": "witness"}
+
+SETTINGS: dict[str, list[Changes]] = {
+    "engines": [
+        DRAKE,
+        DRAKE | EXPLICIT | STEP_END,
+        COMPILED,
+        MUJOCO,
+        FAST_MUJOCO,
+        MUJOCO | {"mujoco.integrator": "Euler", "mujoco.step": "0.25 ms"},
+        MUJOCO | {"mujoco.integrator": "discrete", "mujoco.step": "1 ms"},
+    ],
+    "integrators": [
+        DRAKE,
+        DRAKE | STEP_END,
+        DRAKE | WITNESS,
+        DRAKE | {"simulation.accuracy": 1e-3},
+        DRAKE | EXPLICIT | STEP_END,
+        DRAKE | EXPLICIT | WITNESS,
+    ],
+}
+
+
+@dataclass
+class Batch:
+    """Random gaits, of seeds 0, 1 ..., simulated at the same time."""
+
+    scenario: Scenario
+    size: int
+    cores: int = 1
+    speeds: list[float] = field(default_factory=list)  # by round: times real time, in all
+    step_costs: list[float] = field(default_factory=list)  # by round: μs a core and step
+    steps: int = 0
+
+    def simulate(self) -> None:
+        """Simulates the gaits and measures the time; those that fail do not count."""
+        started = time.perf_counter()
+        gaits = [seeded_gait(self.scenario, seed) for seed in range(self.size)]
+        outcomes = simulate_many(scenario=self.scenario, gaits=gaits, workers=self.cores)
+        seconds = time.perf_counter() - started
+        results = [outcome for outcome in outcomes if isinstance(outcome, SimulationResult)]
+        self.steps = sum(result.integrator.steps for result in results)
+        self.speeds.append(sum(result.duration for result in results) / seconds)
+        self.step_costs.append(1e6 * sum(result.wall_time for result in results) / self.steps)
+
+    @property
+    def speed(self) -> float:
+        """Times real time, in all: the median of the rounds."""
+        return statistics.median(self.speeds)
+
+    @property
+    def step_cost(self) -> float:
+        """The time (μs) that a step of one gait takes a core: the median of the rounds."""
+        return statistics.median(self.step_costs)
+
+
+def measure(batches: Sequence[Batch]) -> None:
+    """Simulates batches in turns, so that what else runs on the machine affects all alike."""
+    for batch in batches:
+        gaits = batch.size * [seeded_gait(batch.scenario)]
+        simulate_many(scenario=brief(batch.scenario), gaits=gaits, workers=1)
+    for _ in range(ROUNDS):
+        for batch in batches:
+            batch.simulate()
+
+
+def settings_table(scenario: Scenario, gaits: int, settings: Sequence[Changes]) -> str:
+    """Speed and error of settings."""
+    walking = [seeded_gait(scenario, seed) for seed in range(gaits)]
+    rows = []
+    for changes in settings:
+        changed = scenario.with_changes(changes)
+        engine = changed.simulation.engine
+        if engine == "mujoco" and not installed():
+            continue
+        converged = scenario.with_changes(MUJOCO_CONVERGED if engine == "mujoco" else CONVERGED)
+        exact_in = distances_in(simulate_many(scenario=converged, gaits=walking))
+        simulate_many(scenario=brief(changed), gaits=walking[:1], workers=1)
+        started = time.perf_counter()
+        # One at a time: together they would share a core's lanes.
+        outcomes = [simulate_many(scenario=changed, gaits=[g], workers=1)[0] for g in walking]
+        speed = gaits * changed.simulation.duration / (time.perf_counter() - started)
+        results = [outcome for outcome in outcomes if isinstance(outcome, SimulationResult)]
+        errors_in = np.abs(distances_in(outcomes) - exact_in)
+        errors = [fixed(np.nanmedian(errors_in), 3), fixed(np.nanmax(errors_in), 3)]
+        evaluations = [result.integrator.derivative_evaluations for result in results]
+        counts = [f"{statistics.mean(evaluations):,.0f}", str(gaits - len(results))]
+        values = [f"{key.partition('.')[2]} {value}" for key, value in changes.items()]
+        rows.append([engine, ", ".join(values[1:]) or "default", f"{speed:.3g}", *errors, *counts])
+    headings = ["engine", "setting", "times real time per core", "median error, in"]
+    headings += ["worst error, in", "evaluations per gait", "failed"]
+    return markdown_table(headings, rows, text_columns=(0, 1))
+
+
+def distances_in(outcomes: Sequence[SimulationResult | SimulationFailure]) -> np.ndarray:
+    """How far (in) gaits walk, NaN where the simulation failed."""
+    walked = [o.metrics.distance_in if isinstance(o, SimulationResult) else None for o in outcomes]
+    return np.array(walked, dtype=float)
+
+
+def brief(scenario: Scenario) -> Scenario:
+    """A simulation that only loads and compiles what is measured later."""
+    return scenario.with_changes({"simulation.duration": 0.02, "simulation.steady_from": 0.01})
+
+
+def batches_table(scenario: Scenario) -> str:
+    """Speed with many gaits at a time, on one core and on all that they fill."""
+    batches = []
+    for cores in sorted({1, available_cores()}):
+        ours = scenario.with_changes(COMPILED)
+        batches += [Batch(ours, size, cores) for size in BATCHES if size >= cores]
+        for changes in (MUJOCO, FAST_MUJOCO) if installed() else ():
+            batches.append(Batch(scenario.with_changes(changes), cores * MUJOCO_BATCH, cores))
+    measure(batches)
+    rows = []
+    for batch in batches:
+        engine = batch.scenario.simulation.engine
+        if engine == "mujoco":
+            engine += f", steps of {1e3 * batch.scenario.mujoco.step:g} ms"
+        rows.append([engine, str(batch.size), str(batch.cores), f"{batch.speed:,.1f}"])
+    return markdown_table(["engine", "gaits at a time", "cores", "times real time"], rows)
+
+
+def sizes_table(scenario: Scenario) -> str:
+    """Cost of a step of the compiled engine by the number of tetrahedra."""
+    robots = [scenario.with_changes(COMPILED | {"robot.tetrahedra": size}) for size in SIZES]
+    pairs = [(Batch(robot, 1), Batch(robot, LANES)) for robot in robots]
+    measure([batch for pair in pairs for batch in pair])
+    rows = []
+    for size, (alone, in_lanes) in zip(SIZES, pairs, strict=True):
+        costs = [alone.step_cost, alone.step_cost / size]
+        costs += [in_lanes.step_cost, in_lanes.step_cost / size]
+        rows.append([str(size), f"{alone.steps:,}", *map(fixed, costs)])
+    headings = ["tetrahedra", "steps", "μs per step", "and tetrahedron"]
+    headings += [f"one of {LANES}: μs per step", "and tetrahedron"]
+    return markdown_table(headings, rows, text_columns=())
+
+
+def grounds_table(scenario: Scenario) -> str:
+    """Speed on one core by ground, friction and network."""
+    shipped = load_scenario("rough")
+    rough = {"terrain": shipped.terrain, "robot.contacts": shipped.robot.contacts}
+    coulomb = {"friction": shipped.friction, "compiled.tolerance": shipped.compiled.tolerance}
+    grounds: dict[str, Changes] = {
+        "the scenario's": {},
+        "signals computed beforehand": {"cpg.signals": "recorded", "cpg.feedback": []},
+        "live network": {"cpg.signals": "live"},
+        "Coulomb friction": coulomb,
+        "rough": rough,
+        "rough, Coulomb friction": rough | coulomb,
+    }
+    batches = []
+    for changes in grounds.values():
+        ours, diagram = (scenario.with_changes({**changes, **e}) for e in (COMPILED, DRAKE))
+        batches.append((Batch(ours, 1), Batch(ours, GROUND_BATCH), Batch(diagram, 1)))
+    measure([batch for three in batches for batch in three])
+    rows = []
+    for name, (alone, many, diagram) in zip(grounds, batches, strict=True):
+        speeds = [f"{alone.speed:,.0f}", f"{many.speed:,.0f}", fixed(diagram.speed)]
+        rows.append([name, f"{many.steps / GROUND_BATCH:,.0f}", *speeds])
+    headings = ["ground", "steps per gait", "compiled, one gait", f"{GROUND_BATCH} gaits", "drake"]
+    return markdown_table(headings, rows)
+
+
+TABLES = {"batches": batches_table, "sizes": sizes_table, "grounds": grounds_table}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Prints the tables of the given names, or all but `integrators`."""
+    assert __doc__
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("tables", metavar="TABLE", nargs="*", help="default: all but integrators")
+    parser.add_argument("--scenario", metavar="NAME|FILE", default="thesis")
+    parser.add_argument("--gaits", metavar="N", type=int, default=12, help="default: 12")
+    options = parser.parse_args(arguments)
+    names = [*SETTINGS, *TABLES]
+    if unknown := {*options.tables} - {*names}:
+        parser.error(f"found {', '.join(sorted(unknown))}; there are {', '.join(names)}")
+    try:
+        scenario = load_scenario(options.scenario)
+        for name in options.tables or ["engines", *TABLES]:
+            if name in SETTINGS:
+                table = settings_table(scenario, options.gaits, SETTINGS[name])
+            else:
+                table = TABLES[name](scenario)
+            print(f"{table}\n", flush=True)
+    except InputError as error:
+        sys.exit(f"benchmark.py: {error}")
+
+
+if __name__ == "__main__":
+    main()
