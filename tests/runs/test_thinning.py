@@ -8,6 +8,7 @@ import pandas
 import pytest
 from helpers.analytic import Bowl
 from helpers.synthetic_run import tiny_scenario, write_run
+from thinning import thin
 
 from tetra_drake.evolution.comparison import compare
 from tetra_drake.evolution.elites import elites
@@ -18,7 +19,6 @@ from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.robustness import gaits_of
 from tetra_drake.evolution.summary import summary
 from tetra_drake.evolution.tables import load_run
-from tetra_drake.evolution.thinning import thin
 from tetra_drake.report.run_page import write_report
 from tetra_drake.scenario.optimizers import QualityDiversity
 
