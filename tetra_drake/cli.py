@@ -154,8 +154,7 @@ def _evolve(options: Options) -> None:
     Evolves gaits by the scenario's optimiser, by default the thesis's evolutionary algorithm, and
     records every evaluation in a run directory. Ctrl-C ends it; the same command with --resume
     continues it. The result depends on scenario and seed only. At the end it writes
-    report.html, replay.html, figures/, champions/ and, of a map, elites/ (gait files) into the
-    run directory.
+    report.html, replay.html, figures/ and, of a map, elites/ (gait files) into the run directory.
     """
     from tetra_drake.evolution.progress import Display
     from tetra_drake.evolution.summary import summary, whole_experiment
@@ -278,9 +277,9 @@ def _figures(options: Options) -> None:
     """Draw the figures of a run or a simulation.
 
     Draws figures as SVG and PNG, and the table of the two best gaits as CSV. For a run of
-    `evolve`, finished or not: into figures/ in its directory, where report.html, replay.html,
-    champions/ and elites/ are written anew, too. For a folder written by `simulate`: the figures
-    of one gait, into figures/ in it.
+    `evolve`, finished or not: into figures/ in its directory, where report.html, replay.html and
+    elites/ are written anew, too. For a folder written by `simulate`: the figures of one gait,
+    into figures/ in it.
     """
     from tetra_drake.report.run_page import write_figures
 
