@@ -116,7 +116,6 @@ BAD = [
     ("fitness: {twist: 1}\nobjective: {lead: 1 /m}", "fitness", "objective"),
     ("disturbances: {draws: 0}", "disturbances.draws", "0"),
     ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
-    ("disturbances: {draws: 2, aggregation: best}", "disturbances.aggregation", "'best'"),
     ("disturbances: {draws: 2, tail: 0}", "disturbances.tail", "0"),
     ("disturbances: {draws: 2, terrain: true}", "disturbances.terrain", "!Flat"),
     (

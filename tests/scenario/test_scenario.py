@@ -165,7 +165,7 @@ AIMS = {
     },
     "robust": {
         "disturbances": {"draws": 8, "start": 0.05, "spreads": dict.fromkeys(SPREAD.split(), 0.05)}
-        | {"aggregation": "cvar", "tail": 0.25}
+        | {"tail": 0.25}
     },
 }
 

@@ -223,9 +223,7 @@ class DisturbancesScenario:
     """The changes of robot and surroundings among which evolution looks for gaits.
 
     Every gait is simulated once for each of `draws` draws; those of an iteration are the same for
-    all its gaits. The fitness is the mean over the worst share of the draws: all of them (`mean`),
-    the worst one (`worst`), or `tail` (`cvar`, the conditional value at risk). With `mean_to_tail`,
-    selection goes from the mean, in the first iteration, to `tail`, in the last one.
+    all its gaits.
     """
 
     draws: int = setting(at_least=1)
@@ -237,8 +235,9 @@ class DisturbancesScenario:
     back, sideways, and up."""
     terrain: bool = setting(default=False)
     """Whether each draw has another seed of the terrain."""
-    aggregation: str = setting(choices=("mean", "worst", "cvar", "mean_to_tail"), default="mean")
-    tail: float = setting(above=0, at_most=1, default=0.25)
+    tail: float = setting(above=0, at_most=1, default=1.0)
+    """The fitness is the mean over this share of the draws, the worst (the conditional value at
+    risk): 1 is the mean over all; one draw counts at least."""
 
 
 @dataclass
