@@ -112,8 +112,6 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
         (gait_file(gains={"load": None}), "gains.load", "nothing"),
         (gait_file(gains={"load": 0.5}), "gains.load", "0.5"),  # the thesis has no feedback
         (gait_file(turn=0.5), "turn", "0.5"),  # its cables are driven in pairs, left and right
-        (gait_file(time_scales=[1, 1, 1]), "time_scales", "3"),
-        (gait_file(time_scales=[1, 1, 0, 1]), "time_scales[2]", "0"),
         *[(without(key), key, "") for key in ("schema", "weights", "tau_a_s")],
         (gait_file(tau_c_s=1), "tau_c_s", "tau_"),
         (gait_file(tau_a=0.3), "tau_a", "tau_a_s"),
@@ -143,13 +141,12 @@ def test_what_is_no_text_file_is_refused(tmp_path, scenario, refused, name):
         load_gait(tmp_path / name, scenario)
 
 
-SCALED = {"gait_bounds.time_scale_min": 0.5, "gait_bounds.time_scale_max": 2.0}
 SPACES = {
     "thesis": {},
     "undulation": {},
     "all-cables": {},
-    "turning": SCALED,
-    "feedback": SCALED | {"evolution.independent_tau_b": True},
+    "turning": {},
+    "feedback": {"evolution.independent_tau_b": True},
 }
 """Shipped scenarios, with changes."""
 
@@ -163,7 +160,6 @@ def test_a_saved_gait_of_any_scenario_loads_back_with_its_names_in_any_order(tmp
     gait = seeded_gait(shipped, 5)
     pathways = shipped.cpg.feedback
     assert [getattr(gait.gains, name) != 0.0 for name in pathways] == [True] * len(pathways)
-    assert len(gait.time_scales) == (4 if shipped.gait_bounds.time_scale_max == 2.0 else 0)
     assert gait.turn == (1.0 if shipped.name == "turning" else 0.0)
     content = gait.to_json(shipped)
     assert content["schema"] == 2 and len(content["weights"]) == len(gait.weights)
@@ -251,45 +247,34 @@ def test_mirrored_weights_are_one_parameter_for_left_and_right():
     assert sorted(weights) == sorted([*vector[:32], *vector[:32]])
 
 
-def test_gains_and_time_scales_have_bounds_steps_and_floors():
+def test_gains_have_bounds_steps_and_floors():
     changes = {
         "gait_bounds.gain_min": -2.0,
         "gait_bounds.gain_max": 3.0,
-        "gait_bounds.time_scale_min": 0.5,
-        "gait_bounds.time_scale_max": 2.0,
         "evolution.gain_mutation": 0.7,
-        "evolution.time_scale_mutation": 0.03,
     }
     feedback = load_scenario("feedback")
     space = ParameterSpace.of(feedback.with_changes(changes))
     columns = zip(space.low, space.high, space.steps, space.floors, strict=True)
     rows = dict(zip(space.names, columns, strict=True))
-    assert space.names[24:] == (
-        *("time scale T1-T2", "time scale T2-T3", "time scale T3-T4", "time scale T4-T5"),
-        *("gain length", "gain load", "gain pitch", "tau_A", "tau_B"),
-    )
-    assert rows["time scale T3-T4"] == (0.5, 2.0, 0.03, 0.5)
-    # A gain may become negative by mutation, a time scale must stay above its least.
+    assert space.names[24:] == ("gain length", "gain load", "gain pitch", "tau_A", "tau_B")
+    # A gain may become negative by mutation.
     assert rows["gain load"] == (-2.0, 3.0, 0.7, -math.inf)
-    gait = space.gait(np.arange(33.0), name="any")
-    assert gait.time_scales == (24.0, 25.0, 26.0, 27.0)
-    assert gait.gains == Gains(length=28.0, load=29.0, pitch=30.0)
-    assert (gait.tau_a, gait.tau_b) == (31.0, 32.0)
+    gait = space.gait(np.arange(29.0), name="any")
+    assert gait.gains == Gains(length=24.0, load=25.0, pitch=26.0)
+    assert (gait.tau_a, gait.tau_b) == (27.0, 28.0)
 
 
-def test_equal_bounds_fix_gains_and_time_scales():
-    changes = {
-        **dict.fromkeys(("gait_bounds.gain_min", "gait_bounds.gain_max"), 0.4),
-        **dict.fromkeys(("gait_bounds.time_scale_min", "gait_bounds.time_scale_max"), 1.2),
-    }
+def test_equal_bounds_fix_gains():
+    changes = dict.fromkeys(("gait_bounds.gain_min", "gait_bounds.gain_max"), 0.4)
     space = ParameterSpace.of(load_scenario("feedback").with_changes(changes))
-    assert not space.steps[24:31].any()
+    assert not space.steps[24:27].any()
     gait = space.gait(space.random(np.random.default_rng(0)), name="any")
-    assert gait.time_scales == (1.2,) * 4 and gait.gains == Gains(length=0.4, load=0.4, pitch=0.4)
+    assert gait.gains == Gains(length=0.4, load=0.4, pitch=0.4)
     one = ParameterSpace.of(load_scenario("feedback").with_changes({"cpg.feedback": ["load"]}))
-    assert one.names[24:] == ("gain load", "tau_A", "tau_B")  # time scales of 1 are no parameters
+    assert one.names[24:] == ("gain load", "tau_A", "tau_B")
     gait = one.gait(np.arange(27.0), name="any")
-    assert (gait.gains, gait.time_scales) == (Gains(load=24.0), ())
+    assert gait.gains == Gains(load=24.0)
 
 
 def test_a_turn_is_that_of_the_scenario_and_no_parameter(tmp_path):

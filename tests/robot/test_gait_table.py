@@ -52,13 +52,12 @@ def test_settings_are_printed_where_they_are_set(thesis_gait, scenario):
         ["tau_B", "0.45", "s,", "1.5", "tau_A"],
     ]
     assert lines[2] == "", "nothing else is set"
-    scales, gains = (1.0, 1.25, 0.5, 1.0), Gains(length=0.5, pitch=-0.25)
-    set_all = dataclasses.replace(thesis_gait, turn=-0.5, gains=gains, time_scales=scales)
-    lines = gait_table(set_all, scenario).splitlines()[3:6]
-    assert [line.split(maxsplit=1)[0] for line in lines] == ["turn", "gains", "time"]
+    gains = Gains(length=0.5, pitch=-0.25)
+    set_all = dataclasses.replace(thesis_gait, turn=-0.5, gains=gains)
+    lines = gait_table(set_all, scenario).splitlines()[3:5]
+    assert [line.split(maxsplit=1)[0] for line in lines] == ["turn", "gains"]
     assert "-0.5" in lines[0]
     assert "length 0.5" in lines[1] and "pitch -0.25" in lines[1] and "load" not in lines[1]
-    assert "T2-T3 1.25" in lines[2] and "T3-T4 0.5" in lines[2]
 
 
 def test_oscillators_have_their_cables_where_the_scenario_has_as_many(thesis_gait, scenario):

@@ -144,7 +144,6 @@ def test_shipped_networks_differ_from_their_bases_in_the_network_only(name):
         ({"gait_bounds.turn": 1.5}, "gait_bounds.turn", "1.5"),
         ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
         ({"gait_bounds.gain_min": 2.0}, "gait_bounds.gain_min", "2"),
-        ({"gait_bounds.time_scale_min": 1.5}, "gait_bounds.time_scale_min", "1.5"),
     ],
     ids=itertools.count(),
 )
@@ -287,7 +286,6 @@ def test_a_dumped_scenario_keeps_every_bit_and_needs_no_base(tmp_path, scenario)
         for name, value in list(getattr(section, "__dict__", {}).items()):
             if isinstance(value, float):
                 setattr(section, name, value * float(generator.uniform(0.9, 1.1)))
-    scenario.gait_bounds.time_scale_max = 1.2  # not below the other
     scenario.friction.stiction_range = 1e-5 / 3  # dumped with an exponent
     scenario.robot.offsets = [[0.1 / 3, 0.0, 1e-9]] * 5
     scenario.name = "a: 'name' that needs # quoting"

@@ -52,8 +52,6 @@ class Gait:
     """From -1 to 1: the input of oscillators is u0 (1 + turn) on the left, u0 (1 - turn) on the
     right."""
     gains: Gains = Gains()
-    time_scales: tuple[float, ...] = ()
-    """Factors on both time constants, by junction; none if all are 1."""
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """The content of a gait file; `scenario` is one that the gait fits."""
@@ -63,18 +61,21 @@ class Gait:
         content["tau_a_s"] = self.tau_a
         if self.tau_b != TAU_B_PER_TAU_A * self.tau_a:
             content["tau_b_s"] = self.tau_b
-        others = {"turn": self.turn, "time_scales": list(self.time_scales)}
-        others["gains"] = {k: gain for k, gain in dataclasses.asdict(self.gains).items() if gain}
-        return content | {key: value for key, value in others.items() if value}
+        if self.turn:
+            content["turn"] = self.turn
+        gains = {name: gain for name, gain in dataclasses.asdict(self.gains).items() if gain}
+        if gains:
+            content["gains"] = gains
+        return content
 
 
 @dataclass(frozen=True)
 class ParameterSpace:
-    """The parameters of a scenario's gaits as one vector: weights, factors on time constants and
-    feedback gains where the scenario has them, tau_A, tau_B (s)."""
+    """The parameters of a scenario's gaits as one vector: weights, feedback gains where the
+    scenario has them, tau_A, tau_B (s)."""
 
     names: tuple[str, ...]
-    """As "weight 3->1 extensor", "time scale T1-T2", "gain length", "tau_A", "tau_B"."""
+    """As "weight 3->1 extensor", "gain length", "tau_A", "tau_B"."""
     low: Vector
     high: Vector
     """Bounds of random gaits (Table 5)."""
@@ -86,8 +87,6 @@ class ParameterSpace:
     """Whether tau_B is kept at 2 tau_A."""
     weights: npt.NDArray[np.int64]
     """(weights of a gait,): the parameter that is each weight, or its mirror image."""
-    junctions: int
-    """How many time scales there are."""
     pathways: tuple[str, ...]
     """Those with a gain."""
     turn: float
@@ -115,15 +114,13 @@ class ParameterSpace:
             floors=np.array(floors),
             couples_tau_b=not scenario.evolution.independent_tau_b,
             weights=places,
-            junctions=sum(name.startswith("time scale") for name in names),
             pathways=tuple(scenario.cpg.feedback),
             turn=scenario.gait_bounds.turn,
         )
 
     def gait(self, vector: Vector, *, name: str) -> Gait:
         """The gait of a vector."""
-        count = len(vector) + TAU_A - len(self.pathways)
-        scales, gains = vector[count - self.junctions : count], vector[count:TAU_A].tolist()
+        gains = vector[len(vector) + TAU_A - len(self.pathways) : TAU_A].tolist()
         return Gait(
             name=name,
             weights=tuple(vector[self.weights].tolist()),
@@ -131,16 +128,14 @@ class ParameterSpace:
             tau_b=float(vector[TAU_B]),
             turn=self.turn,
             gains=Gains(**dict(zip(self.pathways, gains, strict=True))),
-            time_scales=tuple(scales.tolist()),
         )
 
     def vector(self, gait: Gait) -> Vector:
         """The vector of a gait; of mirrored weights, the first ones count."""
         _, first = np.unique(self.weights, return_index=True)
-        scales = (gait.time_scales or (1.0,) * self.junctions)[: self.junctions]
         gains = [getattr(gait.gains, name) for name in self.pathways]
         taus = gait.tau_a, gait.tau_b
-        return np.array([*np.array(gait.weights)[first], *scales, *gains, *taus])
+        return np.array([*np.array(gait.weights)[first], *gains, *taus])
 
     def random(self, generator: np.random.Generator) -> Vector:
         """A vector drawn uniformly within the bounds, with tau_B = 2 tau_A."""
@@ -157,22 +152,18 @@ class ParameterSpace:
 
 def _parameters(scenario: Scenario, weights: list[str]) -> list[tuple[str, *tuple[float, ...]]]:
     """Name, lower and upper bound, step and floor of each parameter."""
-    bounds, settings, junctions = scenario.gait_bounds, scenario.evolution, []
-    if (bounds.time_scale_min, bounds.time_scale_max) != (1.0, 1.0):
-        junctions = [f"T{i + 1}-T{i + 2}" for i in range(scenario.robot.tetrahedra - 1)]
+    bounds, settings = scenario.gait_bounds, scenario.evolution
 
     def kind(name: str, step: float, floor: float) -> tuple[float, float, float, float]:
         low, high = getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max")
         return low, high, 0.0 if low == high and name != "weight" else step, floor
 
     weight = kind("weight", settings.weight_mutation, 0.0)
-    scale = kind("time_scale", settings.time_scale_mutation, bounds.time_scale_min)
     gain = kind("gain", settings.gain_mutation, -math.inf)
     low, high, step, floor = kind("tau_a", settings.tau_mutation_range, bounds.tau_a_min)
     tau_b = (TAU_B_PER_TAU_A * number for number in (low, high, step, floor))
     return [
         *((f"weight {name}", *weight) for name in weights),
-        *((f"time scale {name}", *scale) for name in junctions),
         *((f"gain {name}", *gain) for name in scenario.cpg.feedback),
         ("tau_A", low, high, 0.0 if settings.tau_mutation == "listing" else step, floor),
         ("tau_B", *tau_b),
@@ -206,7 +197,6 @@ class GaitFile:
     tau_b_s: float | None = setting(default=None, above=0)
     turn: float = setting(default=0.0, at_least=-1, at_most=1)
     gains: Gains = setting(default=Gains())
-    time_scales: list[float] = setting(default=[], above=0)
 
 
 def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
@@ -243,7 +233,6 @@ def read_gait(path: str | Path, *, key: str = "") -> tuple[Gait, tuple[str, ...]
         tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
         turn=file.turn,
         gains=file.gains,
-        time_scales=tuple(file.time_scales),
     )
     return gait, tuple(weights) if isinstance(weights, dict) else ()
 
@@ -253,7 +242,6 @@ def check_gait(
 ) -> None:
     """Raises InputError, naming source and key, for what does not fit the scenario."""
     weights, count, n = len(gait.weights), len(actuation.couplings), len(actuation.names)
-    scales, junctions = len(gait.time_scales), scenario.robot.tetrahedra - 1
     pathways, gains = scenario.cpg.feedback, dataclasses.asdict(gait.gains)
     gain = next((name for name in PATHWAYS if gains[name] and name not in pathways), "")
     for wrong, name, found, expected in (
@@ -265,7 +253,6 @@ def check_gait(
             gait.turn,
             "0, as no oscillator has a side",
         ),
-        (scales not in (0, junctions), "time_scales", f"{scales} numbers", f"none or {junctions}"),
     ):
         if wrong:
             problem = f"found {found}, expected {expected}"

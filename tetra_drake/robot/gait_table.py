@@ -48,14 +48,12 @@ def gait_table(
 
 
 def _settings(gait: Gait) -> list[str]:
-    scales = [f"T{i + 1}-T{i + 2} {scale:.4g}" for i, scale in enumerate(gait.time_scales)]
     gains = [f"{name} {gain:.4g}" for name, gain in dataclasses.asdict(gait.gains).items() if gain]
     rows = {
         "tau_A": f"{gait.tau_a:.4g} s",
         "tau_B": f"{gait.tau_b:.4g} s, {gait.tau_b / gait.tau_a:.4g} tau_A",
         "turn": f"{gait.turn:.4g}" if gait.turn else "",
         "gains": ", ".join(gains),
-        "time scales": ", ".join(scales),
     }
     return [f"  {name:<14}{text}" for name, text in rows.items() if text]
 

@@ -163,8 +163,6 @@ class GaitBoundsScenario:
     tau_a_max: float = quantity("s", above=0)
     gain_min: float = setting(default=-1.0)  # of the scenario's feedback
     gain_max: float = setting(default=1.0)
-    time_scale_min: float = setting(above=0, default=1.0)  # of both time constants, by junction
-    time_scale_max: float = setting(above=0, default=1.0)
     turn: float = setting(at_least=-1, at_most=1, default=0.0)
     """The turn of all gaits that are drawn or evolved."""
     mirrored: bool = setting(default=False)
@@ -262,7 +260,6 @@ class EvolutionScenario:
     tau_mutation_range: float = quantity("s", at_least=0)  # largest change of tau_A
     tau_mutation: str = setting(choices=("intended", "listing"))
     gain_mutation: float = setting(at_least=0, default=0.2)  # largest change of a feedback gain
-    time_scale_mutation: float = setting(at_least=0, default=0.05)
     stop_rise: float = setting(at_least=0)
     stop_window: int = setting(at_least=1)
     stop_after: int = setting(at_least=0)
@@ -390,7 +387,7 @@ def _check_relations(scenario: Scenario, source: object) -> None:
     mu, most = (law.kinetic, law.static) if isinstance(law, Coulomb) else (0.0, 0.0)
     ranges = {
         name: (getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max"))
-        for name in ("weight", "tau_a", "gain", "time_scale")
+        for name in ("weight", "tau_a", "gain")
     }
     for wrong, key, found, expected in (
         *(
