@@ -7,7 +7,6 @@ import contextlib
 import inspect
 import math
 import os
-import shutil
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
@@ -16,7 +15,7 @@ from typing import Any
 
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder
-from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, read_gait, seeded_gait
+from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import ENGINES, Scenario
 
@@ -208,36 +207,6 @@ def _scenario_to_evolve(options: Options) -> Scenario | None:
     return load_scenario(options.scenario or FIRST_SCENARIO).with_changes(changes)
 
 
-def _reevaluate_options(command: Command) -> None:
-    _add_path(command, "run_directory", "RUN", "the run directory")
-    command.add_argument(
-        "--initial", action="store_true", help="the initial gaits instead of the best"
-    )
-    _add_workers(command)
-
-
-def _reevaluate(options: Options) -> None:
-    """Evaluate gaits of a run once more, on the Drake diagram.
-
-    Evaluates gaits of a run made on another engine once more, on the Drake diagram, and adds
-    them to the run's record (reevaluations.jsonl of each trial): the best gaits of each trial,
-    which evolve itself does at its end, or all initial gaits. Gaits that have been evaluated so
-    already are skipped.
-    """
-    from tetra_drake.evolution.progress import Display
-    from tetra_drake.evolution.reevaluation import reevaluate
-    from tetra_drake.evolution.summary import summary
-
-    with Display(sys.stdout) as progress:
-        run = reevaluate(
-            options.run_directory,
-            initial=options.initial,
-            workers=options.workers,
-            progress=progress,
-        )
-    print(summary(run))
-
-
 def _replay_options(command: Command) -> None:
     source = "a folder written by `simulate`, a gait file, or a folder written by `evolve`"
     _add_path(command, "source", "RESULT_DIR|GAIT|RUN_DIR", source)
@@ -366,27 +335,6 @@ def _compare(options: Options) -> None:
         from tetra_drake.figures.search import save_comparison
 
         print(f"wrote {', '.join(save_comparison(compared, options.out))} to {options.out}/")
-
-
-def _gait_options(command: Command) -> None:
-    _add_path(command, "file", "FILE", "a gait file (JSON)")
-    _add_scenario(command)
-
-
-def _gait(options: Options) -> None:
-    """Print a gait as a table.
-
-    Prints the parameters of a gait file, the weights as a matrix for each kind of neuron, and
-    whether the gait fits a scenario, else what does not.
-    """
-    from tetra_drake.robot.gait_table import gait_table
-
-    scenario = load_scenario(options.scenario)
-    gait, names = read_gait(options.file)
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    _say(gait_table(gait, scenario, names=names, width=width) + "\n")
-    load_gait(options.file, scenario)
-    print(f"fits scenario {scenario.name}")
 
 
 def _cpg_options(command: Command) -> None:
@@ -527,12 +475,10 @@ def _say(text: str) -> None:
 _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ...] = (
     (_simulate, _simulate_options),
     (_evolve, _evolve_options),
-    (_reevaluate, _reevaluate_options),
     (_replay, _replay_options),
     (_figures, _figures_options),
     (_robustness, _robustness_options),
     (_compare, _compare_options),
-    (_gait, _gait_options),
     (_cpg, _cpg_options),
     (_diagram, _diagram_options),
 )

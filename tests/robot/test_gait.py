@@ -375,3 +375,31 @@ def test_the_seed_alone_decides_the_draw(scenario):
     np.testing.assert_array_equal(first, draw(scenario, seed=8, count=3))
     assert not np.any(first[0] == draw(scenario, seed=9, count=1)[0])
     assert not np.any(first[0] == first[1])
+
+
+# Printing
+
+
+def test_a_printed_gait_has_weights_in_the_row_of_the_inhibited_oscillator(tmp_path, scenario):
+    gait = load_gait(write(tmp_path, gait_file(weights=[*range(1, 25)], name="any")), scenario)
+    head, *tables = str(gait).split("\n\n")
+    assert head.startswith("any") and f"{gait.tau_a:.4g} s" in head
+    extensors, flexors = ([line.split() for line in table.splitlines()] for table in tables)
+    # B.2: w1, w2, w3 act on neuron 1 from 3, 5, 7; w4 on 2 from 4; w24 on 8 from 6.
+    assert extensors[1:3] == [["onto", "1", "2", "3", "4"], ["1", "-", "1.00", "2.00", "3.00"]]
+    assert flexors[2] == ["1", "-", "4.00", "5.00", "6.00"]
+    assert flexors[5] == ["4", "22.00", "23.00", "24.00", "-"]
+
+
+def test_a_printed_gait_has_turn_and_gains_where_they_are_set():
+    gait = seeded_gait(load_scenario("feedback").with_changes({"cpg.feedback": ["load"]}))
+    set_all = dataclasses.replace(gait, turn=-0.5, gains=Gains(load=0.25))
+    lines = str(set_all).splitlines()
+    assert "turn -0.5" in lines and "gain of load 0.25" in lines
+    assert not any(word in str(gait) for word in ("turn", "length", "pitch"))
+
+
+def test_weights_without_names_are_printed_in_a_row():
+    gait = Gait(name="any", weights=(1.25, 2.0), tau_a=0.3, tau_b=0.6)
+    assert "weights 1.25 2" in str(gait)
+    assert "weights none" in str(dataclasses.replace(gait, weights=()))

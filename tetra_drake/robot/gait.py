@@ -4,7 +4,7 @@ import dataclasses
 import difflib
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.robot.actuation import Actuation
+from tetra_drake.formatting import aligned
+from tetra_drake.robot.actuation import KINDS, Actuation
 from tetra_drake.scenario.fields import Check, setting
 from tetra_drake.scenario.schema import PATHWAYS, Scenario
 
@@ -52,6 +53,30 @@ class Gait:
     """From -1 to 1: the input of oscillators is u0 (1 + turn) on the left, u0 (1 - turn) on the
     right."""
     gains: Gains = Gains()
+    weight_names: tuple[str, ...] = field(default=(), repr=False, compare=False)
+    """As "3->1 extensor": from oscillator 3 onto oscillator 1. Empty where they are not known."""
+
+    def __str__(self) -> str:
+        """A table of the parameters; the weights as a matrix for each kind of neuron."""
+        lines = [f"{self.name}: tau_A {self.tau_a:.4g} s, tau_B {self.tau_b:.4g} s"]
+        if self.turn:
+            lines.append(f"turn {self.turn:.4g}")
+        gains = dataclasses.asdict(self.gains)
+        lines += [f"gain of {name} {gain:.4g}" for name, gain in gains.items() if gain]
+        if not self.weight_names:
+            weights = [f"{weight:.4g}" for weight in self.weights]
+            return "\n".join([*lines, f"weights {' '.join(weights) or 'none'}"])
+        by_name = dict(zip(self.weight_names, self.weights, strict=True))
+        numbers = {int(n) for name in by_name for n in name.split()[0].split("->")}
+        oscillators = range(1, max(numbers) + 1)
+        for kind in KINDS:
+            rows = [["onto", *map(str, oscillators)]]
+            for onto in oscillators:
+                cells = [by_name.get(f"{source}->{onto} {kind}") for source in oscillators]
+                rows.append([str(onto), *("-" if w is None else f"{w:.2f}" for w in cells)])
+            lines += ["", f"weights of the {kind}s, a column for each oscillator they come from"]
+            lines.append(aligned(rows))
+        return "\n".join(lines)
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """The content of a gait file; `scenario` is one that the gait fits."""
@@ -87,6 +112,8 @@ class ParameterSpace:
     """Whether tau_B is kept at 2 tau_A."""
     weights: npt.NDArray[np.int64]
     """(weights of a gait,): the parameter that is each weight, or its mirror image."""
+    weight_names: tuple[str, ...]
+    """(weights of a gait,): their names in gait files."""
     pathways: tuple[str, ...]
     """Those with a gain."""
     turn: float
@@ -114,6 +141,7 @@ class ParameterSpace:
             floors=np.array(floors),
             couples_tau_b=not scenario.evolution.independent_tau_b,
             weights=places,
+            weight_names=actuation.weight_names,
             pathways=tuple(scenario.cpg.feedback),
             turn=scenario.gait_bounds.turn,
         )
@@ -128,6 +156,7 @@ class ParameterSpace:
             tau_b=float(vector[TAU_B]),
             turn=self.turn,
             gains=Gains(**dict(zip(self.pathways, gains, strict=True))),
+            weight_names=self.weight_names,
         )
 
     def vector(self, gait: Gait) -> Vector:
@@ -204,19 +233,27 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
 
     Raises InputError, naming file and key, for whatever is wrong in the file or does not fit.
     """
-    gait, names = read_gait(path, key=key)
+    file = _read_file(path, key)
     actuation = Actuation.of(scenario)
-    if names:
-        wanted, weights = actuation.weight_names, dict(zip(names, gait.weights, strict=True))
-        _check_names(names, wanted, path, f"{key}.weights".strip("."))
-        gait = dataclasses.replace(gait, weights=tuple(weights[name] for name in wanted))
+    names, weights = actuation.weight_names, file.weights
+    if isinstance(weights, dict):
+        _check_names(tuple(weights), names, path, f"{key}.weights".strip("."))
+        weights = [weights[name] for name in names]
+    gait = Gait(
+        name=file.name or Path(path).stem,
+        weights=tuple(weights),
+        tau_a=file.tau_a_s,
+        tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
+        turn=file.turn,
+        gains=file.gains,
+        weight_names=names,
+    )
     check_gait(gait, scenario, actuation, source=path, key=key)
     return gait
 
 
-def read_gait(path: str | Path, *, key: str = "") -> tuple[Gait, tuple[str, ...]]:
-    """The gait of a file, for whatever robot: its weights as they stand there, and their names, if
-    they have any. Raises InputError as load_gait() does."""
+def _read_file(path: str | Path, key: str) -> GaitFile:
+    """What a gait file holds, or a JSON file under `key`."""
     text = read_text(path, "gait file")
     try:
         raw = json.loads(text, object_pairs_hook=_unique_keys)
@@ -225,16 +262,7 @@ def read_gait(path: str | Path, *, key: str = "") -> tuple[Gait, tuple[str, ...]
     if key and isinstance(raw, dict):
         raw = raw.get(key)
     file: GaitFile = Check(path, complete=True).value(GaitFile, raw, key)
-    weights = file.weights
-    gait = Gait(
-        name=file.name or Path(path).stem,
-        weights=tuple(weights.values() if isinstance(weights, dict) else weights),
-        tau_a=file.tau_a_s,
-        tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
-        turn=file.turn,
-        gains=file.gains,
-    )
-    return gait, tuple(weights) if isinstance(weights, dict) else ()
+    return file
 
 
 def check_gait(
