@@ -80,8 +80,8 @@ def _simulate_options(command: Command) -> None:
     command.add_argument(
         "--meshcat",
         action="store_true",
-        help="show the robot in a browser during the simulation, at most in real time (does not "
-        "affect results)",
+        help="show the robot in a browser while the Drake diagram simulates it, at most in real "
+        "time (does not affect results)",
     )
 
 
@@ -114,10 +114,9 @@ def _simulate(options: Options) -> None:
         f"wrote result.json, trajectory.nc, scenario.yaml and replay.html to {options.out}/\n"
         f"to watch the robot, open in a browser: {options.out / REPLAY}"
     )
-    if view is not None and result.trajectory is not None:
-        view.replay(result.trajectory)
+    if view is not None:
         with contextlib.suppress(EOFError, KeyboardInterrupt):
-            input("the browser repeats the motion; press Enter to end ")
+            input("press Enter to close the view in the browser ")
 
 
 def _evolve_options(command: Command) -> None:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 
+from tetra_drake.engines.viewer import check_can_be_watched
 from tetra_drake.robot.ground import ground_heights, make_ground
 from tetra_drake.robot.structure import MakeStructure, node_positions
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
-from tetra_drake.visualization.replay import quiet_meshcat, show_replay
+from tetra_drake.visualization.replay import quiet_meshcat
 from tetra_drake.visualization.scene import add_robot, motions, set_surroundings
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class LiveView:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._meshcat, self._scenario = meshcat, scenario
+        self._meshcat = meshcat
         self._clock, self._sleep = clock, sleep
         self._structure = MakeStructure(scenario)
         self._started: float | None = None
@@ -74,13 +75,11 @@ class LiveView:
         self._meshcat.SetSimulationTime(time)  # for the rate it shows
         self._due = (np.floor(time * FRAMES_PER_SECOND) + 1.0) / FRAMES_PER_SECOND
 
-    def replay(self, trajectory: xarray.Dataset) -> None:
-        """Plays what was simulated again and again."""
-        show_replay(self._meshcat, scenario=self._scenario, trajectory=trajectory)
-
 
 def open_view(scenario: Scenario, *, say: Callable[[str], None]) -> LiveView:
-    """A view in a new Meshcat, whose address `say` is told."""
+    """A view in a new Meshcat, whose address `say` is told. Raises InputError where the scenario's
+    engine cannot be watched."""
+    check_can_be_watched(scenario)
     meshcat = quiet_meshcat(MeshcatParams())
     say(f"open {meshcat.web_url()} in a browser, which starts the simulation")
     return LiveView(meshcat, scenario)
