@@ -21,7 +21,6 @@ THESIS: list[tuple[str, str, tuple[float, ...]]] = [
     ("robot", "tetrahedra gravity density", (5, 9.80665, 2.7e-3 / 1e-6)),  # 2.7 g/cm^3
     ("robot", "strut_length strut_diameter node_diameter", (6 * IN, 0.125 * IN, 0.2 * IN)),
     # Table 1; damping by Eq. 2, 3/2 alpha k: the table's lb s/in does not balance Eq. 1
-    ("ground", "restitution velocity_correction", (0.9, 0.72 / IN)),
     ("ground", "stiffness damping", (25 * LBF / IN, 1.5 * 0.72 / IN * 25 * LBF / IN)),
     # Tables 2 and 3
     ("friction", "stiction_range stiction_damping", (0.004 * IN, 0.4 * LBF / IN)),
@@ -205,7 +204,6 @@ def test_a_file_of_schema_1_means_what_it_meant(data, scenario):
     assert differences(loaded, scenario) == [
         ("simulation.engine", "compiled"),
         ("simulation.look_ahead", "0.00025 s"),
-        ("simulation.fresh_steps", "false"),
     ]
     assert (loaded.reference, loaded.robot.offsets) == (None, [])
     # All but the constants of Eq. 10, which are the objective now.

@@ -20,10 +20,7 @@ from tetra_drake.scenario.terrain import Flat, Terrain
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 ENGINES = ("drake", "compiled", "mujoco")
-SCHEMES = (
-    *("radau3", "runge_kutta3", "runge_kutta2", "runge_kutta5", "bogacki_shampine3", "radau1"),
-    *("implicit_euler", "velocity_implicit_euler", "explicit_euler", "semi_explicit_euler"),
-)
+SCHEMES = ("radau3", "runge_kutta3")
 MUJOCO_INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
 
 CABLES = (
@@ -67,12 +64,12 @@ class RobotScenario:
 
 @dataclass
 class GroundScenario:
-    """The normal force (Table 1). `stiffness` and `damping` act; the other two explain them."""
+    """The normal force (Table 1)."""
 
-    restitution: float = setting(above=0, at_most=1)  # e, the aim of the thesis
-    velocity_correction: float = quantity("s/m", above=0)  # alpha: e = 1 - alpha v (Eq. 2)
     stiffness: float = quantity("N/m", above=0)
-    damping: float = quantity("N*s/m^2", at_least=0)  # lambda = 3/2 alpha stiffness (Eq. 2)
+    damping: float = quantity("N*s/m^2", at_least=0)
+    """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
+    speed v: e = 1 - alpha v (Eq. 2)."""
 
 
 @dataclass
@@ -181,19 +178,15 @@ class SimulationScenario:
     duration: float = quantity("s", above=0)
     steady_from: float = quantity("s", at_least=0)  # the fitness counts from here (section 2.3)
     scheme: str = setting(choices=SCHEMES)
-    accuracy: float = setting(above=0)  # per step; unused by schemes without an error estimate
+    accuracy: float = setting(above=0)  # per step
     max_step: float = quantity("s", above=0)
     mode_changes: str = setting(choices=("step_end", "witness"))
     look_ahead: float = quantity("s", at_least=0)
-    """With step_end and an implicit scheme: shortest step that ends at a predicted mode change; 0
-    for none."""
+    """With step_end and radau3: shortest step that ends at a predicted mode change; 0 for none."""
     witness_window: float = quantity("s", above=0)  # how closely a witness localises
     max_evaluations: int = setting(at_least=1)  # of the derivatives, in one simulation
     max_speed: float = quantity("m/s", above=0)  # a faster body counts as diverged
     sample_period: float = quantity("s", above=0)  # of a recorded trajectory
-    fresh_steps: bool = setting(default=False)
-    """With look-ahead: whether steps begin anew after a mode change, short and with a new
-    Jacobian, and approach a distant change before they aim at it."""
 
 
 @dataclass
@@ -253,7 +246,6 @@ class EvolutionScenario:
     max_evaluations: int | None = setting(at_least=1, default=None)
     """Of a trial by an optimiser other than !SteadyState; if not given, as many as there are in
     max_iterations of that one."""
-    crossover: str = setting(choices=("uniform",))
     crossover_probability: float = setting(at_least=0, at_most=1)
     mutation_probability: float = setting(at_least=0, at_most=1)
     weight_mutation: float = setting(at_least=0)  # largest change of a weight in one mutation
