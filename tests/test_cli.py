@@ -69,6 +69,7 @@ def unchanged(work):
     [
         ("simulate --scenario key.yaml", "key.yaml", "robot.tetrahedron tetrahedra"),
         ("simulate --scenario missing.yaml", "missing.yaml", ""),
+        ("simulate --engine compiled --meshcat", "scenario thesis", "simulation.engine compiled"),
         ("cpg --out a.csv --scenario broken.yaml", "broken.yaml", ""),
         ("diagram --out a.dot --scenario folder", "folder", ""),
         ("simulate --gait 23.json", "23.json", "weights 23 24"),

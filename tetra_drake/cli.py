@@ -93,12 +93,15 @@ def _simulate(options: Options) -> None:
     in a browser) and scenario.yaml (the scenario in full).
     """
     from tetra_drake.engines.simulate import prepare, simulate
+    from tetra_drake.engines.viewer import check_can_be_watched
     from tetra_drake.results.folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.results.result import summary
 
     scenario = load_scenario(options.scenario)
     if options.engine:
         scenario = scenario.with_changes({"simulation.engine": options.engine})
+    if options.meshcat:
+        check_can_be_watched(scenario)
     gait = _chosen_gait(options, scenario)
     check_result_folder(options.out)
     prepare(scenario, say=_say)

@@ -242,7 +242,13 @@ def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure
 
 
 @pytest.mark.parametrize(
-    "terrain", [Steps(), Incline(slope=0.1, start=3.0 * INCH), Rough()], ids=lambda t: str(type(t))
+    "terrain",
+    [
+        Steps(height=INCH, depth=6.0 * INCH, count=2),
+        Incline(slope=0.1, start=3.0 * INCH),
+        Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
+    ],
+    ids=["steps", "incline with a start", "rough"],
 )
 def test_ground_that_is_no_plane_is_refused(short, terrain, monkeypatch):
     monkeypatch.setattr(engine, "installed", lambda: True)
