@@ -21,7 +21,7 @@ import statistics
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -78,67 +78,67 @@ SETTINGS: dict[str, list[Changes]] = {
 }
 
 
-@dataclass
-class Batch:
-    """Random gaits, of seeds 0, 1 ..., simulated at the same time."""
+class Batch(NamedTuple):
+    """Random gaits, of seeds 0, 1 ..., to be simulated at the same time."""
 
     scenario: Scenario
-    size: int
+    gaits: int
     cores: int = 1
-    speeds: list[float] = field(default_factory=list)  # by round: times real time, in all
-    step_costs: list[float] = field(default_factory=list)  # by round: μs a core and step
-    steps: int = 0
-
-    def simulate(self) -> None:
-        """Simulates the gaits and measures the time; those that fail do not count."""
-        started = time.perf_counter()
-        gaits = [seeded_gait(self.scenario, seed) for seed in range(self.size)]
-        outcomes = simulate_many(scenario=self.scenario, gaits=gaits, workers=self.cores)
-        seconds = time.perf_counter() - started
-        results = [outcome for outcome in outcomes if isinstance(outcome, SimulationResult)]
-        self.steps = sum(result.integrator.steps for result in results)
-        self.speeds.append(sum(result.duration for result in results) / seconds)
-        self.step_costs.append(1e6 * sum(result.wall_time for result in results) / self.steps)
-
-    @property
-    def speed(self) -> float:
-        """Times real time, in all: the median of the rounds."""
-        return statistics.median(self.speeds)
-
-    @property
-    def step_cost(self) -> float:
-        """The time (μs) that a step of one gait takes a core: the median of the rounds."""
-        return statistics.median(self.step_costs)
 
 
-def measure(batches: Sequence[Batch]) -> None:
-    """Simulates batches in turns, so that what else runs on the machine affects all alike."""
+class Timing(NamedTuple):
+    """What a batch took."""
+
+    speed: float
+    """Times real time, of all gaits together."""
+    step_cost: float
+    """Of one gait, in μs of a core."""
+    steps: float
+    """Of all gaits."""
+
+
+def measure(batches: Sequence[Batch]) -> list[Timing]:
+    """Medians of rounds in which batches take turns, so that whatever else runs on the machine
+    affects all alike. Gaits that fail do not count."""
     for batch in batches:
-        gaits = batch.size * [seeded_gait(batch.scenario)]
-        simulate_many(scenario=brief(batch.scenario), gaits=gaits, workers=1)
-    for _ in range(ROUNDS):
-        for batch in batches:
-            batch.simulate()
+        timing_of(batch._replace(scenario=brief(batch.scenario)))
+    rounds = [[timing_of(batch) for batch in batches] for _ in range(ROUNDS)]
+    return [Timing(*np.median(timings, axis=0)) for timings in zip(*rounds, strict=True)]
+
+
+def timing_of(batch: Batch) -> Timing:
+    """What a batch takes once."""
+    scenario, count, cores = batch
+    started = time.perf_counter()
+    gaits = [seeded_gait(scenario, seed) for seed in range(count)]
+    outcomes = simulate_many(scenario=scenario, gaits=gaits, workers=cores)
+    seconds = time.perf_counter() - started
+    results = successes(scenario, outcomes)
+    steps = sum(result.integrator.steps for result in results)
+    cost = 1e6 * sum(result.wall_time for result in results) / steps
+    return Timing(sum(result.duration for result in results) / seconds, cost, steps)
 
 
 def settings_table(scenario: Scenario, gaits: int, settings: Sequence[Changes]) -> str:
     """Speed and error of settings."""
     walking = [seeded_gait(scenario, seed) for seed in range(gaits)]
+    exact_in: dict[str, np.ndarray] = {}
     rows = []
     for changes in settings:
         changed = scenario.with_changes(changes)
         engine = changed.simulation.engine
         if engine == "mujoco" and not installed():
             continue
-        converged = scenario.with_changes(MUJOCO_CONVERGED if engine == "mujoco" else CONVERGED)
-        exact_in = distances_in(simulate_many(scenario=converged, gaits=walking))
+        if engine not in exact_in:
+            fine = scenario.with_changes(MUJOCO_CONVERGED if engine == "mujoco" else CONVERGED)
+            exact_in[engine] = distances_in(simulate_many(scenario=fine, gaits=walking))
         simulate_many(scenario=brief(changed), gaits=walking[:1], workers=1)
         started = time.perf_counter()
         # One at a time: together they would share a core's lanes.
         outcomes = [simulate_many(scenario=changed, gaits=[g], workers=1)[0] for g in walking]
         speed = gaits * changed.simulation.duration / (time.perf_counter() - started)
-        results = [outcome for outcome in outcomes if isinstance(outcome, SimulationResult)]
-        errors_in = np.abs(distances_in(outcomes) - exact_in)
+        results = successes(changed, outcomes)
+        errors_in = np.abs(distances_in(outcomes) - exact_in[engine])
         errors = [fixed(np.nanmedian(errors_in), 3), fixed(np.nanmax(errors_in), 3)]
         evaluations = [result.integrator.derivative_evaluations for result in results]
         counts = [f"{statistics.mean(evaluations):,.0f}", str(gaits - len(results))]
@@ -147,6 +147,16 @@ def settings_table(scenario: Scenario, gaits: int, settings: Sequence[Changes]) 
     headings = ["engine", "setting", "times real time per core", "median error, in"]
     headings += ["worst error, in", "evaluations per gait", "failed"]
     return markdown_table(headings, rows, text_columns=(0, 1))
+
+
+def successes(
+    scenario: Scenario, outcomes: Sequence[SimulationResult | SimulationFailure]
+) -> list[SimulationResult]:
+    """The results; InputError if all simulations failed."""
+    results = [outcome for outcome in outcomes if isinstance(outcome, SimulationResult)]
+    if not results:
+        raise InputError(f"scenario {scenario.name}", "", f"no gait walks: {outcomes[0]}")
+    return results
 
 
 def distances_in(outcomes: Sequence[SimulationResult | SimulationFailure]) -> np.ndarray:
@@ -168,26 +178,24 @@ def batches_table(scenario: Scenario) -> str:
         batches += [Batch(ours, size, cores) for size in BATCHES if size >= cores]
         for changes in (MUJOCO, FAST_MUJOCO) if installed() else ():
             batches.append(Batch(scenario.with_changes(changes), cores * MUJOCO_BATCH, cores))
-    measure(batches)
     rows = []
-    for batch in batches:
+    for batch, timing in zip(batches, measure(batches), strict=True):
         engine = batch.scenario.simulation.engine
         if engine == "mujoco":
             engine += f", steps of {1e3 * batch.scenario.mujoco.step:g} ms"
-        rows.append([engine, str(batch.size), str(batch.cores), f"{batch.speed:,.1f}"])
+        rows.append([engine, str(batch.gaits), str(batch.cores), f"{timing.speed:,.1f}"])
     return markdown_table(["engine", "gaits at a time", "cores", "times real time"], rows)
 
 
 def sizes_table(scenario: Scenario) -> str:
     """Cost of a step of the compiled engine by the number of tetrahedra."""
     robots = [scenario.with_changes(COMPILED | {"robot.tetrahedra": size}) for size in SIZES]
-    pairs = [(Batch(robot, 1), Batch(robot, LANES)) for robot in robots]
-    measure([batch for pair in pairs for batch in pair])
+    timings = measure([Batch(robot, gaits) for robot in robots for gaits in (1, LANES)])
     rows = []
-    for size, (alone, in_lanes) in zip(SIZES, pairs, strict=True):
+    for size, alone, in_lanes in zip(SIZES, timings[::2], timings[1::2], strict=True):
         costs = [alone.step_cost, alone.step_cost / size]
         costs += [in_lanes.step_cost, in_lanes.step_cost / size]
-        rows.append([str(size), f"{alone.steps:,}", *map(fixed, costs)])
+        rows.append([str(size), f"{alone.steps:,.0f}", *map(fixed, costs)])
     headings = ["tetrahedra", "steps", "μs per step", "and tetrahedron"]
     headings += [f"one of {LANES}: μs per step", "and tetrahedron"]
     return markdown_table(headings, rows, text_columns=())
@@ -196,30 +204,23 @@ def sizes_table(scenario: Scenario) -> str:
 def grounds_table(scenario: Scenario) -> str:
     """Speed on one core by ground, friction and network."""
     shipped = load_scenario("rough")
-    rough: dict[str, object] = {
-        "terrain": shipped.terrain,
-        "robot.contacts": shipped.robot.contacts,
-    }
-    coulomb: dict[str, object] = {
-        "friction": shipped.friction,
-        "compiled.tolerance": shipped.compiled.tolerance,
-    }
+    rough: Changes = {"terrain": shipped.terrain, "robot.contacts": shipped.robot.contacts}
+    tolerance = shipped.compiled.tolerance
+    coulomb: Changes = {"friction": shipped.friction, "compiled.tolerance": tolerance}
     grounds: dict[str, Changes] = {
         "the scenario's": {},
         "signals computed beforehand": {"cpg.signals": "recorded", "cpg.feedback": []},
         "live network": {"cpg.signals": "live"},
         "Coulomb friction": coulomb,
         "rough": rough,
-        "rough, Coulomb friction": rough | coulomb,
+        "rough, Coulomb friction": {**rough, **coulomb},
     }
-    batches = []
-    for changes in grounds.values():
-        ours = scenario.with_changes({**changes, **COMPILED})
-        on_diagram = scenario.with_changes({**changes, **DRAKE})
-        batches.append((Batch(ours, 1), Batch(ours, GROUND_BATCH), Batch(on_diagram, 1)))
-    measure([batch for three in batches for batch in three])
+    columns = (COMPILED, 1), (COMPILED, GROUND_BATCH), (DRAKE, 1)
+    walks = [scenario.with_changes(changes) for changes in grounds.values()]
+    timings = measure([Batch(walk.with_changes(e), n) for walk in walks for e, n in columns])
     rows = []
-    for name, (alone, many, diagram) in zip(grounds, batches, strict=True):
+    for k, name in enumerate(grounds):
+        alone, many, diagram = timings[3 * k : 3 * k + 3]
         speeds = [f"{alone.speed:,.0f}", f"{many.speed:,.0f}", fixed(diagram.speed)]
         rows.append([name, f"{many.steps / GROUND_BATCH:,.0f}", *speeds])
     headings = ["ground", "steps per gait", "compiled, one gait", f"{GROUND_BATCH} gaits", "drake"]
