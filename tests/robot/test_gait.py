@@ -402,4 +402,6 @@ def test_a_printed_gait_has_turn_and_gains_where_they_are_set():
 def test_weights_without_names_are_printed_in_a_row():
     gait = Gait(name="any", weights=(1.25, 2.0), tau_a=0.3, tau_b=0.6)
     assert "weights 1.25 2" in str(gait)
+    named = dataclasses.replace(gait, weight_names=("2->1 flexor",))
+    assert str(named) == str(gait)
     assert "weights none" in str(dataclasses.replace(gait, weights=()))

@@ -63,7 +63,7 @@ class Gait:
             lines.append(f"turn {self.turn:.4g}")
         gains = dataclasses.asdict(self.gains)
         lines += [f"gain of {name} {gain:.4g}" for name, gain in gains.items() if gain]
-        if not self.weight_names:
+        if not self.weights or len(self.weight_names) != len(self.weights):
             weights = [f"{weight:.4g}" for weight in self.weights]
             return "\n".join([*lines, f"weights {' '.join(weights) or 'none'}"])
         by_name = dict(zip(self.weight_names, self.weights, strict=True))
