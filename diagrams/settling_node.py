@@ -51,6 +51,11 @@ def contact_speeds(motion: Motion) -> tuple[float, float]:
     return -float(rate[first]), float(rate[first + above[0]]) if above.size else math.nan
 
 
+def velocity_correction(scenario: Scenario) -> float:
+    """alpha of Eq. 2 (s/m): the ground's damping is 3/2 alpha times its stiffness."""
+    return scenario.ground.damping / (1.5 * scenario.ground.stiffness)
+
+
 @common_style()
 def draw(settling: Motion, bouncing: Motion) -> Figure:
     """Height and normal force of one node over time."""
@@ -82,7 +87,7 @@ def main() -> None:
     save_figure(draw(settling, bouncing), out, "settling_node_motion", kinds=["svg"])
 
     speed, rebound = contact_speeds(bouncing)
-    linear = 1.0 - scenario.ground.velocity_correction * speed
+    linear = 1.0 - velocity_correction(scenario) * speed
     print(f"impact at {contact_speeds(settling)[0] / INCH:.3f} in/s (thesis: about 0.12)")
     print(f"at rest {-settling.p_WN[-1, TRAILING, 2] / INCH:.5f} in deep")
     print(f"restitution without weight {rebound / speed:.3f} (thesis: {THESIS_RESTITUTION:g})")

@@ -26,12 +26,12 @@ from pathlib import Path
 from typing import Any
 
 from analyse import ANALYSIS, analyse
+from thinning import thin
 
 from tetra_drake.engines.simulate import available_cores
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.progress import Display
 from tetra_drake.evolution.record import MANIFEST
-from tetra_drake.evolution.thinning import thin
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration
 from tetra_drake.report.replay_page import write_replay

@@ -14,8 +14,7 @@ import tetra_drake
 PACKAGE = Path(tetra_drake.__file__).parent
 ORDER = (
     *("errors", "files", "formatting", "physics", "scenario", "robot", "systems"),
-    *("visualization", "results", "engines", "evolution", "figures", "report", "benchmark"),
-    *("run", "cli"),
+    *("visualization", "results", "engines", "evolution", "figures", "report", "run", "cli"),
 )
 """A folder, or a module beside the folders, imports only those before it."""
 

@@ -1,4 +1,4 @@
-"""evolve(): what the command does, from Python; and the commands evolve and reevaluate."""
+"""evolve(): what the command does, from Python; and the command evolve."""
 
 import contextlib
 import json
@@ -178,7 +178,6 @@ def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
             tetra_drake.evolve(**({"scenario": None, "out": run, "resume": True} | own | changed))
     assert cli.main(["evolve", "--out", str(run), "--resume"]) == 2
     assert "objective=" in capsys.readouterr().err
-    assert cli.main(["reevaluate", str(run)]) == 2
     assert read_record(run) == begun
     tetra_drake.evolve(None, run, resume=True, **own)
     assert read_record(run) == read_record(tmp_path / "whole")

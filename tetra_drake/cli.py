@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import contextlib
 import inspect
-import json
 import math
 import os
-import shutil
 import signal
 import sys
 import threading
@@ -17,10 +15,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn
 
-from tetra_drake.benchmark.settings import SETS
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import check_folder, whole_file
-from tetra_drake.robot.gait import WALKING_SEED, Gait, load_gait, read_gait, seeded_gait
+from tetra_drake.files import check_folder
+from tetra_drake.robot.gait import WALKING_SEED, Gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import ENGINES, Scenario
 
@@ -29,8 +26,6 @@ BAD_INPUT, FAILED, INTERRUPTED, TERMINATED = 2, 1, 130, 143
 
 FIRST_SCENARIO = "quick"
 """The scenario that `evolve` starts without another: it ends in minutes."""
-
-BENCHMARK_GAITS = 12
 
 _OF_GAIT = "that of the run in whose folder the gait is, else thesis"
 """The default scenario of commands that take a gait."""
@@ -112,8 +107,8 @@ def _simulate_options(command: Command) -> None:
     command.add_argument(
         "--meshcat",
         action="store_true",
-        help="show the robot in a browser during the simulation, at most in real time (does not "
-        "affect results)",
+        help="show the robot in a browser while the Drake diagram simulates it, at most in real "
+        "time (does not affect results)",
     )
 
 
@@ -125,12 +120,15 @@ def _simulate(options: Options) -> None:
     in a browser) and scenario.yaml (the scenario in full).
     """
     from tetra_drake.engines.simulate import prepare, simulate
+    from tetra_drake.engines.viewer import check_can_be_watched
     from tetra_drake.results.folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.results.result import summary
 
     scenario, gait = _chosen_gait(options)
     if options.engine:
         scenario = scenario.with_changes({"simulation.engine": options.engine})
+    if options.meshcat:
+        check_can_be_watched(scenario)
     check_result_folder(options.out)
     prepare(scenario)
     view = None
@@ -145,10 +143,9 @@ def _simulate(options: Options) -> None:
         f"wrote result.json, trajectory.nc, scenario.yaml and replay.html to {options.out}/\n"
         f"to watch the robot, open in a browser: {options.out / REPLAY}"
     )
-    if view is not None and result.trajectory is not None:
-        view.replay(result.trajectory)
+    if view is not None:
         with contextlib.suppress(EOFError, KeyboardInterrupt):
-            input("the browser repeats the motion; press Enter to end ")
+            input("press Enter to close the view in the browser ")
 
 
 def _evolve_options(command: Command) -> None:
@@ -184,8 +181,7 @@ def _evolve(options: Options) -> None:
     Evolves gaits by the scenario's optimiser, by default the thesis's evolutionary algorithm, and
     records every evaluation in a run directory. Ctrl-C ends it; the same command with --resume
     continues it. The result depends on scenario and seed only. At the end it writes
-    report.html, replay.html, figures/, champions/ and, of a map, elites/ (gait files) into the
-    run directory.
+    report.html, replay.html, figures/ and, of a map, elites/ (gait files) into the run directory.
     """
     from tetra_drake.evolution.progress import Display
     from tetra_drake.evolution.summary import summary, whole_experiment
@@ -239,36 +235,6 @@ def _scenario_to_evolve(options: Options) -> Scenario | None:
     return load_scenario(options.scenario or FIRST_SCENARIO).with_changes(changes)
 
 
-def _reevaluate_options(command: Command) -> None:
-    _add_path(command, "run_directory", "RUN", "the run directory")
-    command.add_argument(
-        "--initial", action="store_true", help="the initial gaits instead of the best"
-    )
-    _add_workers(command)
-
-
-def _reevaluate(options: Options) -> None:
-    """Evaluate gaits of a run once more, on the Drake diagram.
-
-    Evaluates gaits of a run made on another engine once more, on the Drake diagram, and adds
-    them to the run's record (reevaluations.jsonl of each trial): the best gaits of each trial,
-    which evolve itself does at its end, or all initial gaits. Gaits that have been evaluated so
-    already are skipped.
-    """
-    from tetra_drake.evolution.progress import Display
-    from tetra_drake.evolution.reevaluation import reevaluate
-    from tetra_drake.evolution.summary import summary
-
-    with Display(sys.stdout) as progress:
-        run = reevaluate(
-            options.run_directory,
-            initial=options.initial,
-            workers=options.workers,
-            progress=progress,
-        )
-    print(summary(run))
-
-
 def _replay_options(command: Command) -> None:
     source = "a folder written by `simulate`, a gait file, or a folder written by `evolve`"
     _add_path(command, "source", "RESULT_DIR|GAIT|RUN_DIR", source)
@@ -308,9 +274,9 @@ def _figures(options: Options) -> None:
     """Draw the figures of a run or a simulation.
 
     Draws figures as SVG and PNG, and the table of the two best gaits as CSV. For a run of
-    `evolve`, finished or not: into figures/ in its directory, where report.html, replay.html,
-    champions/ and elites/ are written anew, too. For a folder written by `simulate`: the figures
-    of one gait, into figures/ in it.
+    `evolve`, finished or not: into figures/ in its directory, where report.html, replay.html and
+    elites/ are written anew, too. For a folder written by `simulate`: the figures of one gait,
+    into figures/ in it.
     """
     from tetra_drake.report.run_page import write_figures
 
@@ -397,80 +363,6 @@ def _compare(options: Options) -> None:
         from tetra_drake.figures.search import save_comparison
 
         print(f"wrote {', '.join(save_comparison(compared, options.out))} to {options.out}/")
-
-
-def _benchmark_options(command: Command) -> None:
-    _add_path(command, "gaits", "GAIT", "gait files (default: random gaits)", nargs="*")
-    gaits = f"number of random gaits, of seeds 0, 1 ... (default: {BENCHMARK_GAITS})"
-    _add_count(command, "--gaits", gaits, dest="number")
-    command.add_argument(
-        "--settings",
-        metavar="SET",
-        nargs="+",
-        choices=SETS,
-        default=["default"],
-        help="sets of settings: default (a few for each engine), integrators (many for the "
-        "diagram), compiled or mujoco (many for that engine)",
-    )
-    sizes = (
-        "numbers of tetrahedra to measure the cost per step for (default: 5 10 20 40 with the "
-        "default settings, else none)"
-    )
-    _add_count(command, "--sizes", sizes, nargs="*")
-    _add_scenario(command)
-    _add_path(command, "--json", "FILE", "also write a JSON file")
-
-
-def _benchmark(options: Options) -> None:
-    """Measure speed and accuracy of the engines and their settings.
-
-    Simulates gaits on the engines with different settings and prints how many times faster than
-    real time each is, the errors of its distances against converged ones, the speed of batches
-    of gaits on one core and on all, and the compiled engine's cost per step by number of
-    tetrahedra. Takes some five minutes; the set integrators takes longer. Times are meaningful
-    on an idle machine only.
-    """
-    scenario = load_scenario(options.scenario)
-    if options.gaits and options.number is not None:
-        raise InputError("--gaits", "", "not allowed with gait files")
-    gaits = [load_gait(path, scenario) for path in options.gaits] or [
-        seeded_gait(scenario, seed) for seed in range(options.number or BENCHMARK_GAITS)
-    ]
-    with contextlib.ExitStack() as stack:
-        # Opened first: a path that cannot be written is refused before minutes are spent.
-        file = stack.enter_context(whole_file(options.json)) if options.json else None
-
-        from tetra_drake.benchmark.measure import SIZES, measure
-        from tetra_drake.benchmark.tables import to_markdown
-
-        sizes = options.sizes
-        if sizes is None:
-            sizes = SIZES if options.settings == ["default"] else ()
-        found = measure(scenario, gaits, sets=options.settings, sizes=sizes, say=_say)
-        print(to_markdown(found))
-        if file is not None:
-            file.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def _gait_options(command: Command) -> None:
-    _add_path(command, "file", "FILE", "a gait file (JSON)")
-    _add_scenario(command)
-
-
-def _gait(options: Options) -> None:
-    """Print a gait as a table.
-
-    Prints the parameters of a gait file, the weights as a matrix for each kind of neuron, and
-    whether the gait fits a scenario, else what does not.
-    """
-    from tetra_drake.robot.gait_table import gait_table
-
-    scenario = load_scenario(options.scenario)
-    gait, names = read_gait(options.file)
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-    _say(gait_table(gait, scenario, names=names, width=width) + "\n")
-    load_gait(options.file, scenario)
-    print(f"fits scenario {scenario.name}")
 
 
 def _cpg_options(command: Command) -> None:
@@ -620,13 +512,10 @@ def _warn(text: str) -> None:
 _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ...] = (
     (_simulate, _simulate_options),
     (_evolve, _evolve_options),
-    (_reevaluate, _reevaluate_options),
     (_replay, _replay_options),
     (_figures, _figures_options),
     (_robustness, _robustness_options),
     (_compare, _compare_options),
-    (_benchmark, _benchmark_options),
-    (_gait, _gait_options),
     (_cpg, _cpg_options),
     (_diagram, _diagram_options),
 )

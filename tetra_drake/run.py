@@ -61,7 +61,7 @@ def evolve(
     progress: shown none by default; see evolution.progress.
     reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another,
         and simulates those of a map on disturbed robots.
-    report: in the end, writes report.html, replay.html, figures/, champions/, elites/ (of a map).
+    report: in the end, writes report.html, replay.html, figures/, elites/ (of a map).
 
     Raises InputError for what cannot be used, EvaluationImpossible if no evaluation can run.
     """

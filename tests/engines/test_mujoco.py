@@ -11,14 +11,12 @@ from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
-from tetra_drake.physics.terrain import GAP, N_Z, T1_Z, T2_Z
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.ground import ground_frames, make_ground
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Coulomb, Scenario
-from tetra_drake.scenario.terrain import Flat, HeightField, Incline, Rough
+from tetra_drake.scenario.terrain import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 needs_mujoco = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
@@ -252,38 +250,6 @@ def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure
 
 
 @needs_mujoco
-def test_a_height_field_that_is_level_is_flat_ground(short, tmp_path):
-    np.save(tmp_path / "level.npy", np.zeros((61, 61)))
-    level = HeightField(str(tmp_path / "level.npy"), cell=INCH)
-    flat, field = (
-        trajectory_of(short.with_changes({"friction": Coulomb(), "terrain": terrain}))
-        for terrain in (Flat(), level)
-    )
-    assert float(abs(field["p_WN"] - flat["p_WN"]).max()) < 1e-4
-
-
-@needs_mujoco
-def test_stands_on_the_surface_of_the_terrain(short):
-    rough = Rough(amplitude=0.25 * INCH, wavelength=6.0 * INCH)
-    times = {"simulation.duration": "1.2 s", "cpg.start_up": "1.25 s"}
-    changes = {"terrain": rough, "robot.contacts": "all", "friction": Coulomb(), **times}
-    standing = short.with_changes(changes)
-    structure = MakeStructure(standing)
-    end = trajectory_of(standing).isel(time=-1)
-    nodes = end["p_WN"].values.reshape(-1, 3)[structure.contacts]
-    frames = ground_frames(nodes, make_ground(standing, structure))
-    normal, friction = end["normal_force"].values, end["friction_force"].values
-    borne = normal > 0.0
-    assert borne.any() and np.ptp(nodes[borne, 2]) > 1e-3
-    # Triangles between points 0.3 in apart are off by some 0.01 mm.
-    depth = normal[borne] / standing.ground.stiffness
-    np.testing.assert_allclose(-frames[borne, GAP], depth, atol=3e-5)
-    along_z = normal * frames[:, N_Z] + friction[:, 0] * frames[:, T1_Z]
-    upward = (along_z + friction[:, 1] * frames[:, T2_Z]).sum()
-    assert upward == pytest.approx(weight_of(standing), rel=1e-3)
-
-
-@needs_mujoco
 def test_a_step_far_too_long_ends_the_simulation(short):
     with pytest.raises(Diverged):
         simulate(scenario=short.with_changes({"mujoco.step": "0.1 s"}), gait=seeded_gait(short))
@@ -294,3 +260,19 @@ def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
     light = short.with_changes({"robot.density": "1e-200 kg/m^3"})
     with refused("thesis", "robot", "mjMINVAL"):
         simulate(scenario=light, gait=seeded_gait(light))
+
+
+@pytest.mark.parametrize(
+    "terrain",
+    [
+        Steps(height=INCH, depth=6.0 * INCH, count=2),
+        Incline(slope=0.1, start=3.0 * INCH),
+        Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
+    ],
+    ids=["steps", "incline with a start", "rough"],
+)
+def test_ground_that_is_no_plane_is_refused(short, terrain, monkeypatch):
+    monkeypatch.setattr(engine, "installed", lambda: True)
+    with pytest.raises(InputError) as caught:
+        simulate(scenario=short.with_changes({"terrain": terrain}), gait=seeded_gait(short))
+    assert caught.value.key == "terrain"

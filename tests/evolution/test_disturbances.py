@@ -11,7 +11,6 @@ import pytest
 from helpers.analytic import (
     TAIL,
     DrawnBowl,
-    RandomSearch,
     drawn_scenario,
     read_record,
     small_scenario,
@@ -23,10 +22,9 @@ from tetra_drake import evolve
 from tetra_drake.engines.compiled.lane_engine import Walk
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mean, worst_share
+from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mean
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import process_executor
-from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.reevaluation import evaluate_again
@@ -116,14 +114,18 @@ def test_an_objective_is_that_of_each_draw(tiny, vector):
 
 
 @pytest.mark.parametrize(
-    ("aggregation", "ours"),
-    # Of three: the mean; the least; the worst half is one and a half of them.
-    [("mean", lambda a, b, c: (a + b + c) / 3), ("worst", lambda a, b, c: a)]
-    + [(kind, lambda a, b, c: (a + b / 2) / 1.5) for kind in ("cvar", "mean_to_tail")],
+    ("tail", "ours"),
+    [
+        ({}, lambda a, b, c: (a + b + c) / 3),
+        ({"tail": 0.5}, lambda a, b, c: (a + b / 2) / 1.5),  # of three, one and a half
+        ({"tail": 1 / 3}, lambda a, b, c: a),
+        ({"tail": 0.1}, lambda a, b, c: a),
+    ],
 )
-def test_the_fitness_is_what_the_run_aims_for(tiny, vector, aggregation, ours):
-    changes = {"disturbances.aggregation": aggregation, "disturbances.tail": 0.5}
-    found = GaitEvaluation(tiny.with_changes(changes))(SeededVector(vector, SEED))
+def test_the_fitness_is_the_mean_over_the_worst_draws_by_default_over_all(tiny, vector, tail, ours):
+    settings = DisturbancesScenario(draws=3, spreads=STIFFNESS, start=0.02, **tail)
+    changed = tiny.with_changes({"disturbances": settings})
+    found = GaitEvaluation(changed)(SeededVector(vector, SEED))
     assert found.fitness == approx(ours(*sorted(found.draws["fitness"])), rel=1e-14)
 
 
@@ -257,42 +259,6 @@ def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
     assert table["draws_fitness"].tolist() == [entry["draws"]["fitness"] for entry in walked]
     worst = [min(entry["draws"]["distance"]) / 0.0254 for entry in walked]
     assert table["worst_distance_in"].tolist() == worst
-
-
-def test_the_score_goes_from_mean_to_tail_in_the_last_iteration(run_drawn):
-    scores = []
-
-    class Scored(RandomSearch):
-        def rescore(self, score):
-            scores.append(score(Evaluation(0.0, draws={"fitness": [0.0, 2.0, 1.0]})))
-
-    # Two iterations, and one that may follow: the last is number 2.
-    run_drawn("run", trials=1, iterations=2, optimizer=Scored)
-    # Shares 1 and (1 + 0.3) / 2 = 0.65: of three, 1.95 count.
-    assert scores == approx([1.0, 0.95 / 1.95], rel=1e-12)
-    scores.clear()
-    run_drawn("short", trials=1, iterations=1, optimizer=Scored)
-    assert scores == approx([1.0, 0.0], abs=1e-12)
-
-
-def test_an_optimiser_that_cannot_be_told_goes_by_what_is_aimed_for(run_drawn):
-    run_drawn("run", trials=1, optimizer=RandomSearch)
-    assert worst_share(drawn_scenario()) == TAIL
-
-
-def test_a_population_is_compared_by_the_score_that_counts_now():
-    settings = small_scenario(population=4, iterations=9)
-    space, generator = ParameterSpace.of(settings), np.random.default_rng(1)
-    optimizer = SteadyState(space, settings.evolution, generator)
-    optimizer.ask()
-    optimizer.tell([Evaluation(fitness) for fitness in (1.0, 2.0, 3.0, 4.0)])
-    optimizer.rescore(lambda evaluation: -evaluation.fitness)
-    optimizer.ask()
-    told = optimizer.tell([Evaluation(5.0), Evaluation(-1.0)])
-    # By the score, 5 is worse than all, and -1 better than whatever it meets.
-    assert told.placed[0] is None and told.placed[1] is not None
-    replaced = told.placed[1] + 1.0
-    assert told.report["mean_fitness"] == approx((10.0 - replaced - 1.0) / 4.0)
 
 
 def test_a_run_in_lanes_has_the_record_of_one_on_other_executors(tiny, tmp_path):

@@ -16,7 +16,6 @@ from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.robot.gait import TAU_A, TAU_B, ParameterSpace
 from tetra_drake.scenario.optimizers import (
     CmaEs,
-    DifferentialEvolution,
     QualityDiversity,
     RandomSearch,
     SteadyState,
@@ -25,7 +24,6 @@ from tetra_drake.scenario.optimizers import (
 LEARNING = [
     CmaEs(sample=0),
     CmaEs(sample=20),
-    DifferentialEvolution(population=20),
 ]
 DIVERSE = QualityDiversity(emitters=2, batch=10, floor=-50.0)
 BUDGETED = [*LEARNING, DIVERSE, RandomSearch()]
@@ -249,19 +247,6 @@ def test_it_begins_anew_and_larger_around_its_best_where_it_has_converged():
     assert reports[first]["sigma"] == pytest.approx(kind.sigma, rel=1e-4)
     best = max(np.concatenate(batches[:first]), key=lambda vector: bowl(vector).fitness)
     assert np.abs(np.mean(batches[first], axis=0) - best)[:-2].max() < 3 * 0.2 * 2.4 / 3
-
-
-# Differential evolution
-
-
-def test_no_member_gets_worse_and_their_number_falls_to_four():
-    optimizer = make(DifferentialEvolution(population=30), budget=900)
-    batches, iterations = run(optimizer)
-    best = [fitnesses(batches[: i + 1]).max() for i in range(len(batches))]
-    assert best[-1] > -0.5
-    sizes = [iteration.report["population"] for iteration in iterations]
-    assert sizes == sorted(sizes, reverse=True)
-    assert (sizes[0], sizes[-2]) == (30, 4)
 
 
 # Quality-diversity

@@ -46,11 +46,8 @@ def test_the_five_best_of_each_trial_are_evaluated_again(run_small):
         assert on_diagram == pytest.approx(recorded - 0.5 / 0.0254)
 
 
-def test_all_initial_gaits_can_be_evaluated_again_but_not_by_another_objective(run_small, refused):
+def test_gaits_are_not_evaluated_again_by_another_objective(run_small, refused):
     directory = run_small()
-    run = again(directory, initial=True)
-    assert list(run.reevaluations.groupby("trial").size()) == [12, 12]
-    assert (run.reevaluations["iteration"] == 0).all()
     with refused(directory, "objective", "Bowl"):
         reevaluate(directory, objective=Bowl())
 

@@ -102,8 +102,8 @@ def small_scenario(
 
 
 def drawn_scenario(**options) -> Scenario:
-    """small_scenario() among draws, selected by their mean at first, by their tail at last."""
-    settings = DisturbancesScenario(draws=3, aggregation="mean_to_tail", tail=TAIL)
+    """small_scenario() among draws, of which the tail counts."""
+    settings = DisturbancesScenario(draws=3, tail=TAIL)
     return small_scenario(**options).with_changes({"disturbances": settings})
 
 

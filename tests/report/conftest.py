@@ -16,8 +16,7 @@ TRIALS = [
 """The second has the fittest gait, its last evaluation."""
 
 COSTS = {4.0: 0.9, 3.0: 0.5, 2.5: 0.7, 2.0: 0.25, 1.5: 0.1}
-"""Costs of transport by fitness. The cheapest that walks half as far as the farthest is the first
-evaluation of the first trial."""
+"""Costs of transport by fitness."""
 
 
 @pytest.fixture(scope="package")

@@ -18,7 +18,6 @@ from tetra_drake.figures.evolution import two_best
 from tetra_drake.figures.study import study_run
 from tetra_drake.report.run_page import render_report, write_report
 from tetra_drake.results.result import ground_text
-from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.terrain import Flat, Incline
 from tetra_drake.scenario.units import INCH
@@ -159,26 +158,18 @@ def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page)
     assert any(f"{best}: 2 in" in text for text in page.texts["p"])
 
 
-def test_metrics_of_the_best_gait_stand_beside_the_initial_ones_and_the_champions(page):
-    columns = ["fittest initial", "fittest, farthest", "cheapest"]
-    gaits = ["trial 1, evaluation 0", "trial 1, evaluation 4", "trial 0, evaluation 0"]
+def test_metrics_of_the_best_gait_stand_beside_the_initial_ones(page):
+    columns = ["fittest initial", "fittest"]
+    gaits = ["trial 1, evaluation 0", "trial 1, evaluation 4"]
     assert ["", *map("".join, zip(columns, gaits, strict=True))] in page.table
     for row in (
-        ["fitness", "1.500", "4.000", "2.000"],
-        ["distance (in)", "0.750", "2.000", "1.000"],
-        ["cost of transport", "0.100", "0.900", "0.250"],
-        ["lifted, T1 to T3 (%)", "- - -", "25 0 50", "- - -"],
+        ["fitness", "1.500", "4.000"],
+        ["distance (in)", "0.750", "2.000"],
+        ["cost of transport", "0.100", "0.900"],
+        ["lifted, T1 to T3 (%)", "- - -", "25 0 50"],
     ):
         assert row in page.table
     assert page.row("heading change (deg)") is None  # which no gait has
-
-
-def test_champions_are_gait_files_of_the_run(run, page):
-    loaded = load_run(run)
-    for name, (trial, index) in {"farthest": (1, 4), "cheapest": (0, 0)}.items():
-        gait = load_gait(run / "champions" / f"{name}.json", loaded.manifest.scenario)
-        assert gait == loaded.gait(trial, index)
-        assert f"champions/{name}.json" in page.attributes("href")
 
 
 def test_objective_and_requirements_are_those_of_the_scenario(tmp_path):

@@ -9,15 +9,11 @@ from helpers.made_up_walk import HEIGHT, PERIOD, make_walk
 from tetra_drake.results.measures import (
     dominant_frequency,
     intervals,
-    junction_signals,
     last_step,
     lifted,
     share_of_time,
     travelling_index,
 )
-from tetra_drake.results.trajectory import assemble_dataset
-from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.load import load_scenario
 
 TIMES = np.linspace(0.0, 15.0, 1501)
 UNEVEN = np.sort(np.concatenate([TIMES, np.linspace(4.0, 5.0, 37)]))
@@ -92,24 +88,3 @@ def test_a_wave_travels_by_its_delay_from_place_to_place():
     pair = np.hstack([np.sin(2 * np.pi * t), 0.3 * np.cos(2 * np.pi * t)]) + 5.0
     assert travelling_index(pair) == pytest.approx(0.3, rel=1e-6)
     assert travelling_index(np.sin(2 * np.pi * t)) == 0.0
-
-
-def test_signals_of_a_junction_are_summed_and_compared_by_side():
-    changes = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"], ["outer top"]]}
-    scenario = load_scenario("thesis").with_changes(changes | {"robot.tetrahedra": 3})
-    structure = MakeStructure(scenario)
-    signals = np.array([[1.0, 0.25, 0.5, 2.0, 3.0, 0.0]])
-    nothing = np.zeros((1, 12))
-    trajectory = assemble_dataset(
-        structure,
-        times=np.zeros(1),
-        states=structure.initial_state[None],
-        signals=signals,
-        tensions=nothing,
-        lengths=nothing,
-        normal_forces=np.zeros((1, 7)),
-        friction_forces=np.zeros((1, 14)),
-        modes=np.zeros((1, 21)),
-    )
-    together, apart = junction_signals(trajectory)
-    assert (together.tolist(), apart.tolist()) == ([[1.75, 5.0]], [[0.75, -1.0]])

@@ -114,8 +114,6 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
         (gait_file(gains={"load": None}), "gains.load", "nothing"),
         (gait_file(gains={"load": 0.5}), "gains.load", "0.5"),  # the thesis has no feedback
         (gait_file(turn=0.5), "turn", "0.5"),  # its cables are driven in pairs, left and right
-        (gait_file(time_scales=[1, 1, 1]), "time_scales", "3"),
-        (gait_file(time_scales=[1, 1, 0, 1]), "time_scales[2]", "0"),
         *[(without(key), key, "") for key in ("schema", "weights", "tau_a_s")],
         (gait_file(tau_c_s=1), "tau_c_s", "tau_"),
         (gait_file(tau_a=0.3), "tau_a", "tau_a_s"),
@@ -145,13 +143,12 @@ def test_what_is_no_text_file_is_refused(tmp_path, scenario, refused, name):
         load_gait(tmp_path / name, scenario)
 
 
-SCALED = {"gait_bounds.time_scale_min": 0.5, "gait_bounds.time_scale_max": 2.0}
 SPACES = {
     "thesis": {},
     "undulation": {},
     "all-cables": {},
-    "turning": SCALED,
-    "feedback": SCALED | {"evolution.independent_tau_b": True},
+    "turning": {},
+    "feedback": {"evolution.independent_tau_b": True},
 }
 """Shipped scenarios, with changes."""
 
@@ -165,7 +162,6 @@ def test_a_saved_gait_of_any_scenario_loads_back_with_its_names_in_any_order(tmp
     gait = seeded_gait(shipped, 5)
     pathways = shipped.cpg.feedback
     assert [getattr(gait.gains, name) != 0.0 for name in pathways] == [True] * len(pathways)
-    assert len(gait.time_scales) == (4 if shipped.gait_bounds.time_scale_max == 2.0 else 0)
     assert gait.turn == (1.0 if shipped.name == "turning" else 0.0)
     content = gait.to_json(shipped)
     assert content["schema"] == 2 and len(content["weights"]) == len(gait.weights)
@@ -253,45 +249,34 @@ def test_mirrored_weights_are_one_parameter_for_left_and_right():
     assert sorted(weights) == sorted([*vector[:32], *vector[:32]])
 
 
-def test_gains_and_time_scales_have_bounds_steps_and_floors():
+def test_gains_have_bounds_steps_and_floors():
     changes = {
         "gait_bounds.gain_min": -2.0,
         "gait_bounds.gain_max": 3.0,
-        "gait_bounds.time_scale_min": 0.5,
-        "gait_bounds.time_scale_max": 2.0,
         "evolution.gain_mutation": 0.7,
-        "evolution.time_scale_mutation": 0.03,
     }
     feedback = load_scenario("feedback")
     space = ParameterSpace.of(feedback.with_changes(changes))
     columns = zip(space.low, space.high, space.steps, space.floors, strict=True)
     rows = dict(zip(space.names, columns, strict=True))
-    assert space.names[24:] == (
-        *("time scale T1-T2", "time scale T2-T3", "time scale T3-T4", "time scale T4-T5"),
-        *("gain length", "gain load", "gain pitch", "tau_A", "tau_B"),
-    )
-    assert rows["time scale T3-T4"] == (0.5, 2.0, 0.03, 0.5)
-    # A gain may become negative by mutation, a time scale must stay above its least.
+    assert space.names[24:] == ("gain length", "gain load", "gain pitch", "tau_A", "tau_B")
+    # A gain may become negative by mutation.
     assert rows["gain load"] == (-2.0, 3.0, 0.7, -math.inf)
-    gait = space.gait(np.arange(33.0), name="any")
-    assert gait.time_scales == (24.0, 25.0, 26.0, 27.0)
-    assert gait.gains == Gains(length=28.0, load=29.0, pitch=30.0)
-    assert (gait.tau_a, gait.tau_b) == (31.0, 32.0)
+    gait = space.gait(np.arange(29.0), name="any")
+    assert gait.gains == Gains(length=24.0, load=25.0, pitch=26.0)
+    assert (gait.tau_a, gait.tau_b) == (27.0, 28.0)
 
 
-def test_equal_bounds_fix_gains_and_time_scales():
-    changes = {
-        **dict.fromkeys(("gait_bounds.gain_min", "gait_bounds.gain_max"), 0.4),
-        **dict.fromkeys(("gait_bounds.time_scale_min", "gait_bounds.time_scale_max"), 1.2),
-    }
+def test_equal_bounds_fix_gains():
+    changes = dict.fromkeys(("gait_bounds.gain_min", "gait_bounds.gain_max"), 0.4)
     space = ParameterSpace.of(load_scenario("feedback").with_changes(changes))
-    assert not space.steps[24:31].any()
+    assert not space.steps[24:27].any()
     gait = space.gait(space.random(np.random.default_rng(0)), name="any")
-    assert gait.time_scales == (1.2,) * 4 and gait.gains == Gains(length=0.4, load=0.4, pitch=0.4)
+    assert gait.gains == Gains(length=0.4, load=0.4, pitch=0.4)
     one = ParameterSpace.of(load_scenario("feedback").with_changes({"cpg.feedback": ["load"]}))
-    assert one.names[24:] == ("gain load", "tau_A", "tau_B")  # time scales of 1 are no parameters
+    assert one.names[24:] == ("gain load", "tau_A", "tau_B")
     gait = one.gait(np.arange(27.0), name="any")
-    assert (gait.gains, gait.time_scales) == (Gains(load=24.0), ())
+    assert gait.gains == Gains(load=24.0)
 
 
 def test_a_turn_is_that_of_the_scenario_and_no_parameter(tmp_path):
@@ -399,3 +384,33 @@ def test_the_many_weights_of_a_large_robot_are_named_once(scenario, monkeypatch)
     monkeypatch.setattr("tetra_drake.robot.actuation.weight_names", names)
     ParameterSpace.of(scenario.with_changes({"robot.tetrahedra": 9}))
     assert names.call_count == 1
+
+
+# Printing
+
+
+def test_a_printed_gait_has_weights_in_the_row_of_the_inhibited_oscillator(tmp_path, scenario):
+    gait = load_gait(write(tmp_path, gait_file(weights=[*range(1, 25)], name="any")), scenario)
+    head, *tables = str(gait).split("\n\n")
+    assert head.startswith("any") and f"{gait.tau_a:.4g} s" in head
+    extensors, flexors = ([line.split() for line in table.splitlines()] for table in tables)
+    # B.2: w1, w2, w3 act on neuron 1 from 3, 5, 7; w4 on 2 from 4; w24 on 8 from 6.
+    assert extensors[1:3] == [["onto", "1", "2", "3", "4"], ["1", "-", "1.00", "2.00", "3.00"]]
+    assert flexors[2] == ["1", "-", "4.00", "5.00", "6.00"]
+    assert flexors[5] == ["4", "22.00", "23.00", "24.00", "-"]
+
+
+def test_a_printed_gait_has_turn_and_gains_where_they_are_set():
+    gait = seeded_gait(load_scenario("feedback").with_changes({"cpg.feedback": ["load"]}))
+    set_all = dataclasses.replace(gait, turn=-0.5, gains=Gains(load=0.25))
+    lines = str(set_all).splitlines()
+    assert "turn -0.5" in lines and "gain of load 0.25" in lines
+    assert not any(word in str(gait) for word in ("turn", "length", "pitch"))
+
+
+def test_weights_without_names_are_printed_in_a_row():
+    gait = Gait(name="any", weights=(1.25, 2.0), tau_a=0.3, tau_b=0.6)
+    assert "weights 1.25 2" in str(gait)
+    named = dataclasses.replace(gait, weight_names=("2->1 flexor",))
+    assert str(named) == str(gait)
+    assert "weights none" in str(dataclasses.replace(gait, weights=()))

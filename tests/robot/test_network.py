@@ -50,13 +50,12 @@ def test_mirror_images_of_weights_exchange_left_and_right(scenario):
     np.testing.assert_array_equal(thesis.images, np.arange(24), "each group is its own image")
 
 
-def test_time_scales_multiply_both_time_constants_of_a_junctions_oscillators(scenario):
+def test_time_constants_are_those_of_the_gait_for_all_neurons(scenario):
     both = scenario.with_changes(SIDES)
-    gait = dataclasses.replace(seeded_gait(both), time_scales=(1.0, 2.0, 0.5, 1.0))
+    gait = dataclasses.replace(seeded_gait(both), tau_a=0.25, tau_b=0.4)
     network = make_network(both, MakeStructure(both), gait)
-    scales = np.repeat([1.0, 2.0, 0.5, 1.0], 4)
-    np.testing.assert_allclose(1.0 / network.per_tau_a, gait.tau_a * scales, rtol=1e-14)
-    np.testing.assert_allclose(1.0 / network.per_tau_b, gait.tau_b * scales, rtol=1e-14)
+    np.testing.assert_allclose(1.0 / network.per_tau_a, np.full(16, 0.25), rtol=1e-14)
+    np.testing.assert_allclose(1.0 / network.per_tau_b, np.full(16, 0.4), rtol=1e-14)
 
 
 def test_a_turn_strengthens_the_left_by_what_it_weakens_the_right(scenario):
@@ -114,7 +113,6 @@ def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
         ({"weights": (1.0,) * 23}, "weights"),
         ({"turn": 0.5}, "turn"),
         ({"gains": Gains(load=1.0)}, "gains.load"),
-        ({"time_scales": (1.0, 1.0)}, "time_scales"),
     ],
 )
 def test_a_gait_that_does_not_fit_is_refused(scenario, structure, refused, changes, key):

@@ -107,7 +107,6 @@ BAD = [
     ("require: {twist: 1 lbf}", "require.twist", "'1 lbf'"),
     ("disturbances: {draws: 0}", "disturbances.draws", "0"),
     ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
-    ("disturbances: {draws: 2, aggregation: best}", "disturbances.aggregation", "'best'"),
     ("disturbances: {draws: 2, tail: 0}", "disturbances.tail", "0"),
     ("disturbances: {draws: 2, terrain: true}", "disturbances.terrain", "!Flat"),
     (
@@ -123,8 +122,8 @@ BAD = [
         *("disturbances.spreads.cables.damping", "0.7"),
     ),
     (
-        "disturbances: {draws: 2, spreads: {ground.restitution: 0.2}}",
-        *("disturbances.spreads.ground.restitution", "at most 1"),
+        "disturbances: {draws: 2, spreads: {evolution.mutation_probability: 0.5}}",
+        *("disturbances.spreads.evolution.mutation_probability", "at most 1"),
     ),
     (
         "friction: !Coulomb\ndisturbances: {draws: 2, spreads: {friction.kinetic: 0.1}}",

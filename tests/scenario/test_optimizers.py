@@ -6,7 +6,6 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.optimizers import (
     CmaEs,
-    DifferentialEvolution,
     QualityDiversity,
     RandomSearch,
     SteadyState,
@@ -20,7 +19,6 @@ MINE = "base: thesis\nname: mine\nevolution: {max_evaluations: 900}\noptimizer: 
     ("text", "kind"),
     [
         ("!CmaEs {sigma: 0.3, population: 20}", CmaEs(sigma=0.3, population=20)),
-        ("!DifferentialEvolution {}", DifferentialEvolution()),
         ("!RandomSearch", RandomSearch()),
         ("!QualityDiversity {floor: -9}", QualityDiversity(floor=-9.0)),
         (

@@ -226,7 +226,9 @@ def test_a_simulation_can_be_watched_as_it_runs(browser, tmp_path):
         try:
             (address,) = re.findall(r"http://\S+", process.stdout.readline())
             with opened(browser, f"{address}/", offline=False, received=messages) as page:
-                page.wait_for_function("viewer.animator.duration > 0.9")
+                while "replay.html" not in process.stdout.readline():  # it runs
+                    pass
+                page.wait_for_timeout(100)
             _, errors = process.communicate(input="\n", timeout=60)
         finally:
             process.kill()

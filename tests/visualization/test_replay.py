@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from helpers.meshcat_page import commands, read_page
 from pydrake.common.eigen_geometry import Quaternion
-from pydrake.geometry import MeshcatParams
 from pydrake.math import RotationMatrix
 
 from tetra_drake.engines.simulate import simulate
@@ -22,9 +21,7 @@ from tetra_drake.visualization.replay import (
     RESOLUTION,
     frame_samples,
     pack_page,
-    quiet_meshcat,
     save_replay,
-    show_replay,
 )
 from tetra_drake.visualization.scene import ARROW_LENGTH, CABLE_KINDS, CABLE_RADIUS, HIDDEN
 
@@ -62,36 +59,14 @@ def page(scenario, trajectory, tmp_path_factory):
     return read_page(path)
 
 
-@pytest.fixture(scope="module", params=["page", "live"])
-def tracks(request, scenario, trajectory, page):
-    """Key frames of the page, and of a live view that replays."""
-    if request.param == "page":
-        return film_tracks(page)
-    meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
-    show_replay(meshcat, scenario=scenario, trajectory=trajectory)
-    return animation_tracks(meshcat.StaticHtml())
-
-
-def animation_tracks(page):
-    """By path and property: times (frames,) in s and values (frames, ...) of the key frames."""
-    (command,) = commands(page, "set_animation")
-    assert command["options"]["play"] is True
-    assert command["options"]["repetitions"] > 1000
-    tracks = {}
-    for one in command["animations"]:
-        clip = one["clip"]
-        tracks[one["path"]] = {
-            track["name"].removeprefix("."): (
-                np.array([key["time"] for key in track["keys"]]) / clip["fps"],
-                np.array([key["value"] for key in track["keys"]]),
-            )
-            for track in clip["tracks"]
-        }
-    return tracks
+@pytest.fixture(scope="module")
+def tracks(page):
+    """Key frames of the page."""
+    return film_tracks(page)
 
 
 def film_tracks(page):
-    """The same of what a page plays without Meshcat's help."""
+    """By path and property: times (frames,) in s and values (frames, ...) of the key frames."""
     (packed,) = re.findall(r"const film = (.*);\n", page)
     film = json.loads(packed)
     times = np.array(film["ticks"]) / film["per_second"]

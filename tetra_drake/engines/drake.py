@@ -23,9 +23,6 @@ from tetra_drake.scenario.schema import Scenario, SimulationScenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 _WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; how Drake's Simulator derives the isolation window
-_IMPLICIT_SCHEMES = ("radau3", "radau1", "implicit_euler", "velocity_implicit_euler")
-"""Those whose steps may be long; stability keeps the steps of the others short."""
-
 _AIM_FACTOR, _AIM_BEYOND = 1.02, 5e-5  # and s: a step shall end just after the change it aims at
 _APPROACH = 0.8, 1e-3  # share and s: a change that is farther away is approached, then aimed at
 _FIRST_STEP, _GROWTH = 3e-4, 3.0  # s, and factor per step: how steps begin again after a change
@@ -107,13 +104,10 @@ def MakeSimulator(diagram: Diagram, settings: SimulationScenario) -> Simulator:
     """A simulator of the diagram with the scenario's integrator settings."""
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, settings.scheme, settings.max_step)
-    if not integrator.get_fixed_step_mode():
-        integrator.set_target_accuracy(settings.accuracy)
+    integrator.set_target_accuracy(settings.accuracy)
     if settings.mode_changes == "witness":
-        per_accuracy = _WITNESS_WINDOW_PER_ACCURACY
-        if integrator.get_fixed_step_mode():
-            per_accuracy *= settings.max_step
-        simulator.get_mutable_context().SetAccuracy(settings.witness_window / per_accuracy)
+        accuracy = settings.witness_window / _WITNESS_WINDOW_PER_ACCURACY
+        simulator.get_mutable_context().SetAccuracy(accuracy)
     return simulator
 
 
@@ -162,12 +156,11 @@ class _StepAimer:
     The prediction takes the mean acceleration of the last step, which costs nothing. That of the
     instant is no better: what follows a change dies out at rates of 1e4 /s.
 
-    With `fresh_steps`: over a long step the mean is not good enough, so such a step only
-    approaches the change. A change of mode changes the Jacobian. The integrator would keep the
-    old one as long as its Newton iterations converge at all: slowly then, and stopped farther
-    from the solution, always on the same side. So it gets a new one, unless the next change is
-    so near that it does not pay. And it would try the step it took before the change, which
-    mostly fails.
+    Over a long step the mean is not good enough, so such a step only approaches the change. A
+    change of mode changes the Jacobian. The integrator would keep the old one as long as its Newton
+    iterations converge at all: slowly then, and stopped farther from the solution, always on the
+    same side. So it gets a new one, unless the next change is so near that it does not pay. And it
+    would try the step it took before the change, which mostly fails: so steps begin again, short.
     """
 
     def __init__(
@@ -180,7 +173,7 @@ class _StepAimer:
         self._aims = (
             settings.mode_changes == "step_end"
             and settings.look_ahead > 0.0
-            and settings.scheme in _IMPLICIT_SCHEMES
+            and settings.scheme == "radau3"  # stability keeps the steps of the other one short
         )
         self._last_time = 0.0
         size = simulator.get_context().get_continuous_state().num_v()
@@ -200,11 +193,10 @@ class _StepAimer:
         due, time_to_change = self._ground.NextModeChange(
             self._ground_context, acceleration=self._acceleration, horizon=self._settings.max_step
         )
-        if self._settings.fresh_steps:
-            if due:
-                self._longest, self._jacobian_is_old = _FIRST_STEP, True
-            elif self._longest < self._settings.max_step:
-                self._longest = _GROWTH * max(step_taken, _FIRST_STEP)
+        if due:
+            self._longest, self._jacobian_is_old = _FIRST_STEP, True
+        elif self._longest < self._settings.max_step:
+            self._longest = _GROWTH * max(step_taken, _FIRST_STEP)
         step = min(self._settings.max_step, self._longest, self._step_towards(time_to_change))
         if self._jacobian_is_old and step >= _RENEW_FROM:
             self._renew_jacobian()
@@ -213,7 +205,7 @@ class _StepAimer:
     def _step_towards(self, time_to_change: float) -> float:
         """The step (s) towards a mode change that is predicted in a time (s)."""
         look_ahead, (share, near) = self._settings.look_ahead, _APPROACH
-        if self._settings.fresh_steps and near < time_to_change < self._settings.max_step:
+        if near < time_to_change < self._settings.max_step:
             return share * time_to_change
         margin = min(_AIM_BEYOND, 0.25 * look_ahead)
         return max(look_ahead, _AIM_FACTOR * time_to_change + margin)

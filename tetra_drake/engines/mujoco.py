@@ -8,11 +8,7 @@ other engines. In place of the reset integrator, a node that sticks is held by t
 stiction damping, but breaks free where that exceeds `mujoco.friction` times the normal force, not
 after a deflection, and then does not slide almost freely.
 
-Level ground and an incline without start are exact planes. Any other terrain is a height field of
-MuJoCo: triangles between heights of the scenario's surface. A node at an edge is pushed by both
-triangles, and where a body leans by an angle, it meets the ground up to a millimetre times its sine
-beside the node: distances differ by some 0.1 in. The field ends where the terrain's grid does: a
-robot that leaves it falls, and has diverged.
+The ground is a plane, level or inclined; other terrains are refused.
 """
 
 from __future__ import annotations
@@ -30,18 +26,16 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
-from tetra_drake.physics.contact import Ground
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.ground import ground_axes, ground_heights
+from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
 from tetra_drake.scenario.schema import Coulomb, Scenario
-from tetra_drake.scenario.terrain import Flat, Incline
-from tetra_drake.scenario.units import INCH
+from tetra_drake.scenario.terrain import Flat, Incline, Terrain
 
 if TYPE_CHECKING:
     import xarray
@@ -54,18 +48,7 @@ _IMPEDANCE = 0.5
 """Of contacts. Nothing at rest depends on it, nor do converged distances by more than 0.01 in;
 with a smaller one friction chatters in steps beyond 0.06 ms, with a larger one errors grow."""
 
-_POINT = 1e-5  # radius (m) of the spheres that touch a plane: it acts on the centres of nodes
-
-_BALL = 1e-3
-"""Radius (m) of those that touch a height field with their lowest points, which are the nodes while
-bodies stand upright. One that sinks in by more is caught at the edges of triangles, and a robot
-that drops half an inch sinks in by 0.7 mm; a larger one is pushed by two triangles for longer."""
-
-_FINER, _FINEST, _MOST_CELLS = 10, 0.1 * INCH, 1000
-"""Cells of a height field along x and along y: for each one of the terrain's, but none smaller than
-the second (m), lest several push a sphere at once, and not more than the third in all."""
-
-_BASE = 0.1  # m of solid below the lowest point of a height field
+_POINT = 1e-5  # radius (m) of the spheres that touch the floor, which acts on the nodes' centres
 
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs of `contact` touch each other
 
@@ -168,8 +151,8 @@ def make_mjcf(scenario: Scenario, structure: Structure, robot: Model) -> str:
     _add(model, "compiler", inertiafromgeom="false")
     _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], cone="elliptic", **steps)
     world = _add(model, "worldbody")
-    spheres = _add_floor(model, world, scenario, structure, robot.ground)
-    _add_bodies(model, world, structure, robot, _contact(scenario, structure, robot), **spheres)
+    _add_floor(world, scenario, structure)
+    _add_bodies(model, world, structure, robot, _contact(scenario, structure, robot))
     _add_cables(model, structure)
     return tostring(model, encoding="unicode")
 
@@ -323,6 +306,10 @@ def check_mujoco(scenario: Scenario) -> None:
     if scenario.cpg.feedback:
         problem = f"found {scenario.cpg.feedback}; mujoco computes signals beforehand"
         raise InputError(scenario.name, "cpg.feedback", problem)
+    if not _is_plane(scenario.terrain):
+        kind = type(scenario.terrain).__name__
+        problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline without start"
+        raise InputError(scenario.name, "terrain", problem)
     if scenario.cables.slack:
         raise InputError(scenario.name, "cables.slack", "found true, which mujoco cannot simulate")
     if isinstance(law := scenario.friction, Coulomb):
@@ -334,42 +321,16 @@ def check_mujoco(scenario: Scenario) -> None:
                 raise InputError(scenario.name, f"friction.{name}", problem)
 
 
-def _add_floor(
-    model: Element, world: Element, scenario: Scenario, structure: Structure, ground: Ground
-) -> dict[str, float]:
-    """The floor, which is geom 0: a plane, or a height field. Returns the radius (m) of the spheres
-    that touch it, and how far above their nodes their centres are."""
-    terrain = scenario.terrain
-    floor = {"name": "floor", **_ALONE}
-    if isinstance(terrain, Flat) or (isinstance(terrain, Incline) and terrain.start is None):
-        slope = terrain.slope if isinstance(terrain, Incline) else 0.0
-        pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
-        _add(world, "geom", type="plane", pos=pos, quat=structure.q_WB, size="0 0 1", **floor)
-        return {"radius": _POINT, "raised": 0.0}
-    low, far, heights = _sampled(ground)
-    least, span = heights.min(), max(np.ptp(heights), _BALL)
-    rows = (heights.T[::-1] - least) / span  # of constant y, the largest first
-    size = [*(far - low) / 2, span, _BASE]
-    shape = {"nrow": str(len(rows)), "ncol": str(len(heights))}
-    _add(_add(model, "asset"), "hfield", name="floor", size=size, elevation=rows, **shape)
-    pos = [*(low + far) / 2, least]
-    _add(world, "geom", type="hfield", hfield="floor", pos=pos, **floor)
-    return {"radius": _BALL, "raised": _BALL}
+def _is_plane(terrain: Terrain) -> bool:
+    return isinstance(terrain, Flat) or (isinstance(terrain, Incline) and terrain.start is None)
 
 
-def _sampled(ground: Ground) -> tuple[Array, Array, Array]:
-    """The corners (x, y) of the ground's grid, and its heights on a finer one, rows along x."""
-    law = ground.law[0]
-    columns = int(law["columns"])
-    cells = np.array([ground.heights.size // columns - 1, columns - 1])
-    low = np.array([law["corner_x"], law["corner_y"]])
-    far = low + cells / (law["per_cell_x"], law["per_cell_y"])
-    finer = np.minimum(_FINER * cells, np.minimum((far - low) / _FINEST, _MOST_CELLS))
-    # Odd numbers of cells: else edges would run under rows of nodes, which two triangles then bear.
-    points = 2 * (finer // 2).astype(int) + 2
-    axes = (np.linspace(a, b, n) for a, b, n in zip(low, far, points, strict=True))
-    x_y = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    return low, far, ground_heights(x_y, ground)
+def _add_floor(world: Element, scenario: Scenario, structure: Structure) -> None:
+    """The floor, a plane, which is geom 0."""
+    slope = getattr(scenario.terrain, "slope", 0.0)
+    pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
+    turned = {"pos": pos, "quat": structure.q_WB}
+    _add(world, "geom", name="floor", type="plane", size="0 0 1", **turned, **_ALONE)
 
 
 def _add_bodies(
@@ -378,9 +339,6 @@ def _add_bodies(
     structure: Structure,
     robot: Model,
     contact: dict,
-    *,
-    radius: float,
-    raised: float,
 ) -> None:
     """The tetrahedra, with a site at each node, and spheres on those that touch the floor."""
     pairs, names = _add(model, "contact"), iter(enumerate(structure.node_names))
@@ -393,8 +351,7 @@ def _add_bodies(
             node, name = next(names)
             _add(body, "site", name=name, pos=p_BN)
             if node in structure.contacts:
-                p_BS = p_BN + np.array([0.0, 0.0, raised])
-                _add(body, "geom", name=name, pos=p_BS, size=radius, **_ALONE)
+                _add(body, "geom", name=name, pos=p_BN, size=_POINT, **_ALONE)
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from tetra_drake.engines.viewer import Viewer
+from tetra_drake.engines.viewer import Viewer, check_can_be_watched
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
@@ -41,7 +40,7 @@ def simulate(
     whether or not a trajectory is recorded and whoever watches.
 
     Raises Diverged or StepBudgetExceeded, which say when and why, and InputError if the gait or
-    the steering does not fit the scenario.
+    the steering does not fit the scenario, or if its engine cannot be watched.
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
@@ -53,19 +52,13 @@ def simulate(
         return simulate_drake(
             scenario=scenario, gait=gait, record=record, viewer=viewer, steering=steering
         )
+    if viewer is not None:
+        check_can_be_watched(scenario)
     if scenario.simulation.engine == "compiled":
         from tetra_drake.engines.compiled.engine import simulate_compiled as run
     else:
         from tetra_drake.engines.mujoco import simulate_mujoco as run
-    recorded = record or viewer is not None
-    result = run(scenario=scenario, gait=gait, record=recorded, steering=steering)
-    if viewer is None or result.trajectory is None:
-        return result
-    # These engines are too fast to be watched: the viewer is shown the recording.
-    for i, time in enumerate(result.trajectory["time"].values):
-        if viewer.wants(time):
-            viewer.show(result.trajectory.isel(time=[i]))
-    return result if record else dataclasses.replace(result, trajectory=None)
+    return run(scenario=scenario, gait=gait, record=record, steering=steering)
 
 
 def simulate_many(

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.schema import Scenario
+
 if TYPE_CHECKING:
     import xarray
 
@@ -16,3 +19,12 @@ class Viewer(Protocol):
 
     def show(self, frame: xarray.Dataset) -> None:
         """Takes one sample of a trajectory (see results.trajectory.assemble_dataset)."""
+
+
+def check_can_be_watched(scenario: Scenario) -> None:
+    """Raises InputError unless the scenario's engine is the diagram: others show nothing until they
+    have ended."""
+    engine = scenario.simulation.engine
+    if engine != "drake":
+        problem = f"found '{engine}', expected 'drake', which alone can be watched as it simulates"
+        raise InputError(f"scenario {scenario.name}", "simulation.engine", problem)

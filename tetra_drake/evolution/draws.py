@@ -68,30 +68,9 @@ def _combined(name: str, values: Sequence[Any]) -> Any:
     return np.mean(values, axis=0).tolist()
 
 
-def worst_share(scenario: Scenario, progress: float = 1.0) -> float:
-    """The share of the draws, the worst, that counts when a run has come so far, from 0 to 1."""
-    settings = scenario.disturbances
-    if settings is None:
-        return 1.0
-    shares = {
-        "mean": 1.0,
-        "worst": 1.0 / settings.draws,
-        "cvar": settings.tail,
-        "mean_to_tail": settings.tail + (1.0 - progress) * (1.0 - settings.tail),
-    }
-    return shares[settings.aggregation]
-
-
 def worst_mean(fitnesses: Sequence[float], share: float) -> float:
     """Mean over the worst share, above 0, of the fitnesses: as many as that are, the last one by
     the fraction of it that is left; the least alone if they are less than one."""
     ranked, count = sorted(fitnesses), max(1.0, share * len(fitnesses))
     weights = [min(1.0, max(0.0, count - i)) for i in range(len(ranked))]
     return math.fsum(w * f for w, f in zip(weights, ranked, strict=True)) / count
-
-
-def score_at(share: float, evaluation: Evaluation) -> float:
-    """The fitness that an evaluation would have if this worst share of its draws counted."""
-    if evaluation.draws is None:
-        return evaluation.fitness
-    return worst_mean(evaluation.draws["fitness"], share)

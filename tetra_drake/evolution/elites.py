@@ -6,9 +6,9 @@ elites.jsonl    those gaits of a run's map that were simulated on disturbed robo
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -116,3 +116,11 @@ def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, panda
         away = (((gaits[CELLS] - ends) / np.array(kind.cells)) ** 2).sum(axis=1)
         named[", ".join(words)] = gaits.loc[away.idxmin()]
     return named
+
+
+def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:
+    """The different ones among named gaits, each with all of its names."""
+    names: dict[Any, list[str]] = {}
+    for name, gait in named.items():
+        names.setdefault((gait["trial"], gait["index"]), []).append(name)
+    return [(each, named[each[0]]) for each in names.values()]

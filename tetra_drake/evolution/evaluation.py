@@ -20,7 +20,7 @@ from tetra_drake.errors import (
     StepBudgetExceeded,
     TimeBudgetExceeded,
 )
-from tetra_drake.evolution.draws import Seed, SeededVector, combine, draws_of, worst_share
+from tetra_drake.evolution.draws import Seed, SeededVector, combine, draws_of
 from tetra_drake.evolution.optimizers.base import Evaluation
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
@@ -114,9 +114,12 @@ class GaitEvaluation:
 
     def _combined(self, task: Vector | SeededVector, draws: list[Evaluation]) -> Evaluation:
         """The evaluation of a task from those of its draws."""
-        seeded = isinstance(task, SeededVector)
-        found = combine(draws, worst_share(self.scenario)) if seeded else draws[0]
-        return dataclasses.replace(found, engine=self.scenario.simulation.engine)
+        settings = self.scenario.disturbances
+        if settings is None or not isinstance(task, SeededVector):
+            evaluation = draws[0]
+        else:
+            evaluation = combine(draws, settings.tail)
+        return dataclasses.replace(evaluation, engine=self.scenario.simulation.engine)
 
     def _simulate(self, scenario: Scenario, gait: Gait) -> SimulationResult:
         with time_limit(self.scenario.evolution.time_budget):

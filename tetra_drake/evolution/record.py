@@ -139,7 +139,7 @@ class Manifest:
     versions: Mapping[str, str]
     method: Method
     thinned: bool = False
-    """Whether most genomes were left out; see `thinning`."""
+    """Whether most genomes were left out, as in the runs recorded beside the package."""
 
     @property
     def longest_trial(self) -> str:

@@ -34,14 +34,13 @@ so that there are about as many simulations."""
 def reevaluate(
     directory: str | Path,
     *,
-    initial: bool = False,
     workers: int | None = None,
     executor: MakeExecutor = process_executor,
     objective: Objective | None = None,
     progress: Progress | None = None,
 ) -> Run:
-    """Evaluates a run's best gaits, or all initial ones, on the Drake diagram, adds them to its
-    record and returns it. Gaits that have been evaluated so already are skipped.
+    """Evaluates a run's best gaits on the Drake diagram, adds them to its record and returns it.
+    Gaits that have been evaluated so already are skipped.
 
     Raises InputError where `objective` is not the run's, or where there is no run.
     """
@@ -56,7 +55,6 @@ def reevaluate(
     return evaluate_again(
         directory,
         GaitEvaluation(on_diagram(scenario), objective),
-        initial=initial,
         workers=workers,
         executor=executor,
         progress=progress,
@@ -72,7 +70,6 @@ def evaluate_again(
     directory: Path,
     evaluate: Evaluate,
     *,
-    initial: bool = False,
     workers: int | None = None,
     executor: MakeExecutor = process_executor,
     progress: Progress | None = None,
@@ -83,14 +80,14 @@ def evaluate_again(
     for trial in range(scenario.evolution.trials):
         repair_torn_line(trial_folder(run.directory, trial) / REEVALUATIONS)
     done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
-    chosen = run.initial() if initial else run.best(max(1, BEST_GAITS // scenario.draws))
-    rows = chosen[["trial", "index", "iteration"]].itertuples(index=False, name=None)
+    best = run.best(max(1, BEST_GAITS // scenario.draws))
+    rows = best[["trial", "index", "iteration"]].itertuples(index=False, name=None)
     missing = [row for row in rows if row[:2] not in done]
     if not missing:
         return run
     vectors = [run.vector(trial, index) for trial, index, _ in missing]
     progress = progress or Progress()
-    title = f"{'initial' if initial else 'best'} gaits on the Drake diagram"
+    title = "best gaits on the Drake diagram"
     progress.stage(title, 0, len(missing))
     tasks = [
         task_of(scenario, vector, (run.manifest.seed, trial, iteration))

@@ -46,7 +46,7 @@ class Run:
     """One row per evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
     wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
     have one), the metrics (distance ...), lifted_T1 ... (Metrics.lifted_shares), distance_in, and
-    the parameters: weight_1 ... in the listing's order, time_scale_T1-T2 ..., gain_length ...,
+    the parameters: weight_1 ... in the listing's order, gain_length ...,
     tau_a_s, tau_b_s, NaN where thinning has left them out. Among disturbances, also draws_fitness
     and draws_distance (m), lists with a number for each draw (missing if it failed), and
     worst_distance_in."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.draws import SeededVector, score_at, task_of, worst_share
+from tetra_drake.evolution.draws import SeededVector, task_of
 from tetra_drake.evolution.executors import (
     EvaluationPool,
     MakeExecutor,
@@ -25,7 +24,6 @@ from tetra_drake.evolution.optimizers.base import (
     Evaluation,
     MakeOptimizer,
     Optimizer,
-    Rescoring,
 )
 from tetra_drake.evolution.record import (
     Manifest,
@@ -141,7 +139,6 @@ class Trial:
     def _iterate(self) -> Iterator[None]:
         """Goes from iteration to iteration; yields to wait for evaluations."""
         while self.status.stop is None:
-            self._rescore()
             batch = dict(enumerate(self._optimizer.ask(), start=self.status.evaluations))
             self._results = {}
             for index, vector in batch.items():
@@ -156,14 +153,6 @@ class Trial:
             self._complete(batch)
         self._record.finish(self.status.evaluations)
         self._save_best()
-
-    def _rescore(self) -> None:
-        """Where the score goes from mean to tail, tells the optimiser that of the iteration."""
-        scenario, iteration = self._scenario, self.status.iteration + 1
-        changes = worst_share(scenario, 0.0) != worst_share(scenario, 1.0)
-        if changes and isinstance(self._optimizer, Rescoring):
-            share = worst_share(scenario, min(1.0, iteration / scenario.evolution.max_iterations))
-            self._optimizer.rescore(functools.partial(score_at, share))
 
     def _add(self, index: int, evaluation: Evaluation) -> None:
         self._results[index] = evaluation

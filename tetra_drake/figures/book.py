@@ -12,8 +12,7 @@ from typing import Any
 import xarray
 
 from tetra_drake.evolution.elites import elites
-from tetra_drake.evolution.pareto import forward_gaits, trades
-from tetra_drake.figures import evolution, forces, motion, pareto
+from tetra_drake.figures import evolution, forces, motion
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.study import Study
 from tetra_drake.figures.style import save_figure
@@ -57,8 +56,6 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
         pictures.append((evolution.initial_fitness, run, study.trial))
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
-    if trades(forward_gaits(run.evaluations)):
-        pictures.append((pareto.pareto, run))
     walks = [(walk.label, walk.trajectory) for walk in (initial, best)]
     scenario = run.manifest.scenario
     pictures.append((motion.before_and_after, walks, scenario.reference))

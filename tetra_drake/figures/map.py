@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tetra_drake.evolution.elites import CELLS, LUCKY, chosen, elites, robust
-from tetra_drake.evolution.pareto import distinct_gaits
+from tetra_drake.evolution.elites import CELLS, LUCKY, chosen, distinct_gaits, elites, robust
 from tetra_drake.evolution.tables import Run, gait_label
 from tetra_drake.figures.style import common_style, make_figure
 from tetra_drake.formatting import fixed, listed

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.evolution.comparison import Compared, reach_text, to_json
 from tetra_drake.figures.style import (
     common_style,
     line_style,
     make_figure,
-    round_logarithmic,
     save_findings,
 )
 
@@ -56,7 +56,9 @@ def search(compared: Compared) -> Figure:
             _draw_reached(row[1], compared, label, ends[label], style)
     for axes in row:
         axes.set(xlabel=compared.unit, xscale="log", xlim=(first, 1.1 * ends.max()))
-        round_logarithmic(axes.xaxis, "{x:,.0f}")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
     row[0].set(title="median and quartiles", ylabel="best fitness so far")
     figure.legend(row[0].lines, labels, loc="outside lower center", ncols=across)
     figure.suptitle(f"How well runs search, by {compared.unit}")

@@ -19,11 +19,9 @@ import numpy as np
 import pandas
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.files import whole_file, write_whole
 from tetra_drake.scenario.schema import ReferenceScenario
@@ -105,13 +103,6 @@ def draw_reference(axes: Axes, reference: ReferenceScenario | None, name: str) -
     place: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
     place["bbox"] = {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.0}
     axes.annotate(f"{reference.source}: {inches:.4g} in", (0.02, inches), (0, 4), **place)
-
-
-def round_logarithmic(axis: Axis, form: str) -> None:
-    """Marks a logarithmic axis at 1, 2, 5, 10 ..., written as `form`, such as "{x:g}"."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(StrMethodFormatter(form))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def save_findings(

@@ -10,8 +10,7 @@ from urllib.parse import quote
 import pandas
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.elites import chosen, elites
-from tetra_drake.evolution.pareto import NEAREST, TRADES, champions, distinct_gaits
+from tetra_drake.evolution.elites import chosen, distinct_gaits, elites
 from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.summary import comparisons, metric_rows
@@ -31,14 +30,14 @@ from tetra_drake.scenario.units import shown
 from tetra_drake.visualization.replay import save_replay
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
-CHAMPIONS, ELITES, ELITES_CSV = "champions", "elites", "elites.csv"
+ELITES, ELITES_CSV = "elites", "elites.csv"
 
 
 def write_figures(source: Path, out: Path | None = None) -> list[Path]:
     """Writes the figures of a run or of a result folder into `out`; returns what was written.
 
-    Without `out`, they go to figures/ in the source, and a run's report, replay and champions are
-    written anew, too. Raises InputError.
+    Without `out`, they go to figures/ in the source, and a run's report and replay are written
+    anew, too. Raises InputError.
     """
     folder = out or source / FIGURES
     if (source / RUN_MANIFEST).exists():
@@ -57,8 +56,8 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
 
 
 def write_report(directory: Path) -> list[Path]:
-    """Writes figures/, champions/, elites/, replay.html and report.html into a run's directory;
-    returns the paths of all but champions and elites, which not every run has.
+    """Writes figures/, elites/, replay.html and report.html into a run's directory; returns the
+    paths of all but elites/, which a run with a map alone has.
 
     Works for an unfinished run, too. Raises InputError if `directory` holds no run, a damaged
     one, or one without any fitness, or cannot be written to.
@@ -67,19 +66,11 @@ def write_report(directory: Path) -> list[Path]:
     study = study_run(load_run(directory))
     scenario, trajectory = study.run.manifest.scenario, study.best.trajectory
     captions = draw_run(study, figures)
-    for name, row in champions(study.run).items():
-        gait = study.run.gait(row["trial"], row["index"])
-        save_gait(gait, directory / _champion(name), scenario)
     _write_map(study, directory)
     title = f"{study.best.gait.name}: {study.best.headline}"
     save_replay(replay, scenario=scenario, trajectory=trajectory, title=title)
     write_whole(report, render_report(study, captions, folder=figures))
     return [figures, replay, report]
-
-
-def _champion(name: str) -> Path:
-    """The file of a champion in a run's directory."""
-    return Path(CHAMPIONS) / f"{name}.json"
 
 
 def _write_map(study: Study, directory: Path) -> None:
@@ -108,8 +99,8 @@ def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[
 def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) -> str:
     """The page, with the pictures in `folder` by name and caption in it; its links are relative."""
     run, manifest = study.run, study.run.manifest
-    best_gait, best_of = trial_folder(Path(), study.trial) / BEST_GAIT, champions(run)
-    named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded} | best_of
+    best_gait = trial_folder(Path(), study.trial) / BEST_GAIT
+    named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded}
     gaits, on_map = distinct_gaits(named), distinct_gaits(chosen(run))
     on_map_files = {n: _map_files(each, gait, study) for each, gait in on_map for n in each}
     walks = {walk.label: walk for walk in (study.best, study.initial)}
@@ -131,9 +122,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         objective=_terms(manifest.scenario.objective, inverse),
         require=_terms(manifest.scenario.require, str),
         gaits=[(names, gait_label(gait)) for names, gait in gaits],
-        links={name: _champion(name) for name in best_of} | {"fittest": best_gait},
-        nearest=NEAREST,
-        trades=[f"the {trade.champion}" for trade in TRADES if trade.champion in best_of],
+        links={"fittest": best_gait},
         metrics=metric_rows([gait for _, gait in gaits]),
         map=[(names, gait_label(gait)) for names, gait in on_map],
         map_links={name: files[0] for name, files in on_map_files.items()},

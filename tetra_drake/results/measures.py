@@ -86,13 +86,6 @@ def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
     return float(frequencies[spectrum.argmax()])
 
 
-def junction_signals(trajectory: xarray.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """(samples, n - 1) each, in N: the signals at each junction, summed, and left less right."""
-    names, signals = trajectory.oscillator_junction.values, trajectory.signal.values
-    at = names[:, np.newaxis] == list(dict.fromkeys(names))
-    return signals @ at, (signals * trajectory.oscillator_side.values) @ at
-
-
 def travelling_index(waves: np.ndarray) -> float:
     """How far waves (samples, places) travel along the places: 0 if they stand, 1 if they travel.
 

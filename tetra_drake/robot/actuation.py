@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -72,8 +71,9 @@ class Actuation:
 
     @property
     def weight_names(self) -> tuple[str, ...]:
-        """Of `couplings`; see weight_names()."""
-        return weight_names(self.couplings)
+        """Names of `couplings`: "3->1 extensor" is from oscillator 3 onto 1, counting from 1."""
+        pairs = self.couplings.tolist()
+        return tuple(f"{j // 2 + 1}->{i // 2 + 1} {KINDS[i % 2]}" for i, j in pairs)
 
 
 def couplings_within(junctions: np.ndarray, reach: int | None) -> np.ndarray:
@@ -82,17 +82,6 @@ def couplings_within(junctions: np.ndarray, reach: int | None) -> np.ndarray:
     far = np.abs(junction[:, np.newaxis] - junction)
     coupled = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
     return np.argwhere(coupled if reach is None else coupled & (far <= reach))
-
-
-def weight_names(couplings: np.ndarray) -> tuple[str, ...]:
-    """As "3->1 extensor": from oscillator 3 onto oscillator 1, counting from 1."""
-    return tuple(f"{j // 2 + 1}->{i // 2 + 1} {KINDS[i % 2]}" for i, j in couplings.tolist())
-
-
-def parse_weight_name(name: str) -> tuple[str, int, int] | None:
-    """("extensor", 1, 3) of "3->1 extensor"; None if it is no such name."""
-    found = re.fullmatch(rf"([1-9]\d{{0,3}})->([1-9]\d{{0,3}}) ({'|'.join(KINDS)})", name, re.ASCII)
-    return (found[3], int(found[2]), int(found[1])) if found else None
 
 
 def _side(group: Sequence[str]) -> float:

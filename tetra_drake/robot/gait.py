@@ -4,7 +4,7 @@ import dataclasses
 import difflib
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.robot.actuation import Actuation
+from tetra_drake.formatting import aligned
+from tetra_drake.robot.actuation import KINDS, Actuation
 from tetra_drake.scenario.fields import Check, setting
 from tetra_drake.scenario.schema import PATHWAYS, Scenario
 
@@ -52,10 +53,32 @@ class Gait:
     """From -1 to 1: the input of oscillators is u0 (1 + turn) on the left, u0 (1 - turn) on the
     right."""
     gains: Gains = Gains()
-    time_scales: tuple[float, ...] = ()
-    """Factors on both time constants, by junction; none if all are 1."""
-    scenario: str = dataclasses.field(default="", compare=False)
+    scenario: str = field(default="", compare=False)
     """Name of the scenario that the gait was made for; "" if that is not known."""
+    weight_names: tuple[str, ...] = field(default=(), repr=False, compare=False)
+    """As "3->1 extensor": from oscillator 3 onto oscillator 1. Empty where they are not known."""
+
+    def __str__(self) -> str:
+        """A table of the parameters; the weights as a matrix for each kind of neuron."""
+        lines = [f"{self.name}: tau_A {self.tau_a:.4g} s, tau_B {self.tau_b:.4g} s"]
+        if self.turn:
+            lines.append(f"turn {self.turn:.4g}")
+        gains = dataclasses.asdict(self.gains)
+        lines += [f"gain of {name} {gain:.4g}" for name, gain in gains.items() if gain]
+        if not self.weights or len(self.weight_names) != len(self.weights):
+            weights = [f"{weight:.4g}" for weight in self.weights]
+            return "\n".join([*lines, f"weights {' '.join(weights) or 'none'}"])
+        by_name = dict(zip(self.weight_names, self.weights, strict=True))
+        numbers = {int(n) for name in by_name for n in name.split()[0].split("->")}
+        oscillators = range(1, max(numbers) + 1)
+        for kind in KINDS:
+            rows = [["onto", *map(str, oscillators)]]
+            for onto in oscillators:
+                cells = [by_name.get(f"{source}->{onto} {kind}") for source in oscillators]
+                rows.append([str(onto), *("-" if w is None else f"{w:.2f}" for w in cells)])
+            lines += ["", f"weights of the {kind}s, a column for each oscillator they come from"]
+            lines.append(aligned(rows))
+        return "\n".join(lines)
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """The content of a gait file; `scenario` is one that the gait fits, and was made for unless
@@ -67,18 +90,21 @@ class Gait:
         content["tau_a_s"] = self.tau_a
         if self.tau_b != TAU_B_PER_TAU_A * self.tau_a:
             content["tau_b_s"] = self.tau_b
-        others = {"turn": self.turn, "time_scales": list(self.time_scales)}
-        others["gains"] = {k: gain for k, gain in dataclasses.asdict(self.gains).items() if gain}
-        return content | {key: value for key, value in others.items() if value}
+        if self.turn:
+            content["turn"] = self.turn
+        gains = {name: gain for name, gain in dataclasses.asdict(self.gains).items() if gain}
+        if gains:
+            content["gains"] = gains
+        return content
 
 
 @dataclass(frozen=True)
 class ParameterSpace:
-    """The parameters of a scenario's gaits as one vector: weights, factors on time constants and
-    feedback gains where the scenario has them, tau_A, tau_B (s)."""
+    """The parameters of a scenario's gaits as one vector: weights, feedback gains where the
+    scenario has them, tau_A, tau_B (s)."""
 
     names: tuple[str, ...]
-    """As "weight 3->1 extensor", "time scale T1-T2", "gain length", "tau_A", "tau_B"."""
+    """As "weight 3->1 extensor", "gain length", "tau_A", "tau_B"."""
     low: Vector
     high: Vector
     """Bounds of random gaits (Table 5)."""
@@ -90,8 +116,8 @@ class ParameterSpace:
     """Whether tau_B is kept at 2 tau_A."""
     weights: npt.NDArray[np.int64]
     """(weights of a gait,): the parameter that is each weight, or its mirror image."""
-    junctions: int
-    """How many time scales there are."""
+    weight_names: tuple[str, ...]
+    """(weights of a gait,): their names in gait files."""
     pathways: tuple[str, ...]
     """Those with a gain."""
     turn: float
@@ -119,15 +145,14 @@ class ParameterSpace:
             floors=np.array(floors),
             couples_tau_b=not scenario.evolution.independent_tau_b,
             weights=places,
-            junctions=sum(name.startswith("time scale") for name in names),
+            weight_names=actuation.weight_names,
             pathways=tuple(scenario.cpg.feedback),
             turn=scenario.gait_bounds.turn,
         )
 
     def gait(self, vector: Vector, *, name: str) -> Gait:
         """The gait of a vector."""
-        count = len(vector) + TAU_A - len(self.pathways)
-        scales, gains = vector[count - self.junctions : count], vector[count:TAU_A].tolist()
+        gains = vector[len(vector) + TAU_A - len(self.pathways) : TAU_A].tolist()
         return Gait(
             name=name,
             weights=tuple(vector[self.weights].tolist()),
@@ -135,16 +160,15 @@ class ParameterSpace:
             tau_b=float(vector[TAU_B]),
             turn=self.turn,
             gains=Gains(**dict(zip(self.pathways, gains, strict=True))),
-            time_scales=tuple(scales.tolist()),
+            weight_names=self.weight_names,
         )
 
     def vector(self, gait: Gait) -> Vector:
         """The vector of a gait; of mirrored weights, the first ones count."""
         _, first = np.unique(self.weights, return_index=True)
-        scales = (gait.time_scales or (1.0,) * self.junctions)[: self.junctions]
         gains = [getattr(gait.gains, name) for name in self.pathways]
         taus = gait.tau_a, gait.tau_b
-        return np.array([*np.array(gait.weights)[first], *scales, *gains, *taus])
+        return np.array([*np.array(gait.weights)[first], *gains, *taus])
 
     def random(self, generator: np.random.Generator) -> Vector:
         """A vector drawn uniformly within the bounds, with tau_B = 2 tau_A."""
@@ -161,22 +185,18 @@ class ParameterSpace:
 
 def _parameters(scenario: Scenario, weights: list[str]) -> list[tuple[str, *tuple[float, ...]]]:
     """Name, lower and upper bound, step and floor of each parameter."""
-    bounds, settings, junctions = scenario.gait_bounds, scenario.evolution, []
-    if (bounds.time_scale_min, bounds.time_scale_max) != (1.0, 1.0):
-        junctions = [f"T{i + 1}-T{i + 2}" for i in range(scenario.robot.tetrahedra - 1)]
+    bounds, settings = scenario.gait_bounds, scenario.evolution
 
     def kind(name: str, step: float, floor: float) -> tuple[float, float, float, float]:
         low, high = getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max")
         return low, high, 0.0 if low == high and name != "weight" else step, floor
 
     weight = kind("weight", settings.weight_mutation, 0.0)
-    scale = kind("time_scale", settings.time_scale_mutation, bounds.time_scale_min)
     gain = kind("gain", settings.gain_mutation, -math.inf)
     low, high, step, floor = kind("tau_a", settings.tau_mutation_range, bounds.tau_a_min)
     tau_b = (TAU_B_PER_TAU_A * number for number in (low, high, step, floor))
     return [
         *((f"weight {name}", *weight) for name in weights),
-        *((f"time scale {name}", *scale) for name in junctions),
         *((f"gain {name}", *gain) for name in scenario.cpg.feedback),
         ("tau_A", low, high, 0.0 if settings.tau_mutation == "listing" else step, floor),
         ("tau_B", *tau_b),
@@ -211,7 +231,6 @@ class GaitFile:
     tau_b_s: float | None = setting(default=None, above=0)
     turn: float = setting(default=0.0, at_least=-1, at_most=1)
     gains: Gains = setting(default=Gains())
-    time_scales: list[float] = setting(default=[], above=0)
 
 
 def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
@@ -219,19 +238,28 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
 
     Raises InputError, naming file and key, for whatever is wrong in the file or does not fit.
     """
-    gait, names = read_gait(path, key=key)
+    file = _read_file(path, key)
     actuation = Actuation.of(scenario)
-    if names:
-        wanted, weights = actuation.weight_names, dict(zip(names, gait.weights, strict=True))
-        _check_names(names, wanted, path, f"{key}.weights".strip("."))
-        gait = dataclasses.replace(gait, weights=tuple(weights[name] for name in wanted))
+    names, weights = actuation.weight_names, file.weights
+    if isinstance(weights, dict):
+        _check_names(tuple(weights), names, path, f"{key}.weights".strip("."))
+        weights = [weights[name] for name in names]
+    gait = Gait(
+        name=file.name or Path(path).stem,
+        weights=tuple(weights),
+        tau_a=file.tau_a_s,
+        tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
+        turn=file.turn,
+        gains=file.gains,
+        scenario=file.scenario,
+        weight_names=names,
+    )
     check_gait(gait, scenario, actuation, source=path, key=key)
     return gait
 
 
-def read_gait(path: str | Path, *, key: str = "") -> tuple[Gait, tuple[str, ...]]:
-    """The gait of a file, for whatever robot: its weights as they stand there, and their names, if
-    they have any. Raises InputError as load_gait() does."""
+def _read_file(path: str | Path, key: str) -> GaitFile:
+    """What a gait file holds, or a JSON file under `key`."""
     text = read_text(path, "gait file")
     try:
         raw = json.loads(text, object_pairs_hook=_unique_keys)
@@ -240,18 +268,7 @@ def read_gait(path: str | Path, *, key: str = "") -> tuple[Gait, tuple[str, ...]
     if key and isinstance(raw, dict):
         raw = raw.get(key)
     file: GaitFile = Check(path, complete=True).value(GaitFile, raw, key)
-    weights = file.weights
-    gait = Gait(
-        name=file.name or Path(path).stem,
-        weights=tuple(weights.values() if isinstance(weights, dict) else weights),
-        tau_a=file.tau_a_s,
-        tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
-        turn=file.turn,
-        gains=file.gains,
-        time_scales=tuple(file.time_scales),
-        scenario=file.scenario,
-    )
-    return gait, tuple(weights) if isinstance(weights, dict) else ()
+    return file
 
 
 def check_gait(
@@ -259,7 +276,6 @@ def check_gait(
 ) -> None:
     """Raises InputError, naming source and key, for what does not fit the scenario."""
     weights, count, n = len(gait.weights), len(actuation.couplings), len(actuation.names)
-    scales, junctions = len(gait.time_scales), scenario.robot.tetrahedra - 1
     pathways, gains = scenario.cpg.feedback, dataclasses.asdict(gait.gains)
     gain = next((name for name in PATHWAYS if gains[name] and name not in pathways), "")
     for wrong, name, found, expected in (
@@ -271,7 +287,6 @@ def check_gait(
             gait.turn,
             "0, as no oscillator has a side",
         ),
-        (scales not in (0, junctions), "time_scales", f"{scales} numbers", f"none or {junctions}"),
     ):
         if wrong:
             problem = f"found {found}, expected {expected}"

@@ -37,12 +37,10 @@ def make_network(scenario: Scenario, structure: Structure, gait: Gait) -> Networ
     inhibition = np.zeros((neurons.size, neurons.size))
     inhibition[neurons, neurons ^ 1] = scenario.cpg.partner_weight
     inhibition[tuple(actuation.couplings.T)] = gait.weights
-    scales = np.array(gait.time_scales or [1.0] * (len(structure.bodies) - 1))
-    scales = np.repeat(scales[actuation.junctions], 2)
     return Network.of(
         inhibition,
-        tau_a=gait.tau_a * scales,
-        tau_b=gait.tau_b * scales,
+        tau_a=gait.tau_a,
+        tau_b=gait.tau_b,
         self_inhibition_weight=scenario.cpg.self_inhibition_weight,
     )
 

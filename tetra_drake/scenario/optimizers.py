@@ -38,16 +38,6 @@ class CmaEs:
 
 
 @dataclass
-class DifferentialEvolution:
-    """Differential evolution that adapts itself: L-SHADE (Tanabe and Fukunaga, CEC 2014)."""
-
-    population: int = setting(at_least=8, at_most=100_000, default=50)
-    """Vectors in the first iteration; falls evenly to 4 in the last one."""
-    greed: float = setting(above=0, at_most=1, default=0.11)
-    """Share of the population, the best, towards which each vector is moved."""
-
-
-@dataclass
 class RandomSearch:
     """Random gaits, as many in an iteration as `evolution.population`: a baseline."""
 
@@ -79,5 +69,5 @@ class QualityDiversity:
     """In the end, each gait of the map is simulated in as many draws of disturbances."""
 
 
-OptimizerKind = SteadyState | CmaEs | DifferentialEvolution | RandomSearch | QualityDiversity
+OptimizerKind = SteadyState | CmaEs | RandomSearch | QualityDiversity
 """What `optimizer` may be; without a tag it is the first."""

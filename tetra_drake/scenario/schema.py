@@ -29,10 +29,7 @@ from tetra_drake.scenario.terrain import Flat, Terrain
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 ENGINES = ("drake", "compiled", "mujoco")
-SCHEMES = (
-    *("radau3", "runge_kutta3", "runge_kutta2", "runge_kutta5", "bogacki_shampine3", "radau1"),
-    *("implicit_euler", "velocity_implicit_euler", "explicit_euler", "semi_explicit_euler"),
-)
+SCHEMES = ("radau3", "runge_kutta3")
 MUJOCO_INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
 
 CABLES = (
@@ -85,12 +82,12 @@ class RobotScenario:
 
 @dataclass
 class GroundScenario:
-    """The normal force (Table 1). `stiffness` and `damping` act; the other two explain them."""
+    """The normal force (Table 1)."""
 
-    restitution: float = setting(above=0, at_most=1)  # e, the aim of the thesis
-    velocity_correction: float = quantity("s/m", above=0)  # alpha: e = 1 - alpha v (Eq. 2)
     stiffness: float = quantity("N/m", above=0)
-    damping: float = quantity("N*s/m^2", at_least=0)  # lambda = 3/2 alpha stiffness (Eq. 2)
+    damping: float = quantity("N*s/m^2", at_least=0)
+    """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
+    speed v: e = 1 - alpha v (Eq. 2)."""
 
 
 @dataclass
@@ -181,8 +178,6 @@ class GaitBoundsScenario:
     tau_a_max: float = quantity("s", above=0)
     gain_min: float = setting(default=-1.0)  # of the scenario's feedback
     gain_max: float = setting(default=1.0)
-    time_scale_min: float = setting(above=0, default=1.0)  # of both time constants, by junction
-    time_scale_max: float = setting(above=0, default=1.0)
     turn: float = setting(at_least=-1, at_most=1, default=0.0)
     """The turn of all gaits that are drawn or evolved."""
     mirrored: bool = setting(default=False)
@@ -201,19 +196,15 @@ class SimulationScenario:
     duration: float = quantity("s", above=0, at_most=1e5)
     steady_from: float = quantity("s", at_least=0)  # the fitness counts from here (section 2.3)
     scheme: str = setting(choices=SCHEMES)
-    accuracy: float = setting(above=0)  # per step; unused by schemes without an error estimate
+    accuracy: float = setting(above=0)  # per step
     max_step: float = quantity("s", above=0)
     mode_changes: str = setting(choices=("step_end", "witness"))
     look_ahead: float = quantity("s", at_least=0)
-    """With step_end and an implicit scheme: shortest step that ends at a predicted mode change; 0
-    for none."""
+    """With step_end and radau3: shortest step that ends at a predicted mode change; 0 for none."""
     witness_window: float = quantity("s", above=0)  # how closely a witness localises
     max_evaluations: int = setting(at_least=1)  # of the derivatives, in one simulation
     max_speed: float = quantity("m/s", above=0)  # a faster body counts as diverged
     sample_period: float = quantity("s", above=0)  # of a recorded trajectory
-    fresh_steps: bool = setting(default=False)
-    """With look-ahead: whether steps begin anew after a mode change, short and with a new
-    Jacobian, and approach a distant change before they aim at it."""
 
 
 @dataclass
@@ -241,9 +232,7 @@ class DisturbancesScenario:
     """The changes of robot and surroundings among which evolution looks for gaits.
 
     Every gait is simulated once for each of `draws` draws; those of an iteration are the same for
-    all its gaits. The fitness is the mean over the worst share of the draws: all of them (`mean`),
-    the worst one (`worst`), or `tail` (`cvar`, the conditional value at risk). With `mean_to_tail`,
-    selection goes from the mean, in the first iteration, to `tail`, in the last one.
+    all its gaits.
     """
 
     draws: int = setting(at_least=1, at_most=10_000)
@@ -255,8 +244,9 @@ class DisturbancesScenario:
     back, sideways, and up."""
     terrain: bool = setting(default=False)
     """Whether each draw has another seed of the terrain."""
-    aggregation: str = setting(choices=("mean", "worst", "cvar", "mean_to_tail"), default="mean")
-    tail: float = setting(above=0, at_most=1, default=0.25)
+    tail: float = setting(above=0, at_most=1, default=1.0)
+    """The fitness is the mean over this share of the draws, the worst (the conditional value at
+    risk): 1 is the mean over all; one draw counts at least."""
 
 
 @dataclass
@@ -274,14 +264,12 @@ class EvolutionScenario:
     max_evaluations: int | None = setting(at_least=1, default=None)
     """Of a trial by an optimiser other than !SteadyState; if not given, as many as there are in
     max_iterations of that one."""
-    crossover: str = setting(choices=("uniform",))
     crossover_probability: float = setting(at_least=0, at_most=1)
     mutation_probability: float = setting(at_least=0, at_most=1)
     weight_mutation: float = setting(at_least=0)  # largest change of a weight in one mutation
     tau_mutation_range: float = quantity("s", at_least=0)  # largest change of tau_A
     tau_mutation: str = setting(choices=("intended", "listing"))
     gain_mutation: float = setting(at_least=0, default=0.2)  # largest change of a feedback gain
-    time_scale_mutation: float = setting(at_least=0, default=0.05)
     stop_rise: float = setting(at_least=0)
     stop_window: int = setting(at_least=1)
     stop_after: int = setting(at_least=0)
@@ -410,7 +398,7 @@ def _check_relations(scenario: Scenario, source: object) -> None:
     mu, most = (law.kinetic, law.static) if isinstance(law, Coulomb) else (0.0, 0.0)
     ranges = {
         name: (getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max"))
-        for name in ("weight", "tau_a", "gain", "time_scale")
+        for name in ("weight", "tau_a", "gain")
     }
     for wrong, key, found, expected in (
         *(

@@ -13,7 +13,7 @@ from tetra_drake.robot.ground import ground_heights, make_ground
 from tetra_drake.robot.structure import MakeStructure, node_positions
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
-from tetra_drake.visualization.replay import quiet_meshcat, show_replay
+from tetra_drake.visualization.replay import quiet_meshcat
 from tetra_drake.visualization.scene import add_robot, motions, set_surroundings
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class LiveView:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._meshcat, self._scenario = meshcat, scenario
+        self._meshcat = meshcat
         self._clock, self._sleep = clock, sleep
         self._structure = MakeStructure(scenario)
         self._started: float | None = None
@@ -73,10 +73,6 @@ class LiveView:
             self._started = self._clock() - time
         self._meshcat.SetSimulationTime(time)  # for the rate it shows
         self._due = (np.floor(time * FRAMES_PER_SECOND) + 1.0) / FRAMES_PER_SECOND
-
-    def replay(self, trajectory: xarray.Dataset) -> None:
-        """Plays what was simulated again and again."""
-        show_replay(self._meshcat, scenario=self._scenario, trajectory=trajectory)
 
 
 def open_view(scenario: Scenario, *, say: Callable[[str], None]) -> LiveView:

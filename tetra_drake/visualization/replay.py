@@ -15,9 +15,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import numpy as np
-from pydrake.common.eigen_geometry import Quaternion
-from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams
-from pydrake.math import RigidTransform
+from pydrake.geometry import Meshcat, MeshcatParams
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
@@ -78,28 +76,6 @@ class Film:
     traces: dict[str, int]
     """By path in the scene: the tick when a piece becomes visible."""
 
-    def animation(self) -> MeshcatAnimation:
-        """The film as Meshcat plays it."""
-        animation = MeshcatAnimation(frames_per_second=TICKS_PER_SECOND)
-        animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
-        animation.set_repetitions(REPETITIONS)
-        for motion in self.motions:
-            for frame, tick in enumerate(self.ticks):
-                position = motion.positions[frame]
-                if motion.quaternions is None:
-                    animation.SetProperty(tick, motion.path, "position", position.tolist())
-                else:
-                    pose = RigidTransform(Quaternion(motion.quaternions[frame]), position)
-                    animation.SetTransform(tick, motion.path, pose)
-                if motion.scales is not None:
-                    scale = motion.scales[frame].tolist()
-                    animation.SetProperty(tick, motion.path, "scale", scale)
-        for path, shown in self.traces.items():
-            animation.SetProperty(0, path, "visible", False)
-            for tick in {shown, self.ticks[-1]}:  # a motion that ends earlier repeats
-                animation.SetProperty(tick, path, "visible", True)
-        return animation
-
     def packed(self) -> dict[str, Any]:
         """The film as overlay.html.jinja plays it, small when compressed: motions are steps from
         frame to frame, the first one from 0, in RESOLUTION, in a row for each component."""
@@ -140,11 +116,6 @@ def save_replay(
         page, script = _without_viewer(page, address=_relative(viewer, Path(path).parent))
         _write_once(viewer, script)
     write_whole(path, pack_page(_with_overlay(page, title, legend, film), title=title))
-
-
-def show_replay(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset) -> None:
-    """Lets a Meshcat that shows the scenario's robot (scene.add_robot) play a trajectory."""
-    meshcat.SetAnimation(add_film(meshcat, scenario=scenario, trajectory=trajectory).animation())
 
 
 def add_film(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset) -> Film:

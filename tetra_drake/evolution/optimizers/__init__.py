@@ -8,7 +8,6 @@ import importlib.util
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.optimizers.base import MakeOptimizer
 from tetra_drake.evolution.optimizers.cma_es import CmaEs
-from tetra_drake.evolution.optimizers.differential_evolution import DifferentialEvolution
 from tetra_drake.evolution.optimizers.quality_diversity import INSTALL, QualityDiversity
 from tetra_drake.evolution.optimizers.random_search import RandomSearch
 from tetra_drake.evolution.optimizers.steady_state import SteadyState
@@ -19,8 +18,6 @@ def optimizer_of(kind: kinds.OptimizerKind) -> MakeOptimizer:
     """What makes the optimiser that a scenario asks for. Raises InputError if pyribs is missing."""
     if isinstance(kind, kinds.CmaEs):
         return functools.partial(CmaEs, own=kind)
-    if isinstance(kind, kinds.DifferentialEvolution):
-        return functools.partial(DifferentialEvolution, own=kind)
     if isinstance(kind, kinds.QualityDiversity):
         if importlib.util.find_spec("ribs") is None:
             raise InputError("optimizer", "", f"needs pyribs: {INSTALL}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -37,9 +37,6 @@ Evaluate = Callable[[Any], Evaluation]
 """A pure function of a vector, or among disturbances of an evolution.draws.SeededVector; it must
 pickle to run in worker processes."""
 
-Score = Callable[[Evaluation], float]
-"""By what evaluations are compared; greater is better."""
-
 
 @dataclass(frozen=True)
 class Iteration:
@@ -67,15 +64,6 @@ class Optimizer(Protocol):
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes the evaluations in the order in which the vectors were asked for."""
-
-
-@runtime_checkable
-class Rescoring(Protocol):
-    """An Optimizer that can be told to compare evaluations by other numbers than their fitness."""
-
-    def rescore(self, score: Score) -> None:
-        """Takes the score that counts from now on, for evaluations told before and for new ones.
-        What is reported of fitnesses stays so."""
 
 
 MakeOptimizer = Callable[[ParameterSpace, EvolutionScenario, np.random.Generator], Optimizer]

@@ -7,12 +7,11 @@ The comparisons are the listing's: an event of probability p happens if a number
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import attrgetter
 
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.evolution.optimizers.base import Evaluation, Iteration, Score
+from tetra_drake.evolution.optimizers.base import Evaluation, Iteration
 from tetra_drake.files import json_number
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.schema import EvolutionScenario
@@ -22,7 +21,7 @@ Fitnesses = npt.NDArray[np.float64]
 
 
 class SteadyState:
-    """A Rescoring Optimizer: first the random population, then two children per iteration.
+    """An Optimizer: first the random population, then two children per iteration.
 
     Both children come from the same two parents and the same mutation numbers, before either is
     placed, so they can be evaluated at once. Reports mean_fitness, over members without failure.
@@ -36,10 +35,7 @@ class SteadyState:
         self._generator = generator
         self._asked: list[Vector] = []
         self._population: list[Vector] = []
-        self._evaluations: list[Evaluation] = []
-        """Of the population."""
-        self._score: Score = attrgetter("fitness")
-        self._scores = np.empty(0)
+        self._fitnesses: Fitnesses = np.empty(0)
         self._means: list[float] = []
 
     @property
@@ -56,20 +52,15 @@ class SteadyState:
             self._asked = self._breed()
         return [vector.copy() for vector in self._asked]
 
-    def rescore(self, score: Score) -> None:
-        """Scores the population anew."""
-        self._score = score
-        self._scores = np.array([score(each) for each in self._evaluations], dtype=float)
-
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes the initial population, or places the children one after the other."""
         if not self._population:
-            self._population, self._evaluations = self._asked, list(evaluations)
-            self.rescore(self._score)
+            self._population = self._asked
+            self._fitnesses = np.array([each.fitness for each in evaluations], dtype=float)
             placed: tuple[int | None, ...] = tuple(range(len(evaluations)))
         else:
             placed = tuple(map(self._place, self._asked, evaluations))
-        mean = mean_fitness(np.array([each.fitness for each in self._evaluations]))
+        mean = mean_fitness(self._fitnesses)
         self._means.append(mean)
         report = {"mean_fitness": json_number(mean)}
         return Iteration(report=report, placed=placed, stop=self._stop())
@@ -77,7 +68,7 @@ class SteadyState:
     def _breed(self) -> list[Vector]:
         settings, generator, space = self._settings, self._generator, self._space
         chosen = (
-            select_parent(self._scores, tournament=settings.tournament, generator=generator)
+            select_parent(self._fitnesses, tournament=settings.tournament, generator=generator)
             for _ in range(2)
         )
         parents, probability = [self._population[i] for i in chosen], settings.crossover_probability
@@ -89,11 +80,10 @@ class SteadyState:
 
     def _place(self, vector: Vector, evaluation: Evaluation) -> int | None:
         tournament, generator = self._settings.tournament, self._generator
-        score = self._score(evaluation)
-        place = find_place(self._scores, score, tournament=tournament, generator=generator)
+        fitness = evaluation.fitness
+        place = find_place(self._fitnesses, fitness, tournament=tournament, generator=generator)
         if place is not None:
-            self._population[place], self._evaluations[place] = vector, evaluation
-            self._scores[place] = score
+            self._population[place], self._fitnesses[place] = vector, fitness
         return place
 
     def _stop(self) -> str | None:

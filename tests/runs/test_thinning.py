@@ -8,30 +8,28 @@ import pandas
 import pytest
 from helpers.analytic import Bowl
 from helpers.synthetic_run import tiny_scenario, write_run
+from thinning import thin
 
 from tetra_drake.evolution.comparison import compare
 from tetra_drake.evolution.elites import elites
 from tetra_drake.evolution.json_lines import append_lines, read_lines
-from tetra_drake.evolution.pareto import champions
 from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.reevaluation import BEST_GAITS, evaluate_again
 from tetra_drake.evolution.source import load_source
 from tetra_drake.evolution.summary import summary
 from tetra_drake.evolution.tables import load_run
-from tetra_drake.evolution.thinning import thin
 from tetra_drake.report.run_page import write_report
 from tetra_drake.scenario.optimizers import QualityDiversity
 
-AGAIN, CHEAP, DEAR, ALONE, EDGE, BEYOND = range(20, 26)
-"""Evaluations that nothing else makes matter: reevaluated; the cheapest, and one that rounding
-would make cheaper; alone in its cell of the map, and one that rounding would put alone into the
-next cell, where it is not the fittest of its own."""
+AGAIN, ALONE, EDGE, BEYOND = range(20, 24)
+"""Evaluations that nothing else makes matter: reevaluated; alone in its cell of the map, and one
+that rounding would put alone into the next cell, where it is not the fittest of its own."""
 
 GENERATOR = np.random.default_rng(3)
 RISING = [12.0 + i for i in range(2 * BEST_GAITS)]
 LOW = GENERATOR.uniform(1.0, 11.0, 31).tolist()
 FITNESS = [[*LOW[:6], *RISING, *LOW[6:]], GENERATOR.normal(8.0, 3.0, 41).tolist()]
-FITNESS[0][AGAIN : BEYOND + 1] = [2.5, 11.5, 11.4, 2.0, 3.0, 4.0]
+FITNESS[0][AGAIN : BEYOND + 1] = [2.5, 2.0, 3.0, 4.0]
 TRIALS = [
     [
         [(f, i) for i, f in enumerate(trial[:6])],
@@ -45,14 +43,12 @@ TRIALS = [
 def metrics_of(trial, i, fitness):
     """More metrics than a synthetic run has."""
     special = {
-        CHEAP: (5.0012, 0.9, 0.5),
-        DEAR: (5.0014, 0.9, 0.5),
-        ALONE: (30.0, 0.1, 0.45),
-        EDGE: (30.0, 1.00001 / 3.0, 0.59),
-        BEYOND: (30.0, 0.5, 0.59),
+        ALONE: (0.1, 0.45),
+        EDGE: (1.00001 / 3.0, 0.59),
+        BEYOND: (0.5, 0.59),
     }
-    cost, index, lifted = special.get(i if trial == 0 else -1, (20.0 + fitness, 0.9, 0.5))
-    numbers = {"cost_of_transport": cost, "travelling_index": index, "lifted": lifted}
+    index, lifted = special.get(i if trial == 0 else -1, (0.9, 0.5))
+    numbers = {"travelling_index": index, "lifted": lifted, "twist": 0.1 + fitness / 70.0}
     return numbers | {"lateral_drift": -1e-17, "clearance": 1.0}
 
 
@@ -85,8 +81,7 @@ def test_every_evaluation_is_there_and_those_that_matter_are_whole(runs):
     last = pandas.concat([run.last_population(0), run.last_population(1)])
     again = run.evaluations.query("trial == 0 and index == @AGAIN")
     assert AGAIN not in rises["index"].values and AGAIN not in last["index"].values
-    champion = pandas.DataFrame(champions(run).values())
-    for matter in (run.initial(), rises, run.best(BEST_GAITS), last, again, elites(run), champion):
+    for matter in (run.initial(), rises, run.best(BEST_GAITS), last, again, elites(run)):
         rows = run.evaluations.loc[matter.index].drop(columns="wall_time_s")
         kept = thinned.evaluations.loc[matter.index].drop(columns="wall_time_s")
         pandas.testing.assert_frame_equal(kept, rows, check_exact=True)
@@ -98,8 +93,8 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     before, after = run.evaluations.loc[rest], thinned.evaluations.loc[rest]
     loss = (before["fitness"] - after["fitness"]).dropna()
     assert (loss >= 0.0).all() and (loss < 1e-4).all() and (loss > 0.0).any()
-    cost = after["cost_of_transport"].dropna()
-    assert [float(f"{x:.3g}") for x in before["cost_of_transport"].dropna()] == cost.tolist()
+    twist = after["twist"].dropna()
+    assert [float(f"{x:.3g}") for x in before["twist"].dropna()] == twist.tolist()
     assert thinned.whole["clearance"].notna().any() and after["clearance"].isna().all()
     assert not np.signbit(after["lateral_drift"].dropna()).any()
     assert set(after["lateral_drift"].dropna()) == {0.0}
@@ -114,12 +109,9 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     assert thinned.fittest() == run.fittest()
     assert thinned.best(99)["tau_a_s"].notna().all()
     assert summary(thinned).replace(str(thinned.directory), str(run.directory)) == summary(run)
-    named = ({n: (g["trial"], g["index"]) for n, g in champions(r).items()} for r in runs)
-    assert next(named) == next(named)
     on_map = [table[["trial", "index"]].to_numpy().tolist() for table in map(elites, runs)]
     assert on_map[0] == on_map[1]
     assert [0, ALONE] in on_map[0] and [0, BEYOND] in on_map[0] and [0, EDGE] not in on_map[0]
-    assert champions(run)["cheapest"]["index"] == CHEAP
     assert load_source(thinned.directory).gaits == load_source(run.directory).gaits
     ours, theirs = (compare([r.directory], reach=0.01).trials for r in (thinned, run))
     assert ours.drop(columns="run").equals(theirs.drop(columns="run"))

@@ -6,7 +6,7 @@
     trial_00/iterations.jsonl.xz, trial_00/reevaluations.jsonl.xz (without genomes), elites.jsonl.xz
 
 The gaits that matter are the first of each trial, each best so far, the last population, the best
-of each trial, those evaluated again on the diagram, the champions and those of a map.
+of each trial, those evaluated again on the diagram and those of a map.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from typing import Any
 
 from tetra_drake.evolution.elites import elites
 from tetra_drake.evolution.json_lines import compressed
-from tetra_drake.evolution.pareto import COST, champions
 from tetra_drake.evolution.record import (
     BEST_GAIT,
     ELITES,
@@ -76,14 +75,13 @@ def _that_matter(run: Run) -> set[tuple[Any, Any]]:
     rises = table[table["fitness"] == table.groupby("trial")["fitness"].cummax()]
     last = [run.last_population(trial) for trial in table["trial"].unique()]
     chosen = [run.initial(), rises, run.best(BEST_GAITS), run.reevaluations, elites(run), *last]
-    rows = [*champions(run).values(), *(row for each in chosen for _, row in each.iterrows())]
-    return {(row["trial"], row["index"]) for row in rows}
+    return {(row["trial"], row["index"]) for table in chosen for _, row in table.iterrows()}
 
 
 def _that_choose(scenario: Scenario) -> set[str]:
     """The metrics by which gaits of a run are compared."""
     measures = getattr(scenario.optimizer, "measures", ())
-    return {"distance", COST.column, *scenario.objective, *scenario.require, *measures}
+    return {"distance", *scenario.objective, *scenario.require, *measures}
 
 
 def _thinned(entry: Mapping[str, Any], metrics: Container[str]) -> dict[str, Any]:

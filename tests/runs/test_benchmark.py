@@ -1,0 +1,48 @@
+"""The benchmark: its tables on short simulations of few gaits."""
+
+import benchmark
+import pytest
+
+QUICK = """
+base: thesis
+name: quick
+cpg: {start_up: 0.1 s}
+simulation: {duration: 0.3 s, steady_from: 0.2 s}
+"""
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """One core, one gait at a time and one size of robot, measured once; no MuJoCo."""
+    monkeypatch.setattr(benchmark, "available_cores", lambda: 1)
+    monkeypatch.setattr(benchmark, "installed", lambda: False)
+    few = {"BATCHES": (1,), "SIZES": (2,), "LANES": 1, "GROUND_BATCH": 1, "ROUNDS": 1}
+    for name, value in few.items():
+        monkeypatch.setattr(benchmark, name, value)
+
+
+def cells(line):
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def test_every_engine_robot_and_ground_is_measured(small, tmp_path, capsys):
+    (tmp_path / "quick.yaml").write_text(QUICK)
+    benchmark.main(["--scenario", str(tmp_path / "quick.yaml"), "--gaits", "2"])
+    tables = [table.splitlines() for table in capsys.readouterr().out.strip().split("\n\n")]
+    engines, batches, sizes, grounds = ([cells(line) for line in table[2:]] for table in tables)
+    assert [row[0] for row in engines] == ["drake", "drake", "compiled"]
+    for row in engines:
+        speed, median, worst, evaluations, failed = row[2:]
+        assert float(speed) > 0.0 and int(evaluations.replace(",", "")) > 0 and failed == "0"
+        assert 0.0 <= float(median) <= float(worst) < 0.05
+    assert [row[:3] for row in batches] == [["compiled", "1", "1"]]
+    ((tetrahedra, steps, alone, per_tetrahedron, *_),) = sizes
+    assert tetrahedra == "2" and int(steps.replace(",", "")) > 0
+    assert float(alone) == pytest.approx(2.0 * float(per_tetrahedron), abs=0.02)
+    assert len(grounds) == 6 and all(float(row[-1]) > 0.0 for row in grounds)
+
+
+def test_a_table_that_does_not_exist_is_refused(capsys):
+    with pytest.raises(SystemExit):
+        benchmark.main(["engine"])
+    assert "engine" in capsys.readouterr().err

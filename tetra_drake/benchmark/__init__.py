@@ -1,1 +1,0 @@
-"""Benchmark of the engines and their settings: speed, accuracy, and cost by size of the robot."""
