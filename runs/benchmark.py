@@ -207,7 +207,7 @@ def grounds_table(scenario: Scenario) -> str:
     """Speed on one core by ground, friction and network."""
     shipped = load_scenario("rough")
     rough: Changes = {"terrain": shipped.terrain, "robot.contacts": shipped.robot.contacts}
-    tolerance = shipped.compiled.tolerance
+    tolerance = f"{shipped.compiled.tolerance!r} m/s"
     coulomb: Changes = {"friction": shipped.friction, "compiled.tolerance": tolerance}
     grounds: dict[str, Changes] = {
         "the scenario's": {},

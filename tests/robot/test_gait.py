@@ -5,12 +5,12 @@ import itertools
 import json
 import math
 from pathlib import Path
-from unittest.mock import Mock
+from unittest.mock import PropertyMock
 
 import numpy as np
 import pytest
 
-from tetra_drake.robot.actuation import weight_names
+from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import (
     TAU_A,
     TAU_B,
@@ -380,8 +380,8 @@ def test_the_seed_alone_decides_the_draw(scenario):
 
 
 def test_the_many_weights_of_a_large_robot_are_named_once(scenario, monkeypatch):
-    names = Mock(wraps=weight_names)
-    monkeypatch.setattr("tetra_drake.robot.actuation.weight_names", names)
+    names = PropertyMock(side_effect=lambda: [f"weight {i}" for i in range(112)])
+    monkeypatch.setattr(Actuation, "weight_names", names)
     ParameterSpace.of(scenario.with_changes({"robot.tetrahedra": 9}))
     assert names.call_count == 1
 

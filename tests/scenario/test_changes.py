@@ -38,7 +38,7 @@ def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
         ({"robot.tetrahedrons": 7}, "robot.tetrahedrons", "'tetrahedra'"),
         ({"robots.tetrahedra": 7}, "robots", "'robot'"),
         ({"robot.spacing.x": "1 m"}, "robot.spacing", "a mapping"),
-        ({"cables.outer_stiffness": "40 N/m"}, "cables.outer_stiffness", "40 without a unit"),
+        ({"cables.outer_stiffness": 40}, "cables.outer_stiffness", "40 without a unit"),
         ({"robot.offsets": np.ones((5, 3))}, "robot.offsets[0][0]", "1.0 without a unit"),
         ({"engine": "compiled"}, "engine", "'simulation.engine'"),
         ({"damping": "1 N*s/m"}, "damping", "'cables.damping'"),

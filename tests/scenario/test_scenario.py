@@ -219,7 +219,18 @@ def test_shipped_aims_are_the_thesis_evolved_for_something_else(name, scenario):
     assert loaded.reference is None
 
 
-OTHERS = sorted({*shipped_scenarios()} - {*GROUNDS, *NETWORKS, *AIMS})
+OTHERS = sorted({*shipped_scenarios()} - {*GROUNDS, *NETWORKS, *AIMS, "quick"})
+
+
+def test_the_quick_scenario_is_the_thesis_in_short_and_is_not_compared_with_it(scenario):
+    quick = load_scenario("quick")
+    assert (quick.robot, quick.friction, quick.cpg) == (
+        scenario.robot,
+        scenario.friction,
+        scenario.cpg,
+    )
+    assert quick.simulation.engine == "drake" and quick.reference is None
+    assert quick.evolution.budget * quick.simulation.duration < 300.0, "some minutes, as said"
 
 
 @pytest.mark.parametrize("name", OTHERS)

@@ -136,6 +136,6 @@ def prepare(scenario: Scenario, *, many: bool = False) -> None:
     brief = max(_BRIEF, scenario.cpg.listing_step)
     if brief < scenario.simulation.duration:
         times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}
-        scenario = scenario.with_changes({f"simulation.{key}": t for key, t in times.items()})
+        scenario = scenario.with_changes({f"simulation.{k}": f"{t!r} s" for k, t in times.items()})
     with contextlib.suppress(SimulationFailure):  # recorded, which takes samples within steps
         simulate(scenario=scenario, gait=seeded_gait(scenario), record=True)

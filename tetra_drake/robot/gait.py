@@ -135,7 +135,8 @@ class ParameterSpace:
         if scenario.gait_bounds.mirrored:
             images = np.minimum(images, actuation.images)
         chosen, places = np.unique(images, return_inverse=True)
-        weights = np.array(actuation.weight_names)[chosen].tolist()
+        weight_names = actuation.weight_names
+        weights = [weight_names[i] for i in chosen]
         names, low, high, steps, floors = zip(*_parameters(scenario, weights), strict=True)
         return cls(
             names=names,
@@ -145,7 +146,7 @@ class ParameterSpace:
             floors=np.array(floors),
             couples_tau_b=not scenario.evolution.independent_tau_b,
             weights=places,
-            weight_names=actuation.weight_names,
+            weight_names=weight_names,
             pathways=tuple(scenario.cpg.feedback),
             turn=scenario.gait_bounds.turn,
         )

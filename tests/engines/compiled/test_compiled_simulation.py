@@ -61,7 +61,8 @@ from tetra_drake.engines.time_limit import time_limit
 from tetra_drake.errors import SimulationFailure, TimeBudgetExceeded
 from tetra_drake.robot.gait import seeded_gait
 
-times = {"simulation.duration": "0.2 s", "simulation.steady_from": "0.1 s", "cpg.start_up": "0.05 s"}
+times = {"simulation.duration": "0.2 s", "simulation.steady_from": "0.1 s"}
+times["cpg.start_up"] = "0.05 s"
 small = times | {"robot.tetrahedra": 2, "simulation.engine": "compiled"}
 scenario = td.load_scenario("thesis").with_changes(small)
 for key, value in (

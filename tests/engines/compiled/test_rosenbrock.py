@@ -80,7 +80,7 @@ def stepper(scenario: Scenario) -> Stepper:
         "friction.stiction_damping": "2.0 N*s/m",
         "ground.damping": "5e3 N*s/m^2",
     }
-    soft["ground.stiffness"] = 200.0  # so that the weight keeps the nodes in the ground
+    soft["ground.stiffness"] = "200 N/m"  # so that the weight keeps the nodes in the ground
     return Stepper(scenario.with_changes(soft))
 
 
