@@ -15,7 +15,7 @@ from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import ParameterSpace, load_gait
 
 TOLERANCE = 0.05
-"""in; versions of Drake, numpy and numba differ in the last digits, which a walk enlarges."""
+"""in; processors and versions of packages differ in the last digits, which a walk enlarges."""
 
 LARGEST = 20_000_000
 """Bytes, of all files that git has in the folder."""

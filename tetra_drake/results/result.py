@@ -134,10 +134,15 @@ def make_result(
 
 
 def versions(engine: str = "") -> dict[str, str]:
-    """The versions on which the last digits of a result of an engine depend."""
+    """The versions of packages, and the kind of processor, on which the last digits of a result
+    of an engine depend."""
+    import numba
+    from llvmlite.binding import get_host_cpu_name
+
     names = ["tetra_drake", "drake", "numpy", "numba"] + ["mujoco"] * (engine == "mujoco")
     packages = {name: metadata.version(name) for name in names}
-    return packages | {"python": platform.python_version()}
+    processor = numba.config.CPU_NAME or get_host_cpu_name()
+    return packages | {"python": platform.python_version(), "processor": processor}
 
 
 def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult) -> None:
