@@ -18,7 +18,8 @@ from tetra_drake.evolution.optimizers.steady_state import SteadyState
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.record import read_manifest
 from tetra_drake.evolution.reevaluation import reevaluate
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.evolution.tables import load_run
+from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
 from tetra_drake.scenario.terrain import Steps
 
@@ -296,8 +297,17 @@ def test_the_command_runs_the_scenario_with_its_options(evolve, tmp_path, capsys
     assert load_scenario(out / "scenario.yaml") == manifest.scenario
     assert reports == [out]
     printed = capsys.readouterr().out
-    for text in (f"{out}/report.html", f"{out}/replay.html", "14.34 in"):
+    for text in (f"{out}/report.html", f"{out}/replay.html"):
         assert text in printed
+
+
+@pytest.mark.parametrize(("options", "again"), [((), True), (("--no-reevaluate",), False)])
+def test_a_switch_leaves_out_the_diagram_at_the_end(tiny, tmp_path, reports, options, again):
+    file = tmp_path / "tiny.yaml"
+    file.write_text(dump_scenario(tiny))
+    out = tmp_path / "run"
+    assert cli.main(["evolve", "--scenario", str(file), "--out", str(out), *options]) == 0
+    assert (len(load_run(out).reevaluations) > 0) == again
 
 
 def test_without_a_scenario_the_first_look_is_run(evolve, tmp_path, capsys):
@@ -320,7 +330,7 @@ def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, t
         ("--trials", 2, "evolution.trials"),
         ("--iterations", 4, "evolution.max_iterations"),
         ("--engine", "compiled", "simulation.engine"),
-        ("--scenario", "thesis", "evolution.population"),
+        ("--scenario", "thesis", "simulation.duration"),
         ("--seed", 1, "seed"),
     ):
         assert evolve("--out", out, "--resume", option, value) == 2

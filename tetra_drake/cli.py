@@ -173,6 +173,13 @@ def _evolve_options(command: Command) -> None:
     command.add_argument(
         "--resume", action="store_true", help="continue an interrupted run; needs only --out"
     )
+    command.add_argument(
+        "--no-reevaluate",
+        dest="reevaluate",
+        action="store_false",
+        help="leave out what is simulated after the search: the best gaits on the Drake diagram if "
+        "the engine is another, those of a map on disturbed robots",
+    )
 
 
 def _evolve(options: Options) -> None:
@@ -199,6 +206,7 @@ def _evolve(options: Options) -> None:
                 resume=options.resume,
                 executor=executor,
                 progress=Display(sys.stdout),
+                reevaluate=options.reevaluate,
             )
     except KeyboardInterrupt:
         resume = f"tetra-drake evolve --out {options.out} --resume"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -136,12 +137,11 @@ def make_result(
 def versions(engine: str = "") -> dict[str, str]:
     """The versions of packages, and the kind of processor, on which the last digits of a result
     of an engine depend."""
-    import numba
     from llvmlite.binding import get_host_cpu_name
 
     names = ["tetra_drake", "drake", "numpy", "numba"] + ["mujoco"] * (engine == "mujoco")
     packages = {name: metadata.version(name) for name in names}
-    processor = numba.config.CPU_NAME or get_host_cpu_name()
+    processor = os.environ.get("NUMBA_CPU_NAME") or get_host_cpu_name()
     return packages | {"python": platform.python_version(), "processor": processor}
 
 
