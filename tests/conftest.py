@@ -15,6 +15,21 @@ from tetra_drake.scenario.schema import Scenario
 Refused = Callable[[object, str, str], contextlib.AbstractContextManager[None]]
 
 
+COMPILE_MOST = ("engines", "systems", "diagrams", "robot", "evolution")
+"""The folders whose tests come first."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Puts tests first that compile most, so that one worker process compiles for all while the
+    others begin at the end, where nothing has to be compiled."""
+
+    def rank(item: pytest.Item) -> int:
+        folder = item.path.relative_to(Path(__file__).parent).parts[0]
+        return COMPILE_MOST.index(folder) if folder in COMPILE_MOST else len(COMPILE_MOST)
+
+    items.sort(key=rank)
+
+
 @pytest.fixture
 def scenario() -> Scenario:
     """The thesis scenario, a fresh copy that a test may change."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from record import EXPERIMENTS
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario, shipped_scenarios
@@ -243,7 +244,8 @@ def test_shipped_scenarios_load_and_keep_the_thesis_reference(name, scenario):
 
 # Files written by earlier versions
 
-RECORDED = sorted((Path(__file__).parents[2] / "runs").glob("*/scenario.yaml"))
+RUNS = Path(__file__).parents[2] / "runs"
+RECORDED = [RUNS / name / "scenario.yaml" for name in EXPERIMENTS if (RUNS / name).is_dir()]
 
 
 @pytest.mark.parametrize("file", RECORDED, ids=lambda file: file.parent.name)
