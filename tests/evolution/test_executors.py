@@ -47,9 +47,9 @@ def succeed_at_0(task):
 
 
 def test_deaths_count_once_anything_has_succeeded():
-    found = dict(evaluate_all(succeed_at_0, [1, 0, 2, 3, 4], workers=1))
-    assert [found[i].failure is None for i in range(5)] == [False, True, False, False, False]
-    for tasks in ([1], [1, 2, 3, 4, 5, 6]):
+    found = dict(evaluate_all(succeed_at_0, [1, 0, 2], workers=1))
+    assert [found[i].failure is None for i in range(3)] == [False, True, False]
+    for tasks in ([1], [1, 2, 3, 4]):
         with pytest.raises(EvaluationImpossible):
             list(evaluate_all(succeed_at_0, tasks, workers=2))
 

@@ -1,6 +1,7 @@
 """Many gaits at a time on the compiled engine: each as if it were alone."""
 
 import dataclasses
+import math
 import threading
 import time
 from concurrent.futures import CancelledError
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk, lanes_for
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.walk import DONE, ROUND, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -31,6 +32,12 @@ FAR_TOO_STRONG = {"cpg.gain": "4e9 N"}
 
 TOO_STRONG = {"cpg.gain": "300.0 N", "simulation.max_evaluations": 20_000}
 """One that winds it up until steps are tiny."""
+
+
+WIDEST = lanes_for(math.inf)
+WIDTHS = [WIDEST, pytest.param(12 - WIDEST, marks=pytest.mark.slow)]
+"""Lanes that fit this processor, four or eight, and the other number, for whose engine a minute of
+compilation is spent in the slow tests only."""
 
 
 @pytest.fixture
@@ -65,20 +72,21 @@ def same(a: Course, b: Course) -> bool:
     return all(np.array_equal(x, y, equal_nan=True) for x, y in pairs)
 
 
-def test_a_gait_walks_alike_in_any_number_of_lanes_in_any_order_beside_any_neighbours(short):
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, width):
     kinds = [short, short.with_changes(FAR_TOO_STRONG), short, short.with_changes(TOO_STRONG)]
     scenarios = [kinds[i % 4] for i in range(11)]
     walks = [Walk.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(scenarios)]
     alone = [courses([walk], 1)[0] for walk in walks]
     statuses = [course.status for course in alone[:4]]
     assert statuses == [DONE, STEP_TOO_SMALL, DONE, TOO_MANY_EVALUATIONS]
-    for width in (4, 8):
-        for order in (range(11), range(10, -1, -1)):
-            found = courses([walks[i] for i in order], width)
-            assert all(same(course, alone[i]) for i, course in zip(order, found, strict=True))
+    for order in (range(11), range(10, -1, -1)):
+        found = courses([walks[i] for i in order], width)
+        assert all(same(course, alone[i]) for i, course in zip(order, found, strict=True))
 
 
-def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short):
+@pytest.mark.parametrize("width", WIDTHS)
+def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short, width):
     # Each lane has a grid of its own size, and constants of its own.
     rough = {"robot.contacts": "all", "terrain": Rough(2e-3, 0.1), "friction": Coulomb()}
     firm = Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)
@@ -88,8 +96,7 @@ def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short):
     alone = [courses([walk], 1)[0] for walk in walks]
     assert [course.status for course in alone[:3]] == [DONE, DONE, STEP_TOO_SMALL]
     assert not same(alone[1], alone[4])
-    for width in (4, 8):
-        assert all(map(same, courses(walks, width), alone))
+    assert all(map(same, courses(walks, width), alone))
 
 
 @pytest.mark.parametrize("workers", [1, 3])
