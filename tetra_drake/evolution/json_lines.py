@@ -97,7 +97,7 @@ def _parse(line: bytes, *, checksums: bool) -> dict[str, Any]:
         raise ValueError("it has no checksum")
     if sealed and zlib.crc32(sealed[1]) != int(sealed[2], 16):
         raise ValueError("its checksum is not that of its content")
-    entry = json.loads(text.decode("utf-8"), parse_constant=_refuse)
+    entry = _DECODER.decode(text.decode("utf-8"))
     if not isinstance(entry, dict):
         raise ValueError("expected a JSON object")
     if "crc" in entry:
@@ -107,3 +107,6 @@ def _parse(line: bytes, *, checksums: bool) -> dict[str, Any]:
 
 def _refuse(constant: str) -> NoReturn:
     raise ValueError(f"found {constant}, expected a number")
+
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse)  # made once, as there are many lines
