@@ -102,11 +102,6 @@ class Recorded:
         """What disturbances do to the trials' fittest gaits, in m. Index: trial."""
         return self.analysis.gaits.set_index("gait")
 
-    @property
-    def command(self) -> str:
-        """What makes the run again."""
-        return f"`tetra-drake evolve --scenario runs/{self.name}/scenario.yaml --out again`"
-
 
 Runs = Mapping[str, Recorded]
 
@@ -149,7 +144,7 @@ def gallery_table(runs: Runs) -> str:
 def _introduced(run: Recorded) -> list[str]:
     picture = f'<img src="{run.name}/{PICTURE}" width="240" alt="{run.name}">'
     title = f"[`{run.name}`]({run.name}/{README}): {EXPERIMENTS[run.name].title}"
-    return [picture, f"{title}<br>[page]({run.name}/{REPLAY}), {run.command}"]
+    return [picture, f"{title}<br>[page]({run.name}/{REPLAY})"]
 
 
 def _best_distances(run: Recorded) -> list[str]:
@@ -158,12 +153,20 @@ def _best_distances(run: Recorded) -> list[str]:
     return [fixed(run.undisturbed(best)), fixed(run.again(best, TIGHT)), kept]
 
 
-def times_table(runs: Runs) -> str:
-    """How long each run took to record."""
-    rows = [[f"`{name}`", duration(run.seconds)] for name, run in runs.items()]
+def effort_table(runs: Runs) -> str:
+    """How each run searched, and how long it took to record."""
+    rows = [[f"`{name}`", *_search(run), duration(run.seconds)] for name, run in runs.items()]
     total = sum(run.seconds for run in runs.values())
-    rows.append(["**all**", duration(total)])
-    return markdown_table(["experiment", "h:mm:ss"], rows)
+    rows.append(["**all**", "", "", "", "", duration(total)])
+    headings = ["experiment", "optimiser", "trials", "evaluations", "failed", "h:mm:ss"]
+    return markdown_table(headings, rows, text_columns=(0, 1))
+
+
+def _search(run: Recorded) -> list[str]:
+    evaluations = run.record.evaluations
+    failed = int(evaluations["failure"].notna().sum())
+    optimizer = run.record.manifest.method.optimizer
+    return [optimizer, f"{len(run.trials)}", f"{len(evaluations)}", f"{failed}"]
 
 
 def trials_table(run: Recorded) -> str:
@@ -187,22 +190,6 @@ def trials_table(run: Recorded) -> str:
     table = markdown_table([*headings, "disturbed, in", "keeps", *names], rows)
     where = f"in trial{'s' * (len(apart) > 1)} {listed(apart)}"
     return table + f"\n\nThe engines differ by more than {APART} in {where}." * bool(apart)
-
-
-def facts_table(run: Recorded) -> str:
-    """What the run is, and the command that repeats it."""
-    manifest, evaluations = run.record.manifest, run.record.evaluations
-    failed = int(evaluations["failure"].notna().sum())
-    rows = [
-        ["engine", run.scenario.simulation.engine],
-        ["optimiser", manifest.method.optimizer],
-        ["trials", f"{len(run.trials)}, {run.trials['ended'].sum()} of them ended"],
-        ["evaluations", f"{len(evaluations)}, of which {failed} failed"],
-        ["simulation took (h:mm:ss)", duration(float(evaluations["wall_time_s"].sum()))],
-        ["versions", ", ".join(f"{name} {number}" for name, number in manifest.versions.items())],
-        ["makes it again", run.command],
-    ]
-    return markdown_table(["", f"`{run.name}`"], rows, text_columns=(0, 1))
 
 
 def changes_table(run: Recorded) -> str:
@@ -385,33 +372,6 @@ SUMMARY: list[Row] = [
 ]
 
 
-def tau_mutation_table(runs: Runs) -> str:
-    """The two ways to mutate the time constants, trial by trial."""
-    chosen = [runs[INTENDED], runs[LISTING]]
-    what = ("best distance, in", "its τ_A, s", "population's τ_A, s", "iterations")
-    numbers = [_tau_numbers(run) for run in chosen]
-    columns = [table.reindex(numbers[0].index) for table in numbers]
-    rows = [
-        [f"{trial}", *(cell for table in columns for cell in _tau_cells(table.loc[trial]))]
-        for trial in columns[0].index
-    ]
-    means = [cell for table in columns for cell in _tau_cells(table.mean())]
-    headings = ["trial", *(f"`{run.name}`: {name}" for run in chosen for name in what)]
-    return markdown_table(headings, [*rows, ["**mean**", *means]])
-
-
-def _tau_numbers(run: Recorded) -> pandas.DataFrame:
-    trials = run.trials.index
-    tau = [run.record.last_population(trial)["tau_a_s"].mean() for trial in trials]
-    columns = run.trials[["distance_in", "tau_a_s", "iterations"]]
-    columns.insert(2, "population", pandas.Series(tau, trials))
-    return columns
-
-
-def _tau_cells(row: pandas.Series) -> list[str]:
-    return [fixed(value, digits) for value, digits in zip(row, (2, 3, 3, 0), strict=True)]
-
-
 def engines_table(runs: Runs) -> str:
     """How far the two engines agree on the gaits that were evaluated on both."""
     headings = ["gaits on both engines", "count", "failed on either", "median difference, in"]
@@ -469,16 +429,14 @@ def _from_to(values: Sequence[float] | pandas.Series) -> str:
 TABLES: dict[str, Callable[[Runs], str]] = {
     "summary": summary_table,
     "gallery": gallery_table,
-    "times": times_table,
+    "effort": effort_table,
     "comparison": comparison_table,
-    "tau-mutation": tau_mutation_table,
     "engines": engines_table,
     "search": search_table,
     "laws": laws_table,
 }
 RUN_TABLES: dict[str, Callable[[Recorded], str]] = {
     "trials": trials_table,
-    "facts": facts_table,
     "changes": changes_table,
 }
 """Of the run in whose folder the page is."""
