@@ -214,12 +214,11 @@ def laws_table(runs: Runs) -> str:
         run = runs[name]
         again = {s: {trial: run.again(trial, s) for trial in run.trials.index} for s in settings}
         table = pandas.DataFrame(again)
-        for trial, distances in table.iterrows():
-            rows.append([f"`{name}`, trial {trial}", *map(fixed, distances)])
         shares = 100.0 * table.div(table[own], axis=0).median()
-        rows.append([f"*`{name}`: median*", *map(fixed, table.median())])
-        rows.append([f"*`{name}`: median share*", *(f"{share:.0f} %" for share in shares)])
-    return markdown_table(["best gait, distance in inches", *settings], rows)
+        rows.append([f"`{name}`: median", *map(fixed, table.median())])
+        rows.append([f"`{name}`: least to most", *map(_from_to, table.T.to_numpy())])
+        rows.append([f"`{name}`: median share", *(f"{share:.0f} %" for share in shares)])
+    return markdown_table(["best gaits, distance in inches", *settings], rows)
 
 
 def search_table(runs: Runs) -> str:
@@ -374,7 +373,7 @@ SUMMARY: list[Row] = [
 
 def engines_table(runs: Runs) -> str:
     """How far the two engines agree on the gaits that were evaluated on both."""
-    headings = ["gaits on both engines", "count", "failed on either", "median difference, in"]
+    headings = ["gaits on both engines", "count", "median difference, in"]
     headings += ["95 % differ by less than, in", f"differ by less than {CLOSE:g} in"]
     rows = []
     if {INTENDED, DIAGRAM} <= {*runs}:
@@ -384,7 +383,7 @@ def engines_table(runs: Runs) -> str:
         both = distances_on_both(run.record)
         if len(both.dropna()):
             rows.append([f"`{run.name}`, best gaits", *_agreement(both)])
-    return markdown_table([*headings, "go the same way"], rows)
+    return markdown_table(headings, rows)
 
 
 def distances_on_both(run: Run) -> pandas.DataFrame:
@@ -410,14 +409,11 @@ def _side_by_side(compiled: pandas.DataFrame, drake: pandas.DataFrame) -> pandas
 def _agreement(distances: pandas.DataFrame) -> list[str]:
     both = distances.dropna()
     difference = (both["compiled_in"] - both["drake_in"]).abs()
-    same_way = (both["compiled_in"] < 0.0) == (both["drake_in"] < 0.0)
     return [
         f"{len(both)}",
-        f"{len(distances) - len(both)}",
         fixed(difference.median(), 3),
         fixed(difference.quantile(0.95)),
         f"{100.0 * (difference < CLOSE).mean():.0f} %",
-        f"{100.0 * same_way.mean():.1f} %",
     ]
 
 
