@@ -2,7 +2,7 @@
 
     python runs/benchmark.py [--scenario NAME|FILE] [--gaits N] [TABLE ...]
 
-Prints the tables of tetra_drake/engines/README.md in Markdown, of random gaits of seeds 0, 1 ...:
+Prints tables in Markdown, as in tetra_drake/engines/README.md, of random gaits of seeds 0, 1 ...:
 
     engines        speed and error of the engines, each with a few settings
     integrators    the same for settings of the diagram; takes longest

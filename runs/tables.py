@@ -102,11 +102,6 @@ class Recorded:
         """What disturbances do to the trials' fittest gaits, in m. Index: trial."""
         return self.analysis.gaits.set_index("gait")
 
-    @property
-    def command(self) -> str:
-        """What makes the run again."""
-        return f"`tetra-drake evolve --scenario runs/{self.name}/scenario.yaml --out again`"
-
 
 Runs = Mapping[str, Recorded]
 
@@ -149,7 +144,7 @@ def gallery_table(runs: Runs) -> str:
 def _introduced(run: Recorded) -> list[str]:
     picture = f'<img src="{run.name}/{PICTURE}" width="240" alt="{run.name}">'
     title = f"[`{run.name}`]({run.name}/{README}): {EXPERIMENTS[run.name].title}"
-    return [picture, f"{title}<br>[page]({run.name}/{REPLAY}), {run.command}"]
+    return [picture, f"{title}<br>[page]({run.name}/{REPLAY})"]
 
 
 def _best_distances(run: Recorded) -> list[str]:
@@ -158,12 +153,20 @@ def _best_distances(run: Recorded) -> list[str]:
     return [fixed(run.undisturbed(best)), fixed(run.again(best, TIGHT)), kept]
 
 
-def times_table(runs: Runs) -> str:
-    """How long each run took to record."""
-    rows = [[f"`{name}`", duration(run.seconds)] for name, run in runs.items()]
+def effort_table(runs: Runs) -> str:
+    """How each run searched, and how long it took to record."""
+    rows = [[f"`{name}`", *_search(run), duration(run.seconds)] for name, run in runs.items()]
     total = sum(run.seconds for run in runs.values())
-    rows.append(["**all**", duration(total)])
-    return markdown_table(["experiment", "h:mm:ss"], rows)
+    rows.append(["**all**", "", "", "", "", duration(total)])
+    headings = ["experiment", "optimiser", "trials", "evaluations", "failed", "h:mm:ss"]
+    return markdown_table(headings, rows, text_columns=(0, 1))
+
+
+def _search(run: Recorded) -> list[str]:
+    evaluations = run.record.evaluations
+    failed = int(evaluations["failure"].notna().sum())
+    optimizer = run.record.manifest.method.optimizer
+    return [optimizer, f"{len(run.trials)}", f"{len(evaluations)}", f"{failed}"]
 
 
 def trials_table(run: Recorded) -> str:
@@ -189,22 +192,6 @@ def trials_table(run: Recorded) -> str:
     return table + f"\n\nThe engines differ by more than {APART} in {where}." * bool(apart)
 
 
-def facts_table(run: Recorded) -> str:
-    """What the run is, and the command that repeats it."""
-    manifest, evaluations = run.record.manifest, run.record.evaluations
-    failed = int(evaluations["failure"].notna().sum())
-    rows = [
-        ["engine", run.scenario.simulation.engine],
-        ["optimiser", manifest.method.optimizer],
-        ["trials", f"{len(run.trials)}, {run.trials['ended'].sum()} of them ended"],
-        ["evaluations", f"{len(evaluations)}, of which {failed} failed"],
-        ["simulation took (h:mm:ss)", duration(float(evaluations["wall_time_s"].sum()))],
-        ["versions", ", ".join(f"{name} {number}" for name, number in manifest.versions.items())],
-        ["makes it again", run.command],
-    ]
-    return markdown_table(["", f"`{run.name}`"], rows, text_columns=(0, 1))
-
-
 def changes_table(run: Recorded) -> str:
     """What hurts the best gaits most."""
     rows = [[row["what"], *_change_cells(row)] for _, row in run.analysis.changes.iterrows()]
@@ -227,12 +214,11 @@ def laws_table(runs: Runs) -> str:
         run = runs[name]
         again = {s: {trial: run.again(trial, s) for trial in run.trials.index} for s in settings}
         table = pandas.DataFrame(again)
-        for trial, distances in table.iterrows():
-            rows.append([f"`{name}`, trial {trial}", *map(fixed, distances)])
         shares = 100.0 * table.div(table[own], axis=0).median()
-        rows.append([f"*`{name}`: median*", *map(fixed, table.median())])
-        rows.append([f"*`{name}`: median share*", *(f"{share:.0f} %" for share in shares)])
-    return markdown_table(["best gait, distance in inches", *settings], rows)
+        rows.append([f"`{name}`: median", *map(fixed, table.median())])
+        rows.append([f"`{name}`: least to most", *map(_from_to, table.T.to_numpy())])
+        rows.append([f"`{name}`: median share", *(f"{share:.0f} %" for share in shares)])
+    return markdown_table(["best gaits, distance in inches", *settings], rows)
 
 
 def search_table(runs: Runs) -> str:
@@ -385,36 +371,9 @@ SUMMARY: list[Row] = [
 ]
 
 
-def tau_mutation_table(runs: Runs) -> str:
-    """The two ways to mutate the time constants, trial by trial."""
-    chosen = [runs[INTENDED], runs[LISTING]]
-    what = ("best distance, in", "its τ_A, s", "population's τ_A, s", "iterations")
-    numbers = [_tau_numbers(run) for run in chosen]
-    columns = [table.reindex(numbers[0].index) for table in numbers]
-    rows = [
-        [f"{trial}", *(cell for table in columns for cell in _tau_cells(table.loc[trial]))]
-        for trial in columns[0].index
-    ]
-    means = [cell for table in columns for cell in _tau_cells(table.mean())]
-    headings = ["trial", *(f"`{run.name}`: {name}" for run in chosen for name in what)]
-    return markdown_table(headings, [*rows, ["**mean**", *means]])
-
-
-def _tau_numbers(run: Recorded) -> pandas.DataFrame:
-    trials = run.trials.index
-    tau = [run.record.last_population(trial)["tau_a_s"].mean() for trial in trials]
-    columns = run.trials[["distance_in", "tau_a_s", "iterations"]]
-    columns.insert(2, "population", pandas.Series(tau, trials))
-    return columns
-
-
-def _tau_cells(row: pandas.Series) -> list[str]:
-    return [fixed(value, digits) for value, digits in zip(row, (2, 3, 3, 0), strict=True)]
-
-
 def engines_table(runs: Runs) -> str:
     """How far the two engines agree on the gaits that were evaluated on both."""
-    headings = ["gaits on both engines", "count", "failed on either", "median difference, in"]
+    headings = ["gaits on both engines", "count", "median difference, in"]
     headings += ["95 % differ by less than, in", f"differ by less than {CLOSE:g} in"]
     rows = []
     if {INTENDED, DIAGRAM} <= {*runs}:
@@ -424,7 +383,7 @@ def engines_table(runs: Runs) -> str:
         both = distances_on_both(run.record)
         if len(both.dropna()):
             rows.append([f"`{run.name}`, best gaits", *_agreement(both)])
-    return markdown_table([*headings, "go the same way"], rows)
+    return markdown_table(headings, rows)
 
 
 def distances_on_both(run: Run) -> pandas.DataFrame:
@@ -450,14 +409,11 @@ def _side_by_side(compiled: pandas.DataFrame, drake: pandas.DataFrame) -> pandas
 def _agreement(distances: pandas.DataFrame) -> list[str]:
     both = distances.dropna()
     difference = (both["compiled_in"] - both["drake_in"]).abs()
-    same_way = (both["compiled_in"] < 0.0) == (both["drake_in"] < 0.0)
     return [
         f"{len(both)}",
-        f"{len(distances) - len(both)}",
         fixed(difference.median(), 3),
         fixed(difference.quantile(0.95)),
         f"{100.0 * (difference < CLOSE).mean():.0f} %",
-        f"{100.0 * same_way.mean():.1f} %",
     ]
 
 
@@ -469,16 +425,14 @@ def _from_to(values: Sequence[float] | pandas.Series) -> str:
 TABLES: dict[str, Callable[[Runs], str]] = {
     "summary": summary_table,
     "gallery": gallery_table,
-    "times": times_table,
+    "effort": effort_table,
     "comparison": comparison_table,
-    "tau-mutation": tau_mutation_table,
     "engines": engines_table,
     "search": search_table,
     "laws": laws_table,
 }
 RUN_TABLES: dict[str, Callable[[Recorded], str]] = {
     "trials": trials_table,
-    "facts": facts_table,
     "changes": changes_table,
 }
 """Of the run in whose folder the page is."""
