@@ -17,17 +17,19 @@ from tetra_drake.scenario.schema import Scenario
 Refused = Callable[[object, str, str], contextlib.AbstractContextManager[None]]
 
 
-COMPILE_MOST = ("engines", "systems", "diagrams", "robot", "evolution")
-"""The folders whose tests come first."""
+FIRST = ("engines", "systems", "diagrams", "robot", "evolution")
+LAST = ("visualization", "report", "results", "runs")
+"""The folders whose tests come first and last."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Puts tests first that compile most, so that one worker process compiles for all while the
-    others begin at the end, where nothing has to be compiled."""
+    """Puts tests first that compile most, so that one worker process compiles for all. The next
+    begins in the middle, with tests that compile nothing, and ends with those that simulate."""
+    order = (*FIRST, "", *LAST)
 
     def rank(item: pytest.Item) -> int:
         folder = item.path.relative_to(Path(__file__).parent).parts[0]
-        return COMPILE_MOST.index(folder) if folder in COMPILE_MOST else len(COMPILE_MOST)
+        return order.index(folder if folder in order else "")
 
     items.sort(key=rank)
 

@@ -127,9 +127,9 @@ def test_random_gaits_walk_as_far_as_converged_ones(scenario):
     assert np.median(errors) < 0.05
 
 
-@pytest.mark.parametrize("tetrahedra", [2, 3, 8])
+@pytest.mark.parametrize("tetrahedra", [2, 3, 7])
 def test_any_number_of_tetrahedra_walks(scenario, tetrahedra):
-    changes = {"simulation.duration": "4.0 s", "simulation.steady_from": "2.0 s"}
+    changes = {"simulation.duration": "3 s", "simulation.steady_from": "2 s"}
     other = scenario.with_changes({"robot.tetrahedra": tetrahedra, **changes})
     count = 2 * (tetrahedra - 1) * (tetrahedra - 2)
     weights = (0.0,) * count  # so that every oscillator oscillates

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
+from tetra_drake.engines.compiled.lane_engine import lanes_for
 from tetra_drake.physics.lanes import (
     FieldArray,
     any_lane,
@@ -33,9 +34,12 @@ SPECIAL += [np.finfo(float).max, -np.finfo(float).max, math.inf, -math.inf, math
 RANGE = (1e-37, 1e38)  # in which inverse_sqrt keeps its promise
 
 
-@pytest.fixture(params=[1, 4, 8])
+WIDEST = lanes_for(math.inf)
+
+
+@pytest.fixture(params=[1, WIDEST, pytest.param(12 - WIDEST, marks=pytest.mark.slow)])
 def width(request: pytest.FixtureRequest) -> int:
-    """Number of lanes."""
+    """Number of lanes: one, those that fit this processor, four or eight, and the other number."""
     return request.param
 
 

@@ -183,6 +183,7 @@ def test_every_window_shows_the_whole_robot_and_its_path(page, trajectory):
         assert 0.5 < extent < 1.0, f"in a window of {width} to {height}"
 
 
+@pytest.mark.slow
 def test_a_page_is_filmed_and_its_end_pictured_as_wide_as_files_may_be_large(
     browser, replay, tmp_path, monkeypatch, refused
 ):
