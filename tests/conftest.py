@@ -17,19 +17,20 @@ from tetra_drake.scenario.schema import Scenario
 Refused = Callable[[object, str, str], contextlib.AbstractContextManager[None]]
 
 
-FIRST = ("engines", "systems", "diagrams", "robot", "evolution")
-LAST = ("visualization", "report", "results", "runs")
-"""The folders whose tests come first and last."""
+ORDER = (
+    *("engines/compiled/test_many.py", "engines", "systems", "diagrams", "robot", "scenario"),
+    *("results", "figures", "physics", "evolution", ""),
+)
+"""The folders of tests, those first that compile most; figures and physics compile least."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Puts tests first that compile most, so that one worker process compiles for all. The next
-    begins in the middle, with tests that compile nothing, and ends with those that simulate."""
-    order = (*FIRST, "", *LAST)
+    """Orders the tests so that one of two worker processes compiles for both: the other one begins
+    in the middle, with tests that compile little."""
 
     def rank(item: pytest.Item) -> int:
-        folder = item.path.relative_to(Path(__file__).parent).parts[0]
-        return order.index(folder if folder in order else "")
+        path = item.path.relative_to(Path(__file__).parent).as_posix()
+        return next(i for i, start in enumerate(ORDER) if path.startswith(start))
 
     items.sort(key=rank)
 

@@ -99,7 +99,7 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     assert progress.warnings == []
 
 
-@pytest.mark.parametrize("bodies", [2, 7])
+@pytest.mark.parametrize("bodies", [2, pytest.param(7, marks=pytest.mark.slow)])
 def test_a_robot_of_any_length_is_evolved_and_drawn(tiny, tmp_path, bodies):
     scenario = tiny.with_changes({"robot.tetrahedra": bodies, "simulation.duration": "2.0 s"})
     run = tetra_drake.evolve(scenario, tmp_path / "run", workers=1, reevaluate=False)
@@ -244,7 +244,10 @@ def test_the_scenarios_optimiser_is_used_recorded_and_resumed(
     assert read_record(run) == read_record(whole)
 
 
-def test_the_gaits_of_a_map_are_simulated_on_disturbed_robots(tiny, tmp_path, interrupting):
+def test_the_gaits_of_a_map_are_simulated_on_disturbed_robots(
+    tiny, tmp_path, interrupting, monkeypatch
+):
+    monkeypatch.setattr("tetra_drake.run.evaluate_again", lambda *_, **__: None)
     kind = QualityDiversity(emitters=2, batch=2, floor=-1e3, draws=2)
     scenario = tiny.with_changes({"optimizer": kind, "evolution.max_evaluations": 10})
     whole, run = tmp_path / "whole", tmp_path / "run"

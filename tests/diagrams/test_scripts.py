@@ -22,7 +22,7 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
     ("script", "files"),
     [
         (single_oscillator, 3),
-        (entrainment, 2),
+        pytest.param(entrainment, 2, marks=pytest.mark.slow),
         (settling_node, 2),
         (sliding_tetrahedron, 2),
         (tetrahedron_on_incline, 2),

@@ -13,7 +13,8 @@ from tetra_drake.robot.structure import MakeStructure
 G = 9.80665
 FALLING = {
     # Bodies are off their balance by some 5 mm, a metre above the ground.
-    "robot.offsets": with_unit(np.random.default_rng(0).normal([0, 0, 1], 0.005, (5, 3)), "m"),
+    "robot.offsets": with_unit(np.random.default_rng(0).normal([0, 0, 1], 0.005, (3, 3)), "m"),
+    "robot.tetrahedra": 3,
     "robot.gravity": with_unit(G, "m/s^2"),
     "cables.damping": 0.0,
     "cpg.gain": 0.0,

@@ -66,10 +66,10 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, heigh
     friction = scenario.friction if friction == "reset" else friction
     surface = TERRAINS.get(terrain, height_field)
     changes = {"terrain": surface, "friction": friction, "robot__contacts": "all"}
-    short = converged(scenario, 0.15, robot__tetrahedra=3, **changes)
+    short = converged(scenario, 0.1, robot__tetrahedra=3, **changes)
     ours, drakes = (trajectory(short, engine)["p_WN"].values for engine in ("compiled", "drake"))
     # As in test_compiled_simulation: with the reset integrator 1.75e-6 m/s per mode change, for
-    # 0.15 s, and some forty of them. Coulomb friction hardly jumps.
+    # 0.1 s, and some forty of them. Coulomb friction hardly jumps.
     tolerance = 1e-5 if friction is scenario.friction else 1e-6
     assert np.abs(ours[-1] - drakes[-1]).max() < tolerance
     assert np.abs(ours[-1] - ours[0]).max() > 5e-4, "it moves"

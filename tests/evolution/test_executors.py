@@ -46,6 +46,7 @@ def succeed_at_0(task):
     return Evaluation(1.0)
 
 
+@pytest.mark.slow
 def test_deaths_count_once_anything_has_succeeded():
     found = dict(evaluate_all(succeed_at_0, [1, 0, 2], workers=1))
     assert [found[i].failure is None for i in range(3)] == [False, True, False]
@@ -80,7 +81,7 @@ EVOLVE = "import tetra_drake\ntetra_drake.evolve(small_scenario(), 'run')"
         ("stdin", EVALUATE.format("Bowl()"), "<stdin>"),
         ("stdin", EVALUATE.format("own"), "<stdin>"),
         ("file", EVALUATE.format("own"), "__main__"),
-        ("file", EVOLVE, "__main__"),
+        pytest.param("file", EVOLVE, "__main__", marks=pytest.mark.slow),
     ],
 )
 def test_programs_that_workers_cannot_import_are_told_at_once(how, call, cause, tmp_path):

@@ -78,7 +78,8 @@ def kill_again_and_again(directory, executor, *, kills, longest, delay=0.006, ki
 
 
 @pytest.mark.parametrize(
-    ("executor", "kills", "longest"), [("threads", 2, 0.3), ("processes", 1, 1.5)]
+    ("executor", "kills", "longest"),
+    [("threads", 2, 0.3), pytest.param("processes", 1, 1.5, marks=pytest.mark.slow)],
 )
 def test_a_run_killed_ends_like_one_that_was_not_and_leaves_no_process(
     tmp_path, uninterrupted, executor, kills, longest
@@ -87,6 +88,7 @@ def test_a_run_killed_ends_like_one_that_was_not_and_leaves_no_process(
     assert read_record(tmp_path / "run") == uninterrupted
 
 
+@pytest.mark.slow
 def test_another_optimiser_goes_on_as_if_nothing_had_happened(tmp_path):
     kill_again_and_again(tmp_path / "run", "threads", kills=1, longest=0.4, kind="CmaEs")
     assert read_record(tmp_path / "run") == uninterrupted_run(tmp_path / "whole", "CmaEs")

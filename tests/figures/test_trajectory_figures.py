@@ -63,7 +63,10 @@ def labels(figure):
 
 
 @pytest.mark.parametrize("draw", FIGURES)
-@pytest.mark.parametrize("bodies", [2, 7, 12, pytest.param(3, id="3, short")])
+@pytest.mark.parametrize(
+    "bodies",
+    [2, pytest.param(7, marks=pytest.mark.slow), 12, pytest.param(3, id="3, short")],
+)
 def test_any_robot_and_duration_is_drawn_on_a_page_with_no_label_on_another(bodies, draw, tmp_path):
     walk = make_walk(bodies=bodies, duration=0.5 if bodies == 3 else 9.0)
     figure = draw(walk, *[FLAT] * (draw in ON_GROUND))
