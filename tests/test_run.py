@@ -166,7 +166,7 @@ def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
 
     run = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
-        tetra_drake.evolve(tiny, run, executor=interrupting, **own)
+        tetra_drake.evolve(tiny, run, executor=interrupting, workers=2, **own)
     begun = read_record(run)
     for changed, key in (
         ({"objective": None}, "objective"),
@@ -255,7 +255,7 @@ def test_the_gaits_of_a_map_are_simulated_on_disturbed_robots(
     assert len(found) > 1
     assert found["kept"].isin([0.0, 0.5, 1.0]).all()
     with pytest.raises(KeyboardInterrupt):
-        tetra_drake.evolve(scenario, run, executor=interrupting, report=False)
+        tetra_drake.evolve(scenario, run, executor=interrupting, workers=2, report=False)
     again = elites(tetra_drake.evolve(None, run, resume=True, report=False, workers=1))
     pandas.testing.assert_frame_equal(
         *(table.drop(columns="wall_time_s") for table in (again, found))
