@@ -1,14 +1,13 @@
 """What several test modules start from."""
 
 import contextlib
-import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from helpers.widths import WIDEST
 
 from tetra_drake.engines.compiled import lane_pool
-from tetra_drake.engines.compiled.lane_engine import lanes_for
 from tetra_drake.errors import InputError
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import load_scenario
@@ -51,9 +50,8 @@ def structure(scenario: Scenario) -> Structure:
 def few_widths() -> Iterator[None]:
     """One lane or as many as fit this processor, as each width is compiled for half a minute or
     more; the numbers are the same with any."""
-    widest = lanes_for(math.inf)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lane_pool, "lanes_for", lambda walks: 1 if walks <= 1 else widest)
+        patch.setattr(lane_pool, "lanes_for", lambda walks: 1 if walks <= 1 else WIDEST)
         yield
 
 

@@ -8,9 +8,9 @@ from decimal import Decimal
 import numba
 import numpy as np
 import pytest
+from helpers.widths import WIDTHS
 from numba.core.errors import TypingError
 
-from tetra_drake.engines.compiled.lane_engine import lanes_for
 from tetra_drake.physics.lanes import (
     FieldArray,
     any_lane,
@@ -34,12 +34,9 @@ SPECIAL += [np.finfo(float).max, -np.finfo(float).max, math.inf, -math.inf, math
 RANGE = (1e-37, 1e38)  # in which inverse_sqrt keeps its promise
 
 
-WIDEST = lanes_for(math.inf)
-
-
-@pytest.fixture(params=[1, WIDEST, pytest.param(12 - WIDEST, marks=pytest.mark.slow)])
+@pytest.fixture(params=[1, *WIDTHS])
 def width(request: pytest.FixtureRequest) -> int:
-    """Number of lanes: one, those that fit this processor, four or eight, and the other number."""
+    """Number of lanes."""
     return request.param
 
 

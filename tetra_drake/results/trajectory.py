@@ -29,7 +29,7 @@ DIMENSIONS = {
     "in_contact": ("time", "contact"),
     "friction_mode": ("time", "contact", "horizontal"),
 }
-"""Those of each variable."""
+"""Dimensions of each variable of a trajectory."""
 
 
 def sample_times(duration: float, period: float) -> np.ndarray:

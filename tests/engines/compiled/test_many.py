@@ -1,7 +1,6 @@
 """Many gaits at a time on the compiled engine: each as if it were alone."""
 
 import dataclasses
-import math
 import threading
 import time
 from concurrent.futures import CancelledError
@@ -9,8 +8,9 @@ from concurrent.futures import CancelledError
 import numpy as np
 import pytest
 import xarray
+from helpers.widths import WIDTHS
 
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk, lanes_for
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.walk import DONE, ROUND, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -32,12 +32,6 @@ FAR_TOO_STRONG = {"cpg.gain": "4e9 N"}
 
 TOO_STRONG = {"cpg.gain": "300.0 N", "simulation.max_evaluations": 20_000}
 """One that winds it up until steps are tiny."""
-
-
-WIDEST = lanes_for(math.inf)
-WIDTHS = [WIDEST, pytest.param(12 - WIDEST, marks=pytest.mark.slow)]
-"""Lanes that fit this processor, four or eight, and the other number, for whose engine a minute of
-compilation is spent in the slow tests only."""
 
 
 @pytest.fixture
