@@ -31,7 +31,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Adder, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from tetra_drake.engines.recorder import Recorder, make_dataset
+from tetra_drake.engines.sampler import Sampler, make_dataset
 from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.results.measures import distance_walked
 from tetra_drake.results.trajectory import sample_times
@@ -111,11 +111,11 @@ def main() -> None:
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.001)
     structure = MakeStructure(scenario)
-    recorder = Recorder(structure, sample_times(options.duration, 0.01))
-    simulator.set_monitor(recorder.after_step)
+    sampler = Sampler(structure, sample_times(options.duration, 0.01))
+    simulator.set_monitor(sampler.after_step)
     simulator.AdvanceTo(options.duration)
 
-    trajectory = make_dataset(diagram, structure, recorder.samples)
+    trajectory = make_dataset(diagram, structure, sampler.samples)
     inches = float(distance_walked(trajectory)[-1]) / INCH
     title = f"{gait.name}: {inches:.2f} inches in {options.duration:g} s"
     save_replay(options.out / "robot.html", scenario=scenario, trajectory=trajectory, title=title)

@@ -36,7 +36,7 @@ from tetra_drake.figures.style import OKABE_ITO, common_style, make_figure, save
 from tetra_drake.robot.structure import BASE
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Coulomb, Scenario
-from tetra_drake.scenario.terrain import Incline
+from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 GENTLE, STEEP = math.radians(10.0), math.radians(35.0)

@@ -23,19 +23,19 @@ import pandas
 from analyse import ANALYSIS, LAWS, MUJOCO, TIGHT, Analysis, load_analysis
 from record import EXPERIMENTS, PICTURE, TIMES
 
+from tetra_drake.analysis.comparison import compare
+from tetra_drake.analysis.robustness import percents
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.comparison import compare
-from tetra_drake.evolution.optimizers.steady_state import CHILDREN
-from tetra_drake.evolution.record import MANIFEST
-from tetra_drake.evolution.robustness import percents
-from tetra_drake.evolution.tables import Run, load_run
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.evolution.run_record import MANIFEST
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import duration, fixed, listed, markdown_table, ranged, signed
-from tetra_drake.results.folder import REPLAY
+from tetra_drake.optimizers.steady_state import CHILDREN
+from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.results.measures import dominant_frequency
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.signals import signal_samples
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, customary
 

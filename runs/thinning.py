@@ -18,9 +18,11 @@ from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tetra_drake.evolution.elites import elites
+from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.json_lines import compressed
-from tetra_drake.evolution.record import (
+from tetra_drake.evolution.reevaluation import BEST_GAITS
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.evolution.run_record import (
     BEST_GAIT,
     ELITES,
     EVALUATIONS,
@@ -31,8 +33,6 @@ from tetra_drake.evolution.record import (
     read_entries,
     trial_folder,
 )
-from tetra_drake.evolution.reevaluation import BEST_GAITS
-from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.files import write_whole
 from tetra_drake.scenario.schema import Scenario
 

@@ -18,7 +18,7 @@ Refused = Callable[[object, str, str], contextlib.AbstractContextManager[None]]
 
 ORDER = (
     *("engines/compiled/test_many.py", "engines", "systems", "diagrams", "robot", "scenario"),
-    *("figures", "physics", "evolution", ""),
+    *("figures", "physics", "simd", "optimizers", "analysis", "evolution", ""),
 )
 """The folders of tests, those first that compile most; figures and physics compile least."""
 

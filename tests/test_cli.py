@@ -17,7 +17,7 @@ from tetra_drake.cli import main
 from tetra_drake.formatting import fixed
 from tetra_drake.robot.gait import Gait, load_gait, save_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metric_units import METRICS
 
 SHORT = """\
 base: thesis

@@ -17,17 +17,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tetra_drake.engines.simulate import simulate as simulate
     from tetra_drake.engines.simulate import simulate_many as simulate_many
-    from tetra_drake.evolution.tables import load_run as load_run
+    from tetra_drake.evolution.run import load_run as load_run
+    from tetra_drake.experiment import evolve as evolve
     from tetra_drake.robot.gait import load_gait as load_gait
-    from tetra_drake.run import evolve as evolve
     from tetra_drake.scenario.load import load_scenario as load_scenario
 
 __version__ = "0.2.0"
 
 _HOMES = {
-    "evolve": "tetra_drake.run",
+    "evolve": "tetra_drake.experiment",
     "load_gait": "tetra_drake.robot.gait",
-    "load_run": "tetra_drake.evolution.tables",
+    "load_run": "tetra_drake.evolution.run",
     "load_scenario": "tetra_drake.scenario.load",
     "simulate": "tetra_drake.engines.simulate",
     "simulate_many": "tetra_drake.engines.simulate",

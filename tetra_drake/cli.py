@@ -121,7 +121,7 @@ def _simulate(options: Options) -> None:
     """
     from tetra_drake.engines.simulate import prepare, simulate
     from tetra_drake.engines.viewer import check_can_be_watched
-    from tetra_drake.results.folder import REPLAY, check_result_folder, save_result_folder
+    from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.results.result import summary
 
     scenario, gait = _chosen_gait(options)
@@ -191,8 +191,8 @@ def _evolve(options: Options) -> None:
     report.html, replay.html, figures/ and, of a map, elites/ (gait files) into the run directory.
     """
     from tetra_drake.evolution.progress import Display
-    from tetra_drake.evolution.summary import summary, whole_experiment
-    from tetra_drake.run import evolve
+    from tetra_drake.experiment import evolve
+    from tetra_drake.report.summary import summary, whole_experiment
 
     if options.scenario is None and not options.resume:
         print(whole_experiment(load_scenario("thesis"), seconds=0.2), flush=True)
@@ -230,7 +230,7 @@ def _executor(options: Options) -> contextlib.AbstractContextManager[Any]:
 
 def _scenario_to_evolve(options: Options) -> Scenario | None:
     """The scenario with the options' changes; None if they leave a run to resume as it is."""
-    from tetra_drake.evolution.record import read_manifest
+    from tetra_drake.evolution.run_record import read_manifest
 
     asked = {
         "simulation.engine": options.engine,
@@ -319,7 +319,7 @@ def _robustness(options: Options) -> None:
     distance), and what hurts most. Writes draws.csv, alone.csv, summary.json and the figure
     robustness, if asked for.
     """
-    from tetra_drake.evolution.robustness import describe, judge
+    from tetra_drake.analysis.robustness import describe, judge
     from tetra_drake.evolution.source import load_source
 
     source = load_source(options.source, scenario=options.scenario, warn=_warn)
@@ -335,7 +335,7 @@ def _robustness(options: Options) -> None:
     )
     print(describe(judgement))
     if options.out:
-        from tetra_drake.figures.robustness import save_judgement
+        from tetra_drake.figures.disturbed import save_judgement
 
         print(f"wrote {', '.join(save_judgement(judgement, options.out))} to {options.out}/")
 
@@ -361,7 +361,7 @@ def _compare(options: Options) -> None:
     bootstrap intervals, evaluations until the fittest gait walks a distance, and time. Writes
     trials.csv, curves.csv, summary.json and the figure search, if asked for.
     """
-    from tetra_drake.evolution.comparison import compare, describe
+    from tetra_drake.analysis.comparison import compare, describe
 
     if options.out:
         check_folder(options.out)

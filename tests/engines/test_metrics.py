@@ -11,7 +11,7 @@ from tetra_drake.results.measures import lifted, travelling_index
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure, moved_nodes
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metric_units import METRICS
 
 
 @pytest.fixture(scope="module")

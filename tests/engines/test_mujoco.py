@@ -16,7 +16,7 @@ from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Coulomb, Scenario
-from tetra_drake.scenario.terrain import Incline, Rough, Steps
+from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 needs_mujoco = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from helpers.analytic import Bowl, small_scenario
 
-from tetra_drake.evolution.record import RunRecord
+from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
 
 

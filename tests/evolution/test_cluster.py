@@ -24,7 +24,7 @@ from helpers.analytic import (
 from tetra_drake import cli
 from tetra_drake.evolution.cluster import dask_cluster, local_cluster
 from tetra_drake.evolution.executors import evaluate_all
-from tetra_drake.evolution.record import RunRecord
+from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
 from tetra_drake.robot.gait import ParameterSpace
 
@@ -115,7 +115,7 @@ def test_workers_with_other_versions_are_refused(cluster, refused):
 
 
 def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("tetra_drake.run.GaitEvaluation", lambda scenario, objective: Bowl())
+    monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda scenario, objective: Bowl())
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
     command = ["evolve", "--scenario", "quick", "--iterations", "2", "--workers", "1"]
     for name, executor in (("dask", ("--executor", "dask")), ("local", ())):

@@ -25,15 +25,15 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mean
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import process_executor
-from tetra_drake.evolution.optimizers.steady_state import SteadyState
-from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.reevaluation import evaluate_again
-from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
+from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.schema import DisturbancesScenario
-from tetra_drake.scenario.terrain import Steps
+from tetra_drake.scenario.terrain_kinds import Steps
 
 STIFFNESS = {"cables.outer_stiffness": 0.05}
 SEED = (5, 0, 3)

@@ -12,7 +12,7 @@ import pytest
 from helpers.analytic import Bowl, Deadly, is_deadly
 
 from tetra_drake.evolution.executors import EvaluationImpossible, evaluate_all, process_executor
-from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import ParameterSpace
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from helpers.analytic import DrawnBowl, drawn_scenario, read_record
 
-from tetra_drake.evolution.record import RunRecord
+from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
 from tetra_drake.scenario.fields import TAG
 

@@ -11,7 +11,7 @@ from helpers.analytic import small_scenario
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.method import Method
-from tetra_drake.evolution.optimizers.steady_state import SteadyState
+from tetra_drake.optimizers.steady_state import SteadyState
 
 
 def scaled(result):

@@ -9,7 +9,7 @@ from helpers.analytic import Bowl
 
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import best_distances, evaluate_again, reevaluate
-from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.run import load_run
 
 
 class Slope:

@@ -8,8 +8,8 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import main
+from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.source import load_source
-from tetra_drake.evolution.tables import load_run
 from tetra_drake.robot.gait import load_gait, save_gait, seeded_gait
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 

@@ -9,11 +9,11 @@ import pytest
 from helpers.analytic import Bowl, RandomSearch, read_record, small_scenario
 
 from tetra_drake.evolution.executors import process_executor
-from tetra_drake.evolution.optimizers.base import Evaluation
-from tetra_drake.evolution.record import RunRecord
-from tetra_drake.evolution.summary import summary
-from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
+from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.report.summary import summary
 
 
 def lines(path):

@@ -7,9 +7,9 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 from matplotlib.collections import QuadMesh
 
-from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.map import map_of_gaits
-from tetra_drake.scenario.optimizers import QualityDiversity
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.units import INCH
 
 PLACES = {2.0: (0.5, 0.1), 4.0: (1.5, 0.1), 3.0: (2.5, 0.9)}

@@ -22,7 +22,7 @@ from tetra_drake.robot.ground import ground_heights, make_ground
 from tetra_drake.robot.structure import STRUTS, MakeStructure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import CABLES, Coulomb, ReferenceScenario
-from tetra_drake.scenario.terrain import Steps
+from tetra_drake.scenario.terrain_kinds import Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 FIGURES = (

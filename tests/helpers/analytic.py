@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.evolution.draws import combine
-from tetra_drake.evolution.optimizers.base import Evaluation, Iteration
+from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import DisturbancesScenario, Scenario
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from helpers.analytic import DrawnBowl, drawn_scenario
 from tetra_drake.evolution.executors import process_executor
-from tetra_drake.evolution.record import MANIFEST, RunRecord
+from tetra_drake.evolution.run_record import MANIFEST, RunRecord
 from tetra_drake.evolution.trials import run_trials
 from tetra_drake.scenario.fields import TAG
 

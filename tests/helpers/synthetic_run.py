@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.evolution.optimizers.base import Evaluation
-from tetra_drake.evolution.record import RunRecord, TrialRecord, evaluation_entry, trial_folder
-from tetra_drake.evolution.tables import Run
+from tetra_drake.evolution.run import Run
+from tetra_drake.evolution.run_record import RunRecord, TrialRecord, evaluation_entry, trial_folder
+from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import ReferenceScenario, Scenario

@@ -8,7 +8,7 @@ from tetra_drake.physics.terrain import GAP, N_X, T1_X, T2_Y, surface
 from tetra_drake.robot.ground import ground_frames, ground_heights, make_ground
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.terrain import HeightField, Rough, Steps
+from tetra_drake.scenario.terrain_kinds import HeightField, Rough, Steps
 
 INCH = 0.0254
 ROUGH = Rough(amplitude=0.5 * INCH, wavelength=5.0 * INCH, seed=3)

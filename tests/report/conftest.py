@@ -6,7 +6,7 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.results.folder import save_result_folder
+from tetra_drake.report.result_folder import save_result_folder
 from tetra_drake.robot.gait import seeded_gait
 
 TRIALS = [

@@ -5,7 +5,7 @@ from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.report.run_page import write_figures
 from tetra_drake.robot.gait import load_gait
-from tetra_drake.scenario.optimizers import QualityDiversity
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
 ONE_GAIT = (
     "time_lapse path_of_the_centre relative_distances one_step signals_and_tensions ground_forces"

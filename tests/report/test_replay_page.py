@@ -9,7 +9,7 @@ from helpers.synthetic_run import write_run
 
 from tetra_drake.errors import InputError
 from tetra_drake.report.replay_page import load_recording, write_replay
-from tetra_drake.results.folder import check_result_folder, save_result_folder
+from tetra_drake.report.result_folder import check_result_folder, save_result_folder
 from tetra_drake.results.metrics import headline
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.units import shown

@@ -12,14 +12,14 @@ from helpers.synthetic_run import tiny_scenario, with_reference, write_run
 
 from tetra_drake.cli import make_parser
 from tetra_drake.evolution.method import Method
-from tetra_drake.evolution.summary import comparisons
-from tetra_drake.evolution.tables import load_run
-from tetra_drake.figures.evolution import two_best
+from tetra_drake.evolution.run import load_run
+from tetra_drake.figures.fitness import two_best
 from tetra_drake.figures.study import study_run
 from tetra_drake.report.run_page import render_report, write_report
+from tetra_drake.report.summary import comparisons
 from tetra_drake.results.result import ground_text
 from tetra_drake.scenario.schema import ReferenceScenario
-from tetra_drake.scenario.terrain import Flat, Incline
+from tetra_drake.scenario.terrain_kinds import Flat, Incline
 from tetra_drake.scenario.units import INCH
 
 from .conftest import COSTS, TRIALS

@@ -16,7 +16,7 @@ from tetra_drake.results.metrics import (
 )
 from tetra_drake.results.path import CentrePath
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, Metrics, inverse
+from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics, inverse
 from tetra_drake.scenario.schema import Scenario
 
 INCH = 0.0254

@@ -8,9 +8,9 @@ import pandas
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
+from tetra_drake.analysis.robustness import START, by_gait, default_disturbances, judge
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.robustness import START, by_gait, default_disturbances, judge
-from tetra_drake.evolution.tables import load_run
+from tetra_drake.evolution.run import load_run
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Coulomb
 

@@ -8,8 +8,8 @@ from analyse import ANALYSIS
 from helpers.meshcat_page import read_page
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.tables import load_run
-from tetra_drake.scenario.optimizers import CmaEs
+from tetra_drake.evolution.run import load_run
+from tetra_drake.scenario.optimizer_kinds import CmaEs
 
 TINY = record.Experiment(
     "two tetrahedra",

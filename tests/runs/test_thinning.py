@@ -10,16 +10,16 @@ from helpers.analytic import Bowl
 from helpers.synthetic_run import tiny_scenario, write_run
 from thinning import thin
 
-from tetra_drake.evolution.comparison import compare
-from tetra_drake.evolution.elites import elites
+from tetra_drake.analysis.comparison import compare
+from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.json_lines import append_lines, read_lines
-from tetra_drake.evolution.record import RunRecord
 from tetra_drake.evolution.reevaluation import BEST_GAITS, evaluate_again
+from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.source import load_source
-from tetra_drake.evolution.summary import summary
-from tetra_drake.evolution.tables import load_run
 from tetra_drake.report.run_page import write_report
-from tetra_drake.scenario.optimizers import QualityDiversity
+from tetra_drake.report.summary import summary
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
 AGAIN, ALONE, EDGE, BEYOND = range(20, 24)
 """Evaluations that nothing else makes matter: reevaluated; alone in its cell of the map, and one

@@ -12,7 +12,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.fields import dump_yaml, tree_of
 from tetra_drake.scenario.load import differences, load_scenario
-from tetra_drake.scenario.optimizers import QualityDiversity
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.schema import Coulomb, ReferenceScenario, Scenario
 
 IN = 0.0254

@@ -11,9 +11,9 @@ from record import EXPERIMENTS
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario, shipped_scenarios
-from tetra_drake.scenario.optimizers import CmaEs, QualityDiversity
+from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity
 from tetra_drake.scenario.schema import CABLES, PATHWAYS, Coulomb
-from tetra_drake.scenario.terrain import Flat, Incline, Rough, Steps
+from tetra_drake.scenario.terrain_kinds import Flat, Incline, Rough, Steps
 
 # Exact by definition.
 IN = 0.0254

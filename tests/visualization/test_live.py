@@ -14,7 +14,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure, node_positions
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.terrain import Incline
+from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.visualization.live import FRAMES_PER_SECOND, ROOM, LiveView, open_view
 from tetra_drake.visualization.replay import quiet_meshcat
 

@@ -13,7 +13,7 @@ from pydrake.math import RotationMatrix
 from tetra_drake.robot.ground import ground_heights, make_ground
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.terrain import Incline, Rough, Steps
+from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.replay import quiet_meshcat
 from tetra_drake.visualization.scene import (

@@ -9,7 +9,7 @@ from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, S
 from pydrake.systems.framework import Context, Diagram
 
 from tetra_drake.engines.observer import Observer
-from tetra_drake.engines.recorder import Recorder, Sample, evaluate_ports, make_dataset
+from tetra_drake.engines.sampler import Sample, Sampler, evaluate_ports, make_dataset
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
@@ -50,7 +50,7 @@ def simulate_drake(
     samples = sample_times(settings.duration, settings.sample_period) if record else np.empty(0)
     needed = result_times(settings)
     times = np.union1d(needed, samples)
-    recorder = Recorder(structure, times)
+    sampler = Sampler(structure, times)
 
     def after_step(context: Context) -> None:
         # What is done here must not depend on whether somebody records or watches.
@@ -59,7 +59,7 @@ def simulate_drake(
         velocities = bodies[7 * len(structure.bodies) :]
         _check(settings, now, velocities, work)
         aimer.aim(context, velocities)
-        recorder.after_step(context)
+        sampler.after_step(context)
         observer.add(now, bodies, signals.Eval(context))
         if viewer is not None and viewer.wants(now):
             viewer.show(make_dataset(diagram, structure, [Sample.of(context)]))
@@ -77,7 +77,7 @@ def simulate_drake(
         raise Diverged(time=now, reason=reason.splitlines()[0]) from error
     wall_time = time.perf_counter() - started
 
-    kept = recorder.samples
+    kept = sampler.samples
     chosen, ours = ([kept[i] for i in np.searchsorted(times, at)] for at in (samples, needed))
     steps, derivative_evaluations, jacobian_evaluations = work.total()
     return make_result(

@@ -35,7 +35,7 @@ from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
 from tetra_drake.scenario.schema import Coulomb, Scenario
-from tetra_drake.scenario.terrain import Flat, Incline, Terrain
+from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
 
 if TYPE_CHECKING:
     import xarray

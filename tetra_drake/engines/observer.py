@@ -6,16 +6,16 @@ import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.physics.cable import PULL_COLUMNS
-from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.physics.lanes import Table
 from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.results.metrics import Totals, empty_tally
 from tetra_drake.robot.model import Model
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Table
 
 _TOGETHER = 1000  # observations, as calls of kernels with many tables are slow
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.schema import Scenario

@@ -21,7 +21,7 @@ from tetra_drake.errors import (
     TimeBudgetExceeded,
 )
 from tetra_drake.evolution.draws import Seed, SeededVector, combine, draws_of
-from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector

@@ -30,7 +30,7 @@ from typing import Any, Generic, TypeVar
 
 from tetra_drake.engines.simulate import available_cores
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation
 
 MakeExecutor = Callable[[int], Executor]
 """Makes an executor with this many workers; if they are not its to choose, its attribute `workers`

@@ -14,16 +14,16 @@ from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import MakeExecutor, evaluate_all, process_executor
 from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
 from tetra_drake.evolution.method import Method
-from tetra_drake.evolution.optimizers.base import Evaluate
 from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.record import (
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.evolution.run_record import (
     REEVALUATIONS,
     evaluation_entry,
     read_manifest,
     trial_folder,
 )
-from tetra_drake.evolution.tables import Run, load_run
 from tetra_drake.evolution.trials import check_fitness
+from tetra_drake.optimizers.base import Evaluate
 from tetra_drake.scenario.schema import Scenario
 
 BEST_GAITS = 5

@@ -18,20 +18,20 @@ from tetra_drake.evolution.executors import (
     evaluate_all,
     process_executor,
 )
-from tetra_drake.evolution.optimizers import optimizer_of
-from tetra_drake.evolution.optimizers.base import (
-    Evaluate,
-    Evaluation,
-    MakeOptimizer,
-    Optimizer,
-)
-from tetra_drake.evolution.record import (
+from tetra_drake.evolution.run_record import (
     Manifest,
     RunRecord,
     TrialRecord,
     evaluation_entry,
     first_with_fitness,
     trial_folder,
+)
+from tetra_drake.optimizers import optimizer_of
+from tetra_drake.optimizers.base import (
+    Evaluate,
+    Evaluation,
+    MakeOptimizer,
+    Optimizer,
 )
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.schema import Scenario

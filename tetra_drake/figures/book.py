@@ -11,8 +11,8 @@ from typing import Any
 
 import xarray
 
-from tetra_drake.evolution.elites import elites
-from tetra_drake.figures import evolution, forces, motion
+from tetra_drake.analysis.elites import elites
+from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.study import Study
 from tetra_drake.figures.style import save_figure
@@ -45,15 +45,15 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
     """As draw_trajectory() of its best gait, with the figures of a run and, as CSV, the table of
     its two best gaits."""
     run, initial, best = study.run, study.initial, study.best
-    table = evolution.two_best(run, study.trial)
+    table = fitness.two_best(run, study.trial)
     if table is not None:
         write_whole(folder / TWO_BEST, table.to_csv())
-    pictures: list[tuple[Any, ...]] = [(evolution.fitness_of_trials, run)]
-    trials = evolution.initial_extremes(run).index
+    pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
+    trials = fitness.initial_extremes(run).index
     if len(trials):
-        pictures.append((evolution.initial_distances, run))
+        pictures.append((fitness.initial_distances, run))
     if study.trial in trials:
-        pictures.append((evolution.initial_fitness, run, study.trial))
+        pictures.append((fitness.initial_fitness, run, study.trial))
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
     walks = [(walk.label, walk.trajectory) for walk in (initial, best)]

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from tetra_drake.evolution.elites import CELLS, LUCKY, chosen, distinct_gaits, elites, robust
-from tetra_drake.evolution.tables import Run, gait_label
+from tetra_drake.analysis.elites import CELLS, LUCKY, chosen, distinct_gaits, elites, robust
+from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures.style import common_style, make_figure
 from tetra_drake.formatting import fixed, listed
-from tetra_drake.scenario.metrics import METRICS
-from tetra_drake.scenario.optimizers import QualityDiversity
+from tetra_drake.scenario.metric_units import METRICS
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.units import customary
 
 _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.0, "zorder": 3}

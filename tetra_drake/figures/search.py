@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from tetra_drake.evolution.comparison import Compared, reach_text, to_json
+from tetra_drake.analysis.comparison import Compared, reach_text, to_json
 from tetra_drake.figures.style import (
     common_style,
     line_style,

@@ -8,7 +8,7 @@ import pandas
 import xarray
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.tables import Run, gait_label
+from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.results.measures import distance_walked
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.kinematics import FORCE, P_WN, V_WN, gather_forces, move_nodes
-from tetra_drake.physics.lanes import Real, Table, inverse_sqrt, maximum
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Table, inverse_sqrt, maximum
 
 PASSIVE = -1
 """The `signal` of a cable that no signal drives."""

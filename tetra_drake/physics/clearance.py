@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.kinematics import P_WN
-from tetra_drake.physics.lanes import Real, Table, any_lane, maximum, minimum
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Table, any_lane, maximum, minimum
 
 CORNERS = 4
 """The nodes of a tetrahedron: three of the base, then the tip."""

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.friction import (
     STICK,
     Pair,
@@ -32,7 +31,9 @@ from tetra_drake.physics.kinematics import (
     gather_forces,
     move_nodes,
 )
-from tetra_drake.physics.lanes import (
+from tetra_drake.physics.terrain import GAP, find_frames, to_frame, to_world
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import (
     Real,
     Table,
     Truth,
@@ -41,7 +42,6 @@ from tetra_drake.physics.lanes import (
     maximum,
     select,
 )
-from tetra_drake.physics.terrain import GAP, find_frames, to_frame, to_world
 
 CONTACT, MODE, STICK_POINT, HEADING, MODE_COLUMNS = 0, 1, 3, 6, 8
 """Columns of `modes`: contact (0 or 1), mode (along t1, t2), stick point (x, y, z) in m, heading

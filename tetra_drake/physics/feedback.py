@@ -16,8 +16,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.lanes import Table
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Table
 
 
 class Senses(NamedTuple):

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.lanes import Real, Truth, select
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Truth, select
 
 STICK = 0.0
 """The friction mode that sticks. One that slips is the direction in which the node broke free:

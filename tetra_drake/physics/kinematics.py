@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.lanes import Real, Table, inverse_sqrt
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Table, inverse_sqrt
 
 Array = np.ndarray
 

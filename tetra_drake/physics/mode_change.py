@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.contact import (
     CONTACT,
     Ground,
@@ -18,8 +17,9 @@ from tetra_drake.physics.contact import (
 )
 from tetra_drake.physics.friction import STICK, Slide, coulomb_pull, coulomb_size, sticks
 from tetra_drake.physics.kinematics import node_acceleration
-from tetra_drake.physics.lanes import Real, Table, Truth, any_lane, maximum, minimum, select
 from tetra_drake.physics.terrain import to_frame
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, maximum, minimum, select
 
 Array = np.ndarray
 

@@ -8,8 +8,8 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.lanes import Real, Table, Truth, maximum, select
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Table, Truth, maximum, select
 
 Array = np.ndarray
 

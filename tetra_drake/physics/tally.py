@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION, Cables
 from tetra_drake.physics.clearance import CORNERS, least_strut_distance
-from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.lanes import Real, Table, maximum, minimum, select
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
 
 
 class Tally(NamedTuple):

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.kinematics import P_WN
-from tetra_drake.physics.lanes import (
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import (
     Real,
     Table,
     any_lane,

@@ -9,7 +9,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.source import load_source
 from tetra_drake.files import check_folder
-from tetra_drake.results.folder import RESULT, RUN_MANIFEST, Recording, load_result_folder
+from tetra_drake.report.result_folder import RESULT, RUN_MANIFEST, StoredResult, load_result_folder
 from tetra_drake.visualization.replay import save_replay
 
 
@@ -47,7 +47,7 @@ def load_recording(
     *,
     scenario: str | None = None,
     warn: Callable[[str], None] = lambda text: None,
-) -> Recording:
+) -> StoredResult:
     """The motion in a result folder, or of a gait file or a run's fittest gait, simulated.
 
     `scenario` is for gait files, `warn` as of load_source(); folders have their own scenarios.
@@ -64,4 +64,4 @@ def load_recording(
     loaded = load_source(source, scenario=scenario, warn=warn)
     result = simulate(scenario=loaded.scenario, gait=loaded.best, record=True)
     assert result.trajectory is not None
-    return Recording(loaded.scenario, loaded.best, result.trajectory, vars(result.metrics))
+    return StoredResult(loaded.scenario, loaded.best, result.trajectory, vars(result.metrics))

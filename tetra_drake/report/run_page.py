@@ -9,23 +9,23 @@ from urllib.parse import quote
 
 import pandas
 
+from tetra_drake.analysis.elites import chosen, distinct_gaits, elites
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.elites import chosen, distinct_gaits, elites
-from tetra_drake.evolution.record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.evolution.reevaluation import best_distances
-from tetra_drake.evolution.summary import comparisons, metric_rows
-from tetra_drake.evolution.tables import gait_label, load_run
+from tetra_drake.evolution.run import gait_label, load_run
+from tetra_drake.evolution.run_record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.figures.book import TWO_BEST, draw_run, draw_trajectory
-from tetra_drake.figures.evolution import two_best
+from tetra_drake.figures.fitness import two_best
 from tetra_drake.figures.study import Study, study_run, walk_again
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import render
-from tetra_drake.results.folder import RESULT, RUN_MANIFEST, load_result_folder
+from tetra_drake.report.result_folder import RESULT, RUN_MANIFEST, load_result_folder
+from tetra_drake.report.summary import comparisons, metric_rows
 from tetra_drake.results.metrics import headline
 from tetra_drake.results.result import ground_text, versions
 from tetra_drake.robot.gait import ParameterSpace, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
-from tetra_drake.scenario.metrics import METRICS, inverse
+from tetra_drake.scenario.metric_units import METRICS, inverse
 from tetra_drake.scenario.units import shown
 from tetra_drake.visualization.replay import save_replay
 

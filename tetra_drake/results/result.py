@@ -29,9 +29,9 @@ from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.fields import tree_of
-from tetra_drake.scenario.metrics import Metrics
+from tetra_drake.scenario.metric_units import Metrics
 from tetra_drake.scenario.schema import Coulomb, Scenario, SimulationScenario
-from tetra_drake.scenario.terrain import Flat
+from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.scenario.units import INCH, POUND_FORCE, shown
 
 if TYPE_CHECKING:

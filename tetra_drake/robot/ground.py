@@ -29,7 +29,7 @@ from tetra_drake.physics.terrain import (
 )
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.schema import Coulomb, Scenario
-from tetra_drake.scenario.terrain import Flat, Grid, make_grid
+from tetra_drake.scenario.terrain_kinds import Flat, Grid, make_grid
 from tetra_drake.scenario.units import INCH
 
 STEP_AHEAD = 1.0 * INCH

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.physics.contact import Ground
-from tetra_drake.physics.lanes import Table
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.simd.lanes import Table
 
 JUNCTION_CABLES = 6
 """The cables between two neighbouring bodies."""

@@ -12,8 +12,8 @@ from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.oscillator import Network, steered_input
 from tetra_drake.robot.bodies import tetrahedron_inertia
+from tetra_drake.robot.equilibrium import settled_lengths
 from tetra_drake.robot.gait import Gait, check_gait
-from tetra_drake.robot.settling import settled_lengths
 from tetra_drake.robot.structure import NODES, Structure
 from tetra_drake.scenario.schema import CpgScenario, Scenario
 

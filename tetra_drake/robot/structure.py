@@ -11,7 +11,7 @@ from tetra_drake.physics.cable import CABLE
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN, move_nodes
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.scenario.schema import CABLES, Scenario
-from tetra_drake.scenario.terrain import Incline
+from tetra_drake.scenario.terrain_kinds import Incline
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
 """The nodes of a tetrahedron; the first three form the base triangle."""

@@ -12,7 +12,7 @@ from tetra_drake.files import read_text
 from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import TAG, Check, Tree, dump_yaml, parse_yaml, tree_of
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.terrain import make_grid
+from tetra_drake.scenario.terrain_kinds import make_grid
 
 MOST_BYTES = 2**20
 """Of a scenario file."""

@@ -23,9 +23,9 @@ from tetra_drake.scenario.fields import (
     tree_of_changes,
     with_values,
 )
-from tetra_drake.scenario.metrics import METRICS, inverse
-from tetra_drake.scenario.optimizers import OptimizerKind, QualityDiversity, SteadyState
-from tetra_drake.scenario.terrain import Flat, Terrain
+from tetra_drake.scenario.metric_units import METRICS, inverse
+from tetra_drake.scenario.optimizer_kinds import OptimizerKind, QualityDiversity, SteadyState
+from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 ENGINES = ("drake", "compiled", "mujoco")

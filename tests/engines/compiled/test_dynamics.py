@@ -19,7 +19,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.model import JUNCTION_CABLES, Model, make_model
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Coulomb, ResetIntegrator, Scenario
-from tetra_drake.scenario.terrain import Flat, Rough
+from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 

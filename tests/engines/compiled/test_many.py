@@ -25,7 +25,7 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.schema import Coulomb, Scenario
-from tetra_drake.scenario.terrain import Rough
+from tetra_drake.scenario.terrain_kinds import Rough
 
 FAR_TOO_STRONG = {"cpg.gain": "4e9 N"}
 """A pull that throws the robot about at the first step."""

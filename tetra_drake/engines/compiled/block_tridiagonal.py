@@ -6,8 +6,8 @@ own block (columns 0 to 5) and its coupling to the next body (columns 6 to 11).
 
 from __future__ import annotations
 
-from tetra_drake.physics.compiling import compiled
-from tetra_drake.physics.lanes import Table
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Table
 
 BLOCK, ROW = 6, 12
 

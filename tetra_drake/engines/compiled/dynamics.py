@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
 from tetra_drake.physics.cable import DIRECTION, add_cable_forces
-from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.contact import (
     CONTACT,
     Ground,
@@ -22,9 +21,10 @@ from tetra_drake.physics.contact import (
 )
 from tetra_drake.physics.friction import STICK, coulomb_damping
 from tetra_drake.physics.kinematics import P_BN_W, gather_forces
-from tetra_drake.physics.lanes import Real, Table, any_lane, select
 from tetra_drake.physics.terrain import to_world
 from tetra_drake.robot.model import JUNCTION_CABLES, Model
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Table, any_lane, select
 
 
 class Forces(NamedTuple):

@@ -37,7 +37,6 @@ from tetra_drake.physics.cable import PULL_COLUMNS, Cables
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, Law
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.physics.lanes import FieldArray, lane_table
 from tetra_drake.physics.oscillator import NEURON_COLUMNS, Network, make_neurons
 from tetra_drake.physics.tally import Tally
 from tetra_drake.physics.terrain import FRAME_COLUMNS
@@ -58,6 +57,7 @@ from tetra_drake.robot.network import (
 from tetra_drake.robot.signals import sample_count
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.simd.lanes import FieldArray, lane_table
 
 _INDICES = 3  # the first fields of Senses, which lanes share
 

@@ -28,10 +28,10 @@ from tetra_drake.engines.compiled.dynamics import (
     inertia,
     move_robot,
 )
-from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.kinematics import move_bodies
-from tetra_drake.physics.lanes import Real, Table, select
 from tetra_drake.robot.model import Model
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Table, select
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 

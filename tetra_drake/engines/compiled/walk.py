@@ -20,11 +20,9 @@ from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
 from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.cable import LENGTH
-from tetra_drake.physics.compiling import compiled
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.feedback import Senses, sense
 from tetra_drake.physics.kinematics import interpolate_state
-from tetra_drake.physics.lanes import Real, Table, any_lane, by_lane, maximum, minimum, select
 from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.oscillator import (
     Network,
@@ -36,6 +34,8 @@ from tetra_drake.physics.oscillator import (
 )
 from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.robot.model import Model
+from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.lanes import Real, Table, any_lane, by_lane, maximum, minimum, select
 
 Array = np.ndarray
 

@@ -1,0 +1,158 @@
+"""Runs side by side: how much they pay for what they find."""
+
+import json
+import math
+
+import pandas
+import pytest
+from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
+
+from tetra_drake.analysis.comparison import SIMULATIONS, compare, describe
+from tetra_drake.cli import main
+from tetra_drake.figures.search import search
+from tetra_drake.scenario.schema import DisturbancesScenario, ReferenceScenario
+from tetra_drake.scenario.units import INCH
+
+
+def trial(*fitnesses):
+    """One evaluation per iteration."""
+    return [[(fitness, 0)] for fitness in fitnesses]
+
+
+@pytest.fixture
+def run(tmp_path):
+    """run(name, trial, ...): the directory of a recorded run, on a scenario with `changes`."""
+
+    def run(name, *trials, changes=None, unfinished=()):
+        scenario = tiny_scenario().with_changes(changes or {})
+        return write_run(tmp_path / name, trials, scenario=scenario, unfinished=unfinished)
+
+    return run
+
+
+def curve(compared, label):
+    rows = compared.curves[compared.curves["run"] == label]
+    return rows[["cost", "low", "median", "high"]].to_numpy().tolist()
+
+
+def test_the_best_so_far_over_trials_that_fail_and_end_at_different_times(run):
+    path = run("a", trial(None, 4.0, 2.0, 8.0), trial(1.0, None), trial(2.0, 6.0, 7.0))
+    found = compare([path])
+    # Best so far: -, 4, 4, 8; 1, 1 and so on; 2, 6, 7 and so on.
+    infinite = -math.inf
+    expected = [[1, infinite, 1.0, 1.5], [2, 2.5, 4.0, 5.0], [3, 2.5, 4.0, 5.5], [4, 4.0, 7.0, 7.5]]
+    assert curve(found, "a") == expected
+    assert found.trials["fitness"].tolist() == [8.0, 1.0, 7.0]
+    assert found.trials["cost"].tolist() == [4, 2, 3]
+    row = found.runs.loc["a"]
+    assert (row["trials"], row["going_on"], row["cost"], row["wall_time"]) == (3, 0, 3.0, 0.5)
+    assert (row["fitness"], row["fitness_mean"]) == pytest.approx((7.0, 16.0 / 3.0))
+    assert row["distance"] == pytest.approx(7.0 / PER_DISTANCE * INCH)
+
+
+def test_the_curve_of_a_run_that_goes_on_ends_with_its_first_trial(run):
+    trials = [trial(1.0, 2.0, 5.0), trial(3.0), trial(2.0, 4.0)]
+    found = compare([run("a", *trials, unfinished=(0, 2))])
+    assert curve(found, "a") == [[1, 1.5, 2.0, 2.5], [2, 2.5, 3.0, 3.5]]
+    assert found.runs.loc["a", "going_on"] == 2
+    assert any("2 of 3" in note for note in found.notes)
+
+
+def test_runs_are_compared_where_the_shortest_ends_and_in_their_ends(run):
+    long = run("long", trial(1.0, 2.0, 3.0, 9.0), trial(0.0, 4.0, 5.0, 7.0))
+    found = compare([long, run("short", trial(3.0, 2.0), trial(5.0))], labels=["x", "y"])
+    assert found.common == 2
+    assert found.runs.loc["x", ["at_common", "fitness"]].tolist() == [3.0, 8.0]
+    assert found.runs.loc["y", ["at_common", "fitness"]].tolist() == [4.0, 4.0]
+    # Of two trials drawn anew, both are the same in half of the cases.
+    assert found.runs.loc["x", ["fitness_low", "fitness_high"]].tolist() == [7.0, 9.0]
+
+
+def test_a_distance_is_reached_when_the_fittest_gait_walks_it(run):
+    # In inches: 1, 2, 3; 2.5; 0, 0, 0.5, 2; never 2 or more; only failures.
+    trials = [trial(2.0, 4.0, 6.0), trial(5.0), trial(None, 0.0, 1.0, 4.0)]
+    trials += [trial(3.0, 3.5), trial(None, None)]
+    found = compare([run("a", *trials)], reach=2.0 * INCH)
+    assert found.trials["reached"].tolist() == [2.0, 1.0, 4.0, math.inf, math.inf]
+    row = found.runs.loc["a"]
+    assert row[["reached_low", "reached", "reached_high"]].tolist() == [2.0, 4.0, math.inf]
+    assert (row["trials"], row["share"]) == (5, 0.6)
+    # Means are over those with a fitness: 6, 5, 4 and 3.5 without the greatest and the least.
+    assert (row["fitness_mean"], row["fitness"]) == (4.5, 4.5)
+    assert any("1 of 5" in note for note in found.notes)
+    assert "4 (2 to never)" in describe(found)
+    assert compare([run("b", trial(1.0), trial(1.0))], reach=INCH).runs.loc["b", "reached"] == (
+        math.inf
+    )
+
+
+def test_the_reference_is_the_distance_to_be_reached(run):
+    reference = ReferenceScenario("a paper", best_distance=2.0 * INCH)
+    paths = [run("a", trial(2.0)), run("b", trial(4.0), changes={"reference": reference})]
+    assert compare(paths[:1]).reach is None
+    found = compare(paths)
+    assert found.reach == 2.0 * INCH
+    assert found.trials["reached"].tolist() == [math.inf, 1.0]
+
+
+def test_runs_that_differ_in_draws_pay_by_simulations(run):
+    disturbed = {"disturbances": DisturbancesScenario(draws=3, start=0.1)}
+    paths = [run("calm", trial(1.0, 2.0)), run("rough", trial(3.0, 4.0), changes=disturbed)]
+    found = compare(paths, reach=2.0 * INCH)
+    assert (found.unit, found.common) == (SIMULATIONS, 2)
+    assert [cost for cost, *_ in curve(found, "rough")] == [3, 6]
+    assert found.trials["reached"].tolist() == [math.inf, 6.0]
+    assert math.isnan(found.runs.loc["rough", "at_common"])  # no gait is done
+    assert compare(paths[1:]).trials["cost"].tolist() == [2]
+    assert any("disturbances.draws" in note for note in found.notes)
+
+
+def test_only_search_may_differ_without_a_note(run):
+    base = run("a", trial(1.0))
+    searches = run("b", trial(1.0), trial(2.0), changes={"evolution.max_iterations": 7})
+    assert compare([base, searches]).notes == []
+    (note,) = compare([base, run("c", trial(1.0), changes={"cables.slack": True})]).notes
+    assert "cables.slack" in note
+
+
+def test_different_objectives_and_wrong_labels_are_refused(run, refused):
+    base = run("a", trial(1.0))
+    other = run("b", trial(1.0), changes={"objective": {"speed": "1 s/m"}})
+    with refused(other, "objective", "a"):
+        compare([base, other])
+    for labels in (["x"], ["x", "x"]):
+        with refused("labels", "", "2"):
+            compare([base, base], labels=labels)
+    failed = run("d", trial(None))
+    with refused(failed, "", "fitness"):
+        compare([failed])
+
+
+def test_the_figure_has_a_line_and_a_band_for_each_run(run):
+    fitnesses = [float(number) for number in range(30)]
+    paths = [run("a", trial(*fitnesses), trial(*fitnesses[::2])), run("b", trial(4.0, 5.0))]
+    left, right = search(compare(paths, reach=5.0 * INCH)).axes
+    first, second = (line.get_xydata().tolist() for line in left.lines)
+    assert first[-1] == [30.0, 28.5]
+    assert second[-1] == [2.0, 5.0]
+    assert len(left.collections) == 2
+    # 5 in are fitness 10: evaluations 11 and 6.
+    assert right.lines[0].get_xydata().tolist()[1:] == [[6.0, 50.0], [11.0, 100.0], [30.0, 100.0]]
+    assert right.lines[1].get_ydata().tolist() == [0.0, 0.0]
+    assert len(search(compare(paths)).axes) == 1
+
+
+def test_the_command_prints_and_writes(run, tmp_path, capsys):
+    paths, out = [run("a", trial(1.0, 30.0)), run("b", trial(2.0))], tmp_path / "out"
+    options = ["--reach", "14.34 in", "--labels", "x", "y", "--out", str(out)]
+    assert main(["compare", *map(str, paths), *options]) == 0
+    printed = capsys.readouterr().out
+    assert all(text in printed for text in ("14.34 in", "never", "1 of 1", "0 of 1"))
+    files = ["curves.csv", "search.png", "search.svg", "summary.json", "trials.csv"]
+    assert sorted(path.name for path in out.iterdir()) == files
+    summary = json.loads((out / "summary.json").read_text())
+    assert [row["run"] for row in summary["runs"]] == ["x", "y"]
+    assert [row["reached"] for row in summary["runs"]] == [2.0, None]
+    assert pandas.read_csv(out / "trials.csv")["fitness"].tolist() == [30.0, 2.0]
+    with pytest.raises(SystemExit):
+        main(["compare", str(paths[0]), "--reach", "14 s"])

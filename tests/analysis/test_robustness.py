@@ -1,0 +1,293 @@
+"""How far gaits walk under fresh draws of disturbances, and what is made of that."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pandas
+import pytest
+from helpers.quantities import with_unit
+from helpers.synthetic_run import tiny_scenario, write_run
+
+from tetra_drake.analysis.robustness import (
+    ALONE,
+    SPREAD,
+    START,
+    TERRAIN,
+    Judgement,
+    by_change,
+    by_gait,
+    default_disturbances,
+    describe,
+    fresh_seed,
+    judge,
+    over_gaits,
+    percents,
+    rank_correlations,
+)
+from tetra_drake.analysis.statistics import share_interval
+from tetra_drake.cli import main
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.gait import save_gait, seeded_gait
+from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.schema import DisturbancesScenario
+from tetra_drake.scenario.terrain_kinds import Steps
+from tetra_drake.scenario.units import INCH
+
+DRAWS = 3
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    """A short walk on rough ground, in which the oscillators start at once."""
+    tiny = tiny_scenario(name="rough")
+    own = {"terrain": load_scenario("rough").terrain, "friction": load_scenario("rough").friction}
+    return tiny.with_changes({"cpg.start_up": 0.0, "robot.contacts": "all", **own})
+
+
+@pytest.fixture(scope="module")
+def gaits(scenario):
+    return {"a": seeded_gait(scenario, 1), "b": seeded_gait(scenario, 2)}
+
+
+@pytest.fixture(scope="module")
+def judgement(scenario, gaits):
+    return judge(scenario, gaits, draws=DRAWS, seed=5, workers=2)
+
+
+def test_the_default_disturbances_are_of_what_the_scenario_has(scenario):
+    thesis, ours = (
+        default_disturbances(load_scenario("thesis"), 2.0),
+        default_disturbances(scenario),
+    )
+    laws = {"friction.static, friction.kinetic", "friction.damping"}
+    assert set(SPREAD) - set(thesis.spreads) == laws
+    assert {key for key in ours.spreads if key.startswith("friction")} == laws
+    assert set(thesis.spreads.values()) == {0.02} == {thesis.start}
+    assert set(ours.spreads.values()) == {0.05} == {ours.start}
+    assert (thesis.terrain, ours.terrain) == (False, True)
+
+
+def test_every_gait_walks_under_the_same_draws_as_evolution_would_simulate_them(judgement, gaits):
+    draws = judgement.draws.set_index(["gait", "draw"])
+    assert draws.index.tolist() == [(gait, i) for i in range(DRAWS) for gait in gaits]
+    changed = judgement.scenario
+    for (gait, i), row in draws.iterrows():
+        draw = draw_disturbances(changed, fresh_seed(5, i))
+        assert row[list(draw.factors)].to_dict() == draw.factors
+        result = simulate(scenario=disturbed(changed, draw), gait=gaits[gait])
+        assert (row["distance"], row["fitness"]) == (result.metrics.distance, result.fitness)
+    assert draws["distance"].nunique() == 2 * DRAWS
+    calm = judgement.undisturbed.set_index("gait")["distance"]
+    for gait in gaits:
+        assert calm[gait] == simulate(scenario=changed, gait=gaits[gait]).metrics.distance
+
+
+def test_every_change_is_also_made_alone(judgement, gaits):
+    alone = judgement.alone[judgement.alone["gait"] == "b"]
+    keys, few = list(judgement.scenario.disturbances.spreads), min(ALONE, DRAWS)
+    expected = {key: [-0.05, 0.05] for key in keys}
+    found = alone.dropna(subset="spread").groupby("what", sort=False)["spread"].apply(list)
+    assert found.to_dict() == expected
+    assert {what: sum(alone["what"] == what) for what in (START, TERRAIN)} == {
+        START: few,
+        TERRAIN: few,
+    }
+    (softer,) = alone.query("what == 'ground.stiffness' and spread < 0")["distance"]
+    stiffness = with_unit(0.95 * judgement.scenario.ground.stiffness, "N/m")
+    changed = judgement.scenario.with_changes({"ground.stiffness": stiffness, "disturbances": None})
+    assert softer == simulate(scenario=changed, gait=gaits["b"]).metrics.distance
+    draw = draw_disturbances(judgement.scenario, fresh_seed(5, 1))
+    terrain = dataclasses.replace(changed.terrain, seed=draw.terrain_seed)
+    changed = judgement.scenario.with_changes({"terrain": terrain, "disturbances": None})
+    (other,) = alone[(alone["what"] == TERRAIN) & (alone["draw"] == 1)]["distance"]
+    assert other == simulate(scenario=changed, gait=gaits["b"]).metrics.distance
+
+
+def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits, judgement):
+    again = judge(scenario, {"b": gaits["b"]}, draws=DRAWS, seed=5, workers=1)
+    for name in ("undisturbed", "draws", "alone"):
+        table = getattr(judgement, name)
+        own = table[table["gait"] == "b"].reset_index(drop=True)
+        pandas.testing.assert_frame_equal(getattr(again, name), own, check_exact=True)
+    assert again.draws["distance"].tolist() != judge(
+        scenario, {"b": gaits["b"]}, draws=DRAWS, seed=6
+    ).draws["distance"].tolist()  # fmt: skip
+
+
+def test_the_scenarios_own_disturbances_are_used_unless_a_percentage_is_given(scenario, gaits):
+    own = DisturbancesScenario(draws=4, spreads={"cables.damping": 0.2})
+    disturbing = scenario.with_changes({"disturbances": own, "require": {"distance": "1 m"}})
+    found = judge(disturbing, gaits, draws=2)
+    assert set(found.alone["what"]) == {"cables.damping"}
+    assert found.draws["cables.damping"].between(0.8, 1.2).all()
+    assert by_gait(found)["missed"].tolist() == [2, 2]  # no gait walks a metre
+    given = judge(disturbing, {"a": gaits["a"]}, percent=3.0, draws=1)
+    assert given.scenario.disturbances == default_disturbances(scenario, 3.0)
+
+
+def test_no_evolution_sees_a_fresh_draw():
+    # numpy reads seeds as 32-bit words and appends zeros, so (5, 1) is (5, 1, 0, 0).
+    def numbers(seed):
+        return tuple(np.random.default_rng(seed).integers(2**62, size=2))
+
+    assert numbers([5, 1]) == numbers([5, 1, 0, 0])
+    fresh = {numbers(fresh_seed(seed, draw)) for seed in range(3) for draw in range(20)}
+    seen = {
+        numbers((seed + high * 2**32, trial, iteration, k))
+        for seed in range(3)
+        for high in range(3)
+        for trial in range(5)
+        for iteration in range(3)
+        for k in range(3)
+    }
+    assert len(fresh) == 60 and not fresh & seen
+
+
+def test_a_simulation_that_fails_has_a_reason_and_no_distance_and_keeps_nothing(scenario, gaits):
+    stopped = scenario.with_changes({"simulation.max_evaluations": 100})
+    found = judge(stopped, {"a": gaits["a"]}, draws=2)
+    for table in (found.undisturbed, found.draws, found.alone):
+        assert table["distance"].isna().all() and table["failure"].str.contains("100").all()
+    row = by_gait(found).loc["a"]
+    assert (row["failed"], row["kept"]) == (2, 0.0)
+    assert row[["50 %", "mean", "mean_low"]].isna().all()
+    assert (by_change(found)["failed"] > 0).all()
+    assert describe(found)
+
+
+@pytest.fixture
+def made(scenario):
+    """A judgement made by hand, of factors p and q; distances in m."""
+    undisturbed = pandas.DataFrame({"gait": ["a", "b"], "distance": [10.0, -10.0]})
+    draws = pandas.DataFrame(
+        {
+            "gait": ["a", "b"] * 4,
+            "draw": np.repeat(range(4), 2),
+            "p": np.repeat([0.9, 1.0, 1.1, 1.2], 2),
+            "q": np.repeat([1.2, 1.1, 1.0, 1.5], 2),
+            # Of a: 12, 9, 8.9 and a failure; of b: -11, -11.1, -9, 2.
+            "distance": [12.0, -11.0, 9.0, -11.1, 8.9, -9.0, np.nan, 2.0],
+            "failure": [None] * 6 + ["fell", None],
+            "missed": [""] * 7 + ["clearance"],
+        }
+    )
+    alone = pandas.DataFrame(
+        {
+            "gait": ["a", "a", "b", "b", "a", "b"],
+            "what": ["p"] * 4 + [START] * 2,
+            "distance": [9.0, 9.5, -10.25, np.nan, 4.0, -9.0],
+            "failure": [None, None, None, "fell", None, None],
+            "missed": "",
+        }
+    )
+    spread = DisturbancesScenario(draws=1, spreads={"p": 0.2, "q": 0.5})
+    judged = dataclasses.replace(scenario, disturbances=spread)
+    return Judgement(judged, seed=0, undisturbed=undisturbed, draws=draws, alone=alone)
+
+
+def test_a_draw_is_kept_if_a_tenth_of_the_distance_is_lost_at_most(made):
+    kept = made.compared(made.draws).groupby("gait")["kept"].apply(list)
+    assert kept["a"] == [True, True, False, False]
+    # From -10, -11 is a tenth less, and forward is more; but there, b misses a requirement.
+    assert kept["b"] == [True, False, True, False]
+
+
+def test_the_summary_of_gaits(made):
+    found = by_gait(made)
+    a, b = found.loc["a"], found.loc["b"]
+    # Linear interpolation between 8.9, 9 and 12: at 5 % a tenth of the way to the second one.
+    assert a[["5 %", "25 %", "50 %", "75 %", "95 %"]].tolist() == pytest.approx(
+        [8.91, 8.95, 9.0, 10.5, 11.7]
+    )
+    assert a[["undisturbed", "mean", "kept"]].tolist() == pytest.approx([10.0, 29.9 / 3.0, 0.5])
+    assert found[["failed", "missed"]].to_numpy().tolist() == [[1, 0], [0, 1]]
+    assert a[["kept_low", "kept_high"]].tolist() == list(share_interval(2, 4))
+    assert b["mean"] == pytest.approx(-29.1 / 4.0)
+    assert b["mean_low"] < b["mean"] < b["mean_high"]
+    over = over_gaits(made)["median"]
+    assert over.to_dict() == pytest.approx(
+        {"undisturbed": 0.0, "mean": (29.9 / 3.0 - 29.1 / 4.0) / 2.0, "kept": 0.5}
+    )
+
+
+def test_an_interval_without_width_is_not_shown():
+    assert percents(1.0, 0.91, 1.0) == "100 % (91 to 100)"
+    assert percents(1.0, 1.0, 1.0) == "100 %"
+
+
+def test_the_summary_of_changes_begins_with_what_hurts_most_alone(made):
+    # START: -6 and +1. p: -1, -0.5, -0.25 and a failure.
+    found = by_change(made)
+    assert found[["median", "worst", "failed"]].reset_index().to_numpy().tolist() == [
+        [START, 3.5, -6.0, 0],
+        ["p", 0.5, -1.0, 1],
+    ]
+    # Ranks of a's distances 3, 2, 1 with p's 1, 2, 3: -1; with q's 3, 2, 1: +1. Of b's 2, 1, 3, 4
+    # with p's 1, 2, 3, 4: 1 - 6 (1 + 1) / 60 = 0.8; with q's 3, 2, 1, 4: 1 - 6 (1 + 1 + 4) / 60.
+    expected = [[-1.0, 1.0], [0.8, 0.4]]
+    np.testing.assert_allclose(rank_correlations(made)[["p", "q"]], expected, rtol=1e-12)
+    assert found.loc["p", ["correlation", "correlation_size"]].tolist() == pytest.approx(
+        [-0.1, 0.9]
+    )
+    assert found.loc[START, ["correlation", "correlation_size"]].isna().all()
+
+
+def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement, tmp_path):
+    gait, out, short = (tmp_path / name for name in ("walks.json", "out", "short.yaml"))
+    save_gait(gaits["b"], gait, scenario)
+    short.write_text(dump_scenario(scenario))
+    options = ["--scenario", str(short), f"--draws={DRAWS}", "--seed=5", "--out", str(out)]
+    assert main(["robustness", str(gait), *options]) == 0
+    names = ["alone.csv", "draws.csv", "robustness.png", "robustness.svg", "summary.json"]
+    assert sorted(file.name for file in out.iterdir()) == names
+    for name in ("draws", "alone"):
+        table = getattr(judgement, name)
+        expected = table[table["gait"] == "b"]["distance"]
+        np.testing.assert_allclose(pandas.read_csv(out / f"{name}.csv")["distance"], expected)
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["draws"], summary["seed"]) == (DRAWS, 5)
+    assert [row["gait"] for row in summary["gaits"]] == ["walks"]
+    assert {row["what"] for row in summary["changes"]} == set(judgement.alone["what"])
+
+
+def test_the_command_takes_the_best_gait_of_each_trial_of_a_run(tmp_path, capsys):
+    trials = [[[(1.0, 0), (2.0, 1)]], [[(3.0, 0)]]]
+    run = write_run(tmp_path / "run", trials)
+    assert main(["robustness", str(run), "--percent=1", "--draws=2"]) == 0
+    printed = capsys.readouterr().out
+    rows = [line.split("  ")[0] for line in printed.splitlines()]
+    assert {"trial 0", "trial 1", START, *default_disturbances(tiny_scenario()).spreads} <= set(
+        rows
+    )
+    assert max(map(len, printed.splitlines())) <= 100
+
+
+def test_nothing_is_written_for_a_gait_of_another_robot(scenario, tmp_path, refused, capsys):
+    with refused("gait random gait 1", "weights", "expected 4"):
+        judge(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)
+    gait, out = tmp_path / "gait.json", tmp_path / "out"
+    save_gait(seeded_gait(scenario, 1), gait, scenario)
+    assert main(["robustness", str(gait), "--out", str(out)]) == 2
+    assert str(gait) in capsys.readouterr().err and not out.exists()
+
+
+def test_a_draw_in_which_the_robot_cannot_start_is_a_failure(scenario, gaits):
+    # The foremost nodes on the ground, those of T3's base, are 1 in from the middle of a step's
+    # ascent, and are moved by up to 0.4 spacings, 1.18 in.
+    edge = 2.0 * scenario.robot.spacing + INCH
+    steps = Steps(height=1.0 * INCH, depth=1.0, count=1, start=edge)
+    own = {"terrain": steps, "disturbances": DisturbancesScenario(draws=1, start=0.4)}
+    found = judge(scenario.with_changes(own), gaits, draws=8)
+    assert by_change(found).loc[START, "failed"] > 0
+    failed = found.draws[found.draws["failure"].notna()]
+    assert 2 <= len(failed) < 16 and failed["failure"].str.contains("below the ground").all()
+    assert failed["gait"].tolist() == ["a", "b"] * (len(failed) // 2)
+    walked = found.draws.drop(failed.index)
+    scenarios = (
+        disturbed(found.scenario, draw_disturbances(found.scenario, fresh_seed(0, i)))
+        for i in walked["draw"]
+    )
+    for changed, gait, distance in zip(scenarios, walked["gait"], walked["distance"], strict=True):
+        assert simulate(scenario=changed, gait=gaits[gait]).metrics.distance == distance

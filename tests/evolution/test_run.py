@@ -1,0 +1,201 @@
+"""A recorded run as tables: columns, best gaits, populations, states of trials."""
+
+import dataclasses
+import json
+import lzma
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from helpers.analytic import Bowl, small_scenario
+from helpers.synthetic_run import write_run
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.json_lines import append_lines, read_lines
+from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run_record import RunRecord
+from tetra_drake.evolution.trials import run_trials
+from tetra_drake.report.summary import comparisons, summary
+from tetra_drake.robot.gait import load_gait
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.units import INCH
+
+
+def test_a_run_loads_as_tables(run_small):
+    run = load_run(run_small(seed=11))
+    assert run.manifest.seed == 11
+    assert len(run.evaluations) == 2 * 42
+    row = run.evaluations.iloc[20]
+    assert row["weight_3"] == run.vector(0, 20)[2]
+    expected = Bowl()(run.vector(0, 20))
+    assert expected.failure or row["fitness"] == expected.fitness
+    failed = run.evaluations["failure"].notna()
+    assert failed.any()
+    assert run.evaluations["fitness"][failed].isna().all()
+    walked = run.evaluations[~failed]
+    np.testing.assert_array_equal(walked["distance_in"], walked["distance"] / INCH)
+    means = run.iterations.pivot(index="iteration", columns="trial", values="mean_fitness")
+    assert means.shape == (16, 2)
+    last = run.iterations.iloc[-1]
+    best = run.evaluations.set_index(["trial", "index"]).loc[(1, last["best_evaluation"])]
+    assert last["best_distance_in"] == best["distance_in"]
+
+
+def test_a_run_in_progress_loads_and_is_left_alone(run_small):
+    run = run_small()
+    path = run / "trial_00" / "evaluations.jsonl"
+    path.write_bytes(path.read_bytes()[:-10])
+    torn = path.read_bytes()
+    assert len(load_run(run).evaluations) == 2 * 42 - 1
+    assert path.read_bytes() == torn
+    for file in run.glob("trial_*/*"):
+        file.unlink()
+    empty = load_run(run)
+    assert empty.evaluations.empty
+    assert [status.evaluations for status in empty.statuses] == [0, 0]
+    with pytest.raises(InputError):
+        empty.fittest()
+
+
+def test_each_tetrahedrons_lifted_share_is_a_column(tmp_path):
+    shares = {4.0: {"lifted_shares": [0.25, 0.0, 0.5]}}
+    run = load_run(write_run(tmp_path / "run", [[[(None, 0), (4.0, 1)]]], metrics=shares))
+    columns = ["lifted_T1", "lifted_T2", "lifted_T3"]
+    np.testing.assert_array_equal(run.evaluations[columns], [[math.nan] * 3, [0.25, 0.0, 0.5]])
+    assert run.gait(0, 1)
+
+
+def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused):
+    run = run_small()
+    plain = load_run(run)
+    for path in run.rglob("*.jsonl"):
+        path.with_name(path.name + ".xz").write_bytes(lzma.compress(path.read_bytes()))
+        path.unlink()
+    packed = load_run(run)
+    assert packed.evaluations.equals(plain.evaluations)
+    assert packed.iterations.equals(plain.iterations)
+    path = run / "trial_00" / "iterations.jsonl"
+    entries = read_lines(path)
+    append_lines(path, [{"more": 1}])
+    assert read_lines(path) == [*entries, {"more": 1}]
+    path.with_name("iterations.jsonl.xz").write_bytes(b"no xz")
+    with refused(f"{path}.xz", "", ""):
+        load_run(run)
+
+
+@pytest.mark.parametrize(
+    ("name", "entry", "key"),
+    [
+        ("evaluations.jsonl", {"index": 0}, "iteration"),
+        ("iterations.jsonl", {"iteration": "first"}, "iteration"),
+        ("reevaluations.jsonl", {"index": 0, "iteration": 0, "genome": 3}, "genome"),
+    ],
+)
+def test_a_line_that_is_no_entry_is_reported(run_small, refused, name, entry, key):
+    run = run_small()
+    path = run / "trial_01" / name
+    path.write_text(json.dumps(entry) + "\n")
+    with refused(path, "line 1", key):
+        load_run(run)
+
+
+def test_metrics_that_an_older_record_lacks_are_nan(tmp_path):
+    evaluations = load_run(write_run(tmp_path / "run", [[[(5.0, 0), (None, 1)]]])).evaluations
+    assert evaluations["distance"].notna().tolist() == [True, False]
+    for name in ("heading_change", "path_curvature"):
+        assert evaluations[name].dtype == float and evaluations[name].isna().all()
+
+
+# Best gaits, populations, states of trials
+
+
+def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(tmp_path):
+    trials = [[[(5.0, 0), (5.0, 1), (None, 2), (7.0, 3)]], [[(6.0, 0)]]]
+    run = load_run(write_run(tmp_path / "run", trials))
+    assert run.best(3)[["trial", "index"]].to_numpy().tolist() == [[0, 3], [0, 0], [1, 0]]
+    assert run.best()["fitness"].tolist() == [7.0, 6.0]
+    assert run.fittest() == (0, 3)
+    assert run.gait(0, 3).name == "tiny, seed 7, trial 0, evaluation 3"
+
+
+def test_the_initial_gaits_are_those_of_the_first_iteration_of_every_trial(tmp_path):
+    trials = [[[(5.0, 0), (None, 1)], [(6.0, 0)], [(7.0, 1)]], [[(2.0, 0)], [(3.0, 0)]]]
+    initial = load_run(write_run(tmp_path / "run", trials)).initial()
+    assert initial[["trial", "index"]].to_numpy().tolist() == [[0, 0], [0, 1], [1, 0]]
+
+
+def test_the_best_gait_of_a_run_is_that_of_its_best_trial(tmp_path):
+    run = load_run(write_run(tmp_path / "run", [[[(5.0, 0), (4.0, 1)]], [[(3.0, 2), (6.0, 3)]]]))
+    assert run.best_gait() == run.gait(1, 1) != run.gait(0, 0)
+
+
+def test_best_gait_and_last_population_are_those_kept_by_hand(run_small, scenario):
+    directory = run_small()
+    run = load_run(directory)
+    for trial in (0, 1):
+        kept = {}
+        for line in (directory / f"trial_0{trial}" / "evaluations.jsonl").open():
+            entry = json.loads(line)
+            if entry["placed"] is not None:
+                kept[entry["placed"]] = entry["index"]
+        population = run.last_population(trial)
+        assert population["placed"].tolist() == list(range(12))
+        assert population["index"].tolist() == [kept[place] for place in range(12)]
+        assert population["fitness"].mean() == pytest.approx(run.statuses[trial].mean_fitness)
+        best = int(run.best()["index"].iloc[trial])
+        saved = load_gait(directory / f"trial_0{trial}" / "best_gait.json", scenario)
+        assert saved == run.gait(trial, best)
+
+
+def test_the_record_says_what_the_run_said_at_its_end(tmp_path):
+    with RunRecord.create(tmp_path / "run", scenario=small_scenario(), seed=3) as record:
+        ended = run_trials(
+            record, evaluate=Bowl(delay=0.001), workers=2, executor=ThreadPoolExecutor
+        )
+    recorded = load_run(tmp_path / "run").statuses
+    alike = {"wall_time": 0.0, "evaluations_at_most": 0}
+    for ours, theirs in zip(recorded, ended, strict=True):
+        assert ours.wall_time == pytest.approx(theirs.wall_time, abs=1e-3)
+        assert dataclasses.replace(ours, **alike) == dataclasses.replace(theirs, **alike)
+
+
+def test_an_unfinished_run_says_how_far_it_has_come(tmp_path):
+    trials = [[[(1.0, 0), (None, 1)], [(4.0, 1)]], [[(None, 0)]], []]
+    run = load_run(write_run(tmp_path / "run", trials, unfinished=(0, 1, 2)))
+    first, second, third = run.statuses
+    assert (first.iteration, first.evaluations, first.failures, first.stop) == (1, 3, 1, None)
+    assert (first.initial_mean_fitness, first.mean_fitness) == (1.0, 2.5)
+    assert (first.initial_best_distance_in, first.best_distance_in) == pytest.approx((0.5, 2.0))
+    assert (second.failures, second.best_fitness) == (1, -math.inf)
+    assert (third.iteration, third.evaluations) == (-1, 0)
+    ours = [row.ours for row in comparisons(run)]
+    assert ours == ["0.50 in", "2.00 in", "+1.50 in", "+1.50 in", "1.00 s"]
+
+
+def test_improvements_are_percents_only_of_distances_that_are_not_near_nothing(tmp_path):
+    # By trials, in inches: from 2 to 3, from 5 to 6, from 0.25 to 4.
+    trials = [[[(4.0, 0)], [(6.0, 0)]], [[(10.0, 0)], [(12.0, 0)]]]
+    *_, mean, best, _ = comparisons(load_run(write_run(tmp_path / "far", trials)))
+    assert (mean.ours, best.ours) == ("+1.00 in (35 %)", "+1.00 in (20 %)")
+    trials.append([[(0.5, 0)], [(8.0, 0)]])
+    *_, mean, best, _ = comparisons(load_run(write_run(tmp_path / "near", trials)))
+    assert (mean.ours, best.ours) == ("+1.92 in", "+1.00 in (20 %)")
+
+
+def test_the_best_evolved_gait_is_the_fittest_of_the_run(tmp_path):
+    far = {3.0: {"distance": 9.0 * INCH}}
+    path = write_run(tmp_path / "run", [[[(2.0, 0)], [(3.0, 0)]], [[(4.0, 0)]]], metrics=far)
+    _, best, *_ = comparisons(load_run(path))
+    assert best.ours == "2.00 in"
+
+
+def test_the_reference_stands_beside_our_numbers_where_there_is_one(tmp_path):
+    scenario = load_scenario("thesis")
+    with_reference = load_run(write_run(tmp_path / "a", [[[(5.0, 0)]]], scenario=scenario))
+    numbers = [row.reference for row in comparisons(with_reference)]
+    assert numbers == ["6.6 in", "14.34 in", "32 %", "51 %", "22 s"]
+    assert "14.34 in" in summary(with_reference)
+    scenario.reference = None
+    without = load_run(write_run(tmp_path / "b", [[[(5.0, 0)]]], scenario=scenario))
+    assert {row.reference for row in comparisons(without)} == {""}

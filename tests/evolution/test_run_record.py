@@ -1,0 +1,361 @@
+"""Run directories: what is refused, repaired and reported, and how runs are resumed."""
+
+import hashlib
+import json
+import math
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from helpers.analytic import Bowl, read_record, small_scenario
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.json_lines import json_line
+from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run_record import RunRecord, TrialRecord, evaluation_entry, read_manifest
+from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.results.result import versions
+from tetra_drake.scenario.fields import TAG
+
+
+def cut(path, lost):
+    """Takes bytes off the end of a file."""
+    path.write_bytes(path.read_bytes()[:-lost])
+
+
+def create(directory):
+    return RunRecord.create(directory, scenario=small_scenario(), seed=5)
+
+
+class Counted:
+    """Bowl, which is interrupted after `most` evaluations."""
+
+    def __init__(self, most=math.inf):
+        self.most, self.asked = most, 0
+
+    def __call__(self, genome):
+        self.asked += 1
+        if self.asked > self.most:
+            raise InterruptedError
+        return Bowl()(genome)
+
+
+# What a run is, and what is refused
+
+
+def test_the_manifest_holds_seed_versions_and_method_and_the_scenario_its_own_file(run_small):
+    run = run_small(seed=11)
+    manifest = read_manifest(run)
+    assert (manifest.scenario, manifest.seed) == (small_scenario(), 11)
+    assert manifest.versions == versions()
+    assert manifest.method == Method.of(small_scenario())
+    raw = json.loads((run / "manifest.json").read_text())
+    text = (run / "scenario.yaml").read_bytes()
+    assert raw["scenario_sha256"] == hashlib.sha256(text).hexdigest()
+    assert "scenario" not in raw
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("seed", "x"),
+        ("seed", -1),
+        ("thinned", "no"),
+        ("schema", 2),
+        ("versions", []),
+        ("objective", 7),
+    ],
+)
+def test_a_damaged_manifest_is_reported(run_small, refused, key, value):
+    run = run_small(population=4, iterations=1)
+    manifest = run / "manifest.json"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {key: value}))
+    with refused(manifest, key, ""):
+        RunRecord.resume(run)
+    cut(manifest, 50)
+    with refused(manifest, "", "cannot be read"):
+        RunRecord.resume(run)
+
+
+def test_a_scenario_changed_after_the_run_began_is_reported(run_small, refused):
+    run = run_small()
+    scenario = run / "scenario.yaml"
+    scenario.write_text(scenario.read_text().replace("population: 12", "population: 13"))
+    with refused(scenario, "", "manifest.json"):
+        RunRecord.resume(run)
+
+
+def test_no_run_is_resumed_where_there_is_none_and_none_begun_in_a_used_directory(
+    run_small, tmp_path, refused
+):
+    for directory in (tmp_path, tmp_path / "none"):
+        with refused(directory, "", "manifest.json"):
+            RunRecord.resume(directory)
+    assert not (tmp_path / "none").exists()
+    run = run_small()
+    before = read_record(run)
+    notes = tmp_path / "notes.txt"
+    notes.write_text("mine")
+    for directory, problem in (
+        (run, "--resume"),
+        (tmp_path, "is not empty"),
+        (notes, "is a file"),
+        (notes / "run", "is a file"),
+    ):
+        with refused(directory, "", problem):
+            create(directory)
+    assert read_record(run) == before
+
+
+def test_what_a_kill_in_the_first_moment_leaves_is_an_empty_directory(tmp_path):
+    leftover = tmp_path / f".manifest.{2**22 + 1}.abcd_123.json"  # of no process
+    (tmp_path / ".lock").touch()
+    leftover.touch()
+    with create(tmp_path):
+        pass
+    assert not leftover.exists()
+
+
+def test_another_seed_scenario_or_method_is_refused(run_small, refused):
+    run = run_small(seed=5)
+    for key, problem, changed in (
+        ("seed", "5, not 6", {"seed": 6}),
+        ("evolution.population", "12", {"scenario": small_scenario(population=13)}),
+        ("objective", "Bowl", {"method": Method.of(small_scenario(), objective=Bowl())}),
+    ):
+        with refused(run, key, problem):
+            RunRecord.resume(run, **changed)
+    own = small_scenario()
+    with RunRecord.resume(run, scenario=own, seed=5, method=Method.of(own)):
+        pass
+
+
+def test_a_second_process_is_refused_until_the_first_ends(run_small):
+    run = run_small()
+    program = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from tetra_drake.evolution.run_record import RunRecord\n"
+        "with RunRecord.resume(Path(sys.argv[1])):\n"
+        "    print('open', flush=True)\n"
+        "    sys.stdin.read()\n"
+    )
+    command = [sys.executable, "-c", program, str(run)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == b"open\n"
+        with pytest.raises(InputError, match="another process is at work"):
+            RunRecord.resume(run)
+        other.kill()
+    with RunRecord.resume(run):
+        pass
+
+
+# Torn and damaged lines
+
+
+@pytest.mark.parametrize("name", ["evaluations.jsonl", "iterations.jsonl"])
+@pytest.mark.parametrize("lost", [1, 60, 500, 5000])
+def test_a_torn_end_is_made_good(run_small, name, lost):
+    run = run_small()
+    whole = read_record(run)
+    cut(run / "trial_01" / name, lost)
+    run_small(resume=True)
+    assert read_record(run) == whole
+
+
+def with_line(number, change):
+    """A function that changes a line of a file, given and returned as bytes."""
+
+    def damage(content):
+        lines = content.splitlines()
+        lines[number - 1] = change(lines[number - 1])
+        return b"\n".join(lines) + b"\n"
+
+    return damage
+
+
+def with_value(number, key, value):
+    """The line as it would have been written with another value: its checksum is right."""
+
+    def change(line):
+        entry = json.loads(line)
+        del entry["crc"]
+        return json_line(entry | {key: value}).encode().strip()
+
+    return with_line(number, change)
+
+
+def with_one_more(content):
+    entry = json.loads(content.splitlines()[-1])
+    del entry["crc"]
+    return content + json_line(entry | {"index": 42}).encode()
+
+
+NO_OBJECTS = [b"{nonsense", b"", b"\xff\xfe", b"[1, 2]", b"\0" * 30, b'{"index": 4}']
+VALUES = [("genome", [2.0] * 26), ("placed", 7), ("index", 77), ("fitness", "high")]
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "problem", "damage"),
+    [
+        *(
+            ("evaluations", n, "", with_line(n, lambda _, t=t: t))
+            for t in NO_OBJECTS
+            for n in (3, 42)
+        ),
+        *(("evaluations", 20, key, with_value(20, key, value)) for key, value in VALUES),
+        ("evaluations", 43, "ends before", with_one_more),
+        ("iterations", 2, "evaluations", with_value(2, "evaluations", 15)),
+    ],
+)
+def test_a_damaged_or_changed_line_is_reported(run_small, refused, name, line, problem, damage):
+    path = run_small(trials=1) / "trial_00" / f"{name}.jsonl"
+    path.write_bytes(damage(path.read_bytes()))
+    with refused(path, f"line {line}", problem):
+        run_small(resume=True)
+
+
+def unsealed(line, changes):
+    entry = json.loads(line)
+    del entry["crc"]
+    return json.dumps(entry | changes).encode()
+
+
+def other(value):
+    """Another value of the same kind."""
+    if isinstance(value, str):
+        return value + "x"
+    if isinstance(value, list):
+        return [other(value[0]), *value[1:]]
+    if isinstance(value, dict):
+        return {key: other(number) for key, number in value.items()} or {"distance": 1.0}
+    return 1 if value is None else value + 1
+
+
+def with_changed(number, key):
+    """A line with another value and the checksum that it had."""
+
+    def change(line):
+        entry = json.loads(line)
+        return json.dumps(entry | {key: other(entry[key])}).encode()
+
+    return with_line(number, change)
+
+
+@pytest.mark.parametrize("kind", ["SteadyState", "CmaEs", "QualityDiversity", "RandomSearch"])
+def test_no_optimiser_takes_over_a_value_that_was_changed(run_small, refused, kind):
+    changes = {"optimizer": {TAG: f"!{kind}"}, "evolution.max_evaluations": 40}
+    run = run_small(population=4, iterations=3, trials=1, changes=changes)
+    whole = read_record(run)
+    for path in sorted(run.glob("trial_00/*.jsonl")):
+        content = path.read_bytes()
+        lines = content.splitlines(keepends=True)
+        for number in {1, len(lines)}:
+            for key in json.loads(lines[number - 1]):
+                path.write_bytes(with_changed(number, key)(content))
+                with refused(path, f"line {number}", "checksum"):
+                    run_small(resume=True)
+                with refused(path, f"line {number}", ""):
+                    load_run(run)
+        # What the message says: cut there, the record is made good.
+        path.write_bytes(b"".join(lines[: len(lines) // 2]))
+        run_small(resume=True)
+        assert read_record(run) == whole
+
+
+def test_a_line_without_checksum_is_read_but_not_resumed(run_small, refused):
+    run = run_small(trials=1)
+    whole, path = load_run(run), run / "trial_00" / "iterations.jsonl"
+    path.write_text(re.sub(', "crc": "\\w+"', "", path.read_text()))
+    assert load_run(run).iterations.equals(whole.iterations)
+    with refused(path, "line 1", "checksum"):
+        run_small(resume=True)
+
+
+def test_an_evaluation_in_progress_that_was_changed_is_refused(run_small, tmp_path, refused):
+    with pytest.raises(InterruptedError):
+        run_small(evaluate=Counted(4), workers=1, trials=1)
+    path = tmp_path / "run" / "trial_00" / "in_progress.jsonl"
+    for key in ("fitness", "failure", "metrics"):
+        content = path.read_bytes()
+        path.write_bytes(with_changed(2, key)(content))
+        with refused(path, "line 2", "checksum"):
+            run_small(resume=True)
+        path.write_bytes(content)
+    assert run_small(resume=True)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("metrics", {"distance": "far"}),
+        ("metrics", {"distance": None}),
+        ("metrics", {"distance": 1.0, "speed": [1.0]}),
+        ("metrics", {"distance": 1.0, "lifted_shares": 1.0}),
+        ("genome", [1.0, None]),
+        ("genome", [1.0] * 25),
+        ("fitness", 10**400),
+        ("draws", {"fitness": [1.0]}),
+        ("draws", {"fitness": [1.0], "distance": []}),
+        ("placed", "first"),
+        ("index", 2.0),
+    ],
+)
+def test_a_run_with_a_value_of_another_kind_is_not_loaded(run_small, refused, key, value):
+    path = run_small(population=4, iterations=1, trials=1) / "trial_00" / "evaluations.jsonl"
+    path.write_bytes(with_line(3, lambda line: unsealed(line, {key: value}))(path.read_bytes()))
+    with refused(path, "line 3", key):
+        load_run(path.parents[1])
+
+
+def test_a_folder_where_a_file_belongs_is_reported(run_small, refused):
+    run = run_small(population=4, iterations=1, trials=1)
+    for name in ("trial_00/evaluations.jsonl", "trial_00/iterations.jsonl", "manifest.json"):
+        (run / name).rename(run / "away")
+        (run / name).mkdir()
+        with pytest.raises(InputError) as caught:
+            load_run(run)
+        assert caught.value.source == str(run / name)
+        assert "is a directory" in caught.value.problem.lower()
+        assert str(run) not in caught.value.problem
+        (run / name).rmdir()
+        (run / "away").rename(run / name)
+    (run / "trial_00").rename(run / "away")
+    (run / "trial_00").touch()
+    with refused(run / "trial_00", "", "is a file"):
+        run_small(resume=True)
+
+
+# Resuming
+
+
+@pytest.mark.parametrize("count", [0, 1, 11, 12, 23, 24, 25, 60, 83, 84])
+def test_an_interrupted_run_ends_like_one_that_was_not_and_makes_no_evaluation_again(
+    run_small, count
+):
+    whole = read_record(run_small("whole"))
+    interrupted, rest = Counted(count), Counted()
+    if count < 84:
+        with pytest.raises(InterruptedError):
+            run_small(evaluate=interrupted, workers=1)
+    else:
+        run_small(evaluate=interrupted)
+    run = run_small(evaluate=rest, resume=True)
+    assert read_record(run) == whole
+    assert rest.asked == 2 * 42 - count
+
+
+def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, refused):
+    genome = np.linspace(1.0, 2.0, 26)
+    failed = Evaluation(-math.inf, {}, "why", 1.25)
+    TrialRecord(tmp_path).keep(evaluation_entry(3, 1, genome, failed))
+    with (tmp_path / "in_progress.jsonl").open("a") as file:
+        file.write('{"index": 4, "torn')
+    record = TrialRecord(tmp_path)
+    assert record.recall(3, genome) == failed
+    assert record.recall(4, genome) is None
+    with refused(tmp_path / "in_progress.jsonl", "line 1", "genome"):
+        record.recall(3, genome + 1.0)

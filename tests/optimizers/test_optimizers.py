@@ -1,0 +1,296 @@
+"""The optimisers beside the thesis's: what all have in common, then each by itself."""
+
+import dataclasses
+import json
+import math
+import sys
+import zlib
+
+import numpy as np
+import pytest
+from helpers.analytic import measures, read_record, small_scenario
+
+from tetra_drake import optimizers
+from tetra_drake.optimizers import optimizer_of
+from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.robot.gait import TAU_A, TAU_B, ParameterSpace
+from tetra_drake.scenario.optimizer_kinds import (
+    CmaEs,
+    QualityDiversity,
+    RandomSearch,
+    SteadyState,
+)
+
+LEARNING = [
+    CmaEs(sample=0),
+    CmaEs(sample=20),
+]
+DIVERSE = QualityDiversity(emitters=2, batch=10, floor=-50.0)
+BUDGETED = [*LEARNING, DIVERSE, RandomSearch()]
+
+
+def make(kind, *, seed=3, budget=600, **changes):
+    scenario = small_scenario().with_changes({"evolution.max_evaluations": budget} | changes)
+    generator = np.random.default_rng(seed)
+    return optimizer_of(kind)(ParameterSpace.of(scenario), scenario.evolution, generator)
+
+
+def bowl(vector):
+    """0 at most, where the weights are 2 and tau_A is at its floor."""
+    fitness = -float(((vector[:-2] - 2.0) ** 2).sum() + 40.0 * (vector[TAU_A] - 0.2))
+    return Evaluation(fitness, measures(vector))
+
+
+def failing(vector):
+    return Evaluation.failed("fell")
+
+
+def run(optimizer, evaluate=bowl):
+    """All vectors asked for, batch by batch, and the iterations."""
+    batches, iterations = [], []
+    while not iterations or iterations[-1].stop is None:
+        batches.append(optimizer.ask())
+        iterations.append(optimizer.tell([evaluate(vector) for vector in batches[-1]]))
+    return batches, iterations
+
+
+def fitnesses(batches):
+    return np.array([bowl(vector).fitness for batch in batches for vector in batch])
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_a_trial_ends_with_the_evaluation_that_the_display_expects_last(kind):
+    optimizer = make(kind, budget=101)
+    batches, iterations = run(optimizer)
+    assert sum(map(len, batches)) == optimizer.evaluations_at_most == 101
+    assert [iteration.stop is None for iteration in iterations[-2:]] == [True, False]
+
+
+def test_the_budget_is_that_of_the_thesiss_algorithm_unless_it_is_given():
+    settings = small_scenario(population=12, iterations=15).evolution
+    space = ParameterSpace.of(small_scenario())
+    made = [optimizer_of(kind)(space, settings, None) for kind in (SteadyState(), RandomSearch())]
+    assert [optimizer.evaluations_at_most for optimizer in made] == [12 + 2 * 15] * 2
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_the_trials_own_generator_alone_decides(kind):
+    before = str(np.random.get_state())
+    ours, theirs, others = (np.concatenate(run(make(kind, seed=seed))[0]) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(ours, theirs)
+    assert not np.array_equal(ours, others)
+    assert str(np.random.get_state()) == before
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_what_is_asked_for_can_be_changed_without_harm(kind):
+    first, second = make(kind), make(kind)
+    for _ in range(3):
+        batch = first.ask()
+        told = [bowl(vector) for vector in batch]
+        for vector in batch:
+            vector[:] = 0.0
+        first.tell(told)
+        second.tell([bowl(vector) for vector in second.ask()])
+    np.testing.assert_array_equal(first.ask(), second.ask())
+
+
+@pytest.mark.parametrize("kind", LEARNING)
+def test_a_quarter_of_the_evaluations_of_random_search_is_enough(kind):
+    best = fitnesses(run(make(RandomSearch(), budget=2400))[0]).max()
+    reached = [fitnesses(run(make(kind, seed=seed))[0]).max() for seed in range(3)]
+    assert min(reached) > 0.5 * best
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_no_vector_is_below_a_floor_and_none_is_asked_for_twice(kind):
+    vectors = np.concatenate(run(make(kind, budget=1500))[0])
+    assert (vectors[:, :-2] >= 0.0).all() and (vectors[:, TAU_A] >= 0.2).all()
+    np.testing.assert_array_equal(vectors[:, TAU_B], 2.0 * vectors[:, TAU_A])
+    assert len(np.unique(vectors[:, :-1], axis=0)) == 1500
+    on_floor = vectors[:, TAU_A] == 0.2
+    assert on_floor.mean() < 0.01
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_parameters_with_equal_bounds_stay_and_tau_b_may_go_its_own_way(kind):
+    fixed = {"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}
+    vectors = np.concatenate(run(make(kind, **fixed))[0])
+    assert (vectors[:, -2:] == [0.3, 0.6]).all()
+    if kind in LEARNING:
+        vectors = np.concatenate(run(make(kind, **{"evolution.independent_tau_b": True}))[0])
+        assert (vectors[:, TAU_B] != 2.0 * vectors[:, TAU_A]).mean() > 0.5
+        assert (vectors[:, TAU_B] >= 0.4).all()
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_one_parameter_is_enough(kind):
+    vectors = np.concatenate(run(make(kind, **{"robot.tetrahedra": 2}))[0])
+    assert vectors.shape == (600, 2)
+    assert vectors[:, TAU_A].min() < 0.205
+
+
+@pytest.mark.parametrize("kind", LEARNING)
+def test_a_failure_is_worse_than_all_others(kind):
+    """However large the other fitnesses are, and wherever the failures are."""
+
+    def steep(vector):
+        if vector[0] > 2.0:
+            return failing(vector)
+        return Evaluation(1e6 * (bowl(vector).fitness - 1e3))
+
+    batches, iterations = run(make(kind, budget=900), steep)
+    shares = [np.mean([vector[0] > 2.0 for vector in batch]) for batch in batches]
+    assert shares[0] > 0.3
+    assert fitnesses(batches[-3:]).mean() > 0.3 * fitnesses(batches[:1]).mean()
+    assert all(math.isfinite(iteration.report["mean_fitness"]) for iteration in iterations)
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_batches_that_fail_as_a_whole_teach_nothing_and_stop_nothing(kind):
+    spoilt, optimizer = 0, make(kind, budget=1200)
+    while spoilt < 240:
+        batch = optimizer.ask()
+        spoilt += len(batch)
+        assert optimizer.tell(list(map(failing, batch))).report["mean_fitness"] is None
+    batches, _ = run(optimizer)
+    assert spoilt + sum(map(len, batches)) == 1200
+    if kind in LEARNING:
+        assert fitnesses(batches).max() > -1.5
+    assert run(make(kind), failing)[1][-1].stop is not None
+
+
+@pytest.mark.parametrize("kind", BUDGETED)
+def test_a_run_killed_after_any_iteration_ends_like_one_that_was_not(kind, run_small):
+    changes = {"optimizer": kind, "evolution.max_evaluations": 90}
+    whole = run_small("whole", trials=1, changes=changes)
+    reference = read_record(whole)
+    files = [whole / "trial_00" / f"{name}.jsonl" for name in ("evaluations", "iterations")]
+    evaluations, iterations = (file.read_text().splitlines(keepends=True) for file in files)
+    for complete, line in enumerate(iterations):
+        kept = json.loads(line)["evaluations"]
+        files[0].write_text("".join(evaluations[:kept]))
+        files[1].write_text("".join(iterations[:complete]))
+        run_small("whole", resume=True)
+        assert read_record(whole) == reference
+
+
+@pytest.mark.parametrize("kind", LEARNING)
+def test_on_another_processor_a_run_is_not_resumed(kind, run_small, monkeypatch, refused):
+    """There, linear algebra, say, ends in another eigenvector: here, in another random number."""
+    changes = {"optimizer": kind, "evolution.max_evaluations": 90}
+    directory = run_small("run", trials=1, changes=changes)
+    whole = read_record(directory)
+    batch = json.loads((directory / "trial_00/iterations.jsonl").read_text().splitlines()[0])
+    name = type(kind).__name__
+    monkeypatch.setattr(f"tetra_drake.optimizers.{name}", elsewhere(name))
+    line = f"line {batch['evaluations'] + 1}"
+    with refused(directory / "trial_00" / "evaluations.jsonl", line, "processor"):
+        run_small("run", resume=True)
+    assert read_record(directory) == whole
+
+
+def elsewhere(name):
+    """The optimiser with a generator that is in another state from the second batch on."""
+
+    class Elsewhere(getattr(optimizers, name)):
+        def tell(self, evaluations):
+            self._generator.random()
+            return super().tell(evaluations)
+
+    return Elsewhere
+
+
+# CMA-ES
+
+
+def test_it_begins_with_a_random_sample_and_goes_on_from_the_mean_of_its_best_quarter():
+    batches, iterations = run(make(CmaEs(sample=32, sigma=1e-9), seed=8, budget=60))
+    generator, space = np.random.default_rng(8), ParameterSpace.of(small_scenario())
+    np.testing.assert_allclose(batches[0], [space.random(generator) for _ in range(32)])
+    best = sorted(batches[0], key=lambda vector: bowl(vector).fitness)[-8:]
+    np.testing.assert_allclose(batches[1] - np.mean(best, axis=0), 0.0, atol=1e-6)
+    first, second = (iteration.report["sigma"] for iteration in iterations[:2])
+    assert (first, second) == (None, pytest.approx(1e-9, rel=1e-4))
+
+
+def test_without_a_sample_it_starts_in_the_middle_as_wide_as_sigma_says():
+    (batch, *_), _ = run(make(CmaEs(sample=0, population=400, sigma=0.1), budget=400))
+    widths = np.array([2.4] * 24 + [0.3])  # of [1, 3.4] and [0.2, 0.5] s
+    middle = np.array([2.2] * 24 + [0.35])
+    deviations = (np.array(batch)[:, :-1] - middle) / widths
+    # Of 400 numbers: the standard error of the mean is 0.005, of the deviation 0.0035.
+    np.testing.assert_allclose(deviations.mean(axis=0), 0.0, atol=0.02)
+    np.testing.assert_allclose(deviations.std(axis=0), 0.1, atol=0.015)
+
+
+def test_the_best_of_several_searches_goes_on():
+    kind = CmaEs(population=10, sample=10, starts=5, tryout=45, sigma=0.01, tolerance=1e-9)
+    batches, iterations = run(make(kind, budget=300))
+    starts = [iteration.report["start"] for iteration in iterations]
+    tried, after = starts[1:16], starts[16:]
+    assert tried == [0] * 5 + [1] * 5 + [2] * 5  # a fourth one would take more than 150 in all
+    best = max(range(3), key=lambda i: fitnesses(batches[1 + 5 * i : 6 + 5 * i]).max())
+    assert set(after) == {best}
+    ranked = sorted(batches[0], key=lambda vector: bowl(vector).fitness)[::-1]
+    for batch, start in zip((batches[6], batches[11]), ranked, strict=False):
+        assert np.abs(np.mean(batch, axis=0) - start)[:-2].max() < 4 * 0.01 * 2.4 / np.sqrt(10)
+
+
+def test_it_begins_anew_and_larger_around_its_best_where_it_has_converged():
+    kind, small = CmaEs(population=6, growth=1.5), {"robot.tetrahedra": 3}
+    batches, iterations = run(make(kind, budget=3000, **small))  # four weights and tau_A
+    reports = [iteration.report for iteration in iterations]
+    assert {(0, 6), (1, 9), (2, 14)} <= {(r["restart"], r["population"]) for r in reports[1:-1]}
+    first = next(i for i, report in enumerate(reports) if report["restart"] == 1)
+    assert reports[first - 1]["sigma"] < kind.tolerance
+    assert reports[first]["sigma"] == pytest.approx(kind.sigma, rel=1e-4)
+    best = max(np.concatenate(batches[:first]), key=lambda vector: bowl(vector).fitness)
+    assert np.abs(np.mean(batches[first], axis=0) - best)[:-2].max() < 3 * 0.2 * 2.4 / 3
+
+
+# Quality-diversity
+
+
+def walker(vector):
+    """As bowl(), but every seventh vector fails, and every seventh lacks a measure."""
+    chance = zlib.crc32(vector.tobytes()) % 7
+    if chance == 0:
+        return failing(vector)
+    return (
+        dataclasses.replace(bowl(vector), metrics={"lifted": 0.5}) if chance == 1 else bowl(vector)
+    )
+
+
+def cells(batches):
+    """By the cells of the default map, the greatest fitness above the floor."""
+    best = {}
+    for vector in np.concatenate(batches):
+        found = walker(vector)
+        if len(found.metrics) == 2 and found.fitness > DIVERSE.floor:
+            x, y = found.metrics["travelling_index"], found.metrics["lifted"]
+            cell = tuple(np.clip([int(20 * x), int(20 * (y - 0.4) / 0.2)], 0, 19).tolist())
+            best[cell] = max(found.fitness, best.get(cell, -math.inf))
+    return best
+
+
+def test_elites_are_the_cells_of_gaits_above_the_floor_that_have_not_failed():
+    batches, iterations = run(make(DIVERSE), walker)
+    found = [len(cells(batches[: i + 1])) for i in range(len(batches))]
+    assert [iteration.report["elites"] for iteration in iterations] == found
+    assert found[-1] > 30
+    _, iterations = run(make(QualityDiversity(batch=10)))  # the bowl is below 0 everywhere
+    assert iterations[-1].report["elites"] == 0
+
+
+def test_the_map_is_fuller_and_fitter_than_that_of_random_search():
+    runs = (run(make(kind, budget=4000), walker) for kind in (DIVERSE, RandomSearch()))
+    ours, theirs = (cells(batches) for batches, _ in runs)
+    assert len(ours) > 1.2 * len(theirs)
+    assert np.median([ours[cell] - theirs[cell] for cell in ours.keys() & theirs.keys()]) > 2.0
+
+
+def test_without_pyribs_it_is_refused(monkeypatch, refused):
+    monkeypatch.setitem(sys.modules, "ribs", None)
+    with refused("optimizer", "", "tetra_drake[qd]"):
+        optimizer_of(QualityDiversity())

@@ -1,0 +1,257 @@
+"""The thesis's algorithm: its operators' statistics and bounds, an iteration of the listing by
+hand, and the optimiser as a whole, told the fitness of a cheap function."""
+
+import math
+
+import numpy as np
+import pytest
+from helpers.analytic import small_scenario
+
+from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.optimizers.steady_state import (
+    SteadyState,
+    cross_over,
+    draw_mutation,
+    find_place,
+    has_levelled_off,
+    mean_fitness,
+    mutate,
+    select_parent,
+    select_victim,
+)
+from tetra_drake.robot.gait import TAU_A, TAU_B, ParameterSpace
+
+DRAWS = 2000
+
+
+class Script:
+    """A generator that deals prepared numbers, as a person following the listing would."""
+
+    def __init__(self, *numbers):
+        self.numbers = list(numbers)
+
+    def random(self, size):
+        row = np.array(self.numbers.pop(0))
+        assert row.shape == (size,)
+        return row
+
+    def integers(self, low, high, size):
+        return self.random(size)
+
+
+@pytest.fixture
+def generator():
+    return np.random.default_rng(7)
+
+
+# Operators
+
+
+def test_tournaments_of_five_are_drawn_with_replacement(generator):
+    fitnesses = np.arange(50.0)
+    options = {"tournament": 5, "generator": generator}
+    parents = np.array([select_parent(fitnesses, **options) for _ in range(20 * DRAWS)])
+    victims = np.array([select_victim(fitnesses, **options) for _ in range(20 * DRAWS)])
+    for member in (1, 10, 25, 40, 48):
+        # The best of five of 50 is at most m with probability ((m + 1) / 50)^5.
+        assert (parents <= member).mean() == pytest.approx(((member + 1) / 50) ** 5, abs=0.01)
+        assert (victims >= member).mean() == pytest.approx(((50 - member) / 50) ** 5, abs=0.01)
+
+
+def test_failed_members_lose_every_tournament_and_do_not_count_in_the_mean():
+    fitnesses = np.array([-math.inf, -3.0, -math.inf])
+    assert select_parent(fitnesses, tournament=3, generator=Script([0, 1, 2])) == 1
+    assert select_victim(fitnesses, tournament=3, generator=Script([0, 1, 1])) == 0
+    assert mean_fitness(fitnesses) == -3.0
+    assert math.isnan(mean_fitness(fitnesses[:1]))
+
+
+@pytest.mark.parametrize("probability", [0.0, 0.2, 1.0])
+def test_each_parameter_is_swapped_with_the_probability(generator, probability):
+    swapped = []
+    for _ in range(DRAWS):
+        first, second = cross_over(
+            np.zeros(26), np.ones(26), probability=probability, generator=generator
+        )
+        np.testing.assert_array_equal(first + second, 1.0)
+        swapped.append(first)
+    # The standard deviation of a mean of 2000 is at most 0.009, and 0.0018 of all 26.
+    tolerance = 0.04 if 0.0 < probability < 1.0 else 0.0
+    np.testing.assert_allclose(np.mean(swapped, axis=0), probability, atol=tolerance)
+    assert np.mean(swapped) == pytest.approx(probability, abs=0.15 * tolerance)
+
+
+def test_seven_tenths_of_the_parameters_move_by_up_to_their_step(scenario, generator):
+    steps = ParameterSpace.of(scenario).steps
+    rows = np.array(
+        [draw_mutation(steps, probability=0.7, generator=generator) for _ in range(DRAWS)]
+    )
+    moved = rows != 0.0
+    np.testing.assert_allclose(moved.mean(axis=0), 0.7, atol=0.04)
+    assert moved.mean() == pytest.approx(0.7, abs=0.006)
+    assert (rows[moved] > 0.0).mean() == pytest.approx(0.5, abs=0.01)
+    sizes = np.abs(rows) / steps
+    assert 0.999 < sizes.max() <= 1.0
+    assert sizes[moved].mean() == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_parameter_that_a_mutation_would_take_to_its_floor_stays():
+    vector = np.array([0.15, 0.15, 0.1, 0.22, 0.44, 0.1])
+    floors = np.array([0.0, 0.0, 0.0, 0.2, 0.4, 0.2])
+    mutation = np.array([-0.2, -0.1, -0.1, -0.03, 0.1, 0.05])
+    child = mutate(vector, mutation=mutation, floors=floors)
+    # The last one, below its floor, can still grow.
+    np.testing.assert_allclose(child, [0.15, 0.05, 0.1, 0.22, 0.54, 0.15])
+
+
+@pytest.mark.parametrize(
+    ("fitness", "place"), [(3.5, 2), (2.0, 1), (1.0, None), (0.5, None), (-math.inf, None)]
+)
+def test_a_child_replaces_the_worst_of_its_tournament_or_else_of_all(fitness, place):
+    fitnesses = np.array([5.0, 1.0, 3.0, 4.0])
+    script = Script([0, 2, 3])
+    assert find_place(fitnesses, fitness, tournament=3, generator=script) == place
+
+
+@pytest.mark.parametrize(
+    ("iterations", "rise", "stops"),
+    [(200, 0.0, False), (201, 0.0, True), (201, 0.029, True), (201, 0.031, False)],
+)
+def test_the_stop_rule_looks_a_hundred_iterations_back_after_the_200th(iterations, rise, stops):
+    means = [0.0] * iterations + [rise]
+    assert has_levelled_off(means, rise=0.03, window=100, after=200) is stops
+    assert not has_levelled_off(means, rise=0.03, window=300, after=0)
+
+
+def test_one_iteration_as_the_listing_goes_through_it(scenario):
+    """A.3 for two weights and tau: two tournaments, crossover, one set of mutation numbers."""
+    population = np.array([[1.0, 2.0, 0.30, 0.60], [1.5, 2.5, 0.21, 0.42], [3.0, 0.1, 0.50, 1.00]])
+    fitnesses = np.array([4.0, 6.0, 5.0])
+    script = Script(
+        [0, 2, 0],  # can1..3 of parent 1: fitnesses 4, 5, 4
+        [1, 1, 0],  # of parent 2: 6, 6, 4
+        [0.9, 0.1, 0.81, 0.5],  # sw_prob: swap weight 1 and tau
+        [0.6, 0.4, 0.2, 0.9],  # mut_op: add, subtract, subtract, add
+        [0.31, 0.95, 0.4, 0.1],  # mut_prob: all but the last beyond 0.3
+        [0.5, 1.0, 0.8, 0.7],  # times the ranges
+        [1, 2, 2],  # places: the tournament of child 1
+        [0, 1, 1],  # of child 2
+    )
+    first = population[select_parent(fitnesses, tournament=3, generator=script)]
+    second = population[select_parent(fitnesses, tournament=3, generator=script)]
+    np.testing.assert_array_equal([first, second], population[[2, 1]])
+    first, second = cross_over(first, second, probability=0.2, generator=script)
+    np.testing.assert_array_equal(first, [1.5, 0.1, 0.21, 1.00])
+    np.testing.assert_array_equal(second, [3.0, 2.5, 0.50, 0.42])
+    steps, floors = np.array([0.2, 0.2, 0.05, 0.1]), np.array([0.0, 0.0, 0.2, 0.4])
+    row = draw_mutation(steps, probability=0.7, generator=script)
+    np.testing.assert_allclose(row, [0.1, -0.2, -0.04, 0.0])
+    space = ParameterSpace.of(scenario)
+    first, second = (
+        space.repair(mutate(child, mutation=row, floors=floors)) for child in (first, second)
+    )
+    # Child 1: weight 2 would be negative and tau below 0.2, so both stay.
+    np.testing.assert_allclose(first, [1.6, 0.1, 0.21, 0.42])
+    np.testing.assert_allclose(second, [3.1, 2.3, 0.46, 0.92])
+
+    # Child 1, fitness 4.5: the worst of its tournament has 5, so it replaces the worst of all.
+    assert find_place(fitnesses, 4.5, tournament=3, generator=script) == 0
+    fitnesses[0] = 4.5
+    # Child 2, fitness 4.7, meets child 1 in its tournament and takes its place.
+    assert find_place(fitnesses, 4.7, tournament=3, generator=script) == 0
+    assert script.numbers == []
+
+
+# The optimiser
+
+
+def evaluate(vector):
+    return Evaluation(-float(((vector[:-2] - 2.0) ** 2).sum() + abs(vector[TAU_A] - 0.25)))
+
+
+def make(scenario, seed=3):
+    generator = np.random.default_rng(seed)
+    return SteadyState(ParameterSpace.of(scenario), scenario.evolution, generator)
+
+
+def run(optimizer):
+    """All vectors asked for, batch by batch, and the iterations."""
+    batches, iterations = [], []
+    while not iterations or iterations[-1].stop is None:
+        batches.append(optimizer.ask())
+        iterations.append(optimizer.tell([evaluate(vector) for vector in batches[-1]]))
+    return batches, iterations
+
+
+def test_first_the_population_then_two_children_per_iteration():
+    optimizer = make(small_scenario(population=12, iterations=15))
+    batches, iterations = run(optimizer)
+    assert [len(batch) for batch in batches] == [12] + [2] * 15
+    assert sum(len(batch) for batch in batches) == optimizer.evaluations_at_most
+    assert iterations[0].placed == tuple(range(12))
+    assert iterations[-1].stop == "all iterations done"
+
+
+@pytest.mark.parametrize("oscillators", [2, 4, 8])
+def test_the_mean_fitness_never_falls_and_rises_much(oscillators):
+    scenario = small_scenario(oscillators=oscillators, population=20, iterations=200)
+    _, iterations = run(make(scenario))
+    means = np.array([iteration.report["mean_fitness"] for iteration in iterations])
+    assert (np.diff(means) >= -1e-12).all()
+    assert means[-1] > 0.6 * means[0]
+
+
+def test_the_generator_alone_decides_a_trial():
+    ours, theirs, others = (
+        np.concatenate(run(make(small_scenario(), seed))[0]) for seed in (3, 3, 4)
+    )
+    np.testing.assert_array_equal(ours, theirs)
+    assert not np.array_equal(ours, others)
+
+
+def test_what_is_asked_for_can_be_changed_without_harm():
+    first, second = make(small_scenario()), make(small_scenario())
+    asked = first.ask()
+    second.tell([evaluate(vector) for vector in second.ask()])
+    told = [evaluate(vector) for vector in asked]
+    for vector in asked:
+        vector[:] = 0.0
+    first.tell(told)
+    np.testing.assert_array_equal(first.ask(), second.ask())
+
+
+def vectors_of(changes):
+    """The initial population and the children of a trial of a changed scenario."""
+    batches, _ = run(make(small_scenario(iterations=100).with_changes(changes)))
+    return np.array(batches[0]), np.concatenate(batches[1:])
+
+
+def test_tau_b_is_twice_tau_a_unless_it_is_independent():
+    for vectors in vectors_of({}):
+        np.testing.assert_array_equal(vectors[:, TAU_B], 2.0 * vectors[:, TAU_A])
+        assert (vectors[:, :-2] > 0.0).all()
+        assert (vectors[:, TAU_A] >= 0.2).all()
+    _, children = vectors_of({"evolution.independent_tau_b": True})
+    assert (children[:, TAU_B] != 2.0 * children[:, TAU_A]).mean() > 0.5
+
+
+def test_with_the_listings_slip_tau_a_is_only_ever_passed_on():
+    initial, children = vectors_of({"evolution.tau_mutation": "listing"})
+    assert set(children[:, TAU_A]) <= set(initial[:, TAU_A])
+    np.testing.assert_array_equal(children[:, TAU_B], 2.0 * children[:, TAU_A])
+
+
+def test_a_fixed_tau_stays():
+    for vectors in vectors_of({"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}):
+        np.testing.assert_array_equal(vectors[:, TAU_A], 0.3)
+        np.testing.assert_array_equal(vectors[:, TAU_B], 0.6)
+
+
+def test_a_trial_ends_when_the_mean_fitness_levels_off_and_not_for_want_of_one():
+    changes = {"evolution.stop_after": 20, "evolution.stop_window": 10}
+    level, failing = (make(small_scenario(iterations=100).with_changes(changes)) for _ in range(2))
+    for iteration in range(22):
+        told = level.tell([Evaluation(1.0)] * len(level.ask()))
+        assert told.stop == ("mean fitness levelled off" if iteration == 21 else None)
+        told = failing.tell([Evaluation.failed("fell")] * len(failing.ask()))
+        assert (told.report, told.stop) == ({"mean_fitness": None}, None)

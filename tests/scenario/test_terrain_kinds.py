@@ -1,0 +1,339 @@
+"""Terrains: the grids they become, the surfaces drawn from those, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.terrain_kinds import (
+    Flat,
+    Grid,
+    HeightField,
+    Incline,
+    Obstacles,
+    Rough,
+    Steps,
+    Terrain,
+    make_grid,
+)
+
+IN = 0.0254
+AHEAD = 20.0 * IN
+
+KINDS: list[Terrain] = [
+    Incline(slope=0.1),
+    Incline(slope=-0.2, start=0.5),
+    Steps(height=0.25 * IN, depth=12 * IN, count=4),
+    Steps(height=-0.1, depth=0.1, count=2, start=-0.3),
+    Rough(amplitude=0.25 * IN, wavelength=6 * IN),
+    Rough(amplitude=0.01, wavelength=2000.0),
+    Obstacles(height=0.01, radius=0.02, spacing=0.2),
+    Obstacles(height=0.01, radius=0.7, spacing=0.1, start=-3.0),
+]
+
+
+def grid_of(terrain: Terrain) -> Grid:
+    return make_grid(terrain, ahead=AHEAD, source="file")
+
+
+def points(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """x of the rows and y of the columns."""
+    x, y = (
+        corner + cell * np.arange(size)
+        for corner, cell, size in zip(grid.corner, grid.cell, grid.heights.shape, strict=True)
+    )
+    return x, y
+
+
+def surface(grid: Grid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The biquadratic B-spline at points inside: each of 3 x 3 heights around with its weight."""
+    x, y = np.broadcast_arrays(x, y)
+    rows, columns = (x - grid.corner[0]) / grid.cell[0], (y - grid.corner[1]) / grid.cell[1]
+
+    def weights(t: np.ndarray) -> list[np.ndarray]:
+        return [0.5 * (0.5 - t) ** 2, 0.75 - t**2, 0.5 * (0.5 + t) ** 2]
+
+    i, j = np.rint(rows).astype(int), np.rint(columns).astype(int)
+    along, across = weights(rows - i), weights(columns - j)
+    return sum(
+        along[a] * across[b] * grid.heights[i + a - 1, j + b - 1]
+        for a in range(3)
+        for b in range(3)
+    )
+
+
+@pytest.fixture
+def across() -> tuple[np.ndarray, np.ndarray]:
+    """x and y of points all over the area that grids cover, the same in each run."""
+    return tuple(
+        np.random.default_rng(0).uniform(*np.multiply(limits, IN), 4000)
+        for limits in ((-24, 120), (-30, 30))
+    )
+
+
+def test_flat_ground_is_a_grid_of_zeros():
+    assert np.array_equal(grid_of(Flat()).heights, np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("terrain", KINDS, ids=repr)
+def test_a_grid_covers_the_way_and_more(terrain):
+    # Half a cell within its outermost heights, the surface has all the heights it is made of.
+    grid = grid_of(terrain)
+    x, y = points(grid)
+    half = 0.5 * np.array(grid.cell)
+    assert x[0] + half[0] <= -24 * IN and x[-1] - half[0] >= 120 * IN
+    assert y[0] + half[1] <= -30 * IN and y[-1] - half[1] >= 30 * IN
+    assert min(grid.heights.shape) >= 3
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.09, -0.5, np.pi / 3])
+def test_an_incline_is_a_plane_through_the_origin(slope, across):
+    x, y = across
+    heights = surface(grid_of(Incline(slope=slope)), x, y)
+    np.testing.assert_allclose(heights, np.tan(slope) * x, atol=1e-12)
+
+
+def test_an_incline_with_a_start_is_flat_before_it(across):
+    x, y = across
+    heights = surface(grid_of(Incline(slope=0.3, start=0.401)), x, y)
+    far = abs(x - 0.401) > 0.75 * IN  # of cells of 0.5 in: the reach of a height
+    np.testing.assert_allclose(heights[far], np.tan(0.3) * np.maximum(0, x - 0.401)[far], atol=1e-9)
+    assert (heights[x < 0.401 - 0.75 * IN] == 0.0).all()
+
+
+@pytest.mark.parametrize("height", [0.25 * IN, -0.25 * IN, 5 * IN])
+@pytest.mark.parametrize("start", [None, -0.1])
+def test_stairs_have_their_treads_and_edges_in_place(height, start):
+    depth, count = 10.1 * IN, 3
+    grid = grid_of(Steps(height=height, depth=depth, count=count, start=start))
+    first = AHEAD if start is None else start
+    steps = np.arange(count)
+    treads = surface(grid, first + (np.arange(-1, count + 2) + 0.5) * depth, 0.01)
+    np.testing.assert_allclose(treads, height * np.array([0, 1, 2, 3, 3, 3]), atol=1e-12)
+    edges = surface(grid, first + steps * depth, -0.2)
+    np.testing.assert_allclose(edges, height * (steps + 0.5), atol=1e-12)
+    # Level again a cell away, which is at most the height of a step.
+    beside = surface(grid, first + steps * depth + min(abs(height), depth / 4), 0.0)
+    np.testing.assert_allclose(beside, height * (steps + 1), atol=1e-12)
+
+
+def test_steps_of_no_height_are_flat():
+    assert not grid_of(Steps(height=0.0, depth=0.1, count=2)).heights.any()
+
+
+def test_rough_heights_are_uniform_and_never_above_the_floor():
+    heights = grid_of(Rough(amplitude=0.3, wavelength=0.06)).heights
+    assert -0.6 <= heights.min() < -0.599 and -0.001 < heights.max() <= 0.0
+    spread = 0.6 / np.sqrt(12.0)
+    assert abs(heights.mean() + 0.3) < 5 * spread / np.sqrt(heights.size)
+    assert heights.std() == pytest.approx(spread, rel=0.02)
+    for axis in (0, 1):  # independent of the neighbour
+        pairs = np.moveaxis(heights + 0.3, axis, 0)
+        assert abs((pairs[1:] * pairs[:-1]).mean()) < 5 * spread**2 / np.sqrt(heights.size)
+
+
+def test_rough_heights_stand_every_half_wavelength():
+    assert grid_of(Rough(amplitude=0.3, wavelength=0.5)).cell == (0.25, 0.25)
+
+
+def test_a_seed_is_one_ground_on_every_machine():
+    first, again, other = (
+        grid_of(Rough(amplitude=0.5, wavelength=0.5, seed=seed)).heights for seed in (0, 0, 1)
+    )
+    # numpy's default_rng(0).random(3)
+    known = np.array([0.6369616873214543, 0.2697867137638703, 0.04097352393619469])
+    np.testing.assert_allclose(first[0, :3], known - 1.0, rtol=1e-14)
+    assert np.array_equal(first, again)
+    assert (first != other).all()
+    bumps = [
+        grid_of(Obstacles(height=1.0, radius=0.1, spacing=0.5, seed=seed)).heights
+        for seed in (3, 3, 4)
+    ]
+    assert np.array_equal(bumps[0], bumps[1])
+    assert not np.array_equal(bumps[0], bumps[2])
+
+
+@pytest.mark.parametrize("start", [None, 0.333])
+def test_ground_is_flat_before_its_start(start, across):
+    x, y = across
+    kinds = [Obstacles(height=0.1, radius=0.1, spacing=0.15, start=start)]
+    kinds += [Rough(amplitude=0.1, wavelength=0.2, start=start)] if start else []
+    for terrain in kinds:
+        heights = surface(grid_of(terrain), x, y)
+        first = AHEAD if start is None else start
+        assert (heights[x <= first] == 0.0).all()
+        assert (heights[x > first + 0.5] != 0.0).mean() > 0.5
+
+
+def test_one_bump_stands_in_each_square():
+    # A paraboloid's volume is half its cylinder's; bumps this small seldom overlap.
+    height, radius, spacing, start = 0.1, 0.01, 0.127, 0.0
+    grid = grid_of(Obstacles(height=height, radius=radius, spacing=spacing, start=start))
+    assert 0.99 * height < grid.heights.max() <= height
+    first = start + radius + 0.75 * radius
+    x, y = points(grid)
+    rows, columns = np.ceil((120 * IN - first) / spacing), 60 * IN / spacing
+    volume = grid.heights.sum() * np.prod(grid.cell)
+    one = 0.5 * np.pi * radius**2 * height
+    assert volume == pytest.approx(rows * columns * one, rel=0.02)
+    for i, j in np.ndindex(int(rows) - 1, int(columns)):
+        left, right = first + i * spacing, -30 * IN + j * spacing
+        inside = abs(x - left - spacing / 2) < spacing / 2 + radius
+        beside = abs(y - right - spacing / 2) < spacing / 2 + radius
+        assert grid.heights[np.ix_(inside, beside)].max() > 0.5 * height
+
+
+def test_where_bumps_overlap_the_highest_counts():
+    grid = grid_of(Obstacles(height=0.1, radius=0.3, spacing=0.02, start=-1.0))
+    x, y = points(grid)
+    inner = grid.heights[np.ix_((x > 0) & (x < 2.5), abs(y) < 0.5)]
+    # A centre is within 0.03 m of every point: squares of 0.02 m.
+    assert 0.1 * (1 - 0.03**2 / 0.3**2) < inner.min() <= inner.max() <= 0.1
+
+
+@pytest.mark.parametrize(
+    ("terrain", "key"),
+    [
+        (Steps(height=0.1, depth=1e-7, count=2), "depth"),
+        (Steps(height=-1e-7, depth=0.1, count=2), "height"),
+        (Rough(amplitude=0.1, wavelength=1e-3), "wavelength"),
+        (Rough(amplitude=0.1, wavelength=1e-200), "wavelength"),
+        (Obstacles(height=0.1, radius=1e-3, spacing=0.1), "radius"),
+        (Obstacles(height=0.1, radius=0.1, spacing=1e-3), "spacing"),
+    ],
+    ids=repr,
+)
+def test_a_terrain_of_too_many_cells_is_refused(terrain, key, refused):
+    with refused("file", f"terrain.{key}", "4000000"):
+        grid_of(terrain)
+
+
+# Height files
+
+HEIGHTS = np.array([[0.0, 1.0, 2.0, 3.0], [0.5, -1.0, 2.5, 1e-3], [4.0, 5.0, 6.0, 7.0]])
+
+
+def write_heights(file: Path, heights: np.ndarray) -> None:
+    if file.suffix == ".npy":
+        np.save(file, heights)
+    else:
+        np.savetxt(file, heights, delimiter=", " if file.suffix == ".csv" else " ", header="x, y")
+
+
+def field(file: Path, **settings: object) -> HeightField:
+    return HeightField(file=str(file), cell=0.5, **settings)
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".csv", ".txt"])
+def test_a_height_file_has_rows_along_x(tmp_path, suffix):
+    file = tmp_path / f"heights{suffix}"
+    write_heights(file, HEIGHTS)
+    grid = grid_of(field(file))
+    assert np.array_equal(grid.heights, HEIGHTS)
+    assert (grid.corner, grid.cell) == ((-0.5, -0.75), (0.5, 0.5))  # centred: 1 by 1.5 m
+    assert grid_of(field(file, corner=[1.0, -2.0])).corner == (1.0, -2.0)
+
+
+def test_whole_numbers_are_heights(tmp_path):
+    write_heights(tmp_path / "heights.npy", np.arange(9, dtype=np.int16).reshape(3, 3))
+    heights = grid_of(field(tmp_path / "heights.npy")).heights
+    assert np.array_equal(heights, np.arange(9.0).reshape(3, 3))
+    assert heights.dtype == float
+
+
+def with_value(value: float) -> np.ndarray:
+    heights = HEIGHTS.copy()
+    heights[1, 2] = value
+    return heights
+
+
+@pytest.mark.parametrize(
+    ("heights", "found"),
+    [
+        (with_value(np.nan), "nan in row 2, column 3"),
+        (with_value(-np.inf), "-inf in row 2, column 3"),
+        (HEIGHTS[:2], "2 x 4"),
+        (HEIGHTS[:, :2], "3 x 2"),
+        (HEIGHTS[0], "4"),
+        (HEIGHTS[None], "1 x 3 x 4"),
+        (np.array(1.0), "a single number"),
+        (HEIGHTS.astype(str), "heights.npy"),
+        (HEIGHTS + 1j, "heights.npy"),
+        (np.array([[{}] * 3] * 3), "heights.npy"),
+    ],
+    ids=lambda value: None if isinstance(value, np.ndarray) else value,
+)
+def test_what_are_no_heights_is_refused(tmp_path, heights, found, refused):
+    np.save(tmp_path / "heights.npy", heights, allow_pickle=True)
+    with refused("file", "terrain.file", found):
+        grid_of(field(tmp_path / "heights.npy"))
+
+
+@pytest.mark.parametrize("content", [b"", b"one two", b"1 2 3\n4 5\n", b"\x89PNG\x00\xff", b"1,,3"])
+@pytest.mark.parametrize("name", ["heights.npy", "heights.txt"])
+@pytest.mark.filterwarnings("error")
+def test_what_is_no_height_file_is_refused(tmp_path, name, content, refused):
+    (tmp_path / name).write_bytes(content)
+    with refused("file", "terrain.file", name):
+        grid_of(field(tmp_path / name))
+
+
+def test_a_missing_height_file_is_refused(tmp_path, refused):
+    for file in (tmp_path, tmp_path / "heights.npy", tmp_path / "heights.txt"):
+        with refused("file", "terrain.file", str(file)):
+            grid_of(field(file))
+
+
+# In scenario files
+
+
+def scenario_file(folder: Path, terrain: str, base: str = "thesis") -> Path:
+    file = folder / "scenario.yaml"
+    folder.mkdir(exist_ok=True)
+    file.write_text(f"base: {base}\n{terrain}\n")
+    return file
+
+
+def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hills").mkdir()
+    write_heights(tmp_path / "hills" / "heights.csv", HEIGHTS)
+    file = scenario_file(tmp_path / "hills", "terrain: !HeightField {file: heights.csv, cell: 5 m}")
+    absolute = HeightField(file=str(tmp_path / "hills" / "heights.csv"), cell=5.0)
+    assert load_scenario(file.relative_to(tmp_path)).terrain == absolute
+    based = scenario_file(tmp_path / "mine", "terrain: !HeightField {cell: 1 m}", base=str(file))
+    assert load_scenario(based).terrain == HeightField(file=absolute.file, cell=1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "found"),
+    [
+        ("!HeightField {file: none.csv, cell: 1 in}", "file", "none.csv"),
+        ("!HeightField {file: /dev/zero, cell: 1 in}", "file", "device"),
+        ("!HeightField {file: none.csv, cell: 1}", "cell", "1 without a unit"),
+        ("!HeightField {file: none.csv, cell: 1 m, corner: [1 m]}", "corner", "1 items"),
+        ("!Incline {slope: 95 deg}", "slope", "1.047 rad"),
+        ("!Incline {slope: -61 deg}", "slope", "'-61 deg'"),
+        ("!Incline {slope: 0.1}", "slope", "0.1 without a unit"),
+        ("!Steps {height: 1 in, depth: 0 in, count: 1}", "depth", "'0 in'"),
+        ("!Steps {height: 1 in, depth: 1 in, count: 0}", "count", "0"),
+        ("!Rough {amplitude: -1 in, wavelength: 1 in}", "amplitude", "'-1 in'"),
+        ("!Rough {amplitude: 1 in, wavelength: 1 in, seed: -1}", "seed", "-1"),
+        ("!Rough {amplitude: 1 in, wavelength: 1 um}", "wavelength", "5e-07 m"),
+        ("!Obstacles {height: 0 in, radius: 1 in, spacing: 1 in}", "height", "'0 in'"),
+        ("!Obstacles {height: 1 in, radius: 1 in}", "spacing", "missing"),
+    ],
+)
+def test_a_bad_terrain_is_refused_when_its_file_is_loaded(tmp_path, text, key, found, refused):
+    file = scenario_file(tmp_path, f"terrain: {text}")
+    with refused(file, f"terrain.{key}", found):
+        load_scenario(file)
+
+
+@pytest.mark.parametrize("slope", ["60 deg", "-60 deg"])
+def test_a_slope_of_60_degrees_is_allowed(tmp_path, slope):
+    terrain = load_scenario(
+        scenario_file(tmp_path, f"terrain: !Incline {{slope: {slope}}}")
+    ).terrain
+    assert abs(terrain.slope) == pytest.approx(np.pi / 3, rel=1e-15)

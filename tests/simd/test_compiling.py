@@ -1,0 +1,243 @@
+"""Where compiled kernels are kept. A copy of the package runs in a fresh process, with a plain
+file where its cache folder would be: unwritable even for root."""
+
+import logging
+import os
+import random
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from unittest.mock import Mock
+
+import numba
+import pytest
+
+import tetra_drake
+from tetra_drake.simd.compiling import LOGGER, announce, compiled
+
+PROGRAM = (
+    "from tetra_drake.physics.mode_change import first_zero;print(first_zero(1.0, -0.5, 0.0, 9.0))"
+)
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A read-only installation."""
+    target = tmp_path / "installed" / "tetra_drake"
+    without_cache = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(Path(tetra_drake.__file__).parent, target, ignore=without_cache)
+    (target / "physics" / "__pycache__").write_text("in the way")
+    return target.parent
+
+
+def run(package: Path, cache_home: Path, program: str = PROGRAM) -> str:
+    """What the program prints."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
+    environment |= {"PYTHONPATH": str(package), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment |= {"XDG_CACHE_HOME": str(cache_home), "HOME": str(cache_home)}
+    command = [sys.executable, "-c", program]
+    return subprocess.check_output(command, env=environment, cwd=package, text=True)
+
+
+@pytest.mark.parametrize(("folder", "caches"), [("cache", True), ("file/cache", False)])
+def test_a_read_only_installation_caches_in_the_users_folder_if_it_can(
+    package, tmp_path, folder, caches
+):
+    (tmp_path / "file").write_text("")
+    assert float(run(package, tmp_path / folder)) == pytest.approx(2.0)
+    assert any(tmp_path.rglob("mode_change.first_zero*.nbc")) == caches
+
+
+@pytest.mark.parametrize("folder", ["physics", "elsewhere/deeper"])
+def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(package, tmp_path, folder):
+    # outer() calls inner(), which uses a constant of a third module; they may be in any folder.
+    kernels = package / "tetra_drake" / folder
+    kernels.mkdir(parents=True, exist_ok=True)
+    name = f"tetra_drake.{folder.replace('/', '.')}"
+    begin = "from tetra_drake.simd.compiling import compiled\n"
+    (kernels / "constant.py").write_text("VALUE = 1.0\n")
+    (kernels / "inner.py").write_text(
+        f"{begin}from {name}.constant import VALUE\n@compiled\ndef inner():\n    return VALUE\n"
+    )
+    (kernels / "outer.py").write_text(
+        f"{begin}from {name}.inner import inner\n@compiled\ndef outer():\n    return inner()\n"
+    )
+    program = f"from {name}.outer import outer;print(outer(), sum(outer.stats.cache_hits.values()))"
+    if folder != "physics":  # keeps numba from writing beside the sources, as there
+        (kernels / "__pycache__").write_text("in the way")
+
+    def value_and_hits() -> list[str]:
+        return run(package, tmp_path / "cache", program).split()
+
+    assert value_and_hits() == ["1.0", "0"]
+    assert value_and_hits() == ["1.0", "1"]
+    (kernels / "constant.py").write_text("VALUE = 2.0\n")
+    assert value_and_hits() == ["2.0", "0"]
+
+
+TWICE = """
+from tetra_drake.simd.compiling import compiled
+
+@compiled
+def twice(x):
+    return x + x
+"""
+
+AT_ONCE = """
+import os, sys, time
+from pathlib import Path
+from twice import twice
+
+replace = os.replace
+
+def wait(*paths):  # until another process, too, is about to write
+    os.replace = replace
+    Path(sys.argv[1]).touch()
+    while not Path(sys.argv[2]).exists():
+        time.sleep(0.01)
+    replace(*paths)
+
+os.replace = wait
+print(twice(eval(sys.argv[3])))
+"""
+
+
+def test_processes_that_save_at_once_do_not_spoil_the_cache(package, tmp_path):
+    (package / "twice.py").write_text(TWICE)
+    environment = os.environ | {"PYTHONPATH": str(package), "NUMBA_CACHE_DIR": str(tmp_path)}
+    here, there = str(tmp_path / "here"), str(tmp_path / "there")
+
+    def start(*arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", *arguments]
+        return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+
+    both = start(AT_ONCE, here, there, "21"), start(AT_ONCE, there, here, "0.25")
+    assert [process.communicate(timeout=60)[0] for process in both] == ["42\n", "0.5\n"]
+    later = (
+        "from twice import twice; print(twice(21), twice(0.25), *twice.stats.cache_hits.values())"
+    )
+    assert start(later).communicate(timeout=60)[0].split() == ["42", "0.5", "1", "1"]
+
+
+def twice(x):
+    return x + x
+
+
+def half(x):
+    return 0.5 * x
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Where numba keeps machine code."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def files(folder: Path, kernel: str = "") -> list[Path]:
+    return sorted(file for file in folder.rglob(f"*.{kernel}*.nbc") if file.is_file())
+
+
+def results_and_hits() -> list[float]:
+    """Of kernels compiled or loaded anew: results for an integer and a real number, and how often
+    the cache helped."""
+    kernels = compiled(twice), compiled(half)
+    results = [kernel(x) for kernel in kernels for x in (3, 0.25)]
+    return [*results, sum(sum(kernel.stats.cache_hits.values()) for kernel in kernels)]
+
+
+def truncate(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:-100])
+
+
+def empty(file: Path) -> None:
+    file.write_bytes(b"")
+
+
+def flip_a_bit(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    content[random.Random(1).randrange(len(content))] ^= 4
+    file.write_bytes(content)
+
+
+def swap_with_another(file: Path) -> None:
+    other = next(path for path in files(file.parent) if path != file)
+    content = file.read_bytes()
+    file.write_bytes(other.read_bytes())
+    other.write_bytes(content)
+
+
+@pytest.mark.parametrize("damage", [truncate, empty, flip_a_bit, swap_with_another, Path.unlink])
+def test_damaged_machine_code_is_made_again(folder, damage):
+    assert results_and_hits() == [6, 0.5, 1.5, 0.125, 0]
+    assert results_and_hits() == [6, 0.5, 1.5, 0.125, 4]
+    for file in files(folder):
+        damage(file)
+        *results, hits = results_and_hits()
+        assert results == [6, 0.5, 1.5, 0.125]
+        assert hits < 4
+        assert results_and_hits() == [6, 0.5, 1.5, 0.125, 4]
+    assert len(files(folder)) == 4
+
+
+def test_machine_code_that_can_be_neither_read_nor_replaced_is_no_reason_to_stop(folder):
+    results_and_hits()
+    for file in files(folder, "twice"):
+        file.unlink()
+        (file / "in the way").mkdir(parents=True)
+    assert results_and_hits() == [6, 0.5, 1.5, 0.125, 2]
+
+
+def test_values_of_a_closure_are_never_those_of_an_earlier_one(folder):
+    def make(factor):
+        def times(x):
+            return factor * x
+
+        return compiled(times)
+
+    assert [make(factor)(2.0) for factor in (3.0, 5.0)] == [6.0, 10.0]
+
+
+@pytest.fixture
+def timers(monkeypatch):
+    """In place of timers, which would run out while a kernel is compiled: what they were given."""
+    made: list[Mock] = []
+
+    def timer(*given: object) -> Mock:
+        made.append(Mock(given=given))
+        return made[-1]
+
+    monkeypatch.setattr("threading.Timer", timer)
+    return made
+
+
+def test_only_compilation_that_takes_longer_than_a_moment_is_announced(folder, timers):
+    compiled(twice)(0.25)
+    (timer,) = timers
+    assert [call[0] for call in timer.method_calls] == ["start", "cancel"]
+    _, function, arguments = timer.given
+    assert (function, arguments) == (announce, [True])
+    compiled(twice)(0.25)  # from the cache
+    assert timers == [timer]
+
+
+def test_compilation_is_announced_once(caplog):
+    announce.cache_clear()
+    announce(True)
+    announce(True)
+    assert [(record.name, record.levelno) for record in caplog.records] == [
+        (LOGGER, logging.WARNING)
+    ]
+
+
+def test_a_plain_script_shows_the_announcement_and_may_silence_it():
+    say = "from tetra_drake.simd.compiling import LOGGER, announce; import logging; "
+    silence = "logging.getLogger(LOGGER).setLevel(logging.ERROR); "
+
+    def shown(program: str) -> str:
+        command = [sys.executable, "-c", program]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stderr
+
+    assert "tetra_drake" in shown(say + "announce(True)")
+    assert shown(say + silence + "announce(True)") == ""

@@ -1,0 +1,357 @@
+"""evolve(): what the command does, from Python; and the command evolve."""
+
+import contextlib
+import json
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import pandas
+import pytest
+from helpers.analytic import Bowl, RandomSearch, read_record, small_scenario
+from helpers.meshcat_page import commands, read_page
+
+import tetra_drake
+from tetra_drake import cli
+from tetra_drake.analysis.elites import elites
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.progress import Progress
+from tetra_drake.evolution.reevaluation import reevaluate
+from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run_record import read_manifest
+from tetra_drake.optimizers.steady_state import SteadyState
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity
+from tetra_drake.scenario.terrain_kinds import Steps
+
+
+@pytest.fixture
+def tiny():
+    """Four gaits and two iterations of 0.3 s on the compiled engine."""
+    return small_scenario(population=4, iterations=2, trials=1).with_changes(
+        {
+            "simulation.engine": "compiled",
+            "simulation.duration": "0.3 s",
+            "simulation.steady_from": "0.1 s",
+            "cpg.start_up": 0.0,
+        }
+    )
+
+
+@pytest.fixture
+def reports(monkeypatch):
+    """The directories of which a report was asked; none is written."""
+    written = []
+    monkeypatch.setattr("tetra_drake.report.run_page.write_report", written.append)
+    return written
+
+
+@dataclass(frozen=True)
+class Heaviest:
+    """Another objective."""
+
+    factor: float = 1.0
+
+    def __call__(self, result):
+        return self.factor * (1.0 + result.metrics.distance)
+
+
+@pytest.fixture
+def interrupting():
+    """An executor that ends a run by Ctrl-C after three tasks, of one or more evaluations."""
+
+    class Interrupting(ThreadPoolExecutor):
+        left = 3
+
+        def submit(self, *arguments):
+            Interrupting.left -= 1
+            if Interrupting.left < 0:
+                raise KeyboardInterrupt
+            return super().submit(*arguments)
+
+    return Interrupting
+
+
+class Told(Progress):
+    """Keeps what it is told."""
+
+    def __init__(self):
+        self.warnings, self.stages, self.shown = [], [], []
+
+    def warn(self, text):
+        self.warnings.append(text)
+
+    def show(self, statuses):
+        self.shown.append(sum(status.evaluations for status in statuses))
+
+    def stage(self, title, done, total, text=""):
+        self.stages.append((done, total))
+
+
+def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, reports):
+    progress = Told()
+    run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=2, progress=progress)
+    assert run.manifest.seed == 3
+    assert run.evaluations["engine"].tolist() == ["compiled"] * 8
+    assert run.reevaluations["engine"].tolist() == ["drake"] * 5
+    assert reports == [tmp_path / "run"]
+    assert progress.shown[0] == 0 and progress.shown[-1] == 8
+    assert progress.stages == [(done, 5) for done in range(6)]
+    assert progress.warnings == []
+
+
+@pytest.mark.parametrize("bodies", [2, pytest.param(7, marks=pytest.mark.slow)])
+def test_a_robot_of_any_length_is_evolved_and_drawn(tiny, tmp_path, bodies):
+    scenario = tiny.with_changes({"robot.tetrahedra": bodies, "simulation.duration": "2.0 s"})
+    run = tetra_drake.evolve(scenario, tmp_path / "run", workers=1, reevaluate=False)
+    trial, index = run.fittest()
+    m = bodies - 1
+    assert len(run.vector(trial, index)) == 2 * m * (m - 1) + 2
+    assert run.statuses[0].failures == 0
+    assert len(list((run.directory / "figures").glob("*.svg"))) >= 9
+    replay = commands(read_page(run.directory / "replay.html"), "set_object")
+    drawn = {one["path"].split("/")[2] for one in replay if one["path"].startswith("/robot/")}
+    assert drawn == {f"T{i + 1}" for i in range(bodies)}
+
+
+def test_workers_of_ones_own_find_the_engine_compiled(tiny, tmp_path, reports, monkeypatch):
+    prepared = []
+    monkeypatch.setattr("tetra_drake.experiment.prepare", lambda own, **_: prepared.append(own))
+    tetra_drake.evolve(tiny, tmp_path / "own", executor=OneByOne, reevaluate=False)
+    assert prepared == [tiny]
+
+
+def test_candidates_side_by_side_have_the_records_of_candidates_one_by_one(tiny, tmp_path, reports):
+    several = tiny.with_changes({"evolution.trials": 3})
+    ways = {"lanes": {"workers": 1}, "threads": {"workers": 3}, "own": {"executor": OneByOne}}
+    records = {}
+    for name, way in ways.items():
+        evolved = tetra_drake.evolve(several, tmp_path / name, seed=4, reevaluate=False, **way)
+        records[name] = evolved.evaluations.drop(columns="wall_time_s")
+    assert len(records["lanes"]) == 24
+    for name in ("threads", "own"):
+        pandas.testing.assert_frame_equal(records[name], records["lanes"], check_exact=True)
+
+
+def OneByOne(workers):
+    """An executor with one thread."""
+    return ThreadPoolExecutor(1)
+
+
+def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
+    on_diagram = tiny.with_changes({"simulation.engine": "drake"})
+    step = Steps(height=0.02, depth=1.0, count=1, start=0.02)
+    for scenario, objective, problem in (
+        ("quack", None, "quack"),
+        (on_diagram.with_changes({"terrain": step}), None, "below the ground"),
+        (None, None, "is needed"),
+        (on_diagram, lambda result: 1.0, "lambda"),
+    ):
+        with pytest.raises(InputError, match=problem):
+            tetra_drake.evolve(scenario, tmp_path / "run", objective=objective)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
+    tiny, tmp_path, refused, capsys, interrupting, reports
+):
+    own = {"objective": Heaviest(2.0), "optimizer": RandomSearch}
+    own |= {"reevaluate": False, "report": False}
+    whole = tetra_drake.evolve(tiny, tmp_path / "whole", **own)
+    assert whole.evaluations["fitness"].tolist() == pytest.approx(
+        (2.0 + 2.0 * whole.evaluations["distance"]).tolist()
+    )
+    assert whole.reevaluations.empty and reports == []
+    assert whole.iterations["note"].tolist() == ["wide", "wide"]
+    assert whole.manifest.method.objective == f'{__name__}.Heaviest {{"factor": 2.0}}'
+
+    run = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        tetra_drake.evolve(tiny, run, executor=interrupting, workers=2, **own)
+    begun = read_record(run)
+    for changed, key in (
+        ({"objective": None}, "objective"),
+        ({"objective": Heaviest(3.0)}, "objective"),
+        ({"optimizer": SteadyState}, "optimizer"),
+        ({"seed": 1}, "seed"),
+        ({"scenario": tiny.with_changes({"evolution.trials": 2})}, "evolution.trials"),
+    ):
+        with refused(run, key, ""):
+            tetra_drake.evolve(**({"scenario": None, "out": run, "resume": True} | own | changed))
+    assert cli.main(["evolve", "--out", str(run), "--resume"]) == 2
+    assert "objective=" in capsys.readouterr().err
+    assert read_record(run) == begun
+    tetra_drake.evolve(None, run, resume=True, **own)
+    assert read_record(run) == read_record(tmp_path / "whole")
+
+
+def make_objective(factor):
+    """Objectives of the same name."""
+
+    def objective(result):
+        return factor * (1.0 + result.metrics.distance)
+
+    return objective
+
+
+def test_no_record_holds_fitnesses_of_two_objectives_of_the_same_name(
+    tiny, tmp_path, refused, interrupting
+):
+    run, own = tmp_path / "run", {"reevaluate": False, "report": False}
+    ways = ({"executor": interrupting}, {})
+    for way, ended in zip(ways, (KeyboardInterrupt, None), strict=True):
+        begin = {"scenario": tiny} if ended else {"scenario": None, "resume": True}
+        with pytest.raises(ended) if ended else contextlib.nullcontext():
+            tetra_drake.evolve(out=run, objective=make_objective(2.0), **begin, **own, **way)
+        begun = read_record(run)
+        for make in (make_objective(3.0), make_objective(-2.0)):
+            with refused(run, "objective", "evaluation 0"):
+                tetra_drake.evolve(None, run, resume=True, objective=make, **own)
+        with refused(run, "objective", "evaluation 0"):
+            reevaluate(run, objective=make_objective(3.0), executor=ThreadPoolExecutor)
+        assert read_record(run) == begun
+
+
+def test_a_run_whose_manifest_forgets_its_objective_is_refused_by_a_fitness(
+    tiny, tmp_path, refused, interrupting
+):
+    run, own = tmp_path / "run", {"reevaluate": False, "report": False}
+    with pytest.raises(KeyboardInterrupt):
+        tetra_drake.evolve(tiny, run, objective=Heaviest(), executor=interrupting, **own)
+    manifest = run / "manifest.json"
+    name = json.loads(manifest.read_text())["objective"]
+    manifest.write_text(manifest.read_text().replace(json.dumps(name), '"fitness"'))
+    with refused(run, "objective", "evaluation 0"):
+        tetra_drake.evolve(None, run, resume=True, **own)
+
+
+def test_the_scenarios_optimiser_is_used_recorded_and_resumed(
+    tiny, tmp_path, interrupting, refused
+):
+    scenario = tiny.with_changes(
+        {"optimizer": CmaEs(population=4, sample=0), "evolution.max_evaluations": 10}
+    )
+    whole, run = tmp_path / "whole", tmp_path / "run"
+    own = {"reevaluate": False, "report": False}
+    evolved = tetra_drake.evolve(scenario, whole, **own)
+    assert evolved.iterations["population"].tolist() == [4, 4, 4]
+    assert len(evolved.evaluations) == 10
+    assert evolved.manifest.method.optimizer == "CmaEs"
+    with pytest.raises(KeyboardInterrupt):
+        tetra_drake.evolve(scenario, run, executor=interrupting, **own)
+    with refused(run, "optimizer", ""):
+        tetra_drake.evolve(None, run, resume=True, optimizer=SteadyState, **own)
+    tetra_drake.evolve(None, run, resume=True, **own)
+    assert read_record(run) == read_record(whole)
+
+
+def test_the_gaits_of_a_map_are_simulated_on_disturbed_robots(
+    tiny, tmp_path, interrupting, monkeypatch
+):
+    monkeypatch.setattr("tetra_drake.experiment.evaluate_again", lambda *_, **__: None)
+    kind = QualityDiversity(emitters=2, batch=2, floor=-1e3, draws=2)
+    scenario = tiny.with_changes({"optimizer": kind, "evolution.max_evaluations": 10})
+    whole, run = tmp_path / "whole", tmp_path / "run"
+    found = elites(tetra_drake.evolve(scenario, whole, report=False, workers=1))
+    assert len(found) > 1
+    assert found["kept"].isin([0.0, 0.5, 1.0]).all()
+    with pytest.raises(KeyboardInterrupt):
+        tetra_drake.evolve(scenario, run, executor=interrupting, workers=2, report=False)
+    again = elites(tetra_drake.evolve(None, run, resume=True, report=False, workers=1))
+    pandas.testing.assert_frame_equal(
+        *(table.drop(columns="wall_time_s") for table in (again, found))
+    )
+
+
+def test_a_report_that_fails_is_no_failed_run_and_other_versions_are_told(
+    tiny, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda path: {}["x1"])
+    with pytest.warns(RuntimeWarning, match="x1"):
+        run = tetra_drake.evolve(tiny, tmp_path / "run", reevaluate=False)
+    assert run.statuses[0].stop is not None
+    manifest = tmp_path / "run" / "manifest.json"
+    current = run.manifest.versions["numpy"]
+    manifest.write_text(manifest.read_text().replace(f'"{current}"', '"0.9"'))
+    with pytest.warns(RuntimeWarning, match=r"numpy 0\.9"):
+        tetra_drake.evolve(None, tmp_path / "run", resume=True, reevaluate=False, report=False)
+
+
+# The command
+
+
+SMALL = ("--scenario", "quick", "--trials", "1", "--iterations", "3", "--workers", "1")
+
+
+@pytest.fixture
+def evolve(monkeypatch, reports):
+    """evolve("--out", ...): the command's exit status, on a cheap fitness and without a report."""
+    monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda scenario, objective: Bowl())
+    monkeypatch.setattr("tetra_drake.experiment.process_executor", ThreadPoolExecutor)
+    return lambda *options: cli.main(["evolve", *map(str, options)])
+
+
+def test_the_command_runs_the_scenario_with_its_options(evolve, tmp_path, capsys, reports):
+    out = tmp_path / "runs" / "demo"
+    assert evolve(*SMALL, "--out", out, "--seed", 4) == 0
+    manifest = read_manifest(out)
+    assert manifest.seed == 4
+    quick = load_scenario("quick")
+    assert manifest.scenario == quick.with_changes({"evolution.max_iterations": 3})
+    assert load_scenario(out / "scenario.yaml") == manifest.scenario
+    assert reports == [out]
+    printed = capsys.readouterr().out
+    for text in (f"{out}/report.html", f"{out}/replay.html"):
+        assert text in printed
+
+
+@pytest.mark.parametrize(("options", "again"), [((), True), (("--no-reevaluate",), False)])
+def test_a_switch_leaves_out_the_diagram_at_the_end(tiny, tmp_path, reports, options, again):
+    file = tmp_path / "tiny.yaml"
+    file.write_text(dump_scenario(tiny))
+    out = tmp_path / "run"
+    assert cli.main(["evolve", "--scenario", str(file), "--out", str(out), *options]) == 0
+    assert (len(load_run(out).reevaluations) > 0) == again
+
+
+def test_without_a_scenario_the_first_look_is_run(evolve, tmp_path, capsys):
+    assert evolve("--out", tmp_path / "run", "--iterations", "1") == 0
+    assert read_manifest(tmp_path / "run").scenario.name == "quick"
+    assert "--scenario thesis" in capsys.readouterr().out
+
+
+def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, tmp_path, capsys):
+    out = tmp_path / "run"
+    evolve(*SMALL, "--out", out)
+    whole = read_record(out)
+    evaluations = out / "trial_00" / "evaluations.jsonl"
+    evaluations.write_bytes(evaluations.read_bytes()[:-100])
+    for options in ((), SMALL):
+        assert evolve("--out", out, "--resume", *options) == 0
+        assert read_record(out) == whole
+    assert capsys.readouterr().err == ""
+    for option, value, key in (
+        ("--trials", 2, "evolution.trials"),
+        ("--iterations", 4, "evolution.max_iterations"),
+        ("--engine", "compiled", "simulation.engine"),
+        ("--scenario", "thesis", "simulation.duration"),
+        ("--seed", 1, "seed"),
+    ):
+        assert evolve("--out", out, "--resume", option, value) == 2
+        assert capsys.readouterr().err.startswith(f"tetra-drake: {out}: {key}: ")
+
+
+@pytest.mark.parametrize("option", ["--trials", "--iterations", "--workers"])
+@pytest.mark.parametrize("value", ["0", "-3", "many"])
+def test_counts_are_counts(evolve, tmp_path, option, value, capsys):
+    with pytest.raises(SystemExit) as caught:
+        evolve("--out", tmp_path / "run", f"{option}={value}")
+    assert caught.value.code == 2
+    assert option in capsys.readouterr().err
+
+
+def test_an_interrupted_run_says_how_to_continue(
+    evolve, tmp_path, capsys, monkeypatch, interrupting
+):
+    monkeypatch.setattr("tetra_drake.experiment.process_executor", interrupting)
+    assert evolve(*SMALL, "--out", tmp_path / "run") == 130
+    assert f"tetra-drake evolve --out {tmp_path / 'run'} --resume" in capsys.readouterr().err

@@ -1,0 +1,1 @@
+"""Robustness, comparisons and maps of recorded runs, as tables."""

@@ -1,0 +1,309 @@
+"""How well runs search: the best of their trials against evaluations, side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tetra_drake.analysis.statistics import interquartile_mean, interval
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.method import FITNESS
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.files import json_number
+from tetra_drake.formatting import aligned, fixed, ranged
+from tetra_drake.scenario.load import differences
+from tetra_drake.scenario.units import INCH
+
+if TYPE_CHECKING:
+    import pandas
+
+EVALUATIONS, SIMULATIONS = "evaluations", "simulations"
+"""What search is paid in: simulations where runs differ in how many draws of disturbances an
+evaluation has."""
+
+QUARTILES = (0.25, 0.5, 0.75)
+
+_SEARCH = ("evolution", "optimizer")
+"""Sections of the scenario that say how runs search, and not for what."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What compare() has found. Fitness is what all runs maximise, so it is what is compared."""
+
+    unit: str
+    """EVALUATIONS or SIMULATIONS, of which all costs are numbers."""
+    common: int
+    """Where the run with the least cost ends."""
+    reach: float | None
+    """The distance (m) to be reached by the fittest gait so far."""
+    trials: pandas.DataFrame
+    """A row per trial that has begun: run, trial, ended, cost, at_common and fitness (the best so
+    far there and at the trial's end, -inf where there is none), distance (m, of the fittest),
+    reached (cost of the first fittest so far that walks `reach`; infinite where none does)."""
+    curves: pandas.DataFrame
+    """The best fitness so far, where it rises: run, cost, low, median, high (QUARTILES over the
+    trials). A trial that has ended goes on with its last value; the curve ends where the first
+    trial does that has not, else with the longest."""
+    runs: pandas.DataFrame
+    """A row per run: trials, going_on, draws, cost (median over trials); at_common, fitness and
+    distance (medians over trials with a fitness), each with _mean, _low and _high (interquartile
+    mean and its 95 % confidence interval); reached_low, reached and reached_high (quartiles over
+    trials), share (of trials that reach it); wall_time (s, mean per evaluation)."""
+    notes: list[str]
+    """What else than search differs, or is not done."""
+
+
+def compare(
+    directories: Sequence[str | Path],
+    *,
+    labels: Sequence[str] | None = None,
+    reach: float | None = None,
+) -> Compared:
+    """Compares how runs of one objective search, finished or not.
+
+    labels: of the runs, by default the names of their folders.
+    reach: a distance (m), by default the best of the scenarios' first reference.
+
+    Raises InputError where objectives differ, labels are not one for each run, or a run has no
+    fitness yet.
+    """
+    import pandas
+
+    runs = _labelled([load_run(directory) for directory in directories], labels)
+    notes = _differences(runs)
+    draws = {label: run.manifest.scenario.draws for label, run in runs.items()}
+    unit = EVALUATIONS if len({*draws.values()}) == 1 else SIMULATIONS
+    costs = {label: count if unit == SIMULATIONS else 1 for label, count in draws.items()}
+    if reach is None:
+        references = (run.manifest.scenario.reference for run in runs.values())
+        known = (each.best_distance for each in references if each)
+        reach = next((distance for distance in known if distance is not None), None)
+    searches = {label: _trials(run, costs[label]) for label, run in runs.items()}
+    ends = {label: _end(trials) for label, trials in searches.items()}
+    common = min(ends.values())
+    rows = [
+        {"run": label, "trial": number, "ended": trial.ended, "cost": trial.costs[-1]}
+        | {"at_common": trial.at(common), "fitness": trial.best[-1]}
+        | {"distance": trial.distance[-1], "reached": trial.reached(reach)}
+        for label, trials in searches.items()
+        for number, trial in trials.items()
+    ]
+    table = pandas.DataFrame(rows)
+    for label, trials in searches.items():
+        if going_on := sum(not trial.ended for trial in trials.values()):
+            notes.append(f"{label}: {going_on} of {len(trials)} trials go on")
+        if failed := sum(np.isneginf(trial.best[-1]) for trial in trials.values()):
+            notes.append(f"{label}: {failed} of {len(trials)} trials have no fitness")
+    summaries = {
+        label: {"draws": draws[label]}
+        | _summary(table[table["run"] == label])
+        | {"wall_time": run.evaluations["wall_time_s"].mean()}
+        for label, run in runs.items()
+    }
+    curves = [_curve(t, ends[label]).assign(run=label) for label, t in searches.items()]
+    return Compared(
+        unit=unit,
+        common=common,
+        reach=reach,
+        trials=table,
+        curves=pandas.concat(curves, ignore_index=True),
+        runs=pandas.DataFrame.from_dict(summaries, orient="index").rename_axis("run"),
+        notes=notes,
+    )
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """What a trial had found after each of its evaluations, arrays of equal length."""
+
+    costs: npt.NDArray[np.int64]
+    best: npt.NDArray[np.float64]
+    """Fitness, -inf until there is one."""
+    distance: npt.NDArray[np.float64]
+    """Of the fittest so far, in m."""
+    ended: bool
+
+    def at(self, cost: npt.ArrayLike) -> Any:
+        """The best fitness at a cost; its last one from its end on."""
+        place = np.searchsorted(self.costs, cost, side="right") - 1
+        return np.where(place < 0, -math.inf, self.best[np.maximum(place, 0)])
+
+    def reached(self, distance: float | None) -> float:
+        """The cost of the first fittest so far that walks a distance; infinite if none does."""
+        there = self.costs[self.distance >= (math.inf if distance is None else distance)]
+        return float(there[0]) if len(there) else math.inf
+
+
+def _trials(run: Run, cost: int) -> dict[int, _Trial]:
+    """The trials that have begun, by their numbers; `cost`: of an evaluation."""
+    run.fittest()  # raises InputError if there is none
+    found = {}
+    for number, rows in run.evaluations.groupby("trial"):
+        fitness = rows["fitness"].fillna(-math.inf).to_numpy()
+        best = np.maximum.accumulate(fitness)
+        fittest = np.maximum.accumulate(np.where(_rises(best), np.arange(len(best)), 0))
+        distance = np.where(np.isfinite(best), rows["distance"].to_numpy()[fittest], math.nan)
+        costs = cost * np.arange(1, len(best) + 1)
+        ended = run.statuses[int(number)].stop is not None
+        found[int(number)] = _Trial(costs, best, distance, ended)
+    return found
+
+
+def _rises(best: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Where the best so far is a new one, as the first always is."""
+    return np.r_[True, best[1:] > best[:-1]]
+
+
+def _end(trials: Mapping[int, _Trial]) -> int:
+    """Where a run's curve ends."""
+    going_on = [int(trial.costs[-1]) for trial in trials.values() if not trial.ended]
+    return min(going_on) if going_on else max(int(t.costs[-1]) for t in trials.values())
+
+
+def _curve(trials: Mapping[int, _Trial], end: int) -> pandas.DataFrame:
+    """The quartiles over the trials where they rise, and at the end."""
+    import pandas
+
+    rises = [trial.costs[_rises(trial.best)] for trial in trials.values()]
+    costs = np.unique(np.concatenate([*rises, [end]]))
+    costs = costs[costs <= end]
+    quartiles = _quartiles(np.array([trial.at(costs) for trial in trials.values()]))
+    values = dict(zip(("low", "median", "high"), quartiles, strict=True))
+    return pandas.DataFrame({"cost": costs} | values)
+
+
+def _quartiles(values: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float64]]:
+    """Of each column (or of one). Unlike those of numpy, of infinite values, too."""
+    ordered = np.sort(values, axis=0)
+    places = [share * (len(values) - 1) for share in QUARTILES]
+    around = [(ordered[math.floor(p)], ordered[math.ceil(p)], p % 1.0) for p in places]
+    return [(1.0 - w) * low + w * high if w else low for low, high, w in around]
+
+
+def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
+    """A run's columns of Compared.runs, from its trials."""
+    found: dict[str, Any] = {"trials": len(trials), "going_on": int((~trials["ended"]).sum())}
+    found["cost"] = trials["cost"].median()
+    for name in ("at_common", "fitness", "distance"):
+        values = trials[name].replace(-math.inf, math.nan).dropna()
+        low, high = interval(values, interquartile_mean)
+        mean = float(interquartile_mean(values)) if len(values) else math.nan
+        found |= {name: values.median(), f"{name}_mean": mean}
+        found |= {f"{name}_low": low, f"{name}_high": high}
+    quartiles = _quartiles(trials["reached"].to_numpy())
+    found |= dict(zip(("reached_low", "reached", "reached_high"), quartiles, strict=True))
+    return found | {"share": float(np.isfinite(trials["reached"]).mean())}
+
+
+def _labelled(runs: Sequence[Run], labels: Sequence[str] | None) -> dict[str, Run]:
+    """The runs by different labels; InputError where there are none."""
+    if labels is None:
+        labels = [run.directory.resolve().name for run in runs]
+        if len({*labels}) < len(labels):
+            labels = [str(run.directory) for run in runs]
+    if len({*labels}) < len(labels) or len(labels) != len(runs):
+        problem = f"found {', '.join(labels)}; expected {len(runs)} different ones, one for a run"
+        raise InputError("labels", "", problem)
+    return dict(zip(labels, runs, strict=True))
+
+
+def _differences(runs: Mapping[str, Run]) -> list[str]:
+    """What differs from the first run beside search; InputError where the objective does."""
+    (first, base), *others = runs.items()
+    notes = []
+    for label, run in others:
+        ours, theirs = _objective(run), _objective(base)
+        if ours != theirs:
+            problem = f"is not that of {first}, and fitnesses of different objectives say nothing"
+            raise InputError(run.directory, "objective", f"{problem} about each other")
+        changed = [
+            f"{key} {value}"
+            for key, value in differences(run.manifest.scenario, base.manifest.scenario)
+            if key.split(".")[0] not in _SEARCH
+        ]
+        if changed:
+            notes.append(
+                f"{label} has not only its search other than {first}: {', '.join(changed)}"
+            )
+    return notes
+
+
+def _objective(run: Run) -> tuple[str, Mapping[str, float]]:
+    name, terms = run.manifest.method.objective, run.manifest.scenario.objective
+    return name, terms if name == FITNESS else {}
+
+
+def to_json(compared: Compared) -> dict[str, Any]:
+    """The summary as JSON holds it, lengths in m; null for what is infinite or unknown."""
+    rows = compared.runs.reset_index().to_dict("records")
+    return {
+        "unit": compared.unit,
+        "common": compared.common,
+        "reach": compared.reach,
+        "notes": compared.notes,
+        "runs": [{key: json_number(value) for key, value in row.items()} for row in rows],
+    }
+
+
+def describe(compared: Compared) -> str:
+    """The summary as tables for printing, distances in inches."""
+    unit, common = compared.unit, compared.common
+    texts = [
+        f"Fitness of the best of each trial at {common} {unit}, where the shortest run ends, and "
+        "in\nthe end: interquartile mean over trials, in brackets its 95 % confidence interval.",
+        aligned(
+            [["run", "trials", unit, f"at {common}", "in the end"]]
+            + [[label, *_fitness(row)] for label, row in compared.runs.iterrows()]
+        ),
+        "Distance of the fittest gait of each trial in inches, likewise; seconds per evaluation"
+        + _reach_note(compared),
+        aligned(
+            [["run", "distance", "seconds", *_reach_headings(compared)]]
+            + [[label, *_distance(compared, row)] for label, row in compared.runs.iterrows()]
+        ),
+    ]
+    return "\n\n".join([*texts, *(f"note: {note}" for note in compared.notes)])
+
+
+def reach_text(reach: float) -> str:
+    """The distance to be reached, in inches."""
+    return f"{reach / INCH:.4g} in"
+
+
+def _fitness(row: pandas.Series) -> list[str]:
+    means = (ranged(*row[[f"{n}_mean", f"{n}_low", f"{n}_high"]]) for n in ("at_common", "fitness"))
+    return [f"{row['trials']:.0f}", f"{row['cost']:.0f}", *means]
+
+
+def _reach_note(compared: Compared) -> str:
+    if compared.reach is None:
+        return "."
+    return (
+        f";\n{compared.unit} until the fittest so far walks {reach_text(compared.reach)}, median "
+        "over the trials, in brackets\nquartiles; trials in which it does."
+    )
+
+
+def _reach_headings(compared: Compared) -> list[str]:
+    return [] if compared.reach is None else [f"to {reach_text(compared.reach)}", "trials"]
+
+
+def _distance(compared: Compared, row: pandas.Series) -> list[str]:
+    mean = ranged(*(row[["distance_mean", "distance_low", "distance_high"]] / INCH))
+    cells = [mean, fixed(row["wall_time"], 3)]
+    if compared.reach is not None:
+        low, median, high = map(_cost, row[["reached_low", "reached", "reached_high"]])
+        there = row["share"] * row["trials"]
+        cells += [f"{median} ({low} to {high})", f"{there:.0f} of {row['trials']:.0f}"]
+    return cells
+
+
+def _cost(cost: float) -> str:
+    return f"{cost:.0f}" if math.isfinite(cost) else "never"

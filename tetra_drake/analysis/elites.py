@@ -1,0 +1,126 @@
+"""The map of a run: the fittest gait in each cell of a grid of two metrics, made from its record.
+
+elites.jsonl    those gaits of a run's map that were simulated on disturbed robots, line by line
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tetra_drake.analysis.robustness import by_gait, judge
+from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.evolution.run_record import ELITES, read_entries, read_manifest
+from tetra_drake.files import json_number
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
+
+if TYPE_CHECKING:
+    import pandas
+
+LUCKY = 0.5
+"""A gait of the map that keeps a smaller share of the draws of disturbances is there by luck."""
+
+CELLS = ["cell_1", "cell_2"]
+_KEY = ["trial", "index"]
+_JUDGED = ["kept", "mean_distance"]
+_EPSILON = 1e-6
+"""What pyribs adds against rounding."""
+
+
+def elites(run: Run) -> pandas.DataFrame:
+    """The fittest gait of each cell, of all trials, the fittest first: rows of the evaluations, and
+    cell_1 and cell_2, the numbers of the cell, from 0; kept and mean_distance, the share of the
+    draws kept and the mean distance (m) on disturbed robots, NaN where not simulated. Empty if the
+    run's scenario asks for no map.
+    """
+    import pandas
+
+    table, kind = run.whole, run.manifest.scenario.optimizer
+    judged = pandas.DataFrame(read_entries(run.directory / ELITES), columns=[*_KEY, *_JUDGED])
+    if isinstance(kind, QualityDiversity) and not table.empty:
+        table = table[table["fitness"] > kind.floor].dropna(subset=list(kind.measures))
+        table = table.assign(**dict(zip(CELLS, cells(table, kind), strict=True)))
+        table = table.sort_values(["fitness", *_KEY], ascending=[False, True, True])
+        table = table.drop_duplicates(CELLS)
+    else:
+        table = table.iloc[:0].assign(**dict.fromkeys(CELLS, 0))
+    return table.merge(judged.astype(dict.fromkeys(_JUDGED, float)), on=_KEY, how="left")
+
+
+def cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> list[npt.NDArray[np.int64]]:
+    """For each of the two measures, the numbers of the cells of gaits, as pyribs has them."""
+    return [
+        np.clip((count * (gaits[name] - low) + _EPSILON) / (high - low), 0, count - 1)
+        .to_numpy()
+        .astype(np.int64)
+        for (name, (low, high)), count in zip(kind.measures.items(), kind.cells, strict=True)
+    ]
+
+
+def judge_elites(
+    directory: Path,
+    *,
+    workers: int | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> None:
+    """Simulates the elites of a run on robots disturbed as judge() does, as often as the scenario
+    says, and adds to the record how far they walk. Those that have been are skipped."""
+    kind = read_manifest(directory).scenario.optimizer
+    if not isinstance(kind, QualityDiversity) or not kind.draws:
+        return
+    repair_torn_line(directory / ELITES)
+    run = load_run(directory)
+    scenario, found = run.manifest.scenario, elites(run)
+    missing = found[found["kept"].isna()]
+    if missing.empty:
+        return
+    say(f"simulating {len(missing)} gaits of the map in {kind.draws} draws of disturbances")
+    keys = [(int(trial), int(index)) for trial, index in missing[_KEY].to_numpy()]
+    gaits = dict(enumerate(run.gait(*key) for key in keys))
+    seed = run.manifest.seed
+    judgement = judge(scenario, gaits, draws=kind.draws, seed=seed, alone=False, workers=workers)
+    table = by_gait(judgement)
+    lines = [
+        {"trial": trial, "index": index, "kept": kept, "mean_distance": json_number(mean)}
+        for (trial, index), kept, mean in zip(keys, table["kept"], table["mean"], strict=True)
+    ]
+    append_lines(directory / ELITES, lines)
+
+
+def robust(found: pandas.DataFrame) -> pandas.DataFrame:
+    """The elites without the lucky ones, the fittest first."""
+    return found[~(found["kept"] < LUCKY)]
+
+
+def chosen(run: Run) -> dict[str, pandas.Series]:
+    """By name, the fittest of the robust elites and those nearest to the corners of the map."""
+    found, kind = robust(elites(run)), run.manifest.scenario.optimizer
+    if not isinstance(kind, QualityDiversity) or found.empty:
+        return {}
+    return {"fittest of the map": found.iloc[0]} | _corners(found, kind)
+
+
+def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, pandas.Series]:
+    """By the corners' names, the gaits whose cells are nearest to them."""
+    named = {}
+    for corner in itertools.product((0, 1), repeat=2):
+        sides = zip(corner, kind.measures, strict=True)
+        words = (f"{('low', 'high')[end]} {name.replace('_', ' ')}" for end, name in sides)
+        ends = np.array(corner) * (np.array(kind.cells) - 1)
+        away = (((gaits[CELLS] - ends) / np.array(kind.cells)) ** 2).sum(axis=1)
+        named[", ".join(words)] = gaits.loc[away.idxmin()]
+    return named
+
+
+def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:
+    """The different ones among named gaits, each with all of its names."""
+    names: dict[Any, list[str]] = {}
+    for name, gait in named.items():
+        names.setdefault((gait["trial"], gait["index"]), []).append(name)
+    return [(each, named[each[0]]) for each in names.values()]

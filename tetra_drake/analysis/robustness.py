@@ -1,0 +1,357 @@
+"""Robustness of gaits, judged on fresh draws: how far they walk when robot and surroundings differ
+from the model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tetra_drake.analysis.statistics import interval, share_interval
+from tetra_drake.engines.simulate import check_scenario, simulate_many
+from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.files import json_number
+from tetra_drake.formatting import aligned, fixed, ranged, signed
+from tetra_drake.results.metrics import unmet_requirements
+from tetra_drake.results.result import SimulationResult, versions
+from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.disturbances import Draw, disturbed, draw_disturbances, key_groups
+from tetra_drake.scenario.fields import tree_of
+from tetra_drake.scenario.metric_units import METRICS
+from tetra_drake.scenario.schema import DisturbancesScenario, Scenario
+from tetra_drake.scenario.units import INCH
+
+if TYPE_CHECKING:
+    import pandas
+
+NOTHING, ALL = "nothing", "all"
+START, TERRAIN = "displaced start", "terrain seed"
+"""What is changed, beside keys of the scenario's spreads."""
+
+SPREAD = (
+    *("robot.spacing", "friction.stiction_range", "friction.stiction_damping"),
+    *("friction.stiction_switch", "friction.proportional_stiction"),
+    *("friction.static, friction.kinetic", "friction.damping"),
+    *("cables.outer_stiffness", "cables.inner_stiffness", "ground.stiffness", "ground.damping"),
+)
+"""The keys that the default disturbances spread, where the scenario has them."""
+
+PERCENT, DRAWS = 5.0, 200
+ALONE = 8
+"""Draws of which the displaced start, or the terrain seed, is also simulated alone."""
+
+LOSS = 0.1
+"""A gait keeps a draw in which it loses at most this share of its undisturbed distance, and misses
+none of the scenario's requirements."""
+
+QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What judge() has simulated.
+
+    All tables have the columns gait (its key), failure (None where there is none), missed (the
+    scenario's requirements that are not met), fitness and the metrics (distance ...) in SI, NaN
+    where the simulation failed.
+    """
+
+    scenario: Scenario
+    """With the disturbances that the draws are of."""
+    seed: int
+    undisturbed: pandas.DataFrame
+    """A row per gait."""
+    draws: pandas.DataFrame
+    """A row per gait and draw. Also: draw, and a factor by each key of the scenario's spreads."""
+    alone: pandas.DataFrame
+    """A row per gait and single change. Also: what (a key, START or TERRAIN), spread (of a key, of
+    either sign), draw (whose start or seed it is)."""
+
+    def compared(self, table: pandas.DataFrame) -> pandas.DataFrame:
+        """A table with more columns: undisturbed (distance), change (of the distance), kept."""
+        before = table["gait"].map(self.undisturbed.set_index("gait")["distance"])
+        change = table["distance"] - before
+        kept = (change >= -LOSS * before.abs()) & (table["missed"] == "")  # False where NaN
+        return table.assign(undisturbed=before, change=change, kept=kept)
+
+
+def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> DisturbancesScenario:
+    """Those that spread each key of SPREAD that the scenario has, and displace starts, by so many
+    percent, and draw the terrain's seed if it has one."""
+    share = percent / 100.0
+    groups = key_groups(dict.fromkeys(SPREAD, share))
+    return DisturbancesScenario(
+        draws=1,
+        spreads={joined: share for joined, keys in groups if _has(scenario, keys[0])},
+        start=share,
+        terrain=hasattr(scenario.terrain, "seed"),
+    )
+
+
+def _has(scenario: Scenario, key: str) -> bool:
+    section, _, name = key.partition(".")
+    return hasattr(getattr(scenario, section), name)
+
+
+def judge(
+    scenario: Scenario,
+    gaits: Mapping[Any, Gait],
+    *,
+    percent: float | None = None,
+    draws: int = DRAWS,
+    seed: int = 0,
+    alone: bool = True,
+    workers: int | None = None,
+) -> Judgement:
+    """Simulates gaits on the compiled engine: undisturbed, under fresh draws of the scenario's
+    disturbances, the same for all gaits, and, if `alone`, under each change alone.
+
+    Without disturbances in the scenario, or with `percent`, they are the default ones. No evolution
+    ever sees these draws, whatever its seed. `workers` are those of simulate_many().
+
+    Raises InputError where a gait is for another robot, or percent too large for the scenario.
+    """
+    changes: dict[str, Any] = {"simulation.engine": "compiled"}
+    if scenario.disturbances is None or percent is not None:
+        changes["disturbances"] = default_disturbances(scenario, percent or PERCENT)
+    scenario = scenario.with_changes(changes)
+    settings = scenario.disturbances
+    assert settings is not None
+    fresh = [draw_disturbances(scenario, fresh_seed(seed, i)) for i in range(draws)]
+    plan: list[tuple[dict[str, Any], Draw]] = [({"what": NOTHING}, Draw({}))]
+    plan += [({"what": ALL, "draw": i, **each.factors}, each) for i, each in enumerate(fresh)]
+    plan += _alone(settings, fresh) if alone else []
+    outcomes = _outcomes(scenario, [draw for _, draw in plan], gaits, workers=workers)
+    labels = [{"gait": key} | label for label, _ in plan for key in gaits]
+    rows = [a | b for a, b in zip(labels, outcomes, strict=True)]
+    chosen = {what: [row for row in rows if row["what"] == what] for what in (NOTHING, ALL)}
+    changed = [row for row in rows if row["what"] not in chosen]
+    return Judgement(
+        scenario=scenario,
+        seed=seed,
+        undisturbed=_table(chosen[NOTHING]),
+        draws=_table(chosen[ALL], "draw", *settings.spreads),
+        alone=_table(changed, "what", "spread", "draw"),
+    )
+
+
+def fresh_seed(seed: int, draw: int) -> tuple[int, ...]:
+    """The seed of a fresh draw.
+
+    Those of evolution have four numbers, of which the first may count as two: numpy takes a seed
+    above 2³² for two numbers, and appends zeros where there are few. So it gets six, no zero last.
+    """
+    return seed, draw, 0, 0, 0, 1
+
+
+def _alone(
+    settings: DisturbancesScenario, fresh: Sequence[Draw]
+) -> Iterator[tuple[dict[str, Any], Draw]]:
+    """Each change alone, with its labels."""
+    for key, size in settings.spreads.items():
+        for spread in (-size, size):
+            yield {"what": key, "spread": spread}, Draw({key: 1.0 + spread})
+    for i, draw in enumerate(fresh[:ALONE]):
+        if draw.moves is not None:
+            yield {"what": START, "draw": i}, Draw({}, moves=draw.moves)
+        if draw.terrain_seed is not None:
+            yield {"what": TERRAIN, "draw": i}, Draw({}, terrain_seed=draw.terrain_seed)
+
+
+def _outcomes(
+    scenario: Scenario, draws: Sequence[Draw], gaits: Mapping[Any, Gait], **options: Any
+) -> Iterator[dict[str, Any]]:
+    """The columns that simulations fill, for each draw and gait."""
+    check_scenario(scenario)
+    # One scenario for all gaits: the engine prepares it once.
+    changed = [disturbed(scenario, draw) for draw in draws]
+    refused = [_refusal(each) for each in changed]
+    able = [each for each, error in zip(changed, refused, strict=True) if error is None]
+    scenarios, walking = [each for each in able for _ in gaits], [*gaits.values()] * len(able)
+    found = iter(simulate_many(scenario=scenarios, gaits=walking, **options))
+    for error in refused:
+        for _ in gaits:
+            yield _outcome(error or next(found), scenario.require)
+
+
+def _refusal(scenario: Scenario) -> InputError | None:
+    """Why a robot cannot start, such as one displaced into a step of the terrain."""
+    try:
+        check_scenario(scenario)
+    except InputError as error:
+        return error
+    return None
+
+
+def _outcome(
+    found: SimulationResult | SimulationFailure | InputError, require: Mapping[str, float]
+) -> dict[str, Any]:
+    if not isinstance(found, SimulationResult):
+        return {"failure": str(found), "missed": ""}
+    missed = ", ".join(unmet_requirements(found.metrics, require))
+    return {"missed": missed, "fitness": found.fitness} | found.metrics.to_json()
+
+
+def _table(rows: list[dict[str, Any]], *labels: str) -> pandas.DataFrame:
+    import pandas
+
+    numbers = ["fitness", *METRICS]
+    table = pandas.DataFrame(rows, columns=["gait", *labels, "failure", "missed", *numbers])
+    table["failure"] = table["failure"].astype(object).where(table["failure"].notna(), None)
+    return table.astype(dict.fromkeys(numbers, float))
+
+
+def by_gait(judgement: Judgement) -> pandas.DataFrame:
+    """A row per gait: undisturbed, QUANTILES and mean of the distance (m) under the draws, without
+    those that failed; kept (share of all draws); mean_low, mean_high, kept_low and kept_high (95 %
+    confidence intervals); failed and missed (draws that failed, or with too little of a required
+    metric)."""
+    import pandas
+
+    rows = {}
+    for gait, draws in judgement.compared(judgement.draws).groupby("gait", sort=False):
+        distance, kept = draws["distance"], draws["kept"]
+        rows[gait] = {
+            "undisturbed": draws["undisturbed"].iloc[0],
+            **{name: distance.quantile(share) for name, share in QUANTILES.items()},
+            "mean": distance.mean(),
+            **dict(zip(("mean_low", "mean_high"), interval(distance), strict=True)),
+            "kept": kept.mean(),
+            **dict(
+                zip(
+                    ("kept_low", "kept_high"),
+                    share_interval(int(kept.sum()), len(kept)),
+                    strict=True,
+                )
+            ),
+            "failed": int(draws["failure"].notna().sum()),
+            "missed": int((draws["missed"] != "").sum()),
+        }
+    return pandas.DataFrame.from_dict(rows, orient="index").rename_axis("gait")
+
+
+def over_gaits(judgement: Judgement) -> pandas.DataFrame:
+    """Medians over the gaits of columns of by_gait(): undisturbed, mean, kept. Columns: median, and
+    low and high, the 95 % confidence interval if gaits are drawn anew."""
+    import pandas
+
+    gaits = by_gait(judgement)[["undisturbed", "mean", "kept"]]
+    rows = {name: [values.median(), *interval(values, np.median)] for name, values in gaits.items()}
+    table = pandas.DataFrame.from_dict(rows, orient="index", columns=["median", "low", "high"])
+    return table.rename_axis("of")
+
+
+def by_change(judgement: Judgement) -> pandas.DataFrame:
+    """A row per change, first what hurts most alone.
+
+    Columns: median (of the absolute change of the distance, m, over gaits and signs or draws),
+    worst (change) and failed (simulations) alone; correlation (mean over gaits of those of
+    rank_correlations()) and correlation_size (median over gaits of their absolute value), NaN where
+    nothing is scaled.
+    """
+    alone = judgement.compared(judgement.alone)
+    alone = alone.assign(size=alone["change"].abs(), failed=alone["failure"].notna())
+    table = alone.groupby("what", sort=False).agg(
+        median=("size", "median"), worst=("change", "min"), failed=("failed", "sum")
+    )
+    ranks = rank_correlations(judgement)
+    table["correlation"], table["correlation_size"] = ranks.mean(), ranks.abs().median()
+    return table.sort_values("median", ascending=False, na_position="first", kind="stable")
+
+
+def rank_correlations(judgement: Judgement) -> pandas.DataFrame:
+    """Spearman's correlation of each factor (columns) and the distance over the draws of a gait
+    (index) without those that failed; NaN where all distances are the same."""
+    import pandas
+
+    settings = judgement.scenario.disturbances
+    keys = list(settings.spreads) if settings else []
+    rows = {}
+    for gait, draws in judgement.draws.dropna(subset="distance").groupby("gait", sort=False):
+        ranks = draws[["distance", *keys]].rank()
+        rows[gait] = [ranks["distance"].corr(ranks[key]) for key in keys]
+    return pandas.DataFrame.from_dict(rows, orient="index", columns=keys)
+
+
+def to_json(judgement: Judgement) -> dict[str, Any]:
+    """The summaries as JSON holds them, in SI: gaits, over_gaits and changes, and what they are
+    of."""
+    tables = {"gaits": by_gait, "over_gaits": over_gaits, "changes": by_change}
+    return {
+        "versions": versions(),
+        "scenario": judgement.scenario.name,
+        "disturbances": tree_of(judgement.scenario)["disturbances"],
+        "draws": int(judgement.draws["draw"].nunique()),
+        "seed": judgement.seed,
+    } | {
+        name: [
+            {key: json_number(value) for key, value in row.items()}
+            for row in make(judgement).reset_index().to_dict("records")
+        ]
+        for name, make in tables.items()
+    }
+
+
+def describe(judgement: Judgement) -> str:
+    """The summaries as tables for printing, distances in inches."""
+    gaits, count = by_gait(judgement), judgement.draws["draw"].nunique()
+    require = bool(judgement.scenario.require)
+    texts = [
+        f"Distance in inches under {count} draws of the disturbances. A gait keeps a draw in which "
+        f"it loses at\nmost {100.0 * LOSS:g} % of its undisturbed distance"
+        f"{' and misses no requirement' * require}.\nIn brackets: 95 % confidence intervals.",
+        aligned(_gait_cells(gaits, missed=require)),
+    ]
+    if len(gaits) > 1:
+        over = over_gaits(judgement)
+        before, mean = (inches(*over.loc[name]) for name in ("undisturbed", "mean"))
+        texts.append(
+            f"Median over {len(gaits)} gaits: undisturbed {before}, mean {mean},\n"
+            f"keeps {percents(*over.loc['kept'])} of the draws."
+        )
+    texts.append(
+        "What hurts most: change of the distance by one change alone, in inches; Spearman's rank\n"
+        "correlation of factor and distance over the draws of a gait, mean and median size.\n"
+        f"Chance alone gives up to {chance(count):.2f}."
+    )
+    return "\n\n".join([*texts, aligned(_change_cells(by_change(judgement)))])
+
+
+def chance(draws: int) -> float:
+    """The size that 95 % of the rank correlations of unrelated numbers do not reach."""
+    return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
+
+
+def _gait_cells(gaits: pandas.DataFrame, *, missed: bool) -> list[list[str]]:
+    numbers, counts = ("undisturbed", "5 %", "50 %", "95 %"), ("failed", "missed")[: 1 + missed]
+    rows = [["gait", *numbers, "mean", "keeps", *counts]]
+    for gait, row in gaits.iterrows():
+        mean = inches(*row[["mean", "mean_low", "mean_high"]])
+        kept = percents(*row[["kept", "kept_low", "kept_high"]])
+        lengths, integers = (row[name] / INCH for name in numbers), (row[name] for name in counts)
+        name = str(gait) if len(str(gait)) < 12 else f"{str(gait)[:11]}…"
+        rows.append([name, *map(fixed, lengths), mean, kept, *map("{:.0f}".format, integers)])
+    return rows
+
+
+def _change_cells(changes: pandas.DataFrame) -> list[list[str]]:
+    rows = [["changed", "median change", "worst", "failed", "correlation", "size"]]
+    for what, row in changes.iterrows():
+        lengths = [fixed(row["median"] / INCH), signed(row["worst"] / INCH)]
+        ranks = [signed(row["correlation"]), fixed(row["correlation_size"])]
+        rows.append([str(what), *lengths, f"{row['failed']:.0f}", *ranks])
+    return rows
+
+
+def inches(value: float, low: float, high: float) -> str:
+    """A length (m) with its confidence interval."""
+    return ranged(value / INCH, low / INCH, high / INCH)
+
+
+def percents(value: float, low: float, high: float) -> str:
+    """A share with its confidence interval, which is left out where it has no width."""
+    text = f"{100.0 * value:.0f} %"
+    return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"

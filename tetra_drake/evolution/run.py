@@ -1,0 +1,223 @@
+"""A recorded run as tables: `load_run`."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.evolution.run_record import (
+    EVALUATIONS,
+    ITERATIONS,
+    REEVALUATIONS,
+    Manifest,
+    read_entries,
+    read_manifest,
+    trial_folder,
+)
+from tetra_drake.evolution.trials import TrialStatus
+from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
+from tetra_drake.scenario.metric_units import METRICS
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
+
+if TYPE_CHECKING:
+    import pandas
+
+_EMPTY = ["trial", "index", "iteration", "fitness", "failure", "wall_time_s", "distance_in"]
+"""Columns of an empty table."""
+_NUMBERS = [*METRICS, "distance_in"]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A recorded run, finished or not; metrics in SI, times in s."""
+
+    directory: Path
+    manifest: Manifest
+    """Scenario, seed, versions, and the method: objective, optimiser."""
+    evaluations: pandas.DataFrame
+    """One row per evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
+    wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
+    have one), the metrics (distance ...), lifted_T1 ... (Metrics.lifted_shares), distance_in, and
+    the parameters: weight_1 ... in the listing's order, gain_length ...,
+    tau_a_s, tau_b_s, NaN where thinning has left them out. Among disturbances, also draws_fitness
+    and draws_distance (m), lists with a number for each draw (missing if it failed), and
+    worst_distance_in."""
+    iterations: pandas.DataFrame
+    """One row per iteration, 0 being the initial one: trial, iteration, evaluations so far,
+    best_fitness, best_evaluation (its index), best_distance_in (that gait's), stop, and the
+    optimiser's report (mean_fitness)."""
+    reevaluations: pandas.DataFrame
+    """Gaits evaluated once more on the Drake diagram: columns as in evaluations, without
+    `placed`; empty if there are none."""
+
+    @cached_property
+    def whole(self) -> pandas.DataFrame:
+        """The evaluations with their genomes: all of them, unless the run is thinned."""
+        return self.evaluations[self.evaluations.filter(self._columns).notna().all(axis=1)]
+
+    @cached_property
+    def statuses(self) -> list[TrialStatus]:
+        """The state of each trial."""
+        return [self._status(trial) for trial in range(self.manifest.scenario.evolution.trials)]
+
+    def best(self, count: int = 1) -> pandas.DataFrame:
+        """The fittest different gaits of each trial: rows of `evaluations`.
+
+        Trial after trial, within a trial the best first. So the first row is the best of trial 0,
+        not of the run: that is best_gait().
+        """
+        ranked = self.whole.dropna(subset="fitness").sort_values(
+            ["trial", "fitness", "index"], ascending=[True, False, True]
+        )
+        return ranked.drop_duplicates(["trial", *self._columns]).groupby("trial").head(count)
+
+    def fittest(self) -> tuple[int, int]:
+        """Trial and index of the run's fittest gait; InputError while no gait has a fitness."""
+        best = self.best()
+        if best.empty:
+            raise InputError(self.directory, "", "no gait of this run has a fitness yet")
+        row = best.loc[best["fitness"].idxmax()]
+        return int(row["trial"]), int(row["index"])
+
+    def best_gait(self) -> Gait:
+        """The run's fittest gait, of all trials; InputError while no gait has a fitness."""
+        return self.gait(*self.fittest())
+
+    def initial_best(self, trial: int) -> int:
+        """Index of the fittest gait of a trial's first iteration in which not all failed."""
+        rows = self.evaluations.query("trial == @trial").dropna(subset="fitness")
+        first = rows[rows["iteration"] == rows["iteration"].min()].set_index("index")
+        return int(first["fitness"].idxmax())
+
+    def evaluation(self, trial: int, index: int) -> pandas.Series:
+        """A row of `evaluations`."""
+        return self.evaluations.query("trial == @trial and index == @index").iloc[0]
+
+    def initial(self) -> pandas.DataFrame:
+        """The evaluations of iteration 0."""
+        return self.evaluations[self.evaluations["iteration"] == 0]
+
+    def last_population(self, trial: int) -> pandas.DataFrame:
+        """The population of a trial after its last iteration: rows of `evaluations`."""
+        rows = self.evaluations[self.evaluations["trial"] == trial]
+        if "placed" not in rows:
+            return rows.iloc[:0]
+        # The last row of a place is its member.
+        rows = rows.dropna(subset="placed").drop_duplicates("placed", keep="last")
+        return rows.sort_values("placed")
+
+    def vector(self, trial: int, index: int) -> Vector:
+        """The parameters of an evaluation; InputError if thinning has left them out."""
+        rows = self.whole.set_index(["trial", "index"])
+        if (trial, index) not in rows.index:
+            problem = f"has no genome of trial {trial}, evaluation {index}"
+            raise InputError(self.directory, "", problem)
+        return rows.loc[(trial, index), self._columns].to_numpy(dtype=np.float64)
+
+    def gait(self, trial: int, index: int) -> Gait:
+        """The gait of an evaluation."""
+        scenario = self.manifest.scenario
+        name = f"{scenario.name}, seed {self.manifest.seed}, trial {trial}, evaluation {index}"
+        gait = ParameterSpace.of(scenario).gait(self.vector(trial, index), name=name)
+        return replace(gait, scenario=scenario.name)
+
+    @property
+    def _columns(self) -> list[str]:
+        return _parameters(self.manifest.scenario)
+
+    def _status(self, trial: int) -> TrialStatus:
+        rows = self.evaluations[self.evaluations["trial"] == trial]
+        status = TrialStatus(trial)
+        failures, wall_time = rows["failure"].notna().sum(), rows["wall_time_s"].sum()
+        status.count(len(rows), failures=int(failures), wall_time=float(wall_time))
+        lines = self.iterations[self.iterations["trial"] == trial].drop(columns="trial")
+        for line in lines.iloc[[0, -1]].to_dict("records") if len(lines) else ():
+            status.complete(line, best_distance_in=line.pop("best_distance_in"))
+        return status
+
+
+def gait_label(row: pandas.Series) -> str:
+    """Trial and number of an evaluation, one of `Run.evaluations`."""
+    return f"trial {row['trial']}, evaluation {row['index']}"
+
+
+def load_run(path: str | Path) -> Run:
+    """Loads a run directory, finished or not, as pandas tables.
+
+        run = load_run("runs/demo")
+        run.iterations.pivot(index="iteration", columns="trial", values="mean_fitness").plot()
+
+    Raises InputError if `path` holds no run or the record is damaged.
+    """
+    directory = Path(path)
+    manifest = read_manifest(directory)
+    files = (EVALUATIONS, ITERATIONS, REEVALUATIONS)
+    trials, columns = manifest.scenario.evolution.trials, _parameters(manifest.scenario)
+    tables = [_table(directory, trials, name, columns) for name in files]
+    evaluations, iterations, _ = tables
+    if not iterations.empty:
+        distances = evaluations.set_index(["trial", "index"])["distance_in"].to_dict()
+        best = zip(iterations["trial"], iterations["best_evaluation"], strict=True)
+        iterations["best_distance_in"] = [distances.get(each, math.nan) for each in best]
+    return Run(directory, manifest, *tables)
+
+
+def _parameters(scenario: Scenario) -> list[str]:
+    """The columns of a gait's parameters, in the order of ParameterSpace.names."""
+    names, count = ParameterSpace.of(scenario).names, itertools.count(1)
+    taus = {"tau_A": "tau_a_s", "tau_B": "tau_b_s"}
+    return [
+        f"weight_{next(count)}"
+        if name.startswith("weight ")
+        else taus.get(name, name).replace(" ", "_")
+        for name in names
+    ]
+
+
+def _table(directory: Path, trials: int, name: str, columns: list[str]) -> pandas.DataFrame:
+    import pandas
+
+    rows = [
+        {"trial": trial, **(_flat(entry, columns) if "genome" in entry else entry)}
+        for trial in range(trials)
+        for entry in _entries(trial_folder(directory, trial) / name, len(columns))
+    ]
+    table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
+    kinds = dict.fromkeys(("placed", "best_evaluation"), "Int64")
+    numbers = {column for column in table if column in _NUMBERS or column.endswith("fitness")}
+    kinds |= dict.fromkeys(numbers - {"draws_fitness"}, "float")
+    kinds = {column: kind for column, kind in kinds.items() if column in table}
+    return table.astype(kinds).copy()  # in one piece, as astype() makes one of each column
+
+
+def _entries(path: Path, parameters: int) -> list[dict[str, Any]]:
+    """The lines of a file; InputError for a genome of another number of parameters."""
+    entries = read_entries(path)
+    for line, entry in enumerate(entries, start=1):
+        genome = entry.get("genome")
+        if genome is not None and len(genome) != parameters:
+            problem = f"is damaged: the genome has {len(genome)} numbers, expected {parameters}"
+            raise InputError(path, f"line {line}", problem)
+    return entries
+
+
+def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:
+    """A line of evaluations with a column for each number."""
+    genome = entry.pop("genome") or [math.nan] * len(columns)
+    parameters = dict(zip(columns, genome, strict=True))
+    metrics = dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
+    shares = enumerate(metrics.pop("lifted_shares", []), start=1)
+    metrics |= {f"lifted_T{number}": share for number, share in shares}
+    metrics["distance_in"] = metrics["distance"] / INCH
+    if draws := entry.pop("draws", None):
+        metrics |= {f"draws_{name}": numbers for name, numbers in draws.items()}
+        metrics["worst_distance_in"] = min(draws["distance"]) / INCH
+    return entry | metrics | parameters

@@ -1,0 +1,172 @@
+"""evolve(): a whole run, from its record's first line to its report."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+
+from tetra_drake.analysis.elites import judge_elites
+from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.simulate import available_cores, check_scenario, prepare
+from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
+from tetra_drake.evolution.executors import (
+    EvaluationImpossible,
+    MakeExecutor,
+    check_guard,
+    check_sendable,
+    process_executor,
+    thread_executor,
+)
+from tetra_drake.evolution.method import FITNESS, Method
+from tetra_drake.evolution.progress import Progress
+from tetra_drake.evolution.reevaluation import evaluate_again, on_diagram
+from tetra_drake.evolution.run import Run, load_run
+from tetra_drake.evolution.run_record import Manifest, RunRecord, read_manifest
+from tetra_drake.evolution.trials import check_fitness, run_trials
+from tetra_drake.optimizers import optimizer_of
+from tetra_drake.optimizers.base import MakeOptimizer
+from tetra_drake.results.result import versions
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+
+
+def evolve(
+    scenario: Scenario | str | Path | None,
+    out: str | Path,
+    *,
+    seed: int | None = None,
+    workers: int | None = None,
+    resume: bool = False,
+    optimizer: MakeOptimizer | None = None,
+    objective: Objective | None = None,
+    executor: MakeExecutor | None = None,
+    progress: Progress | None = None,
+    reevaluate: bool = True,
+    report: bool = True,
+) -> Run:
+    """Evolves gaits on a scenario and records the run in the new directory `out`.
+
+    seed: 0 by default. The record depends on scenario, method and seed only.
+    workers: one per core by default; a Dask cluster's are as many as it has.
+    resume: goes on with the run in `out`; then `scenario` may be None, and what is given must be
+        what the run began with: a recorded gait is evaluated again and must get its fitness again.
+    optimizer: optimizer(space, scenario.evolution, generator) makes the optimiser of a trial
+        (see optimizers.base); by default the scenario's.
+    objective: objective(result) -> float, to be maximised; by default the scenario's fitness.
+    executor: executor(workers) makes a concurrent.futures.Executor; by default worker processes,
+        for which an objective must be defined in a module. On the compiled engine, by default,
+        threads simulate the candidates of all trials side by side; see simulate_many. Others:
+        evolution.cluster.dask_cluster(), mpi4py.futures.MPIPoolExecutor.
+    progress: shown none by default; see evolution.progress.
+    reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another,
+        and simulates those of a map on disturbed robots.
+    report: in the end, writes report.html, replay.html, figures/, elites/ (of a map).
+
+    Raises InputError for what cannot be used, EvaluationImpossible if no evaluation can run.
+    """
+    check_guard()
+    out, progress = Path(out), progress or Progress()
+    workers = getattr(executor, "workers", None) or workers or available_cores()
+    if isinstance(scenario, (str, Path)):
+        scenario = load_scenario(scenario)
+    own = read_manifest(out).scenario if resume else scenario
+    if own is None:
+        raise InputError("scenario", "", "is needed to begin a run")
+    check_scenario(own)  # before there is a directory
+    make = optimizer or optimizer_of(own.optimizer)
+    method = Method.of(own, objective=objective, optimizer=optimizer)
+    evaluate = GaitEvaluation(own, objective)
+    in_lanes = executor is None and own.simulation.engine == "compiled"
+    where = thread_executor if in_lanes else executor or process_executor
+    if resume:
+        record = RunRecord.resume(out, scenario=scenario, seed=seed, method=method)
+    else:
+        check_sendable(evaluate, where)
+        record = RunRecord.create(out, scenario=own, seed=seed or 0, method=method)
+    with record, progress:
+        progress.say(_introduction(out, record.manifest, workers, report=report))
+        _warn_of_versions(record.manifest, progress)
+        with contextlib.ExitStack() as stack:
+            at_a_time = workers
+            if in_lanes:
+                lanes = stack.enter_context(LanePool(workers))
+                evaluate, at_a_time = GaitEvaluation(own, objective, lanes), lanes.capacity
+            else:
+                prepare(own, many=True)
+            if resume:
+                check_fitness(out, record.manifest, evaluate=evaluate, executor=where)
+            run_trials(
+                record,
+                evaluate=evaluate,
+                workers=at_a_time,
+                executor=where,
+                optimizer=make,
+                show=progress.show,
+            )
+        if reevaluate and own.simulation.engine != "drake":
+            try:
+                evaluate_again(
+                    out,
+                    GaitEvaluation(on_diagram(own), objective),
+                    workers=workers,
+                    executor=executor or process_executor,
+                    progress=progress,
+                )
+            except EvaluationImpossible as error:
+                progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
+        if reevaluate:
+            try:
+                judge_elites(out, workers=workers)
+            except InputError as error:
+                progress.warn(
+                    f"the gaits of the map were not simulated on disturbed robots: {error}"
+                )
+        if report:
+            _report(out, progress)
+    return load_run(out)
+
+
+def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
+    """What begins: scenario, size, method, and where the results will be."""
+    scenario, method = manifest.scenario, manifest.method
+    among = scenario.disturbances
+    draws = f", each gait among {among.draws} draws of disturbances" if among else ""
+    own = "" if method.objective == FITNESS else f", objective {method.objective}"
+    text = (
+        f"{directory}: scenario {scenario.name}, seed {manifest.seed}, optimiser "
+        f"{method.optimizer}, trials {scenario.evolution.trials}, each of at most "
+        f"{manifest.longest_trial}, engine {scenario.simulation.engine}, workers {workers}{draws}"
+        f"{own}"
+    )
+    if report:
+        text += (
+            f"\nat the end: {directory / 'replay.html'}, the best gait walking, and "
+            f"{directory / 'report.html'}; at any time before: tetra-drake figures {directory}"
+        )
+    return text
+
+
+def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
+    then, now = manifest.versions, versions(manifest.scenario.simulation.engine)
+    changed = [f"{name} {then.get(name)}" for name in now if then.get(name) != now[name]]
+    if changed:
+        progress.warn(
+            f"the run was begun with {', '.join(changed)}; with other versions its record may "
+            "not be that of an uninterrupted run"
+        )
+
+
+def _report(directory: Path, progress: Progress) -> None:
+    """Writes the report; the run is complete even if that fails."""
+    from tetra_drake.report.run_page import write_report
+
+    progress.say("drawing figures and the report")
+    try:
+        write_report(directory)
+    except Exception as error:
+        known = isinstance(error, (InputError, SimulationFailure))
+        progress.warn(
+            "the run is complete, but its report could not be written: "
+            f"{error if known else repr(error)}; try again with: tetra-drake figures {directory}"
+        )

@@ -1,0 +1,25 @@
+"""Optimisers behind ask/tell."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+
+from tetra_drake.errors import InputError
+from tetra_drake.optimizers.base import MakeOptimizer
+from tetra_drake.optimizers.cma_es import CmaEs
+from tetra_drake.optimizers.quality_diversity import INSTALL, QualityDiversity
+from tetra_drake.optimizers.random_search import RandomSearch
+from tetra_drake.optimizers.steady_state import SteadyState
+from tetra_drake.scenario import optimizer_kinds as kinds
+
+
+def optimizer_of(kind: kinds.OptimizerKind) -> MakeOptimizer:
+    """What makes the optimiser that a scenario asks for. Raises InputError if pyribs is missing."""
+    if isinstance(kind, kinds.CmaEs):
+        return functools.partial(CmaEs, own=kind)
+    if isinstance(kind, kinds.QualityDiversity):
+        if importlib.util.find_spec("ribs") is None:
+            raise InputError("optimizer", "", f"needs pyribs: {INSTALL}")
+        return functools.partial(QualityDiversity, own=kind)
+    return RandomSearch if isinstance(kind, kinds.RandomSearch) else SteadyState

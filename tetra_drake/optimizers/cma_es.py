@@ -1,0 +1,134 @@
+"""CMA-ES with restarts, through pycma (Hansen, arXiv 1604.00772; IPOP: Auger and Hansen, CEC 2005).
+
+pycma searches the roots of the distances to floors (see Ranges.from_roots), so that no vector is
+thrown away, and nothing keeps it from a best vector at a floor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tetra_drake.optimizers.generational import (
+    MIDDLE,
+    Generational,
+    Matrix,
+    Ranges,
+)
+from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.scenario import optimizer_kinds as kinds
+from tetra_drake.scenario.schema import EvolutionScenario
+
+
+class CmaEs(Generational):
+    """Several searches by CMA-ES, each for some evaluations; the one with the best point goes on.
+
+    Where they end is decided early and differs much more between searches than within one. The
+    first starts from the mean of the best quarter of a random sample, the others from its best
+    points; without a sample, from the middle and from random points. Reports besides the number of
+    the search (`start`), its restarts, and sigma, the standard deviation of its parameters in units
+    of their ranges (root mean square).
+    """
+
+    def __init__(
+        self,
+        space: ParameterSpace,
+        settings: EvolutionScenario,
+        generator: np.random.Generator,
+        own: kinds.CmaEs | None = None,
+    ) -> None:
+        super().__init__(space, settings, generator)
+        self._own = own = own or kinds.CmaEs()
+        self._starts = min(own.starts, max(1, settings.budget // (2 * own.tryout)))
+        self._searches: list[_Search] = []
+        """Empty during the sample."""
+        if not own.sample:
+            middle = np.full(self._ranges.size, MIDDLE)
+            self._begin(np.vstack([middle, *self._random(self._starts - 1)]))
+
+    def _begin(self, starts: Matrix) -> None:
+        chosen = starts[: self._starts]
+        self._searches = [_Search(self._own, self._ranges, self._generator, x) for x in chosen]
+
+    def _draw(self) -> Matrix:
+        return self._current.draw() if self._searches else self._random(self._own.sample)
+
+    def _learn(self, fitnesses: Vector) -> None:
+        if self._searches:
+            self._current.learn(self._points, fitnesses)
+        else:
+            ranked = self._points[np.argsort(-fitnesses, kind="stable")]
+            mean = ranked[: max(1, len(ranked) // 4)].mean(axis=0)
+            self._begin(np.vstack([mean, ranked]))
+
+    @property
+    def _current(self) -> _Search:
+        """The search that draws next, or has drawn."""
+        untried = (each for each in self._searches if each.evaluations < self._own.tryout)
+        return next(untried, None) or max(self._searches, key=lambda each: each.best)
+
+    def _state(self) -> Mapping[str, Any]:
+        if not self._searches:
+            return {"start": None, "restart": 0, "sigma": None}
+        current = self._current
+        start = self._searches.index(current)
+        return {"start": start, "restart": current.restarts, "sigma": current.sigma}
+
+
+class _Search:
+    """CMA-ES from a point; where it has converged, anew around its best one, with a larger
+    population."""
+
+    def __init__(
+        self, own: kinds.CmaEs, ranges: Ranges, generator: np.random.Generator, start: Vector
+    ) -> None:
+        self._own, self._ranges, self._generator = own, ranges, generator
+        self._population = own.population or 4 + int(3.0 * math.log(max(2, ranges.size)))
+        self.evaluations = self.restarts = 0
+        self.best = -math.inf
+        """Fitness of the best point."""
+        self._best = start
+        self._drawn: Matrix = np.empty((0, 0))
+        """The roots drawn last, with a second one where there is a single parameter only, as pycma
+        knows no single dimension."""
+        self._strategy = self._make_strategy()
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the parameters (root mean square)."""
+        return float(np.sqrt(np.mean(self._strategy.stds**2)))
+
+    def draw(self) -> Matrix:
+        """Points of the distribution."""
+        self._drawn = np.array(self._strategy.ask())
+        return self._ranges.from_roots(self._drawn[:, : self._ranges.size])
+
+    def learn(self, points: Matrix, fitnesses: Vector) -> None:
+        """Takes the points evaluated for it and their fitnesses."""
+        self.evaluations += len(points)
+        best = int(np.argmax(fitnesses))
+        if fitnesses[best] > self.best:
+            self.best, self._best = float(fitnesses[best]), points[best].copy()
+        told, size = self._drawn, self._ranges.size
+        told[:, :size] = np.copysign(self._ranges.roots(points), told[:, :size])
+        self._strategy.tell(list(told), (-fitnesses).tolist(), check_points=False)
+        if self._strategy.stop():
+            self.restarts += 1
+            self._population = round(self._own.growth * self._population)
+            self._strategy = self._make_strategy()
+
+    def _make_strategy(self) -> Any:
+        import cma
+
+        options = {
+            "popsize": self._population,
+            "tolx": self._own.tolerance,
+            "randn": lambda *shape: self._generator.standard_normal(shape),
+            "seed": math.nan,  # leaves the generator of numpy alone
+            "verbose": -10,  # and reads no file of signals
+        }
+        roots = np.pad(self._ranges.roots(self._best), (0, max(0, 2 - len(self._best))))
+        return cma.CMAEvolutionStrategy(roots, self._own.sigma, options)

@@ -1,0 +1,112 @@
+"""What optimisers that go on until their evaluations are used up have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tetra_drake.optimizers.base import Evaluation, Iteration
+from tetra_drake.robot.gait import TAU_B, ParameterSpace, Vector
+from tetra_drake.scenario.schema import EvolutionScenario
+
+Matrix = npt.NDArray[np.float64]
+
+MIDDLE = 0.5
+"""Of a range, in its units."""
+
+
+class Ranges:
+    """The parameters that vary, in units of their ranges in random gaits: 0 is the lower bound, 1
+    the upper one. Only floors limit them."""
+
+    def __init__(self, space: ParameterSpace) -> None:
+        self._space = space
+        self._free = space.high > space.low
+        self._free[TAU_B] &= not space.couples_tau_b
+        self._width = (space.high - space.low)[self._free]
+        self.size = len(self._width)
+        self.floors = (space.floors - space.low)[self._free] / self._width
+
+    def vector(self, point: Vector) -> Vector:
+        """The vector of a point; what is below its floor is put there."""
+        vector = self._space.low.copy()
+        vector[self._free] += point * self._width
+        return self._space.repair(np.maximum(vector, self._space.floors))
+
+    def from_roots(self, roots: Matrix) -> Matrix:
+        """The points floor + root^2 / (4 (MIDDLE - floor)), and the roots where there is no floor.
+
+        All roots are allowed, and a best point at the floor is one that fitness is smooth around.
+        In the middle of its range, a point moves as its root does.
+        """
+        points = self.floors + roots**2 / (4.0 * (MIDDLE - self.floors))
+        return np.where(np.isfinite(self.floors), points, roots)
+
+    def roots(self, points: Matrix) -> Matrix:
+        """The roots of points, none negative where there is a floor."""
+        roots = 2.0 * np.sqrt((MIDDLE - self.floors) * (points - self.floors))
+        return np.where(np.isfinite(self.floors), roots, points)
+
+    def point(self, vector: Vector) -> Vector:
+        """The point of a vector."""
+        return (vector - self._space.low)[self._free] / self._width
+
+
+class Generational:
+    """An Optimizer that draws batches until the evaluations are used up; the last may be smaller.
+
+    It learns from a batch unless all of it has failed; a failure is worse than all others. Reports
+    mean_fitness, over the evaluations of the batch without failure.
+    """
+
+    def __init__(
+        self, space: ParameterSpace, settings: EvolutionScenario, generator: np.random.Generator
+    ) -> None:
+        self._space = space
+        self._settings = settings
+        self._generator = generator
+        self._ranges = Ranges(space)
+        self._left = settings.budget
+        self._points: Matrix = np.empty((0, self._ranges.size))
+        """Those drawn last."""
+
+    @property
+    def evaluations_at_most(self) -> int:
+        """Number of evaluations of a trial."""
+        return self._settings.budget
+
+    def ask(self) -> list[Vector]:
+        """The next batch."""
+        self._points = self._draw()
+        return [self._ranges.vector(point) for point in self._points[: self._left]]
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
+        """Takes the evaluations of a batch."""
+        self._left -= len(evaluations)
+        fitnesses = np.array([each.fitness for each in evaluations])
+        known = fitnesses[np.isfinite(fitnesses)]
+        mean = float(np.mean(known)) if known.size else None
+        report = {"mean_fitness": mean, "population": len(self._points), **self._state()}
+        if self._left and known.size:
+            failed = np.min(known) - abs(np.min(known)) - 1.0
+            self._learn(np.where(np.isfinite(fitnesses), fitnesses, failed))
+        return Iteration(report=report, stop=None if self._left else "all evaluations done")
+
+    def _random(self, count: int) -> Matrix:
+        """The points of random vectors."""
+        drawn = [self._space.random(self._generator) for _ in range(count)]
+        return np.array([self._ranges.point(vector) for vector in drawn])
+
+    def _draw(self) -> Matrix:
+        """The points to evaluate next."""
+        raise NotImplementedError
+
+    def _learn(self, fitnesses: Vector) -> None:
+        """Takes the fitnesses of all points drawn last, all finite."""
+
+    def _state(self) -> Mapping[str, Any]:
+        """What to report besides."""
+        return {}

@@ -1,0 +1,154 @@
+"""The thesis's steady-state evolutionary algorithm and its operators (section 2.3, listing A.3).
+
+The comparisons are the listing's: an event of probability p happens if a number drawn from
+[0, 1) is at least 1 - p.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from tetra_drake.files import json_number
+from tetra_drake.optimizers.base import Evaluation, Iteration
+from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.scenario.schema import EvolutionScenario
+
+CHILDREN = 2
+Fitnesses = npt.NDArray[np.float64]
+
+
+class SteadyState:
+    """An Optimizer: first the random population, then two children per iteration.
+
+    Both children come from the same two parents and the same mutation numbers, before either is
+    placed, so they can be evaluated at once. Reports mean_fitness, over members without failure.
+    """
+
+    def __init__(
+        self, space: ParameterSpace, settings: EvolutionScenario, generator: np.random.Generator
+    ) -> None:
+        self._space = space
+        self._settings = settings
+        self._generator = generator
+        self._asked: list[Vector] = []
+        self._population: list[Vector] = []
+        self._fitnesses: Fitnesses = np.empty(0)
+        self._means: list[float] = []
+
+    @property
+    def evaluations_at_most(self) -> int:
+        """Number of evaluations of a trial that is not stopped early."""
+        return self._settings.population + CHILDREN * self._settings.max_iterations
+
+    def ask(self) -> list[Vector]:
+        """The initial population, then two children at a time."""
+        if not self._population:
+            count = self._settings.population
+            self._asked = [self._space.random(self._generator) for _ in range(count)]
+        else:
+            self._asked = self._breed()
+        return [vector.copy() for vector in self._asked]
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
+        """Takes the initial population, or places the children one after the other."""
+        if not self._population:
+            self._population = self._asked
+            self._fitnesses = np.array([each.fitness for each in evaluations], dtype=float)
+            placed: tuple[int | None, ...] = tuple(range(len(evaluations)))
+        else:
+            placed = tuple(map(self._place, self._asked, evaluations))
+        mean = mean_fitness(self._fitnesses)
+        self._means.append(mean)
+        report = {"mean_fitness": json_number(mean)}
+        return Iteration(report=report, placed=placed, stop=self._stop())
+
+    def _breed(self) -> list[Vector]:
+        settings, generator, space = self._settings, self._generator, self._space
+        chosen = (
+            select_parent(self._fitnesses, tournament=settings.tournament, generator=generator)
+            for _ in range(2)
+        )
+        parents, probability = [self._population[i] for i in chosen], settings.crossover_probability
+        crossed = cross_over(*parents, probability=probability, generator=generator)
+        mutation = draw_mutation(
+            space.steps, probability=settings.mutation_probability, generator=generator
+        )
+        return [space.repair(mutate(c, mutation=mutation, floors=space.floors)) for c in crossed]
+
+    def _place(self, vector: Vector, evaluation: Evaluation) -> int | None:
+        tournament, generator = self._settings.tournament, self._generator
+        fitness = evaluation.fitness
+        place = find_place(self._fitnesses, fitness, tournament=tournament, generator=generator)
+        if place is not None:
+            self._population[place], self._fitnesses[place] = vector, fitness
+        return place
+
+    def _stop(self) -> str | None:
+        settings = self._settings
+        if len(self._means) - 1 >= settings.max_iterations:
+            return "all iterations done"
+        rise, window, after = settings.stop_rise, settings.stop_window, settings.stop_after
+        levelled_off = has_levelled_off(self._means, rise=rise, window=window, after=after)
+        return "mean fitness levelled off" if levelled_off else None
+
+
+def select_parent(fitnesses: Fitnesses, *, tournament: int, generator: np.random.Generator) -> int:
+    """The best of a tournament; of equals the first drawn (listing A.3.2)."""
+    candidates = generator.integers(0, len(fitnesses), size=tournament)
+    return int(candidates[np.argmax(fitnesses[candidates])])
+
+
+def select_victim(fitnesses: Fitnesses, *, tournament: int, generator: np.random.Generator) -> int:
+    """The worst of a tournament; of equals the last drawn (listing A.3.5)."""
+    candidates = generator.integers(0, len(fitnesses), size=tournament)[::-1]
+    return int(candidates[np.argmin(fitnesses[candidates])])
+
+
+def cross_over(
+    first: Vector, second: Vector, *, probability: float, generator: np.random.Generator
+) -> tuple[Vector, Vector]:
+    """Two children: the parents with each parameter swapped at this probability."""
+    swapped = generator.random(len(first)) >= 1.0 - probability
+    return np.where(swapped, second, first), np.where(swapped, first, second)
+
+
+def draw_mutation(steps: Vector, *, probability: float, generator: np.random.Generator) -> Vector:
+    """Changes of all parameters: 0, or up to the parameter's step with either sign; one draw
+    serves both children of an iteration, as in the listing."""
+    sign = np.where(generator.random(len(steps)) > 0.5, 1.0, -1.0)
+    moved = generator.random(len(steps)) >= 1.0 - probability
+    size = steps * generator.random(len(steps))
+    return np.where(moved, sign * size, 0.0)
+
+
+def mutate(vector: Vector, *, mutation: Vector, floors: Vector) -> Vector:
+    """The vector with the mutation added; a parameter that would fall to its floor stays. Only
+    reductions are checked, as in the listing (A.3.3, A.3.4)."""
+    moved = vector + mutation
+    return np.where((mutation < 0.0) & ~(moved > floors), vector, moved)
+
+
+def find_place(
+    fitnesses: Fitnesses, child: float, *, tournament: int, generator: np.random.Generator
+) -> int | None:
+    """Index of the member that a child of this fitness replaces: the worst of a tournament if the
+    child is fitter, else the worst of all if it is fitter than that, else None."""
+    victim = select_victim(fitnesses, tournament=tournament, generator=generator)
+    return next((m for m in (victim, int(np.argmin(fitnesses))) if child > fitnesses[m]), None)
+
+
+def mean_fitness(fitnesses: Fitnesses) -> float:
+    """Mean over the members that have not failed; NaN if all have."""
+    finite = fitnesses[np.isfinite(fitnesses)]
+    return float(np.mean(finite)) if finite.size else float("nan")
+
+
+def has_levelled_off(means: Sequence[float], *, rise: float, window: int, after: int) -> bool:
+    """Whether the mean fitness rose by less than `rise` in the last `window` iterations, and
+    iteration `after` is over; `means` begins with iteration 0."""
+    iteration = len(means) - 1
+    long_enough = iteration > after and iteration >= window
+    return long_enough and means[iteration] - means[iteration - window] < rise

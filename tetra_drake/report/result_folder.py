@@ -1,0 +1,136 @@
+"""The folder of one simulation: written by `simulate`, read by `replay` and `figures`.
+
+scenario.yaml     the scenario in full, for `--scenario`
+trajectory.nc     motion and forces over time, for xarray
+replay.html       a page that plays the motion
+result.json       the numbers, the gait, and the path of the centre
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.files import check_folder, read_text, write_whole
+from tetra_drake.results.metrics import headline
+from tetra_drake.results.trajectory import DIMENSIONS, labels
+from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.metric_units import METRICS
+from tetra_drake.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    import xarray
+
+    from tetra_drake.results.result import SimulationResult
+
+SCENARIO, TRAJECTORY = "scenario.yaml", "trajectory.nc"
+REPLAY, RESULT = "replay.html", "result.json"
+RUN_MANIFEST = "manifest.json"
+"""Marks the folder of a run, which has a scenario.yaml of its own."""
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """The motion of one gait, with all that is needed to show it."""
+
+    scenario: Scenario
+    gait: Gait
+    trajectory: xarray.Dataset
+    """See results.trajectory.assemble_dataset."""
+    metrics: Mapping[str, float]
+    """By the names of METRICS, in SI."""
+
+    @property
+    def title(self) -> str:
+        """The gait's name and what it did."""
+        return f"{self.gait.name}: {headline(self.scenario, self.metrics)}"
+
+
+def check_result_folder(folder: Path) -> None:
+    """Raises InputError if a simulation cannot write its files to `folder`."""
+    check_folder(folder)
+    if (folder / RUN_MANIFEST).exists():
+        raise InputError(folder, "", "holds a run of `evolve`, expected another folder")
+
+
+def save_result_folder(
+    folder: Path, *, scenario: Scenario, gait: Gait, result: SimulationResult
+) -> None:
+    """Writes the files of a simulation that recorded its trajectory.
+
+    Raises InputError if the folder cannot be written to.
+    """
+    from tetra_drake.results.result import save_result
+    from tetra_drake.results.trajectory import save_dataset
+    from tetra_drake.visualization.replay import save_replay
+
+    trajectory = result.trajectory
+    assert trajectory is not None
+    # Written last and removed first: where there is a result.json, the other files belong to it.
+    if (folder / RESULT).is_file():
+        (folder / RESULT).unlink()
+    write_whole(folder / SCENARIO, dump_scenario(scenario))
+    save_dataset(trajectory, folder / TRAJECTORY)
+    title = StoredResult(scenario, gait, trajectory, vars(result.metrics)).title
+    save_replay(folder / REPLAY, scenario=scenario, trajectory=trajectory, title=title)
+    save_result(folder / RESULT, scenario, gait, result)
+
+
+def load_result_folder(folder: Path) -> StoredResult:
+    """Reads a simulation's scenario, gait and trajectory back.
+
+    Raises InputError, naming the file, if one is missing, damaged, or not of this scenario.
+    """
+    for name in (RESULT, SCENARIO, TRAJECTORY):
+        if not (folder / name).is_file():
+            problem = f"holds no {name}, so it was not written by `simulate`"
+            raise InputError(folder, name, problem)
+    scenario = load_scenario(folder / SCENARIO)
+    structure = MakeStructure(scenario)
+    return StoredResult(
+        scenario=scenario,
+        gait=load_gait(folder / RESULT, scenario, key="gait"),
+        trajectory=_load_trajectory(folder / TRAJECTORY, structure),
+        metrics=_load_metrics(folder / RESULT),
+    )
+
+
+def _load_metrics(path: Path) -> dict[str, float]:
+    """The metrics in result.json, NaN where one is null; InputError if one is missing."""
+    numbers = json.loads(read_text(path, "result")).get("metrics")
+    for name in METRICS:
+        if not isinstance(numbers, dict) or not isinstance(numbers.get(name, ""), float | None):
+            raise InputError(path, f"metrics.{name}", "is missing, or no number")
+    return {name: math.nan if numbers[name] is None else numbers[name] for name in METRICS}
+
+
+def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
+    """The trajectory in a file; InputError unless it holds the motion of this robot."""
+    import xarray
+
+    try:
+        trajectory = xarray.load_dataset(path, engine="h5netcdf")
+    except Exception as error:  # what HDF5 raises for damaged files has no common ancestor
+        raise InputError(path, "", f"cannot be read as netCDF: {error}") from error
+    for name, (_, expected) in labels(structure).items():
+        if name not in trajectory.coords or trajectory[name].values.tolist() != expected:
+            raise InputError(path, name, f"is not that of the robot in {SCENARIO}")
+    for name, dimensions in {"time": ("time",), **DIMENSIONS}.items():
+        if name not in trajectory or trajectory[name].dims != dimensions:
+            raise InputError(path, name, f"is missing, or not over {', '.join(dimensions)}")
+        values = trajectory[name].values
+        if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+            raise InputError(path, name, "holds what is no finite number")
+    times = trajectory["time"].values
+    if len(times) < 2 or not (np.diff(times) > 0.0).all():
+        raise InputError(path, "time", "has fewer than two samples, or does not ascend")
+    return trajectory

@@ -1,0 +1,1 @@
+"""Lanes of numbers and the compiling decorator; nothing of robots."""
