@@ -8,7 +8,7 @@ import pytest
 from helpers.quantities import with_unit
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.robot import settling
+from tetra_drake.robot import equilibrium
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.equilibrium import settled_lengths, settled_state
 from tetra_drake.robot.gait import seeded_gait
@@ -142,6 +142,6 @@ def test_neither_terrain_nor_offsets_nor_friction_matter(scenario):
 
 
 def test_a_robot_that_finds_no_rest_is_refused_by_name(scenario, refused, monkeypatch):
-    monkeypatch.setattr(settling, "ITERATIONS", 2)
+    monkeypatch.setattr(equilibrium, "ITERATIONS", 2)
     with refused("thesis", "robot", "no rest"):
         settled_state(scenario)
