@@ -347,7 +347,7 @@ def _compare_options(command: Command) -> None:
         "--reach",
         metavar="LENGTH",
         type=_length,
-        help="a distance to be reached, as '14.34 in' (default: that of the scenario's reference)",
+        help="a distance to be reached, as '14.34 in'",
     )
     command.add_argument("--labels", metavar="LABEL", nargs="+", help="a name for each run")
     _add_path(command, "--out", "DIR", "write tables (CSV, JSON) and the figure into this folder")

@@ -10,7 +10,7 @@ from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 from tetra_drake.analysis.comparison import SIMULATIONS, compare, describe
 from tetra_drake.cli import main
 from tetra_drake.figures.search import search
-from tetra_drake.scenario.schema import DisturbancesScenario, ReferenceScenario
+from tetra_drake.scenario.schema import DisturbancesScenario
 from tetra_drake.scenario.units import INCH
 
 
@@ -84,15 +84,6 @@ def test_a_distance_is_reached_when_the_fittest_gait_walks_it(run):
     assert compare([run("b", trial(1.0), trial(1.0))], reach=INCH).runs.loc["b", "reached"] == (
         math.inf
     )
-
-
-def test_the_reference_is_the_distance_to_be_reached(run):
-    reference = ReferenceScenario("a paper", best_distance=2.0 * INCH)
-    paths = [run("a", trial(2.0)), run("b", trial(4.0), changes={"reference": reference})]
-    assert compare(paths[:1]).reach is None
-    found = compare(paths)
-    assert found.reach == 2.0 * INCH
-    assert found.trials["reached"].tolist() == [math.inf, 1.0]
 
 
 def test_runs_that_differ_in_draws_pay_by_simulations(run):

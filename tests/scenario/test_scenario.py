@@ -10,7 +10,7 @@ import pytest
 from record import EXPERIMENTS
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.load import differences, dump_scenario, load_scenario, shipped_scenarios
+from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity
 from tetra_drake.scenario.schema import CABLES, PATHWAYS, Coulomb
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Rough, Steps
@@ -84,7 +84,6 @@ def test_shipped_grounds_are_the_thesis_on_other_ground(name, scenario):
     assert type(loaded.terrain) is kind
     given = [value for value in vars(loaded.terrain).values() if value is not None]
     assert given == pytest.approx(numbers, rel=1e-15)
-    assert loaded.reference is None
 
 
 LEFT, RIGHT = ["outer bottom_left"], ["outer bottom_right"]
@@ -210,6 +209,7 @@ AIMS = {
         "disturbances": {"draws": 8, "start": 0.05, "spreads": dict.fromkeys(SPREAD.split(), 0.05)}
         | {"tail": 0.25}
     },
+    "thesis-listing": {"evolution.tau_mutation": "listing"},
 }
 
 
@@ -217,29 +217,17 @@ AIMS = {
 def test_shipped_aims_are_the_thesis_evolved_for_something_else(name, scenario):
     loaded = load_scenario(name)
     assert loaded == scenario.with_changes({"name": name} | AIMS[name])
-    assert loaded.reference is None
 
 
-OTHERS = sorted({*shipped_scenarios()} - {*GROUNDS, *NETWORKS, *AIMS, "quick"})
-
-
-def test_the_quick_scenario_is_the_thesis_in_short_and_is_not_compared_with_it(scenario):
+def test_the_quick_scenario_is_the_thesis_in_short(scenario):
     quick = load_scenario("quick")
     assert (quick.robot, quick.friction, quick.cpg) == (
         scenario.robot,
         scenario.friction,
         scenario.cpg,
     )
-    assert quick.simulation.engine == "drake" and quick.reference is None
+    assert quick.simulation.engine == "drake"
     assert quick.evolution.budget * quick.simulation.duration < 300.0, "some minutes, as said"
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_shipped_scenarios_load_and_keep_the_thesis_reference(name, scenario):
-    loaded = load_scenario(name)
-    assert (loaded.name, loaded.reference) == (name, scenario.reference)
-    assert loaded.reference.best_distance == pytest.approx(14.34 * IN, rel=1e-12)
-    assert len(loaded.reference.two_best_weights) == 24
 
 
 # Files written by earlier versions
@@ -355,7 +343,6 @@ BAD = [
     ("robot: {tetrahedron: 4}", "robot.tetrahedron", "'tetrahedra'"),
     ("robot:", "robot", "nothing"),
     ("robot: {spacing: 3}", "robot.spacing", "3 without a unit"),
-    ("reference: {best_distance: 3}", "reference.best_distance", "3 without a unit"),
     ("robot: {offsets: [[0 m, 0 m, 0 m]]}", "robot.offsets", "1 items"),
     ("gait_bounds: {tau_a_min: 0.6 s}", "gait_bounds.tau_a_min", "0.6"),
     ("gait_bounds: {weight_max: 0.5}", "gait_bounds.weight_min", "1.0"),

@@ -232,11 +232,6 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     lines.append(f"  {'fitness':<17}{fixed(result.fitness):>7}")
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"  {text} (requirement not met)" for text in unmet]
-    reference = scenario.reference
-    if reference is not None:
-        best = {"random": reference.best_initial_distance, "evolved": reference.best_distance}
-        texts = [f"{name} {d / INCH:.4g} in" for name, d in best.items() if d is not None]
-        lines.append(f"  {reference.source}: best distances {', '.join(texts)}")
     speed = fixed(result.duration / result.wall_time, 1)
     lines.append(
         f"  simulated in {fixed(result.wall_time, 1)} s, {speed} times real time: "

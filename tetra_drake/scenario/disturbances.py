@@ -49,7 +49,7 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
     Its values are not checked again: those of the largest changes are when a scenario is loaded.
     """
     sections = {name: copy.copy(section) for name, section in vars(scenario).items()}
-    changed = dataclasses.replace(scenario, **sections | {"disturbances": None, "reference": None})
+    changed = dataclasses.replace(scenario, **sections | {"disturbances": None})
     for joined, keys in key_groups(draw.factors):
         for key in keys:
             section, _, name = key.partition(".")

@@ -42,13 +42,13 @@ def dump_scenario(scenario: Scenario) -> str:
 
 
 def differences(scenario: Scenario, base: Scenario) -> list[tuple[str, str]]:
-    """(key, value as text) of what a scenario has other than `base`, name and reference aside."""
+    """(key, value as text) of what a scenario has other than `base`, its name aside."""
     ours, theirs = (
         dict(_texts(tree_of(each, lambda number, unit: f"{number:.6g} {unit}")))
         for each in (scenario, base)
     )
     changed = [(key, text) for key, text in ours.items() if theirs.get(key) != text]
-    return [(k, text) for k, text in changed if k.split(".")[0] not in ("name", "reference")]
+    return [(key, text) for key, text in changed if key != "name"]
 
 
 def _texts(tree: Tree, prefix: str = "") -> Iterator[tuple[str, str]]:

@@ -15,7 +15,7 @@ WHOLE = ("objective", "require")
 
 
 def on_base(base: Tree, given: Tree) -> Tree:
-    """The tree of a base with what a file gives, which may decide on spacing and reference.
+    """The tree of a base with what a file gives, which may decide on the spacing.
 
     Masses do not count for the balance: twice the density moves T1 by less than 0.003 in.
     """
@@ -28,21 +28,7 @@ def on_base(base: Tree, given: Tree) -> Tree:
     tree: Tree = merge(base, given) | {k: given[k] for k in WHOLE if k in given}
     if "spacing" not in given.get("robot", {}) and decisive(tree) != decisive(base):
         tree["robot"] = tree.get("robot", {}) | {"spacing": BALANCED}
-    if not same_experiment(tree, base):
-        tree["reference"] = given.get("reference")
     return tree
-
-
-def same_experiment(tree: Tree, base: Tree) -> bool:
-    """Whether two trees agree in all that the numbers of a reference depend on."""
-
-    def relevant(tree: Tree) -> list[Any]:
-        others = ("name", "reference", "simulation", "compiled", "mujoco", "evolution", "optimizer")
-        simulation = tree.get("simulation", {})
-        rest = {name: value for name, value in tree.items() if name not in others}
-        return [rest, simulation.get("duration"), simulation.get("steady_from")]
-
-    return relevant(tree) == relevant(base)
 
 
 def key_groups(spreads: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:

@@ -283,27 +283,6 @@ class EvolutionScenario:
         return self.max_evaluations or self.population + 2 * self.max_iterations
 
 
-@dataclass
-class ReferenceScenario:
-    """Published results of this robot and experiment, shown beside ours; each may be left out.
-
-    A file inherits it from its base while it changes only name, evolution, engine and integration.
-    """
-
-    source: str = setting()
-    duration: float | None = quantity("s", above=0, default=None)  # of the walks measured
-    best_initial_distance: float | None = quantity("m", default=None)  # of random gaits
-    best_distance: float | None = quantity("m", default=None)  # of evolved gaits
-    mean_improvement: float | None = setting(default=None)  # % by evolution, mean over trials
-    best_improvement: float | None = setting(default=None)  # % in the best trial
-    iteration_time: float | None = quantity("s", above=0, default=None)  # wall time
-    share_backward: str = setting(default="")  # of initial gaits, in words
-    # Absolute differences of the two best gaits of the best trial:
-    two_best_fitness: float | None = setting(default=None)  # in fitness (in)
-    two_best_weights: list[float] = setting(default=[])  # in each weight
-    two_best_tau: float | None = quantity("s", default=None)  # in either time constant
-
-
 @dataclass(kw_only=True)
 class Scenario:
     """Everything that defines an experiment but the gait; all numbers in SI units."""
@@ -327,7 +306,6 @@ class Scenario:
     disturbances: DisturbancesScenario | None = setting(default=None)
     evolution: EvolutionScenario
     optimizer: OptimizerKind = setting(default=SteadyState())
-    reference: ReferenceScenario | None = setting(default=None)
 
     @property
     def oscillators(self) -> int:
@@ -343,9 +321,9 @@ class Scenario:
         """A checked copy with other values: {"robot.tetrahedra": 7, "cables.damping": "8 N*s/m"}.
 
         The same rules hold as in a file that is based on this scenario: quantities have units,
-        mappings are merged, and the spacing and the reference follow what is changed. Dataclasses,
-        whose numbers are SI, replace their section or kind as a whole: {"friction": Coulomb()}.
-        Raises InputError, naming the key.
+        mappings are merged, and the spacing follows what is changed. Dataclasses, whose numbers are
+        SI, replace their section or kind as a whole: {"friction": Coulomb()}. Raises InputError,
+        naming the key.
         """
         source, base = f"scenario {self.name}", tree_of(self)
         given: Tree = Check(source).value(type(self), tree_of_changes(changes, base, source))
