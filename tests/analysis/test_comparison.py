@@ -100,7 +100,7 @@ def test_runs_that_differ_in_draws_pay_by_simulations(run):
 
 def test_only_search_may_differ_without_a_note(run):
     base = run("a", trial(1.0))
-    searches = run("b", trial(1.0), trial(2.0), changes={"evolution.max_iterations": 7})
+    searches = run("b", trial(1.0), trial(2.0), changes={"evolution.evaluations": 99})
     assert compare([base, searches]).notes == []
     (note,) = compare([base, run("c", trial(1.0), changes={"cables.slack": True})]).notes
     assert "cables.slack" in note

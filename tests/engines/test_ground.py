@@ -20,7 +20,6 @@ from tetra_drake.scenario.terrain_kinds import (
     Flat,
     HeightField,
     Incline,
-    Obstacles,
     Rough,
     Steps,
     Terrain,
@@ -30,13 +29,12 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 INCH = 0.0254
 COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
 
-# Obstacles and steps are where the robot meets them at once.
+# Steps are where the robot meets them at once.
 TERRAINS: dict[str, Terrain] = {
     "flat": Flat(),
     "incline": Incline(np.radians(5.0)),
     "steps": Steps(-0.25 * INCH, 4.0 * INCH, 4, start=2.0 * INCH),
     "rough": Rough(0.1 * INCH, 6.0 * INCH),
-    "obstacles": Obstacles(0.25 * INCH, 1.0 * INCH, 2.5 * INCH, start=14.0 * INCH),
 }
 
 
@@ -165,7 +163,6 @@ SLOWLY = {
         "simulation.accuracy": 1e-4,
         "simulation.max_step": "3e-4 s",
         "simulation.mode_changes": "witness",
-        "simulation.witness_window": "1e-6 s",
         "simulation.max_evaluations": 10**8,
     },
 }

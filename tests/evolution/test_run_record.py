@@ -247,7 +247,7 @@ def with_changed(number, key):
 
 @pytest.mark.parametrize("kind", ["SteadyState", "CmaEs", "QualityDiversity", "RandomSearch"])
 def test_no_optimiser_takes_over_a_value_that_was_changed(run_small, refused, kind):
-    changes = {"optimizer": {TAG: f"!{kind}"}, "evolution.max_evaluations": 40}
+    changes = {"optimizer": {TAG: f"!{kind}"}, "evolution.evaluations": 40}
     run = run_small(population=4, iterations=3, trials=1, changes=changes)
     whole = read_record(run)
     for path in sorted(run.glob("trial_00/*.jsonl")):

@@ -16,6 +16,7 @@ import numpy as np
 
 from tetra_drake.evolution.draws import combine
 from tetra_drake.optimizers.base import Evaluation, Iteration
+from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import DisturbancesScenario, Scenario
 
@@ -95,7 +96,7 @@ def small_scenario(
         {
             "robot.tetrahedra": oscillators + 1,
             "evolution.population": population,
-            "evolution.max_iterations": iterations,
+            "evolution.evaluations": population + CHILDREN * iterations,
             "evolution.trials": trials,
         }
     )

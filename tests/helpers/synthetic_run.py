@@ -64,7 +64,7 @@ def write_run(
                     "mean_fitness": sum(finite) / len(finite) if finite else None,
                     "best_fitness": best.get("fitness"),
                     "best_evaluation": best.get("index"),
-                    "stop": "all iterations done" if ends else None,
+                    "stop": "all evaluations done" if ends else None,
                 }
                 trial.complete(entries[begin:], line)
     return directory

@@ -116,7 +116,7 @@ def test_a_mapping_changes_what_it_names_as_in_a_file(tmp_path, scenario):
 
 
 def test_a_dataclass_replaces_its_section_as_a_whole(scenario):
-    other = QualityDiversity(measures={"distance": [0.0, 1.0], "lifted": [0.0, 1.0]}, sigma=0.3)
+    other = QualityDiversity(measures={"distance": [0.0, 1.0], "lifted": [0.0, 1.0]}, draws=3)
     mapped = scenario.with_changes({"optimizer": other})
     twist = QualityDiversity(measures={"twist": [0.0, 0.1], "lifted": [0.0, 1.0]})
     assert mapped.with_changes({"optimizer": twist}).optimizer == twist

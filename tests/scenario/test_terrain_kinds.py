@@ -11,7 +11,6 @@ from tetra_drake.scenario.terrain_kinds import (
     Grid,
     HeightField,
     Incline,
-    Obstacles,
     Rough,
     Steps,
     Terrain,
@@ -28,8 +27,6 @@ KINDS: list[Terrain] = [
     Steps(height=-0.1, depth=0.1, count=2, start=-0.3),
     Rough(amplitude=0.25 * IN, wavelength=6 * IN),
     Rough(amplitude=0.01, wavelength=2000.0),
-    Obstacles(height=0.01, radius=0.02, spacing=0.2),
-    Obstacles(height=0.01, radius=0.7, spacing=0.1, start=-3.0),
 ]
 
 
@@ -146,50 +143,13 @@ def test_a_seed_is_one_ground_on_every_machine():
     np.testing.assert_allclose(first[0, :3], known - 1.0, rtol=1e-14)
     assert np.array_equal(first, again)
     assert (first != other).all()
-    bumps = [
-        grid_of(Obstacles(height=1.0, radius=0.1, spacing=0.5, seed=seed)).heights
-        for seed in (3, 3, 4)
-    ]
-    assert np.array_equal(bumps[0], bumps[1])
-    assert not np.array_equal(bumps[0], bumps[2])
 
 
-@pytest.mark.parametrize("start", [None, 0.333])
-def test_ground_is_flat_before_its_start(start, across):
+def test_rough_ground_is_flat_before_its_start(across):
     x, y = across
-    kinds = [Obstacles(height=0.1, radius=0.1, spacing=0.15, start=start)]
-    kinds += [Rough(amplitude=0.1, wavelength=0.2, start=start)] if start else []
-    for terrain in kinds:
-        heights = surface(grid_of(terrain), x, y)
-        first = AHEAD if start is None else start
-        assert (heights[x <= first] == 0.0).all()
-        assert (heights[x > first + 0.5] != 0.0).mean() > 0.5
-
-
-def test_one_bump_stands_in_each_square():
-    # A paraboloid's volume is half its cylinder's; bumps this small seldom overlap.
-    height, radius, spacing, start = 0.1, 0.01, 0.127, 0.0
-    grid = grid_of(Obstacles(height=height, radius=radius, spacing=spacing, start=start))
-    assert 0.99 * height < grid.heights.max() <= height
-    first = start + radius + 0.75 * radius
-    x, y = points(grid)
-    rows, columns = np.ceil((120 * IN - first) / spacing), 60 * IN / spacing
-    volume = grid.heights.sum() * np.prod(grid.cell)
-    one = 0.5 * np.pi * radius**2 * height
-    assert volume == pytest.approx(rows * columns * one, rel=0.02)
-    for i, j in np.ndindex(int(rows) - 1, int(columns)):
-        left, right = first + i * spacing, -30 * IN + j * spacing
-        inside = abs(x - left - spacing / 2) < spacing / 2 + radius
-        beside = abs(y - right - spacing / 2) < spacing / 2 + radius
-        assert grid.heights[np.ix_(inside, beside)].max() > 0.5 * height
-
-
-def test_where_bumps_overlap_the_highest_counts():
-    grid = grid_of(Obstacles(height=0.1, radius=0.3, spacing=0.02, start=-1.0))
-    x, y = points(grid)
-    inner = grid.heights[np.ix_((x > 0) & (x < 2.5), abs(y) < 0.5)]
-    # A centre is within 0.03 m of every point: squares of 0.02 m.
-    assert 0.1 * (1 - 0.03**2 / 0.3**2) < inner.min() <= inner.max() <= 0.1
+    heights = surface(grid_of(Rough(amplitude=0.1, wavelength=0.2, start=0.333)), x, y)
+    assert (heights[x <= 0.333] == 0.0).all()
+    assert (heights[x > 0.833] != 0.0).mean() > 0.5
 
 
 @pytest.mark.parametrize(
@@ -199,8 +159,6 @@ def test_where_bumps_overlap_the_highest_counts():
         (Steps(height=-1e-7, depth=0.1, count=2), "height"),
         (Rough(amplitude=0.1, wavelength=1e-3), "wavelength"),
         (Rough(amplitude=0.1, wavelength=1e-200), "wavelength"),
-        (Obstacles(height=0.1, radius=1e-3, spacing=0.1), "radius"),
-        (Obstacles(height=0.1, radius=0.1, spacing=1e-3), "spacing"),
     ],
     ids=repr,
 )
@@ -321,8 +279,6 @@ def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, mon
         ("!Rough {amplitude: -1 in, wavelength: 1 in}", "amplitude", "'-1 in'"),
         ("!Rough {amplitude: 1 in, wavelength: 1 in, seed: -1}", "seed", "-1"),
         ("!Rough {amplitude: 1 in, wavelength: 1 um}", "wavelength", "5e-07 m"),
-        ("!Obstacles {height: 0 in, radius: 1 in, spacing: 1 in}", "height", "'0 in'"),
-        ("!Obstacles {height: 1 in, radius: 1 in}", "spacing", "missing"),
     ],
 )
 def test_a_bad_terrain_is_refused_when_its_file_is_loaded(tmp_path, text, key, found, refused):

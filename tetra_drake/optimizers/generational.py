@@ -69,14 +69,14 @@ class Generational:
         self._settings = settings
         self._generator = generator
         self._ranges = Ranges(space)
-        self._left = settings.budget
+        self._left = settings.evaluations
         self._points: Matrix = np.empty((0, self._ranges.size))
         """Those drawn last."""
 
     @property
     def evaluations_at_most(self) -> int:
         """Number of evaluations of a trial."""
-        return self._settings.budget
+        return self._settings.evaluations
 
     def ask(self) -> list[Vector]:
         """The next batch."""

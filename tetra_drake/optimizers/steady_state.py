@@ -41,7 +41,7 @@ class SteadyState:
     @property
     def evaluations_at_most(self) -> int:
         """Number of evaluations of a trial that is not stopped early."""
-        return self._settings.population + CHILDREN * self._settings.max_iterations
+        return self._settings.evaluations
 
     def ask(self) -> list[Vector]:
         """The initial population, then two children at a time."""
@@ -88,8 +88,10 @@ class SteadyState:
 
     def _stop(self) -> str | None:
         settings = self._settings
-        if len(self._means) - 1 >= settings.max_iterations:
-            return "all iterations done"
+        iteration = len(self._means) - 1
+        evaluations = settings.population + CHILDREN * iteration
+        if evaluations + CHILDREN > settings.evaluations:
+            return "all evaluations done"
         rise, window, after = settings.stop_rise, settings.stop_window, settings.stop_after
         levelled_off = has_levelled_off(self._means, rise=rise, window=window, after=after)
         return "mean fitness levelled off" if levelled_off else None

@@ -92,11 +92,10 @@ def whole_experiment(scenario: Scenario, *, seconds: float) -> str:
     """What evolving on a whole scenario takes on this machine's cores, and its command; seconds:
     wall time per evaluation on the compiled engine."""
     settings, cores, name = scenario.evolution, available_cores(), scenario.name
-    evaluations = settings.trials * settings.budget
-    time = duration(evaluations * seconds / cores)
+    time = duration(settings.trials * settings.evaluations * seconds / cores)
     return (
         f"this is a first look; scenario {name}, {settings.trials} trials of at most "
-        f"{settings.max_iterations} iterations, takes about {time} (h:mm:ss) on the {cores} cores "
+        f"{settings.evaluations} evaluations, takes about {time} (h:mm:ss) on the {cores} cores "
         f"here: tetra-drake evolve --scenario {name} --engine compiled --out runs/{name}"
     )
 

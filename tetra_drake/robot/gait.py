@@ -20,6 +20,10 @@ from tetra_drake.scenario.schema import PATHWAYS, Scenario
 
 SCHEMA = 2
 
+LARGEST_GAIN, GAIN_MUTATION = 1.0, 0.2
+"""Of a feedback gain: the greatest absolute value of random gaits, and the largest change in one
+mutation."""
+
 Vector = npt.NDArray[np.float64]
 """The parameters of one gait in the order of ParameterSpace.names."""
 
@@ -144,7 +148,7 @@ class ParameterSpace:
             high=np.array(high),
             steps=np.array(steps),
             floors=np.array(floors),
-            couples_tau_b=not scenario.evolution.independent_tau_b,
+            couples_tau_b=scenario.evolution.tau_mutation != "independent",
             weights=places,
             weight_names=weight_names,
             pathways=tuple(scenario.cpg.feedback),
@@ -187,19 +191,16 @@ class ParameterSpace:
 def _parameters(scenario: Scenario, weights: list[str]) -> list[tuple[str, *tuple[float, ...]]]:
     """Name, lower and upper bound, step and floor of each parameter."""
     bounds, settings = scenario.gait_bounds, scenario.evolution
-
-    def kind(name: str, step: float, floor: float) -> tuple[float, float, float, float]:
-        low, high = getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max")
-        return low, high, 0.0 if low == high and name != "weight" else step, floor
-
-    weight = kind("weight", settings.weight_mutation, 0.0)
-    gain = kind("gain", settings.gain_mutation, -math.inf)
-    low, high, step, floor = kind("tau_a", settings.tau_mutation_range, bounds.tau_a_min)
+    weight = bounds.weight_min, bounds.weight_max, settings.weight_mutation, 0.0
+    gain = -LARGEST_GAIN, LARGEST_GAIN, GAIN_MUTATION, -math.inf
+    low, high, floor = bounds.tau_a_min, bounds.tau_a_max, bounds.tau_a_min
+    step = 0.0 if low == high else settings.tau_mutation_range
+    tau_a = low, high, 0.0 if settings.tau_mutation == "listing" else step, floor
     tau_b = (TAU_B_PER_TAU_A * number for number in (low, high, step, floor))
     return [
         *((f"weight {name}", *weight) for name in weights),
         *((f"gain {name}", *gain) for name in scenario.cpg.feedback),
-        ("tau_A", low, high, 0.0 if settings.tau_mutation == "listing" else step, floor),
+        ("tau_A", *tau_a),
         ("tau_B", *tau_b),
     ]
 

@@ -47,8 +47,9 @@ def make_network(scenario: Scenario, structure: Structure, gait: Gait) -> Networ
 
 def initial_neurons(cpg: CpgScenario, oscillators: int) -> np.ndarray:
     """(4n,): u, then v, of all neurons at t = 0 (Table 4)."""
-    u = np.full(2 * oscillators, cpg.inner_state)
-    v = np.tile([cpg.extensor_self_inhibition, cpg.flexor_self_inhibition], oscillators)
+    inner_state, extensor_self_inhibition, flexor_self_inhibition = cpg.initial_state
+    u = np.full(2 * oscillators, inner_state)
+    v = np.tile([extensor_self_inhibition, flexor_self_inhibition], oscillators)
     return np.concatenate([u, v])
 
 

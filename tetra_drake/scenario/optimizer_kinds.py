@@ -26,15 +26,6 @@ class CmaEs:
     quarter of the sample, the others from its best gaits; without a sample, from the middle of the
     ranges and random gaits. Fewer where trying them out would take more than half of the
     evaluations, and one more than the sample at most."""
-    tryout: int = setting(at_least=1, default=350)
-    """Evaluations in which each of them is tried out."""
-    sigma: float = setting(above=0, default=0.2)
-    """Standard deviation at the start, as a share of each parameter's range in random gaits (in its
-    middle; smaller near a floor)."""
-    tolerance: float = setting(above=0, default=0.05)
-    """It has converged where all standard deviations are below this share of the ranges."""
-    growth: float = setting(at_least=1, default=2.0)
-    """Factor on the population at each restart (IPOP)."""
 
 
 @dataclass
@@ -55,16 +46,6 @@ class QualityDiversity:
     edge."""
     cells: list[int] = setting(at_least=2, at_most=1000, length=2, default=[20, 20])
     """Of each metric."""
-    floor: float = setting(default=0.0)
-    """The fitness that gaits on the map exceed: the level of all cells at the start."""
-    learning_rate: float = setting(above=0, at_most=1, default=0.01)
-    """Share of the way to a better gait's fitness by which it raises the level of its cell."""
-    emitters: int = setting(at_least=1, at_most=1000, default=4)
-    """Runs of CMA-ES side by side."""
-    batch: int = setting(at_least=2, at_most=100_000, default=15)
-    """Vectors of each in an iteration."""
-    sigma: float = setting(above=0, default=0.5)
-    """As of !CmaEs; starts are random gaits and, where one begins anew, gaits of the map."""
     draws: int = setting(at_least=0, at_most=10_000, default=10)
     """In the end, each gait of the map is simulated in as many draws of disturbances."""
 

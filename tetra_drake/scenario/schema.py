@@ -30,7 +30,6 @@ from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 ENGINES = ("drake", "compiled", "mujoco")
 SCHEMES = ("radau3", "runge_kutta3")
-MUJOCO_INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete")
 
 CABLES = (
     *("outer bottom_left", "outer bottom_right", "outer top"),
@@ -47,6 +46,8 @@ MOST_SIGNALS = {"drake": 20_000_000, "compiled": 100_000_000, "mujoco": 100_000_
 
 MOST_SAMPLES = 2_000_000
 """Recorded poses of all tetrahedra in one simulation: some 2 GB."""
+
+TAU_MUTATIONS = ("intended", "listing", "independent")
 
 SIDES = ("left", "right")
 """How the names of cables on one side of the robot end."""
@@ -154,9 +155,8 @@ class CpgScenario:
 
     self_inhibition_weight: float = setting(at_least=0)  # beta
     external_input: float = setting()  # u0
-    inner_state: float = setting()  # u of every neuron at t = 0
-    extensor_self_inhibition: float = setting()  # v at t = 0
-    flexor_self_inhibition: float = setting()  # v at t = 0
+    initial_state: list[float] = setting(length=3)
+    """At t = 0: u of every neuron, v of the extensors, v of the flexors."""
     partner_weight: float = setting(at_least=0)  # between extensor and flexor of an oscillator
     gain: float = quantity("N")  # force per unit of y_extensor - y_flexor
     start_up: float = quantity("s", at_least=0)  # until then the cables are not actuated
@@ -176,8 +176,6 @@ class GaitBoundsScenario:
     weight_max: float = setting(at_least=0)
     tau_a_min: float = quantity("s", above=0)
     tau_a_max: float = quantity("s", above=0)
-    gain_min: float = setting(default=-1.0)  # of the scenario's feedback
-    gain_max: float = setting(default=1.0)
     turn: float = setting(at_least=-1, at_most=1, default=0.0)
     """The turn of all gaits that are drawn or evolved."""
     mirrored: bool = setting(default=False)
@@ -188,7 +186,7 @@ class GaitBoundsScenario:
 class SimulationScenario:
     """How long to simulate, on which engine, how finely, and when to give up.
 
-    From `scheme` to `witness_window`, the settings are those of the engine `drake`. Contact and
+    From `scheme` to `look_ahead`, the settings are those of the engine `drake`. Contact and
     stiction (modes) change at the end of steps, or are localised by a witness function.
     """
 
@@ -201,9 +199,7 @@ class SimulationScenario:
     mode_changes: str = setting(choices=("step_end", "witness"))
     look_ahead: float = quantity("s", at_least=0)
     """With step_end and radau3: shortest step that ends at a predicted mode change; 0 for none."""
-    witness_window: float = quantity("s", above=0)  # how closely a witness localises
     max_evaluations: int = setting(at_least=1)  # of the derivatives, in one simulation
-    max_speed: float = quantity("m/s", above=0)  # a faster body counts as diverged
     sample_period: float = quantity("s", above=0)  # of a recorded trajectory
 
 
@@ -222,7 +218,6 @@ class CompiledScenario:
 class MujocoScenario:
     """How the engine `mujoco` simulates, and its friction, which is not that of Table 2."""
 
-    integrator: str = setting(choices=MUJOCO_INTEGRATORS, default="implicitfast")
     step: float = quantity("s", at_least=1e-7, at_most=1, default=0.125e-3)
     friction: float = setting(above=0, default=0.5)  # coefficient, as of metal on a floor
 
@@ -254,33 +249,26 @@ class EvolutionScenario:
     """The evolutionary algorithm (Table 6, section 2.3, appendix A).
 
     It stops when the mean fitness rose by less than `stop_rise` over `stop_window` iterations, not
-    before iteration `stop_after`. With `tau_mutation: listing`, mutation never changes tau_A.
+    before iteration `stop_after`.
     """
 
     population: int = setting(at_least=2, at_most=100_000)
     tournament: int = setting(at_least=1, at_most=100_000)
     trials: int = setting(at_least=1, at_most=1000)
-    max_iterations: int = setting(at_least=1)
-    max_evaluations: int | None = setting(at_least=1, default=None)
-    """Of a trial by an optimiser other than !SteadyState; if not given, as many as there are in
-    max_iterations of that one."""
+    evaluations: int = setting(at_least=1)
+    """Of a trial that does not end early, by any optimiser. !SteadyState makes one for each member
+    of the population, then two in each iteration."""
     crossover_probability: float = setting(at_least=0, at_most=1)
     mutation_probability: float = setting(at_least=0, at_most=1)
     weight_mutation: float = setting(at_least=0)  # largest change of a weight in one mutation
     tau_mutation_range: float = quantity("s", at_least=0)  # largest change of tau_A
-    tau_mutation: str = setting(choices=("intended", "listing"))
-    gain_mutation: float = setting(at_least=0, default=0.2)  # largest change of a feedback gain
+    tau_mutation: str = setting(choices=TAU_MUTATIONS)
+    """`intended`: tau_A mutates, and tau_B stays 2 tau_A. `listing`: as in the thesis's listing,
+    neither does. `independent`: both do, and every optimiser varies tau_B by itself."""
     stop_rise: float = setting(at_least=0)
     stop_window: int = setting(at_least=1)
     stop_after: int = setting(at_least=0)
-    independent_tau_b: bool = setting()  # tau_B evolves by itself instead of staying at 2 tau_A
     time_budget: float = quantity("s", above=0)  # wall time; a longer simulation counts as failed
-
-    @property
-    def budget(self) -> int:
-        """Evaluations of a trial that does not end early: max_evaluations, or the population and
-        two children in each iteration."""
-        return self.max_evaluations or self.population + 2 * self.max_iterations
 
 
 @dataclass(kw_only=True)
@@ -376,7 +364,7 @@ def _check_relations(scenario: Scenario, source: object) -> None:
     mu, most = (law.kinetic, law.static) if isinstance(law, Coulomb) else (0.0, 0.0)
     ranges = {
         name: (getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max"))
-        for name in ("weight", "tau_a", "gain")
+        for name in ("weight", "tau_a")
     }
     for wrong, key, found, expected in (
         *(
@@ -390,6 +378,7 @@ def _check_relations(scenario: Scenario, source: object) -> None:
         *_size_relations(scenario),
         *_network_relations(scenario),
         *_map_relations(scenario),
+        *_budget_relations(scenario),
     ):
         if wrong:
             raise InputError(source, key, f"found {found}, expected {expected}")
@@ -479,6 +468,14 @@ def _map_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:
         (low >= high, f"{key}.{name}", low, f"less than the range's end, {high}")
         for name, (low, high) in kind.measures.items()
     ]
+
+
+def _budget_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:
+    """As _network_relations(), of the evaluations of !SteadyState."""
+    settings, steady = scenario.evolution, isinstance(scenario.optimizer, SteadyState)
+    few = steady and settings.evaluations < settings.population
+    expected = f"at least the population, {settings.population}"
+    return [(few, "evolution.evaluations", settings.evaluations, expected)]
 
 
 def mirrored(cables: Sequence[str]) -> list[str]:

@@ -74,22 +74,6 @@ class Rough:
 
 
 @dataclass
-class Obstacles:
-    """Round bumps, h = height max(0, 1 - (r / radius)^2), the highest where two overlap.
-
-    One stands at a random place in each square of side `spacing`, none reaches before `start`, 1 in
-    ahead of the robot if not given. The grid lowers a bump's top by about an eighth. The same seed
-    is the same ground.
-    """
-
-    height: float = quantity("m", above=0)
-    radius: float = quantity("m", above=0)
-    spacing: float = quantity("m", above=0)
-    seed: int = setting(at_least=0, default=0)
-    start: float | None = quantity("m", default=None)
-
-
-@dataclass
 class HeightField:
     """Heights in m from a file: rows along x, columns along y, both upward.
 
@@ -103,7 +87,7 @@ class HeightField:
     """x and y of the first height; the grid's centre is the origin if not given."""
 
 
-Terrain = Flat | Incline | Steps | Rough | Obstacles | HeightField
+Terrain = Flat | Incline | Steps | Rough | HeightField
 
 
 @dataclass(frozen=True)
@@ -121,7 +105,7 @@ class Grid:
 def make_grid(terrain: Terrain, *, ahead: float, source: object) -> Grid:
     """The grid of a terrain.
 
-    Steps and obstacles without a start begin at x = `ahead` (m). Raises InputError, naming `source`
+    Steps without a start begin at x = `ahead` (m). Raises InputError, naming `source`
     and the key, for more than MOST_CELLS cells, and for a height file that cannot be used.
     """
     if isinstance(terrain, HeightField):
@@ -132,8 +116,6 @@ def make_grid(terrain: Terrain, *, ahead: float, source: object) -> Grid:
         return _steps(terrain, ahead, source)
     if isinstance(terrain, Rough):
         return _rough(terrain, source)
-    if isinstance(terrain, Obstacles):
-        return _obstacles(terrain, ahead, source)
     return Grid(np.zeros((3, 3)), (-ASIDE, -ASIDE), (ASIDE, ASIDE))
 
 
@@ -167,29 +149,6 @@ def _rough(rough: Rough, source: object) -> Grid:
     if rough.start is not None:
         heights[x < rough.start + 1.5 * half] = 0.0  # how far a control point reaches
     return _grid(x, y, heights, (half, half))
-
-
-def _obstacles(obstacles: Obstacles, ahead: float, source: object) -> Grid:
-    cell, spacing = 0.5 * obstacles.radius, obstacles.spacing
-    _check_size((cell, cell), source, "radius")
-    _check_size((spacing, spacing), source, "spacing")
-    x, y = _axes((cell, cell), 0.0)
-    start = ahead if obstacles.start is None else obstacles.start
-    first = max(-BEHIND, start + obstacles.radius + 1.5 * cell)  # a bump and its control points
-    squares = np.arange(first, AHEAD, spacing), np.arange(-ASIDE, ASIDE, spacing)
-    corners = np.stack(np.meshgrid(*squares, indexing="ij"), axis=-1).reshape(-1, 2)
-    generator = np.random.default_rng(obstacles.seed)
-    centres = corners + spacing * generator.uniform(size=corners.shape)
-    heights = np.zeros((len(x), len(y)))
-    nearest = np.rint((centres - (x[0], y[0])) / cell).astype(int)
-    for offset in np.ndindex(5, 5):  # a bump is four cells wide
-        at = nearest + offset - np.array([2, 2])
-        inside = ((at >= 0) & (at < heights.shape)).all(axis=1)
-        at, centre = at[inside], centres[inside]
-        r_squared = (x[at[:, 0]] - centre[:, 0]) ** 2 + (y[at[:, 1]] - centre[:, 1]) ** 2
-        bumps = obstacles.height * (1.0 - r_squared / obstacles.radius**2)
-        np.maximum.at(heights, (at[:, 0], at[:, 1]), bumps)
-    return _grid(x, y, heights, (cell, cell))
 
 
 def _height_field(field: HeightField, source: object) -> Grid:

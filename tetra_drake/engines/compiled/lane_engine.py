@@ -33,6 +33,7 @@ from tetra_drake.engines.compiled.walk import (
     Walks,
     advance,
 )
+from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics.cable import PULL_COLUMNS, Cables
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, Law
 from tetra_drake.physics.feedback import Senses
@@ -211,7 +212,7 @@ class LaneEngine:
         senses = each.senses
         turns = sample_turns(scenario, each.structure, each.gait, each.steering)
         numbers: dict[str, Any] = dataclasses.asdict(compiled)
-        numbers |= {name: getattr(simulation, name) for name in ("max_speed", "max_evaluations")}
+        numbers |= {"max_speed": MAX_SPEED, "max_evaluations": simulation.max_evaluations}
         numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
         numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
         numbers["neurons"] = make_neurons(initial_neurons(cpg, scenario.oscillators))
