@@ -180,7 +180,7 @@ def batches_table(scenario: Scenario) -> str:
             batches.append(Batch(scenario.with_changes(changes), cores * MUJOCO_BATCH, cores))
     rows = []
     for batch, timing in zip(batches, measure(batches), strict=True):
-        engine = batch.scenario.simulation.engine
+        engine: str = batch.scenario.simulation.engine
         if engine == "mujoco":
             engine += f", steps of {1e3 * batch.scenario.mujoco.step:g} ms"
         rows.append([engine, str(batch.gaits), str(batch.cores), f"{timing.speed:,.1f}"])

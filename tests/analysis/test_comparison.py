@@ -10,7 +10,7 @@ from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 from tetra_drake.analysis.comparison import SIMULATIONS, compare, describe
 from tetra_drake.cli import main
 from tetra_drake.figures.search import search
-from tetra_drake.scenario.schema import DisturbancesScenario
+from tetra_drake.scenario.disturbances import Disturbances
 from tetra_drake.scenario.units import INCH
 
 
@@ -87,7 +87,7 @@ def test_a_distance_is_reached_when_the_fittest_gait_walks_it(run):
 
 
 def test_runs_that_differ_in_draws_pay_by_simulations(run):
-    disturbed = {"disturbances": DisturbancesScenario(draws=3, start=0.1)}
+    disturbed = {"disturbances": Disturbances(draws=3, start=0.1)}
     paths = [run("calm", trial(1.0, 2.0)), run("rough", trial(3.0, 4.0), changes=disturbed)]
     found = compare(paths, reach=2.0 * INCH)
     assert (found.unit, found.common) == (SIMULATIONS, 2)

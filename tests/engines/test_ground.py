@@ -15,7 +15,8 @@ from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.ground import ground_frames, make_ground
 from tetra_drake.robot.model import make_model
 from tetra_drake.robot.structure import MakeStructure, node_positions
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import (
     Flat,
     HeightField,

@@ -15,7 +15,8 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -104,11 +105,11 @@ def test_friction_opposes_motion_within_the_cone(short, structure):
 @needs_mujoco
 def test_steps_count_against_the_budget_of_evaluations(short):
     gait, steps = seeded_gait(short), 3200
-    short.simulation.max_evaluations = steps
+    short = short.with_changes({"simulation.max_evaluations": steps})
     implicit = simulate(scenario=short, gait=gait)
     assert implicit.integrator.scheme == "implicitfast"
     assert implicit.integrator.steps == implicit.integrator.derivative_evaluations == steps
-    short.simulation.max_evaluations = steps - 1
+    short = short.with_changes({"simulation.max_evaluations": steps - 1})
     with pytest.raises(StepBudgetExceeded):
         simulate(scenario=short, gait=gait)
 

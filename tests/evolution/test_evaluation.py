@@ -18,7 +18,7 @@ from tetra_drake.evolution.draws import SeededVector
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import evaluate_all
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.scenario.schema import DisturbancesScenario
+from tetra_drake.scenario.disturbances import Disturbances
 
 
 @pytest.fixture
@@ -116,7 +116,7 @@ def test_time_budgets_hold_in_any_thread_and_end_with_their_evaluation(tiny, vec
 
 def test_many_gaits_in_lanes_are_those_gaits_one_by_one(tiny, vectors):
     compiled = tiny.with_changes({"simulation.engine": "compiled"})
-    draws = DisturbancesScenario(draws=2, start=0.1)
+    draws = Disturbances(draws=2, start=0.1)
     among = compiled.with_changes({"disturbances": draws})
     for scenario, tasks in (
         (compiled, vectors),

@@ -14,7 +14,7 @@ from helpers.analytic import DrawnBowl, drawn_scenario, read_record
 
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
-from tetra_drake.scenario.fields import TAG
+from tetra_drake.scenario.sections import TAG
 
 PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
 

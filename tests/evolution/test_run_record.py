@@ -18,7 +18,7 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord, evaluation_entry, read_manifest
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.results.result import versions
-from tetra_drake.scenario.fields import TAG
+from tetra_drake.scenario.sections import TAG
 
 
 def cut(path, lost):

@@ -20,8 +20,9 @@ from tetra_drake.figures.style import OKABE_ITO, common_style, save_figure
 from tetra_drake.results.measures import last_step, lifted
 from tetra_drake.robot.ground import ground_heights, make_ground
 from tetra_drake.robot.structure import STRUTS, MakeStructure
+from tetra_drake.scenario.cable_names import CABLES
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import CABLES, Coulomb
 from tetra_drake.scenario.terrain_kinds import Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 

@@ -12,7 +12,7 @@ from helpers.analytic import DrawnBowl, drawn_scenario
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.run_record import MANIFEST, RunRecord
 from tetra_drake.evolution.trials import run_trials
-from tetra_drake.scenario.fields import TAG
+from tetra_drake.scenario.sections import TAG
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in jobs of a script

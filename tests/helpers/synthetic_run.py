@@ -42,7 +42,7 @@ def write_run(
     in SI, by fitness.
     """
     scenario = scenario or tiny_scenario()
-    scenario.evolution.trials = len(trials)
+    scenario = scenario.with_changes({"evolution.trials": len(trials)})
     with RunRecord.create(directory, scenario=scenario, seed=7):
         for number, iterations in enumerate(trials):
             trial = TrialRecord(trial_folder(directory, number))

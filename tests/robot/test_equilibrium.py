@@ -13,7 +13,8 @@ from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.equilibrium import settled_lengths, settled_state
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import BOTTOM_LEFT, TIP, MakeStructure, node_positions
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 

@@ -59,12 +59,12 @@ def test_integers_and_weights_of_zero_are_legal(tmp_path, scenario):
 
 @pytest.mark.parametrize("tetrahedra", [2, 3, 4, 9])
 def test_a_gait_has_the_weights_of_its_robot(tmp_path, scenario, tetrahedra, refused):
-    scenario.robot.tetrahedra = tetrahedra
+    scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra})
     # Two neurons per oscillator, each inhibited by its like in every other oscillator.
     count = 2 * (tetrahedra - 1) * (tetrahedra - 2)
     file = write(tmp_path, gait_file(weights=[1.5] * count))
     assert load_gait(file, scenario).weights == (1.5,) * count
-    scenario.robot.tetrahedra += 1
+    scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra + 1})
     with refused(file, "weights", f"{count}"):
         load_gait(file, scenario)
 
@@ -280,7 +280,7 @@ def test_a_turn_is_that_of_the_scenario_and_no_parameter(tmp_path):
 
 @pytest.mark.parametrize("oscillators", [1, 2, 4, 8])
 def test_a_vector_is_a_gait_in_the_order_of_the_names(scenario, oscillators):
-    scenario.robot.tetrahedra = oscillators + 1
+    scenario = scenario.with_changes({"robot.tetrahedra": oscillators + 1})
     space = ParameterSpace.of(scenario)
     vector = space.random(np.random.default_rng(7))
     assert vector.shape == (2 * oscillators * (oscillators - 1) + 2,)
@@ -305,9 +305,11 @@ def test_steps_and_floors_are_the_thesis_s(scenario):
     assert (space.steps[0], space.floors[0]) == (0.2, 0.0)
     np.testing.assert_allclose(space.steps[[TAU_A, TAU_B]], [0.05, 0.1])
     np.testing.assert_allclose(space.floors[[TAU_A, TAU_B]], [0.2, 0.4])
-    scenario.evolution.tau_mutation = "listing"
+    scenario = scenario.with_changes({"evolution.tau_mutation": "listing"})
     np.testing.assert_allclose(ParameterSpace.of(scenario).steps[[TAU_A, TAU_B]], [0.0, 0.1])
-    scenario.gait_bounds.tau_a_min = scenario.gait_bounds.tau_a_max = 0.3
+    scenario = scenario.with_changes(
+        {"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}
+    )
     np.testing.assert_array_equal(ParameterSpace.of(scenario).steps[[TAU_A, TAU_B]], 0.0)
 
 
@@ -318,7 +320,7 @@ def test_repair_couples_tau_b_unless_it_is_independent(scenario):
     assert repaired[TAU_B] == 2.0 * vector[TAU_A]
     np.testing.assert_array_equal(repaired[:TAU_B], vector[:TAU_B])
     assert vector[TAU_B] == 2.0
-    scenario.evolution.tau_mutation = "independent"
+    scenario = scenario.with_changes({"evolution.tau_mutation": "independent"})
     np.testing.assert_array_equal(ParameterSpace.of(scenario).repair(vector), vector)
 
 
@@ -353,8 +355,8 @@ def test_random_gaits_are_uniform_within_the_bounds(scenario):
 
 
 def test_random_gaits_follow_other_bounds(scenario):
-    scenario.gait_bounds.weight_min, scenario.gait_bounds.weight_max = 7.0, 8.0
-    scenario.gait_bounds.tau_a_min = scenario.gait_bounds.tau_a_max = 0.35
+    bounds = {"weight_min": 7, "weight_max": 8, "tau_a_min": "0.35 s", "tau_a_max": "0.35 s"}
+    scenario = scenario.with_changes({"gait_bounds": bounds})
     vectors = draw(scenario, seed=0, count=20)
     assert vectors[:, :-2].min() >= 7.0 and vectors[:, :-2].max() <= 8.0
     np.testing.assert_array_equal(vectors[:, TAU_A], 0.35)

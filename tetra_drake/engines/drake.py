@@ -19,7 +19,7 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.schema import Scenario, SimulationScenario
+from tetra_drake.scenario.schema import Scenario, SimulationSection
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 _WITNESS_WINDOW = 2e-5  # s: how closely a witness localises, where the accuracy is 1e-3 or more
@@ -101,7 +101,7 @@ def simulate_drake(
     )
 
 
-def MakeSimulator(diagram: Diagram, settings: SimulationScenario) -> Simulator:
+def MakeSimulator(diagram: Diagram, settings: SimulationSection) -> Simulator:
     """A simulator of the diagram with the scenario's integrator settings."""
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, settings.scheme, settings.max_step)
@@ -139,7 +139,7 @@ class _Work:
         self._before = self.total()
 
 
-def _check(settings: SimulationScenario, now: float, velocities: np.ndarray, work: _Work) -> None:
+def _check(settings: SimulationSection, now: float, velocities: np.ndarray, work: _Work) -> None:
     """Raises Diverged or StepBudgetExceeded if the simulation has failed."""
     speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
     used = work.derivative_evaluations()
@@ -165,7 +165,7 @@ class _StepAimer:
     """
 
     def __init__(
-        self, diagram: Diagram, simulator: Simulator, settings: SimulationScenario, work: _Work
+        self, diagram: Diagram, simulator: Simulator, settings: SimulationSection, work: _Work
     ) -> None:
         self._integrator, self._settings = simulator.get_mutable_integrator(), settings
         self._work = work

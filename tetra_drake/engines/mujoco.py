@@ -34,7 +34,8 @@ from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from tetra_drake.optimizers.generational import (
 )
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
-from tetra_drake.scenario.schema import EvolutionScenario
+from tetra_drake.scenario.schema import EvolutionSection
 
 TRYOUT = 350
 """Evaluations in which each search is tried out."""
@@ -49,7 +49,7 @@ class CmaEs(Generational):
     def __init__(
         self,
         space: ParameterSpace,
-        settings: EvolutionScenario,
+        settings: EvolutionSection,
         generator: np.random.Generator,
         own: kinds.CmaEs | None = None,
     ) -> None:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.robot.gait import TAU_B, ParameterSpace, Vector
-from tetra_drake.scenario.schema import EvolutionScenario
+from tetra_drake.scenario.schema import EvolutionSection
 
 Matrix = npt.NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class Generational:
     """
 
     def __init__(
-        self, space: ParameterSpace, settings: EvolutionScenario, generator: np.random.Generator
+        self, space: ParameterSpace, settings: EvolutionSection, generator: np.random.Generator
     ) -> None:
         self._space = space
         self._settings = settings

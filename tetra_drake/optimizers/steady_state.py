@@ -14,7 +14,7 @@ import numpy.typing as npt
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.robot.gait import ParameterSpace, Vector
-from tetra_drake.scenario.schema import EvolutionScenario
+from tetra_drake.scenario.schema import EvolutionSection
 
 CHILDREN = 2
 Fitnesses = npt.NDArray[np.float64]
@@ -28,7 +28,7 @@ class SteadyState:
     """
 
     def __init__(
-        self, space: ParameterSpace, settings: EvolutionScenario, generator: np.random.Generator
+        self, space: ParameterSpace, settings: EvolutionSection, generator: np.random.Generator
     ) -> None:
         self._space = space
         self._settings = settings

@@ -1,22 +1,52 @@
-"""Draws of a scenario's disturbances, and the scenario changed by one."""
+"""Disturbances of robot and surroundings: settings, draws, and the scenario changed by a draw."""
 
 from __future__ import annotations
 
-import copy
-import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from pydantic import Field
 
-from tetra_drake.scenario.rules import key_groups
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.sections import Section
+
+if TYPE_CHECKING:
+    from tetra_drake.scenario.schema import Scenario
+
+Spread = Annotated[float, Field(gt=0, le=0.5)]
+
+
+class Disturbances(Section):
+    """The changes of robot and surroundings among which evolution looks for gaits.
+
+    Every gait is simulated once for each of `draws` draws; those of an iteration are the same for
+    all its gaits.
+    """
+
+    draws: int = Field(ge=1, le=10_000)
+    spreads: dict[str, Spread] = Field(default={})
+    """By scenario keys: each draw multiplies the number by 1 + up to +-spread, uniformly. Keys
+    joined by commas get the same factor."""
+    start: float = Field(default=0.0, ge=0, le=0.5)
+    """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing, forward or
+    back, sideways, and up."""
+    terrain: bool = False
+    """Whether each draw has another seed of the terrain."""
+    tail: float = Field(default=1.0, gt=0, le=1)
+    """The fitness is the mean over this share of the draws, the worst (the conditional value at
+    risk): 1 is the mean over all; one draw counts at least."""
+
+
+def key_groups(spreads: Mapping[str, float]) -> Iterator[tuple[str, list[str]]]:
+    """Each key of `spreads` with the scenario keys that it joins by commas."""
+    for joined in spreads:
+        yield joined, [key.strip() for key in joined.split(",")]
 
 
 @dataclass(frozen=True)
 class Draw:
-    """What one draw changes."""
+    """The changes of one draw."""
 
     factors: Mapping[str, float]
     """By the keys of `disturbances.spreads`."""
@@ -48,17 +78,18 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
 
     Its values are not checked again: those of the largest changes are when a scenario is loaded.
     """
-    sections = {name: copy.copy(section) for name, section in vars(scenario).items()}
-    changed = dataclasses.replace(scenario, **sections | {"disturbances": None})
-    for joined, keys in key_groups(draw.factors):
-        for key in keys:
-            section, _, name = key.partition(".")
-            setattr(
-                getattr(changed, section), name, draw.factors[joined] * attrgetter(key)(scenario)
-            )
+    numbers = scenario.numbers()
+    changed = scenario.with_numbers(
+        {
+            key: draw.factors[joined] * numbers[key]
+            for joined, keys in key_groups(draw.factors)
+            for key in keys
+        }
+    )
+    robot, terrain = changed.robot, changed.terrain
     if draw.moves is not None:
-        offsets = scenario.robot.offsets or np.zeros_like(draw.moves)
-        changed.robot.offsets = (draw.moves + offsets).tolist()
+        offsets = draw.moves + (robot.offsets or np.zeros_like(draw.moves))
+        robot = robot.model_copy(update={"offsets": offsets.tolist()})
     if draw.terrain_seed is not None:
-        setattr(changed.terrain, "seed", draw.terrain_seed)  # noqa: B010 (kinds with a seed only)
-    return changed
+        terrain = terrain.model_copy(update={"seed": draw.terrain_seed})
+    return changed.with_sections(robot=robot, terrain=terrain, disturbances=None)

@@ -18,7 +18,8 @@ from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.model import JUNCTION_CABLES, Model, make_model
 from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.schema import Coulomb, ResetIntegrator, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -114,7 +115,7 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario, terrain, 
 def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
     # At rest and without other stiffness, forces change with positions by the normal forces only.
     for key in ("outer_stiffness", "inner_stiffness"):
-        setattr(scenario.cables, key, 1e-12)
+        scenario = scenario.with_numbers({f"cables.{key}": 1e-12})
     robot, state, modes = disturbed_robot(scenario, 0)
     state[35:] = 0.0
 

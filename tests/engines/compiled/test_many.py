@@ -24,7 +24,8 @@ from tetra_drake.errors import (
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Rough
 
 FAR_TOO_STRONG = {"cpg.gain": "4e9 N"}

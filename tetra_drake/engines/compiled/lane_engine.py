@@ -211,7 +211,7 @@ class LaneEngine:
         network = make_network(scenario, each.structure, each.gait)
         senses = each.senses
         turns = sample_turns(scenario, each.structure, each.gait, each.steering)
-        numbers: dict[str, Any] = dataclasses.asdict(compiled)
+        numbers: dict[str, Any] = dict(compiled)
         numbers |= {"max_speed": MAX_SPEED, "max_evaluations": simulation.max_evaluations}
         numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
         numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
