@@ -132,7 +132,7 @@ def test_shipped_networks_differ_from_their_bases_in_the_network_only(name):
     [
         ({"robot.actuation": []}, "robot.actuation", "[]"),
         ({"robot.actuation": [LEFT, []]}, "robot.actuation", "[]"),
-        ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "['outer bottom_left'] twice"),
+        ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
         ({"robot.actuation": [["outer left"]]}, "robot.actuation[0][0]", "'outer left'"),
         ({"robot.actuation": [LEFT], "gait_bounds.mirrored": True}, "gait_bounds.mirrored", "true"),
         ({"cpg.reach": -1}, "cpg.reach", "-1"),

@@ -18,10 +18,10 @@ from tetra_drake.formatting import aligned, fixed, ranged, signed
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult, versions
 from tetra_drake.robot.gait import Gait
-from tetra_drake.scenario.disturbances import Draw, disturbed, draw_disturbances, key_groups
+from tetra_drake.scenario.disturbances import Draw, disturbed, draw_disturbances
 from tetra_drake.scenario.fields import tree_of
 from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import DisturbancesScenario, Scenario
+from tetra_drake.scenario.schema import DisturbancesScenario, Scenario, separate
 from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
@@ -82,10 +82,9 @@ def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Distur
     """Those that spread each key of SPREAD that the scenario has, and displace starts, by so many
     percent, and draw the terrain's seed if it has one."""
     share = percent / 100.0
-    groups = key_groups(dict.fromkeys(SPREAD, share))
     return DisturbancesScenario(
         draws=1,
-        spreads={joined: share for joined, keys in groups if _has(scenario, keys[0])},
+        spreads={joined: share for joined in SPREAD if _has(scenario, separate(joined)[0])},
         start=share,
         terrain=hasattr(scenario.terrain, "seed"),
     )

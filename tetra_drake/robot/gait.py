@@ -15,8 +15,8 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import aligned
 from tetra_drake.robot.actuation import KINDS, Actuation
-from tetra_drake.scenario.fields import Check, setting
-from tetra_drake.scenario.schema import PATHWAYS, Scenario
+from tetra_drake.scenario.fields import Check, refuse, setting
+from tetra_drake.scenario.schema import Scenario
 
 SCHEMA = 2
 
@@ -277,22 +277,21 @@ def check_gait(
     gait: Gait, scenario: Scenario, actuation: Actuation, *, source: object, key: str = ""
 ) -> None:
     """Raises InputError, naming source and key, for what does not fit the scenario."""
-    weights, count, n = len(gait.weights), len(actuation.couplings), len(actuation.names)
-    pathways, gains = scenario.cpg.feedback, dataclasses.asdict(gait.gains)
-    gain = next((name for name in PATHWAYS if gains[name] and name not in pathways), "")
-    for wrong, name, found, expected in (
-        (weights != count, "weights", f"{weights} numbers", f"{count} for {n} oscillators"),
-        (gain, f"gains.{gain}", gains.get(gain), f"0, as cpg.feedback is {pathways}"),
-        (
-            gait.turn and not actuation.sides.any(),
-            "turn",
-            gait.turn,
-            "0, as no oscillator has a side",
-        ),
-    ):
-        if wrong:
-            problem = f"found {found}, expected {expected}"
-            raise InputError(source, f"{key}.{name}".strip("."), problem)
+    count, expected = len(gait.weights), len(actuation.couplings)
+    if count != expected:
+        expected_text = f"{expected} for {len(actuation.names)} oscillators"
+        refuse(source, _key(key, "weights"), found=f"{count} numbers", expected=expected_text)
+    for name, gain in dataclasses.asdict(gait.gains).items():
+        if gain and name not in scenario.cpg.feedback:
+            expected_text = f"0, as cpg.feedback is {scenario.cpg.feedback}"
+            refuse(source, _key(key, f"gains.{name}"), found=gain, expected=expected_text)
+    if gait.turn and not actuation.sides.any():
+        expected_text = "0, as no oscillator has a side"
+        refuse(source, _key(key, "turn"), found=gait.turn, expected=expected_text)
+
+
+def _key(section: str, name: str) -> str:
+    return f"{section}.{name}" if section else name
 
 
 def _check_names(found: tuple[str, ...], wanted: tuple[str, ...], source: object, key: str) -> None:

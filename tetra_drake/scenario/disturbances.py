@@ -10,8 +10,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from tetra_drake.scenario.rules import key_groups
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import Scenario, separate
 
 
 @dataclass(frozen=True)
@@ -50,12 +49,10 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
     """
     sections = {name: copy.copy(section) for name, section in vars(scenario).items()}
     changed = dataclasses.replace(scenario, **sections | {"disturbances": None})
-    for joined, keys in key_groups(draw.factors):
-        for key in keys:
+    for joined, factor in draw.factors.items():
+        for key in separate(joined):
             section, _, name = key.partition(".")
-            setattr(
-                getattr(changed, section), name, draw.factors[joined] * attrgetter(key)(scenario)
-            )
+            setattr(getattr(changed, section), name, factor * attrgetter(key)(scenario))
     if draw.moves is not None:
         offsets = scenario.robot.offsets or np.zeros_like(draw.moves)
         changed.robot.offsets = (draw.moves + offsets).tolist()

@@ -19,7 +19,7 @@ import operator
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, NoReturn
 
 import yaml
 
@@ -338,6 +338,11 @@ def _sections_with(name: Any, fields: Iterable[dataclasses.Field[Any]]) -> str:
         if dataclasses.is_dataclass(kind) and name in {g.name for g in dataclasses.fields(kind)}
     ]
     return f"did you mean {' or '.join(dict.fromkeys(keys))}?" if keys else ""
+
+
+def refuse(source: object, key: str, *, found: object, expected: str) -> NoReturn:
+    """Raises InputError for a value."""
+    raise InputError(source, key, f"found {found}, expected {expected}")
 
 
 def hint(name: Any, known: Iterable[str]) -> str:

@@ -9,9 +9,8 @@ from pathlib import Path
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import TAG, Check, Tree, dump_yaml, parse_yaml, tree_of
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import Scenario, on_base
 from tetra_drake.scenario.terrain_kinds import make_grid
 
 MOST_BYTES = 2**20
@@ -89,4 +88,4 @@ def _load_tree(file: Path, seen: tuple[Path, ...] = ()) -> Tree:
     if not os.path.exists(base_file):
         raise InputError(file, "base", f"'{base}': no such {expected}")
     tree = _load_tree(base_file, (*seen, file.resolve()))
-    return rules.on_base(tree, given)
+    return on_base(tree, given)

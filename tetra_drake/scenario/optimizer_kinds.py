@@ -1,14 +1,25 @@
 """Kinds of optimisers and their settings."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from tetra_drake.scenario.fields import setting
+from tetra_drake.scenario.fields import refuse, setting
 from tetra_drake.scenario.metric_units import METRICS
+
+if TYPE_CHECKING:
+    from tetra_drake.scenario.schema import Scenario
 
 
 @dataclass
 class SteadyState:
     """The thesis's evolutionary algorithm. Its settings are those of the section `evolution`."""
+
+    def check(self, scenario: "Scenario", source: object) -> None:
+        """Raises InputError if there are not enough evaluations for the first population."""
+        evaluations, population = scenario.evolution.evaluations, scenario.evolution.population
+        if evaluations < population:
+            expected = f"at least the population, {population}"
+            refuse(source, "evolution.evaluations", found=evaluations, expected=expected)
 
 
 @dataclass
@@ -48,6 +59,16 @@ class QualityDiversity:
     """Of each metric."""
     draws: int = setting(at_least=0, at_most=10_000, default=10)
     """In the end, each gait of the map is simulated in as many draws of disturbances."""
+
+    def check(self, scenario: "Scenario", source: object) -> None:
+        """Raises InputError unless there are two measures, each with a range."""
+        if len(self.measures) != 2:
+            found, expected = f"{len(self.measures)} metrics", "two, one for each side of the map"
+            refuse(source, "optimizer.measures", found=found, expected=expected)
+        for name, (low, high) in self.measures.items():
+            if low >= high:
+                expected = f"less than the range's end, {high}"
+                refuse(source, f"optimizer.measures.{name}", found=low, expected=expected)
 
 
 OptimizerKind = SteadyState | CmaEs | RandomSearch | QualityDiversity

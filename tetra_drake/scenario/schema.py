@@ -7,24 +7,25 @@ field existed.
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario import rules
 from tetra_drake.scenario.fields import (
     Check,
     Tree,
     hint,
+    merge,
     quantity,
+    refuse,
     setting,
     tree_of,
     tree_of_changes,
     with_values,
 )
 from tetra_drake.scenario.metric_units import METRICS, inverse
-from tetra_drake.scenario.optimizer_kinds import OptimizerKind, QualityDiversity, SteadyState
+from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -37,6 +38,12 @@ CABLES = (
 )
 """The cables of a junction, from one tetrahedron to the next: outer ones join base nodes of the
 same name, inner ones join the tip to base nodes."""
+
+BALANCED = "balanced"
+"""Written as robot.spacing: the spacing at which the cables of a junction balance."""
+
+WHOLE = ("objective", "require")
+"""The sections that a file gives as a whole."""
 
 SHORTEST_STEP = 1e-9
 """No step of the engine `compiled` (s) is as short."""
@@ -69,7 +76,7 @@ class RobotScenario:
     strut_diameter: float = quantity("m", above=0)
     node_diameter: float = quantity("m", above=0)
     density: float = quantity("kg/m^3", above=0)
-    spacing: float = quantity("m", above=0, choices=(rules.BALANCED,))  # of base triangles, t = 0
+    spacing: float = quantity("m", above=0, choices=(BALANCED,))  # of base triangles, t = 0
     gravity: float = quantity("m/s^2", at_least=0)
     offsets: list[list[float]] = quantity("m", default=[], length=3)
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
@@ -79,6 +86,42 @@ class RobotScenario:
     ground leaves the others untouched."""
     actuation: list[list[str]] = setting(choices=CABLES, default=[[CABLES[0], CABLES[1]]])
     """The groups of a junction's cables that share an oscillator, the same for every junction."""
+
+    def check(self, scenario: "Scenario", source: object) -> None:
+        """Raises InputError for groups of cables, or offsets, that do not fit the robot."""
+        if not self.actuation or not all(self.actuation):
+            expected = "groups of at least one cable"
+            refuse(source, "robot.actuation", found=self.actuation, expected=expected)
+        cables = [cable for group in self.actuation for cable in group]
+        for cable in cables:
+            if cables.count(cable) > 1:
+                expected = "each cable once at most"
+                refuse(source, "robot.actuation", found=f"'{cable}' twice", expected=expected)
+        count = len(self.offsets)
+        if count not in (0, self.tetrahedra):
+            expected = f"none or {self.tetrahedra}, one each"
+            refuse(source, "robot.offsets", found=f"{count} items", expected=expected)
+
+    def balanced_spacing(self, cables: "CableScenario", source: object) -> float:
+        """The spacing at which the cables of a junction balance along x.
+
+        Three outer cables of length s pull two tetrahedra together. Three inner ones, from a tip at
+        height h to base nodes at s along and R across, push them apart while s < h.
+        """
+        height = self.strut_length * math.sqrt(2.0 / 3.0)
+        radius = self.strut_length / math.sqrt(3.0)
+
+        def pull(s: float) -> float:
+            length = math.hypot(radius, height - s)
+            inner = cables.inner_stiffness * (length - cables.free_length) * (height - s) / length
+            return cables.outer_stiffness * (s - cables.free_length) - inner
+
+        near, far = 0.0, height + cables.free_length
+        if pull(near) >= 0.0:
+            raise InputError(source, "robot.spacing", "the cables balance at no spacing; give one")
+        while near < (middle := 0.5 * (near + far)) < far:
+            near, far = (near, middle) if pull(middle) > 0.0 else (middle, far)
+        return far
 
 
 @dataclass
@@ -128,6 +171,12 @@ class Coulomb:
     backward: float = setting(above=0, default=1.0)
     lateral: float = setting(above=0, default=1.0)
 
+    def check(self, scenario: "Scenario", source: object) -> None:
+        """Raises InputError if a contact in slip had more friction than one in stick."""
+        if self.kinetic > self.static:
+            expected = f"at most static, {self.static}"
+            refuse(source, "friction.kinetic", found=self.kinetic, expected=expected)
+
 
 Friction = ResetIntegrator | Coulomb
 """What `friction` may be; without a tag it is the first."""
@@ -167,6 +216,21 @@ class CpgScenario:
     feedback: list[str] = setting(choices=PATHWAYS, default=[])
     """What is fed back, by gains that are parameters of the gait."""
 
+    def check(self, scenario: "Scenario", source: object) -> None:
+        """Raises InputError for a step that does not fit the duration, and for feedback that
+        cannot be."""
+        step, duration = self.listing_step, scenario.simulation.duration
+        if step > duration:
+            expected = f"at most the duration, {duration} s"
+            refuse(source, "cpg.listing_step", found=f"{step} s", expected=expected)
+        check_memory(source, "cpg.listing_step", step, least=scenario.least_signal_period)
+        if self.feedback and self.signals != "live":
+            expected = f"'live' for feedback of {self.feedback}"
+            refuse(source, "cpg.signals", found=f"'{self.signals}'", expected=expected)
+        if "load" in self.feedback and scenario.robot.gravity == 0.0:
+            expected = "a weight, for feedback of the load"
+            refuse(source, "robot.gravity", found="0 m/s^2", expected=expected)
+
 
 @dataclass
 class GaitBoundsScenario:
@@ -180,6 +244,25 @@ class GaitBoundsScenario:
     """The turn of all gaits that are drawn or evolved."""
     mirrored: bool = setting(default=False)
     """Whether weights are drawn and evolved in pairs, left and right alike."""
+
+    def check(self, scenario: "Scenario", source: object) -> None:
+        """Raises InputError for empty ranges, and for what the robot's actuation cannot have."""
+        for name in ("weight", "tau_a"):
+            low, high = getattr(self, f"{name}_min"), getattr(self, f"{name}_max")
+            if low > high:
+                expected = f"at most {name}_max, {high}"
+                refuse(source, f"gait_bounds.{name}_min", found=low, expected=expected)
+        groups = scenario.robot.actuation
+        sided = any(all(cable.endswith(side) for cable in g) for g in groups for side in SIDES)
+        if self.turn and not sided:
+            expected = "0, as no group is on one side"
+            refuse(source, "gait_bounds.turn", found=self.turn, expected=expected)
+        if not self.mirrored:
+            return
+        for group in groups:
+            if set(mirrored(group)) not in map(set, groups):
+                expected = f"false, as {group} has no mirror image"
+                refuse(source, "gait_bounds.mirrored", found="true", expected=expected)
 
 
 @dataclass
@@ -202,6 +285,15 @@ class SimulationScenario:
     max_evaluations: int = setting(at_least=1)  # of the derivatives, in one simulation
     sample_period: float = quantity("s", above=0)  # of a recorded trajectory
 
+    def check(self, scenario: "Scenario", source: object) -> None:
+        """Raises InputError for a steady stretch without length, or too many samples."""
+        start, end = self.steady_from, self.duration
+        if start >= end:
+            expected = f"less than the duration, {end} s"
+            refuse(source, "simulation.steady_from", found=f"{start} s", expected=expected)
+        least = end * scenario.robot.tetrahedra / MOST_SAMPLES
+        check_memory(source, "simulation.sample_period", self.sample_period, least=least)
+
 
 @dataclass
 class CompiledScenario:
@@ -220,6 +312,11 @@ class MujocoScenario:
 
     step: float = quantity("s", at_least=1e-7, at_most=1, default=0.125e-3)
     friction: float = setting(above=0, default=0.5)  # coefficient, as of metal on a floor
+
+    def check(self, scenario: "Scenario", source: object) -> None:
+        """Raises InputError for steps that do not fit in memory."""
+        if scenario.simulation.engine == "mujoco":
+            check_memory(source, "mujoco.step", self.step, least=scenario.least_signal_period)
 
 
 @dataclass
@@ -242,6 +339,23 @@ class DisturbancesScenario:
     tail: float = setting(above=0, at_most=1, default=1.0)
     """The fitness is the mean over this share of the draws, the worst (the conditional value at
     risk): 1 is the mean over all; one draw counts at least."""
+
+    def check(self, scenario: "Scenario", source: object) -> None:
+        """Raises InputError for a number that a draw cannot change, or not that far."""
+        if self.terrain and not hasattr(scenario.terrain, "seed"):
+            expected = f"false: !{type(scenario.terrain).__name__} has no seed"
+            refuse(source, "disturbances.terrain", found="true", expected=expected)
+        undisturbed = tree_of(scenario) | {"disturbances": None}
+        for joined, spread in self.spreads.items():
+            key = f"disturbances.spreads.{joined}"
+            numbers = {name: _number(scenario, name, key, source) for name in separate(joined)}
+            for factor in (1.0 - spread, 1.0 + spread):
+                changed = {name: factor * number for name, number in numbers.items()}
+                try:
+                    Scenario.from_tree(with_values(undisturbed, changed), source)
+                except InputError as error:
+                    problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
+                    raise InputError(source, key, problem) from error
 
 
 @dataclass
@@ -301,6 +415,11 @@ class Scenario:
         return len(self.robot.actuation) * (self.robot.tetrahedra - 1)
 
     @property
+    def least_signal_period(self) -> float:
+        """Time between values of the signals (s) below which they would not fit in memory."""
+        return self.simulation.duration * self.oscillators / MOST_SIGNALS[self.simulation.engine]
+
+    @property
     def draws(self) -> int:
         """Simulations of a gait in evolution: one, or one for each draw of disturbances."""
         return self.disturbances.draws if self.disturbances else 1
@@ -315,167 +434,67 @@ class Scenario:
         """
         source, base = f"scenario {self.name}", tree_of(self)
         given: Tree = Check(source).value(type(self), tree_of_changes(changes, base, source))
-        for section in rules.WHOLE:
+        for section in WHOLE:
             if section in given and section not in changes:  # as {"objective.lead": "2 /in"}
                 given[section] = base[section] | given[section]
-        return self.from_tree(rules.on_base(base, given), source)
+        return self.from_tree(on_base(base, given), source)
 
     @classmethod
     def from_tree(cls, tree: dict[str, Any], source: object) -> Self:
         """The scenario of an SI tree; raises InputError that names `source` and key."""
         scenario: Self = Check(source, complete=True).value(cls, tree)
-        _balance(scenario, source)
-        _check_relations(scenario, source)
+        if scenario.robot.spacing == BALANCED:
+            scenario.robot.spacing = scenario.robot.balanced_spacing(scenario.cables, source)
         if not scenario.objective:
             raise InputError(source, "objective", "found no metric, expected one at least")
-        _check_disturbances(scenario, tree, source)
+        for section in vars(scenario).values():
+            if hasattr(section, "check"):
+                section.check(scenario, source)
         return scenario
 
 
-def _balance(scenario: Scenario, source: object) -> None:
-    """Gives a `balanced` spacing its number: there, the cables of a junction balance along x.
+def on_base(base: Tree, given: Tree) -> Tree:
+    """The tree of a base with what a file gives, which may decide on the spacing.
 
-    Three outer cables of length s pull two tetrahedra together. Three inner ones, from a tip at
-    height h to base nodes at s along and R across, push them apart while s < h.
+    Masses do not count for the balance: twice the density moves T1 by less than 0.003 in.
     """
-    robot, cables = scenario.robot, scenario.cables
-    height, radius = robot.strut_length * math.sqrt(2.0 / 3.0), robot.strut_length / math.sqrt(3.0)
 
-    def pull(s: float) -> float:
-        length = math.hypot(radius, height - s)
-        inner = cables.inner_stiffness * (length - cables.free_length) * (height - s) / length
-        return cables.outer_stiffness * (s - cables.free_length) - inner
+    def decisive(tree: Tree) -> list[Any]:
+        names = ("strut_length", "outer_stiffness", "inner_stiffness", "free_length")
+        values = tree.get("robot", {}) | tree.get("cables", {})
+        return [values.get(name) for name in names]
 
-    if robot.spacing != rules.BALANCED:
-        return
-    near, far = 0.0, height + cables.free_length
-    if pull(near) >= 0.0:
-        raise InputError(source, "robot.spacing", "the cables balance at no spacing; give one")
-    while near < (middle := 0.5 * (near + far)) < far:
-        near, far = (near, middle) if pull(middle) > 0.0 else (middle, far)
-    robot.spacing = far
+    tree: Tree = merge(base, given) | {k: given[k] for k in WHOLE if k in given}
+    if "spacing" not in given.get("robot", {}) and decisive(tree) != decisive(base):
+        tree["robot"] = tree.get("robot", {}) | {"spacing": BALANCED}
+    return tree
 
 
-def _check_relations(scenario: Scenario, source: object) -> None:
-    """Checks values of a scenario against each other; raises InputError."""
-    bounds, simulation, n = scenario.gait_bounds, scenario.simulation, scenario.robot.tetrahedra
-    offsets, start, end = len(scenario.robot.offsets), simulation.steady_from, simulation.duration
-    law, step = scenario.friction, scenario.cpg.listing_step
-    mu, most = (law.kinetic, law.static) if isinstance(law, Coulomb) else (0.0, 0.0)
-    ranges = {
-        name: (getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max"))
-        for name in ("weight", "tau_a")
-    }
-    for wrong, key, found, expected in (
-        *(
-            (low > high, f"gait_bounds.{name}_min", low, f"at most {name}_max, {high}")
-            for name, (low, high) in ranges.items()
-        ),
-        (start >= end, "simulation.steady_from", f"{start} s", f"less than the duration, {end} s"),
-        (mu > most, "friction.kinetic", mu, f"at most static, {most}"),
-        (offsets not in (0, n), "robot.offsets", f"{offsets} items", f"none or {n}, one each"),
-        (step > end, "cpg.listing_step", f"{step} s", f"at most the duration, {end} s"),
-        *_size_relations(scenario),
-        *_network_relations(scenario),
-        *_map_relations(scenario),
-        *_budget_relations(scenario),
-    ):
-        if wrong:
-            raise InputError(source, key, f"found {found}, expected {expected}")
+def check_memory(source: object, key: str, period: float, *, least: float) -> None:
+    """Raises InputError if a period (s) makes more values than memory holds."""
+    if period < least:
+        expected = f"at least {least:.3g} s for this duration and robot, to fit in memory"
+        refuse(source, key, found=f"{period} s", expected=expected)
 
 
-def _check_disturbances(scenario: Scenario, tree: dict[str, Any], source: object) -> None:
-    """Checks that every number a draw may change can be changed that far; raises InputError."""
-    settings = scenario.disturbances
-    if settings is None:
-        return
-    key = "disturbances.terrain"
-    if settings.terrain and not hasattr(scenario.terrain, "seed"):
-        kind = type(scenario.terrain).__name__
-        raise InputError(source, key, f"found true, expected false: !{kind} has no seed")
-    tree = tree | {"disturbances": None}
-    for joined, keys in rules.key_groups(settings.spreads):
-        key, spread = f"disturbances.spreads.{joined}", settings.spreads[joined]
-        numbers = {name: _number(scenario, name, key, source) for name in keys}
-        for factor in (1.0 - spread, 1.0 + spread):
-            changed = {name: factor * number for name, number in numbers.items()}
-            try:
-                Scenario.from_tree(with_values(tree, changed), source)
-            except InputError as error:
-                problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
-                raise InputError(source, key, problem) from error
+def separate(joined: str) -> list[str]:
+    """The scenario keys that a key of `disturbances.spreads` joins by commas."""
+    return [key.strip() for key in joined.split(",")]
 
 
 def _number(scenario: Scenario, name: str, key: str, source: object) -> float:
     """The number at a dotted key, which `disturbances` changes at `key`."""
-    section, _, rest = name.partition(".")
-    sections = {k: vars(v) for k, v in vars(scenario).items() if dataclasses.is_dataclass(v)}
-    known = [f"{k}.{n}" for k, v in sections.items() for n, x in v.items() if type(x) is float]
-    if name not in known:
-        raise InputError(source, key, f"'{name}' is no number of the scenario; {hint(name, known)}")
-    return float(sections[section][rest])
-
-
-def _size_relations(scenario: Scenario) -> Iterator[tuple[bool, str, Any, str]]:
-    """As _network_relations(), of what has to fit in memory."""
-    simulation = scenario.simulation
-    signals = simulation.duration * scenario.oscillators / MOST_SIGNALS[simulation.engine]
-    samples = simulation.duration * scenario.robot.tetrahedra / MOST_SAMPLES
-    for key, period, least in (
-        ("cpg.listing_step", scenario.cpg.listing_step, signals),
-        ("mujoco.step", scenario.mujoco.step, signals * (simulation.engine == "mujoco")),
-        ("simulation.sample_period", simulation.sample_period, samples),
-    ):
-        expected = f"at least {least:.3g} s for this duration and robot, to fit in memory"
-        yield period < least, key, f"{period} s", expected
-
-
-def _network_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:
-    """What may be wrong with groups, steering and feedback: whether it is, key, found, expected."""
-    groups, bounds, cpg = scenario.robot.actuation, scenario.gait_bounds, scenario.cpg
-    cables = [cable for group in groups for cable in group]
-    twice = [cable for cable in cables if cables.count(cable) > 1][:1]
-    alone = [group for group in groups if {*mirrored(group)} not in map(set, groups)][:1]
-    sided = any(all(cable.endswith(side) for cable in g) for g in groups for side in SIDES)
-    needs_live, weightless = bool(cpg.feedback), scenario.robot.gravity == 0.0
-    actuation, turn, live = "robot.actuation", "gait_bounds.turn", "'live' for feedback of"
-    return [
-        (not groups or not all(groups), actuation, groups, "groups of at least one cable"),
-        (bool(twice), actuation, f"{twice} twice", "each cable once at most"),
-        (bounds.turn != 0.0 and not sided, turn, bounds.turn, "0, as no group is on one side"),
-        (
-            bounds.mirrored and bool(alone),
-            *("gait_bounds.mirrored", "true", f"false, as {alone} has no mirror image"),
-        ),
-        (
-            "load" in cpg.feedback and weightless,
-            *("robot.gravity", "0 m/s^2", "a weight, for feedback of the load"),
-        ),
-        (
-            needs_live and cpg.signals != "live",
-            *("cpg.signals", f"'{cpg.signals}'", f"{live} {cpg.feedback}"),
-        ),
-    ]
-
-
-def _map_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:
-    """As _network_relations(), of the map of !QualityDiversity."""
-    kind, key = scenario.optimizer, "optimizer.measures"
-    if not isinstance(kind, QualityDiversity):
-        return []
-    count = len(kind.measures)
-    return [(count != 2, key, f"{count} metrics", "two, one for each side of the map")] + [
-        (low >= high, f"{key}.{name}", low, f"less than the range's end, {high}")
-        for name, (low, high) in kind.measures.items()
-    ]
-
-
-def _budget_relations(scenario: Scenario) -> list[tuple[bool, str, Any, str]]:
-    """As _network_relations(), of the evaluations of !SteadyState."""
-    settings, steady = scenario.evolution, isinstance(scenario.optimizer, SteadyState)
-    few = steady and settings.evaluations < settings.population
-    expected = f"at least the population, {settings.population}"
-    return [(few, "evolution.evaluations", settings.evaluations, expected)]
+    numbers = {
+        f"{section}.{field}": value
+        for section, settings in vars(scenario).items()
+        if dataclasses.is_dataclass(settings)
+        for field, value in vars(settings).items()
+        if type(value) is float
+    }
+    if name not in numbers:
+        problem = f"'{name}' is no number of the scenario; {hint(name, numbers)}"
+        raise InputError(source, key, problem)
+    return numbers[name]
 
 
 def mirrored(cables: Sequence[str]) -> list[str]:
