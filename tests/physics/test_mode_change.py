@@ -71,7 +71,7 @@ class Sliding:
         return mode_margin(nodes, self.modes, self.ground, frames)
 
 
-@pytest.fixture(params=[Flat(), Incline(SLOPE)], ids=["flat", "incline"])
+@pytest.fixture(params=[Flat(), Incline(slope=SLOPE)], ids=["flat", "incline"])
 def sliding(request: pytest.FixtureRequest, scenario: Scenario) -> Sliding:
     return Sliding(scenario, request.param)
 

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.common.yaml import yaml_load_typed
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
@@ -13,8 +12,6 @@ from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import differences, load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import tree_of
-from tetra_drake.scenario.yaml_text import dump_yaml
 
 IN = 0.0254
 
@@ -143,16 +140,3 @@ def test_a_difference_to_a_base_with_other_than_default_values_is_seen(scenario)
     base = scenario.with_changes({"mujoco.friction": 0.7})
     assert differences(scenario, base) == [("mujoco.friction", "0.5")]
     assert differences(base, scenario) == [("mujoco.friction", "0.7")]
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"robot.tetrahedra": 3, "robot.offsets": [[0.0, 0.0, "0.1 m"]] * 3},
-        {"friction": Coulomb(lateral=2.0)},  # not kinds with required keys: Drake starts from none
-    ],
-)
-def test_drakes_own_loader_reads_what_is_written_in_si(scenario, changes):
-    changed = scenario.with_changes(changes)
-    text = dump_yaml(tree_of(changed))
-    assert yaml_load_typed(schema=Scenario, data=text, defaults=scenario) == changed

@@ -23,7 +23,7 @@ from tetra_drake.scenario.disturbances import (
     Draw,
     disturbed,
     draw_disturbances,
-    key_groups,
+    separate,
 )
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
@@ -88,10 +88,9 @@ def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Distur
     """Those that spread each key of SPREAD that the scenario has, and displace starts, by so many
     percent, and draw the terrain's seed if it has one."""
     share = percent / 100.0
-    groups = key_groups(dict.fromkeys(SPREAD, share))
     return Disturbances(
         draws=1,
-        spreads={joined: share for joined, keys in groups if _has(scenario, keys[0])},
+        spreads={joined: share for joined in SPREAD if _has(scenario, separate(joined)[0])},
         start=share,
         terrain=hasattr(scenario.terrain, "seed"),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -38,10 +38,9 @@ class Disturbances(Section):
     risk): 1 is the mean over all; one draw counts at least."""
 
 
-def key_groups(spreads: Mapping[str, float]) -> Iterator[tuple[str, list[str]]]:
-    """Each key of `spreads` with the scenario keys that it joins by commas."""
-    for joined in spreads:
-        yield joined, [key.strip() for key in joined.split(",")]
+def separate(joined: str) -> list[str]:
+    """The scenario keys in a key of `spreads`, which joins them by commas."""
+    return [key.strip() for key in joined.split(",")]
 
 
 @dataclass(frozen=True)
@@ -81,9 +80,9 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
     numbers = scenario.numbers()
     changed = scenario.with_numbers(
         {
-            key: draw.factors[joined] * numbers[key]
-            for joined, keys in key_groups(draw.factors)
-            for key in keys
+            key: factor * numbers[key]
+            for joined, factor in draw.factors.items()
+            for key in separate(joined)
         }
     )
     robot, terrain = changed.robot, changed.terrain

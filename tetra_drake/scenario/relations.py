@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.cable_names import SIDES, mirrored
-from tetra_drake.scenario.disturbances import key_groups
+from tetra_drake.scenario.disturbances import separate
 from tetra_drake.scenario.optimizer_kinds import SteadyState
 from tetra_drake.scenario.sections import hint
 
@@ -107,9 +107,9 @@ def _check_disturbances(scenario: Scenario, source: object) -> None:
         problem = f"found true, expected false: !{kind} has no seed"
         raise InputError(source, "disturbances.terrain", problem)
     undisturbed = scenario.with_sections(disturbances=None)
-    for joined, keys in key_groups(settings.spreads):
-        place, spread = f"disturbances.spreads.{joined}", settings.spreads[joined]
-        known = scenario.numbers()
+    known = scenario.numbers()
+    for joined, spread in settings.spreads.items():
+        place, keys = f"disturbances.spreads.{joined}", separate(joined)
         for key in keys:
             if key not in known:
                 problem = f"'{key}' is no number of the scenario; {hint(key, known)}"

@@ -110,11 +110,21 @@ class Kinds:
             if not isinstance(value, (dict, Section)) or name(value) not in kinds:
                 wanted = name(value) if isinstance(value, (dict, Section)) else ""
                 refuse("", f"found {described(value)}; {hint(f'!{wanted}', tags(kinds))}")
+            if isinstance(value, dict):
+                _check_kind(value, name(value), kinds)
             return value
 
         choices = {kind: handler(section) for kind, section in kinds.items()}
         union = core_schema.tagged_union_schema(choices, discriminator=name)
         return core_schema.no_info_before_validator_function(check, union)
+
+
+def _check_kind(tree: Tree, name: str, kinds: Mapping[str, type[Section]]) -> None:
+    """Refuses a key that only another kind has."""
+    for key in tree:
+        others = [other for other, kind in kinds.items() if key in keys_of(kind)]
+        if others and name not in others:
+            refuse(key, f"unknown key of !{name}; did you mean {' or '.join(tags(others))}?")
 
 
 def tags(kinds: Iterable[str]) -> list[str]:

@@ -60,7 +60,9 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 5, 8])
-@pytest.mark.parametrize("changes", [{}, {"terrain": Rough(2e-4, 0.03), "friction": Coulomb()}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"terrain": Rough(amplitude=2e-4, wavelength=0.03), "friction": Coulomb()}]
+)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_accelerations_are_those_of_the_diagram(scenario, tetrahedra, changes, seed):
     scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra, **changes})
@@ -82,7 +84,18 @@ UNEVEN = Rough(amplitude=0.0005, wavelength=0.03, seed=1)
 
 
 @pytest.mark.parametrize("terrain", [Flat(), UNEVEN])
-@pytest.mark.parametrize("friction", [ResetIntegrator(1e-4, 70.0, 0.7, 0.0), Coulomb(static=50.0)])
+@pytest.mark.parametrize(
+    "friction",
+    [
+        ResetIntegrator(
+            stiction_range=1e-4,
+            stiction_damping=70.0,
+            stiction_switch=0.7,
+            proportional_stiction=0.0,
+        ),
+        Coulomb(static=50.0),
+    ],
+)
 def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario, terrain, friction):
     # With stiffness left out (it enters squared in time) and the small dependence of bristles
     # on speed switched off, d force / d velocity is minus the damping matrix. (A limit of Coulomb

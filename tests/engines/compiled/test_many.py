@@ -83,9 +83,13 @@ def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short
 @pytest.mark.parametrize("width", WIDTHS)
 def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short, width):
     # Each lane has a grid of its own size, and constants of its own.
-    rough = {"robot.contacts": "all", "terrain": Rough(2e-3, 0.1), "friction": Coulomb()}
+    rough = {
+        "robot.contacts": "all",
+        "terrain": Rough(amplitude=2e-3, wavelength=0.1),
+        "friction": Coulomb(),
+    }
     firm = Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)
-    finer = rough | {"terrain": Rough(3e-3, 0.05, seed=1), "friction": firm}
+    finer = rough | {"terrain": Rough(amplitude=3e-3, wavelength=0.05, seed=1), "friction": firm}
     kinds = [short.with_changes(changes) for changes in (finer, rough, rough | FAR_TOO_STRONG)]
     walks = [Walk.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(kinds * 3)]
     alone = [courses([walk], 1)[0] for walk in walks]

@@ -217,7 +217,7 @@ class LaneEngine:
         numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
         numbers["neurons"] = make_neurons(initial_neurons(cpg, scenario.oscillators))
         numbers["external_input"] = cpg.external_input
-        numbers["gains"] = dataclasses.astuple(each.gait.gains)
+        numbers["gains"] = [gain for _, gain in each.gait.gains]
         numbers["sides"] = np.repeat(each.structure.actuation.sides, 2)
         numbers["tonic"] = tonic_input(scenario, each.structure, turns)[0]
         for name, values in numbers.items():
