@@ -1,6 +1,7 @@
 """What several test modules start from."""
 
 import contextlib
+import copy
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -34,10 +35,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=rank)
 
 
-@pytest.fixture
-def scenario() -> Scenario:
-    """The thesis scenario, a fresh copy that a test may change."""
+@pytest.fixture(scope="session")
+def thesis() -> Scenario:
+    """The thesis scenario, which no test may change."""
     return load_scenario("thesis")
+
+
+@pytest.fixture
+def scenario(thesis: Scenario) -> Scenario:
+    """The thesis scenario, a fresh copy that a test may change."""
+    return copy.deepcopy(thesis)
 
 
 @pytest.fixture

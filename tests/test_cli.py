@@ -15,6 +15,7 @@ import xarray
 import tetra_drake
 from tetra_drake.cli import main
 from tetra_drake.formatting import fixed
+from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gait, load_gait, save_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metric_units import METRICS
@@ -27,11 +28,11 @@ simulation: {duration: 0.3 s, steady_from: 0.1 s, sample_period: 70 ms}
 """The sample period does not divide the duration."""
 
 INCH = 0.0254
-WEIGHTS = [1.5] * 24
-GOOD = {"schema": 1, "name": "good", "weights": WEIGHTS, "tau_a_s": 0.3}
+WEIGHTS = dict.fromkeys(Actuation.of(load_scenario()).weight_names, 1.5)
+GOOD = {"schema": 2, "name": "good", "weights": WEIGHTS, "tau_a_s": 0.3}
 FILES = {
     "good.json": json.dumps(GOOD),
-    "23.json": json.dumps(GOOD | {"weights": WEIGHTS[:23]}),
+    "23.json": json.dumps(GOOD | {"weights": dict([*WEIGHTS.items()][:23])}),
     "key.json": json.dumps(GOOD | {"tau": 0.3}),
     "short.yaml": SHORT,
     "key.yaml": "base: thesis\nrobot: {tetrahedron: 4}\n",
@@ -72,7 +73,7 @@ def unchanged(work):
         ("simulate --engine compiled --meshcat", "scenario thesis", "simulation.engine compiled"),
         ("cpg --out a.csv --scenario broken.yaml", "broken.yaml", ""),
         ("diagram --out a.dot --scenario folder", "folder", ""),
-        ("simulate --gait 23.json", "23.json", "weights 23 24"),
+        ("simulate --gait 23.json", "23.json", "weights 24 misses"),
         # 2 n (n - 1) = 40 weights for the 5 oscillators of 6 tetrahedra.
         ("simulate --scenario six.yaml --gait good.json", "good.json", "weights 24 40"),
         ("cpg --out a.csv --gait key.json", "key.json", "tau: tau_b_s"),

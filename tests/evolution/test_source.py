@@ -58,7 +58,8 @@ def test_a_gait_file_keeps_the_scenario_that_it_was_made_for(tmp_path):
 
 
 def test_nothing_is_said_of_a_file_without_a_scenario(tmp_path):
-    content = {"schema": 1, "weights": [1.5] * 24, "tau_a_s": 0.3}
+    content = seeded_gait(load_scenario("coulomb")).to_json(load_scenario("coulomb"))
+    del content["scenario"]
     (tmp_path / "gait.json").write_text(json.dumps(content))
     told = []
     source = load_source(tmp_path / "gait.json", scenario="coulomb", warn=told.append)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import (
     TAU_A,
     TAU_B,
@@ -21,7 +22,8 @@ from tetra_drake.robot.gait import (
 )
 from tetra_drake.scenario.load import load_scenario
 
-WEIGHTS = [1.0 + 0.1 * i for i in range(24)]
+NAMES = Actuation.of(load_scenario()).weight_names
+WEIGHTS = {name: 1.0 + 0.1 * i for i, name in enumerate(NAMES)}
 
 
 def write(folder: Path, content: object) -> Path:
@@ -32,7 +34,7 @@ def write(folder: Path, content: object) -> Path:
 
 
 def gait_file(**changes: object) -> dict[str, object]:
-    return {"schema": 1, "name": "mine", "weights": WEIGHTS, "tau_a_s": 0.3} | changes
+    return {"schema": 2, "name": "mine", "weights": WEIGHTS, "tau_a_s": 0.3} | changes
 
 
 def without(key: str) -> dict[str, object]:
@@ -44,21 +46,20 @@ def without(key: str) -> dict[str, object]:
 
 def test_a_gait_file_gives_weights_and_time_constants(tmp_path, scenario):
     gait = load_gait(write(tmp_path, gait_file()), scenario)
-    assert gait == Gait(name="mine", weights=tuple(WEIGHTS), tau_a=0.3, tau_b=0.6)
+    assert gait == Gait(name="mine", weights=tuple(WEIGHTS.values()), tau_a=0.3, tau_b=0.6)
     assert load_gait(write(tmp_path, gait_file(tau_b_s=0.45)), scenario).tau_b == 0.45
     assert load_gait(write(tmp_path, without("name")), scenario).name == "mine"
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 4])
 def test_a_gait_has_the_weights_of_its_robot(tmp_path, scenario, tetrahedra, refused):
-    scenario.robot.tetrahedra = tetrahedra
+    robot = scenario.with_changes({"robot.tetrahedra": tetrahedra})
+    gait = seeded_gait(robot)
     # Two neurons per oscillator, each inhibited by its like in every other oscillator.
-    count = 2 * (tetrahedra - 1) * (tetrahedra - 2)
-    file = write(tmp_path, gait_file(weights=[1.5] * count))
-    assert load_gait(file, scenario).weights == (1.5,) * count
-    scenario.robot.tetrahedra += 1
-    with refused(file, "weights", f"{count}"):
-        load_gait(file, scenario)
+    assert len(gait.weights) == 2 * (tetrahedra - 1) * (tetrahedra - 2)
+    save_gait(gait, tmp_path / "gait.json", robot)
+    with refused(tmp_path / "gait.json", "weights", "of the 24 weights"):
+        load_gait(tmp_path / "gait.json", scenario)
 
 
 @pytest.mark.parametrize(("tau_b", "written"), [(2 * 0.1 / 3, False), (0.45, True)])
@@ -74,11 +75,11 @@ def test_a_saved_gait_loads_back_to_the_last_bit(tmp_path, tau_b, written, scena
 
 BAD_TIMES = [-0.3, 0, math.inf, "0.3"]
 BAD_VALUES = {
-    "weights[7]": [math.nan, -0.1, "1.5", None, [1.5]],
+    "weights.3->1 flexor": [math.nan, -0.1, "1.5", None, [1.5]],
     "tau_a_s": BAD_TIMES,
     "tau_b_s": BAD_TIMES,
     "name": [5],
-    "schema": [3],
+    "schema": [1, 3],
 }
 
 
@@ -86,8 +87,8 @@ BAD_VALUES = {
     ("key", "value"), [(key, value) for key, values in BAD_VALUES.items() for value in values]
 )
 def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, refused, scenario):
-    weights = {"weights": [*WEIGHTS[:7], value, *WEIGHTS[8:]]}
-    file = write(tmp_path, gait_file(**(weights if key == "weights[7]" else {key: value})))
+    section, _, name = key.partition(".")
+    file = write(tmp_path, gait_file(**{section: WEIGHTS | {name: value} if name else value}))
     shown = {None: "nothing", True: "true"}.get(value) if value is None or value is True else ""
     with refused(file, key, shown or ("a list" if isinstance(value, list) else str(value))):
         load_gait(file, scenario)
@@ -96,9 +97,7 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
 @pytest.mark.parametrize(
     ("content", "key", "found"),
     [
-        (gait_file(weights=WEIGHTS[:23]), "weights", "23"),
-        (gait_file(weights=[*WEIGHTS, 1]), "weights", "25"),
-        (gait_file(weights=1.5), "weights", "1.5"),
+        (gait_file(weights=[1.5] * 24), "weights", "a list"),
         (gait_file(weights={"1->2 flexor": -1}), "weights.1->2 flexor", "-1"),
         (gait_file(turn=1.01), "turn", "1.01"),
         (gait_file(gains={"lenght": 0.1}), "gains.lenght", "'length'"),
@@ -108,7 +107,7 @@ def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, re
         (gait_file(tau_c_s=1), "tau_c_s", "tau_"),
         (gait_file(tau_a_s=10**400), "tau_a_s", "1000"),
         ([1, 2], "", "list"),
-        ('{"schema": 1, "schema": 1, "weights": [], "tau_a_s": 0.3}', "", "twice"),
+        ('{"schema": 2, "schema": 2, "weights": {}, "tau_a_s": 0.3}', "", "twice"),
         ('{"tau_a_s": 1' + "0" * 5000 + "}", "", "JSON"),  # beyond Python's limit of digits
         ("weights: [1, 2]", "", "JSON"),
         (json.dumps(gait_file())[:100], "", "JSON"),
@@ -168,13 +167,11 @@ def test_a_saved_gait_of_any_scenario_loads_back_with_its_names_in_any_order(tmp
     ],
 )
 def test_missing_and_unknown_names_are_refused(tmp_path, scenario, refused, change, found):
-    names = [name.removeprefix("weight ") for name in ParameterSpace.of(scenario).names[:-2]]
-    named = dict(zip(names, WEIGHTS, strict=True)) | change
-    weights = {name: weight for name, weight in named.items() if weight is not None}
-    file = write(tmp_path, gait_file(schema=2, weights=weights))
+    weights = {name: w for name, w in (WEIGHTS | change).items() if w is not None}
+    file = write(tmp_path, gait_file(weights=weights))
     with refused(file, "weights", found):
         load_gait(file, scenario)
-    write(tmp_path, {"gait": gait_file(schema=2, weights=weights)})
+    write(tmp_path, {"gait": gait_file(weights=weights)})
     with refused(file, "gait.weights", found):
         load_gait(file, scenario, key="gait")
 
@@ -324,7 +321,8 @@ def test_the_seed_alone_decides_the_draw(scenario):
 
 
 def test_a_printed_gait_has_weights_in_the_row_of_the_inhibited_oscillator(tmp_path, scenario):
-    gait = load_gait(write(tmp_path, gait_file(weights=[*range(1, 25)], name="any")), scenario)
+    weights = dict(zip(NAMES, range(1, 25), strict=True))
+    gait = load_gait(write(tmp_path, gait_file(weights=weights, name="any")), scenario)
     head, *tables = str(gait).split("\n\n")
     assert head.startswith("any") and f"{gait.tau_a:.4g} s" in head
     extensors, flexors = ([line.split() for line in table.splitlines()] for table in tables)

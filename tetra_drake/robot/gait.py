@@ -4,6 +4,7 @@ import dataclasses
 import difflib
 import json
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -224,11 +225,11 @@ def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
 class GaitFile:
     """What a gait file holds; see Gait."""
 
-    schema: int = setting(at_least=1, at_most=SCHEMA)
+    schema: int = setting(at_least=SCHEMA, at_most=SCHEMA)
     name: str = setting(default="")
     scenario: str = setting(default="")
-    weights: dict[str, float] | list[float] = setting(at_least=0)
-    """By Actuation.weight_names, in any order; a list, which schema 1 has, in their order."""
+    weights: dict[str, float] = setting(at_least=0)
+    """By Actuation.weight_names, in any order."""
     tau_a_s: float = setting(above=0)
     tau_b_s: float | None = setting(default=None, above=0)
     turn: float = setting(default=0.0, at_least=-1, at_most=1)
@@ -242,13 +243,11 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     """
     file = _read_file(path, key)
     actuation = Actuation.of(scenario)
-    names, weights = actuation.weight_names, file.weights
-    if isinstance(weights, dict):
-        _check_names(tuple(weights), names, path, f"{key}.weights".strip("."))
-        weights = [weights[name] for name in names]
+    names = actuation.weight_names
+    _check_names(file.weights, names, path, _key(key, "weights"))
     gait = Gait(
         name=file.name or Path(path).stem,
-        weights=tuple(weights),
+        weights=tuple(file.weights[name] for name in names),
         tau_a=file.tau_a_s,
         tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
         turn=file.turn,
@@ -294,20 +293,23 @@ def _key(section: str, name: str) -> str:
     return f"{section}.{name}" if section else name
 
 
-def _check_names(found: tuple[str, ...], wanted: tuple[str, ...], source: object, key: str) -> None:
-    given, known = set(found), set(wanted)
-    missing = [name for name in wanted if name not in given]
-    unknown = [name for name in found if name not in known]
+def _check_names(
+    weights: Mapping[str, float], names: Sequence[str], source: object, key: str
+) -> None:
+    """Raises InputError, naming source and key, unless the weights have these names."""
+    missing = [name for name in names if name not in weights]
+    unknown = [name for name in weights if name not in {*names}]
+    parts = []
+    if missing:
+        parts.append(f"misses {len(missing)} ('{missing[0]}'{' ...' * (len(missing) > 1)})")
+    if unknown:
+        parts.append(f"has in excess {len(unknown)} ('{unknown[0]}'{' ...' * (len(unknown) > 1)})")
+    if not parts:
+        return
     close = difflib.get_close_matches(unknown[0], missing, n=1) if unknown else []
-    hint = f"; did you mean '{close[0]}'?" if close else ""
-    parts = [
-        f"{what} {len(some)} ('{some[0]}'{' ...' * (len(some) > 1)})"
-        for what, some in (("misses", missing), ("has in excess", unknown))
-        if some
-    ]
-    if parts:
-        problem = f"of the {len(wanted)} weights of the scenario it {' and '.join(parts)}{hint}"
-        raise InputError(source, key, problem)
+    advice = f"; did you mean '{close[0]}'?" if close else ""
+    problem = f"of the {len(names)} weights of the scenario it {' and '.join(parts)}{advice}"
+    raise InputError(source, key, problem)
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

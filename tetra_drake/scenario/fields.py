@@ -1,11 +1,11 @@
 """Settings as dataclasses: fields with units and limits, checked, built and written back.
 
 Works on any dataclass whose fields come from the helpers below. Types: float, int, str, bool,
-another dataclass, `X | None`, `list[X]`, `dict[str, X]`, a union of such a list and dict, and
-tagged kinds: a union of dataclasses, written `!Name {...}` as in Drake's YAML; without a tag, a
-mapping is the first of them. A *tree* is what YAML holds (dicts, lists, scalars) with all numbers
-in SI; the dict of a tagged kind has its tag under "_tag". Annotations are read as types, so a
-module with such dataclasses must not postpone them.
+another dataclass, `X | None`, `list[X]`, `dict[str, X]`, and tagged kinds: a union of dataclasses,
+written `!Name {...}` as in Drake's YAML; without a tag, a mapping is the first of them. A *tree* is
+what YAML holds (dicts, lists, scalars) with all numbers in SI; the dict of a tagged kind has its
+tag under "_tag". Annotations are read as types, so a module with such dataclasses must not postpone
+them.
 """
 
 from __future__ import annotations
@@ -99,8 +99,6 @@ class Check:
         if value is None and types.NoneType in typing.get_args(kind):
             return None
         kinds = {f"!{k.__name__}": k for k in _kinds(kind)}
-        if kinds.keys() == {"!dict", "!list"}:
-            del kinds["!dict" if isinstance(value, (list, tuple)) else "!list"]
         if len(kinds) > 1:
             tag = _tag(value, kinds) if isinstance(value, dict) else ""
             if tag not in kinds:
