@@ -98,36 +98,48 @@ class Check:
             value = value.tolist()
         if value is None and types.NoneType in typing.get_args(kind):
             return None
-        kinds = {f"!{k.__name__}": k for k in _kinds(kind)}
+        kinds = _kinds(kind)
         if len(kinds) > 1:
-            tag = _tag(value, kinds) if isinstance(value, dict) else ""
-            if tag not in kinds:
-                raise ValueError(f"found {tag or _describe(value)}; {hint(tag, kinds)}")
-            section = self._section(kinds[tag], value, key)
-            return section if self.complete else {TAG: tag} | section
-        (kind,) = kinds.values()
+            return self._tagged_section(kinds, value, key)
+        (kind,) = kinds
         if dataclasses.is_dataclass(kind):
             return self._section(kind, value, key)
-        container, items = typing.get_origin(kind), typing.get_args(kind)
-        if container is list:
-            if not isinstance(value, (list, tuple)):
-                raise ValueError(f"found {_describe(value)}, expected a list")
-            length = limits.get("length", len(value))
-            if len(value) != length and typing.get_origin(items[0]) is not list:
-                raise ValueError(f"found {len(value)} items, expected {length}")
-            return [self.value(items[-1], v, f"{key}[{i}]", limits) for i, v in enumerate(value)]
-        if container is dict:
-            if not isinstance(value, dict) or any(not isinstance(name, str) for name in value):
-                raise ValueError(f"found {_describe(value)}, expected a mapping with texts as keys")
-            units = limits.get("units", dict.fromkeys(value, limits.get("unit")))
-            for name in value:
-                if name not in units:
-                    raise InputError(
-                        self.source, f"{key}.{name}", f"unknown name; {hint(name, units)}"
-                    )
-            own = {k: {**limits, "unit": units[k]} for k in value}
-            return {k: self.value(items[-1], v, f"{key}.{k}", own[k]) for k, v in value.items()}
+        if typing.get_origin(kind) is list:
+            return self._list(kind, value, key, limits)
+        if typing.get_origin(kind) is dict:
+            return self._dict(kind, value, key, limits)
         return self._scalar(kind, value, limits)
+
+    def _tagged_section(self, kinds: Iterable[Any], value: Any, key: str) -> Any:
+        schemas = {f"!{kind.__name__}": kind for kind in kinds}
+        tag = _tag(value, schemas) if isinstance(value, dict) else ""
+        if tag not in schemas:
+            raise ValueError(f"found {tag or _describe(value)}; {hint(tag, schemas)}")
+        section = self._section(schemas[tag], value, key)
+        return section if self.complete else {TAG: tag} | section
+
+    def _list(self, kind: Any, value: Any, key: str, limits: Limits) -> list[Any]:
+        (item,) = typing.get_args(kind)
+        if not isinstance(value, (list, tuple)):
+            raise ValueError(f"found {_describe(value)}, expected a list")
+        length = limits.get("length", len(value))
+        innermost = typing.get_origin(item) is not list
+        if innermost and len(value) != length:
+            raise ValueError(f"found {len(value)} items, expected {length}")
+        return [self.value(item, v, f"{key}[{i}]", limits) for i, v in enumerate(value)]
+
+    def _dict(self, kind: Any, value: Any, key: str, limits: Limits) -> Tree:
+        _, item = typing.get_args(kind)
+        if not isinstance(value, dict) or any(not isinstance(name, str) for name in value):
+            raise ValueError(f"found {_describe(value)}, expected a mapping with texts as keys")
+        units = limits.get("units", dict.fromkeys(value, limits.get("unit")))
+        tree: Tree = {}
+        for name, number in value.items():
+            path = f"{key}.{name}"
+            if name not in units:
+                raise InputError(self.source, path, f"unknown name; {hint(name, units)}")
+            tree[name] = self.value(item, number, path, {**limits, "unit": units[name]})
+        return tree
 
     def _section(self, schema: Any, raw: Any, key: str) -> Any:
         tag = f"!{schema.__name__}"
