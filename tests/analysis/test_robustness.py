@@ -64,7 +64,6 @@ def test_the_default_disturbances_are_of_what_the_scenario_has(scenario):
     assert {key for key in ours.spreads if key.startswith("friction")} == laws
     assert set(thesis.spreads.values()) == {0.02} == {thesis.start}
     assert set(ours.spreads.values()) == {0.05} == {ours.start}
-    assert (thesis.terrain, ours.terrain) == (False, True)
 
 
 def test_every_gait_walks_under_the_same_draws_as_evolution_would_simulate_them(judgement, gaits):

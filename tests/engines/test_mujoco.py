@@ -16,7 +16,7 @@ from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -95,7 +95,7 @@ def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, struc
 def test_friction_opposes_motion_within_the_cone(short, structure):
     trajectory = trajectory_of(short.with_changes({"simulation.duration": "1.0 s"}))
     friction = trajectory["friction_force"].values
-    limit = short.mujoco.friction * trajectory["normal_force"].values
+    limit = MUJOCO_FRICTION * trajectory["normal_force"].values
     assert (np.linalg.norm(friction, axis=2) <= limit + 1e-6).all()
     velocity = trajectory["v_WN"].values.reshape(len(friction), -1, 3)[:, structure.contacts, :2]
     power = (friction * velocity).sum(axis=2)

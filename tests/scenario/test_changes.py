@@ -137,6 +137,6 @@ def test_a_balanced_robot_stays_where_it_stands_until_it_is_actuated(scenario):
 
 
 def test_a_difference_to_a_base_with_other_than_default_values_is_seen(scenario):
-    base = scenario.with_changes({"mujoco.friction": 0.7})
-    assert differences(scenario, base) == [("mujoco.friction", "0.5")]
-    assert differences(base, scenario) == [("mujoco.friction", "0.7")]
+    base = scenario.with_changes({"mujoco.step": "1 ms"})
+    assert differences(scenario, base) == [("mujoco.step", "0.000125 s")]
+    assert differences(base, scenario) == [("mujoco.step", "0.001 s")]

@@ -240,7 +240,7 @@ BAD = [
     ("friction: !Coulomb {stiction_range: 1 in}", "friction.stiction_range", "!ResetIntegrator"),
     ("friction: {static: 0.4}", "friction.static", "!Coulomb"),
     ("friction: {stiction_rage: 1 in}", "friction.stiction_rage", "'stiction_range'"),
-    ("robot: {contacts: some}", "robot.contacts", "thesis, all"),
+    ("robot: {contacts: some}", "robot.contacts", "'thesis' or 'all'"),
     ("cables: {free_length: 1 km}", "robot.spacing", "balance"),
 ]
 BAD_FILES = [

@@ -86,13 +86,12 @@ class Judgement:
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
     """Those that spread each key of SPREAD that the scenario has, and displace starts, by so many
-    percent, and draw the terrain's seed if it has one."""
+    percent."""
     share = percent / 100.0
     return Disturbances(
         draws=1,
         spreads={joined: share for joined in SPREAD if _has(scenario, separate(joined)[0])},
         start=share,
-        terrain=hasattr(scenario.terrain, "seed"),
     )
 
 

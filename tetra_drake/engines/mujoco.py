@@ -5,7 +5,7 @@ contact with a cone of friction. The normal force has the scenario's stiffness, 
 damping: the scenario's at the depth of rest on the nodes of the thesis, which otherwise grows with
 depth. Coulomb friction without stiffness is the scenario's own, and robots walk as far as on the
 other engines. In place of the reset integrator, a node that sticks is held by the scenario's
-stiction damping, but breaks free where that exceeds `mujoco.friction` times the normal force, not
+stiction damping, but breaks free where that exceeds MUJOCO_FRICTION times the normal force, not
 after a deflection, and then does not slide almost freely.
 
 The ground is a plane, level or inclined; other terrains are refused.
@@ -35,7 +35,7 @@ from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
 
 if TYPE_CHECKING:
@@ -364,7 +364,7 @@ def _contact(scenario: Scenario, structure: Structure, robot: Model) -> dict:
     if isinstance(law, Coulomb):
         friction, stiction_damping = law.kinetic, law.damping
     else:
-        friction, stiction_damping = scenario.mujoco.friction, law.stiction_damping
+        friction, stiction_damping = MUJOCO_FRICTION, law.stiction_damping
     mass, bodies = robot.body.mass[0], len(structure.bodies)
     borne = mass * bodies * scenario.robot.gravity / (2 * bodies + 1)  # by a foot of the thesis's
     rest_damping = ground.damping * borne / ground.stiffness

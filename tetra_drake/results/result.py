@@ -30,7 +30,7 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.metric_units import Metrics
-from tetra_drake.scenario.schema import Scenario, SimulationSection
+from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario, SimulationSection
 from tetra_drake.scenario.sections import tree_of
 from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.scenario.units import INCH, POUND_FORCE, shown
@@ -185,7 +185,7 @@ def ground_text(scenario: Scenario) -> str:
         numbers = {"static": law.static, "kinetic": law.kinetic}
         friction = f"Coulomb friction ({_listed(numbers | tree_of(law, show=shown))})"
     elif scenario.simulation.engine == "mujoco":
-        friction = f"MuJoCo's friction (coefficient {scenario.mujoco.friction:g})"
+        friction = f"MuJoCo's friction (coefficient {MUJOCO_FRICTION:g})"
     elif isinstance(terrain, Flat):
         return ""
     else:

@@ -21,7 +21,7 @@ class Disturbances(Section):
     """The changes of robot and surroundings among which evolution looks for gaits.
 
     Every gait is simulated once for each of `draws` draws; those of an iteration are the same for
-    all its gaits.
+    all its gaits. Each draw also has another seed of the terrain, if that has one.
     """
 
     draws: int = Field(ge=1, le=10_000)
@@ -31,8 +31,6 @@ class Disturbances(Section):
     start: float = Field(default=0.0, ge=0, le=0.5)
     """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing, forward or
     back, sideways, and up."""
-    terrain: bool = False
-    """Whether each draw has another seed of the terrain."""
     tail: float = Field(default=1.0, gt=0, le=1)
     """The fitness is the mean over this share of the draws, the worst (the conditional value at
     risk): 1 is the mean over all; one draw counts at least."""
@@ -68,7 +66,7 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
     return Draw(
         factors={key: 1.0 + size for key, size in sizes.items()},
         moves=reach * moves if reach else None,
-        terrain_seed=terrain_seed if settings.terrain else None,
+        terrain_seed=terrain_seed if hasattr(scenario.terrain, "seed") else None,
     )
 
 

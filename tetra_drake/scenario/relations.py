@@ -102,10 +102,6 @@ def _check_disturbances(scenario: Scenario, source: object) -> None:
     settings = scenario.disturbances
     if settings is None:
         return
-    if settings.terrain and "seed" not in type(scenario.terrain).model_fields:
-        kind = type(scenario.terrain).__name__
-        problem = f"found true, expected false: !{kind} has no seed"
-        raise InputError(source, "disturbances.terrain", problem)
     undisturbed = scenario.with_sections(disturbances=None)
     known = scenario.numbers()
     for joined, spread in settings.spreads.items():

@@ -198,12 +198,14 @@ class CompiledSection(Section):
     """Time from a predicted mode change to the end of the step that aims at it."""
 
 
+MUJOCO_FRICTION = 0.5
+"""Coefficient of MuJoCo's friction, as of metal on a floor, in place of the thesis's law."""
+
+
 class MujocoSection(Section):
-    """How the engine `mujoco` simulates, and its friction, which is not that of Table 2."""
+    """How finely the engine `mujoco` simulates."""
 
     step: float = quantity("s", default=0.125e-3, ge=1e-7, le=1)
-    friction: float = Field(default=0.5, gt=0)
-    """Coefficient of friction, as of metal on a floor."""
 
 
 class EvolutionSection(Section):
