@@ -117,7 +117,7 @@ BAD = [
     ("1: 2", "1", "unknown key"),
     ("inner: 5", "inner", "5"),
     ("inner: !Inner {}", "inner", "!Inner"),
-    ("inner: {slope: 5 rad}", "inner.slope", "'5 rad', expected less than or equal to 4 rad"),
+    ("inner: {slope: 5 rad}", "inner.slope", "'5 rad', expected at most 4 rad"),
     ("inner: {slope: 3 degz}", "inner.slope", "'3 degz'"),
     ("inner: {surface: wet}", "inner.surface", "'wet'"),
     ("count: 4.5", "count", "4.5"),

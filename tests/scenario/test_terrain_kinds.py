@@ -282,7 +282,7 @@ def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, mon
         ("!HeightField {file: none.csv, cell: 1 in}", "file", "none.csv"),
         ("!HeightField {file: /dev/zero, cell: 1 in}", "file", "device"),
         ("!HeightField {file: none.csv, cell: 1}", "cell", "1 without a unit"),
-        ("!HeightField {file: none.csv, cell: 1 m, corner: [1 m]}", "corner", "1 items"),
+        ("!HeightField {file: none.csv, cell: 1 m, corner: [1 m]}", "corner", "2 items"),
         ("!Incline {slope: 95 deg}", "slope", "1.047 rad"),
         ("!Steps {height: 1 in, depth: 0 in, count: 1}", "depth", "'0 in'"),
         ("!Rough {amplitude: -1 in, wavelength: 1 in}", "amplitude", "'-1 in'"),

@@ -212,9 +212,22 @@ def input_error(
     if first["type"] == "missing":
         return InputError(source, key, "is missing; give it, or name a `base` that has it")
     expected = first["msg"].removeprefix("Input should be ")
-    if "than" in first["type"] and field is not None:  # a limit
-        expected += f" {_extra(field).get('unit', '')}"
-    return InputError(source, key, f"found {described(value)}, expected {expected}".rstrip())
+    if first["type"] in _LIMITS:
+        unit = _extra(field).get("unit", "") if field else ""
+        words, name = _LIMITS[first["type"]]
+        expected = f"{words} {first['ctx'][name]:.4g} {unit}".rstrip()
+    elif "actual_length" in first.get("ctx", {}):
+        length = first["ctx"].get("min_length", first["ctx"].get("max_length"))
+        expected = f"{length} items, not {first['ctx']['actual_length']}"
+    return InputError(source, key, f"found {described(value)}, expected {expected}")
+
+
+_LIMITS = {
+    "greater_than": ("more than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than_equal": ("at most", "le"),
+}
+"""Words for the kinds of limits, and the names by which pydantic gives their numbers."""
 
 
 def _depth(key: str) -> int:
