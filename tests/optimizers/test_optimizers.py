@@ -18,7 +18,6 @@ from tetra_drake.scenario.optimizer_kinds import (
     CmaEs,
     QualityDiversity,
     RandomSearch,
-    SteadyState,
 )
 
 LEARNING = [
@@ -73,13 +72,6 @@ def test_a_trial_ends_with_the_evaluation_that_the_display_expects_last(kind):
     batches, iterations = run(optimizer)
     assert sum(map(len, batches)) == optimizer.evaluations_at_most == 101
     assert [iteration.stop is None for iteration in iterations[-2:]] == [True, False]
-
-
-def test_the_budget_is_that_of_the_thesiss_algorithm_unless_it_is_given():
-    settings = small_scenario(population=12, iterations=15).evolution
-    space = ParameterSpace.of(small_scenario())
-    made = [optimizer_of(kind)(space, settings, None) for kind in (SteadyState(), RandomSearch())]
-    assert [optimizer.evaluations_at_most for optimizer in made] == [12 + 2 * 15] * 2
 
 
 @pytest.mark.parametrize("kind", BUDGETED)
