@@ -58,7 +58,7 @@ def height_field(tmp_path) -> HeightField:
     return HeightField(str(tmp_path / "waves.npy"), 0.02, corner=[-0.5, -0.5])
 
 
-@pytest.mark.parametrize("terrain", ["incline", "steps", "rough", "obstacles", "field"])
+@pytest.mark.parametrize("terrain", ["incline", "steps", "rough", "field"])
 @pytest.mark.parametrize("friction", ["reset", COULOMB, FIRM])
 def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, height_field):
     friction = scenario.friction if friction == "reset" else friction
