@@ -102,7 +102,7 @@ def main() -> None:
     options = parser.parse_args()
 
     scenario = load_scenario("thesis")
-    scenario.simulation.duration = options.duration
+    scenario = scenario.with_changes({"simulation.duration": f"{options.duration} s"})
     gait = load_gait(options.gait, scenario)
     diagram = make_diagram(scenario, gait)
     save_block_diagram(diagram, options.out / "robot.svg")

@@ -23,8 +23,9 @@ from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
 from tetra_drake.results.measures import intervals
 from tetra_drake.robot.structure import BASE, NODES
+from tetra_drake.scenario.friction_kinds import ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import ResetIntegrator, Scenario
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 INITIAL_SPEED = 30.0 * INCH  # m/s

@@ -34,8 +34,9 @@ from one_tetrahedron import (
 from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.figures.style import OKABE_ITO, common_style, make_figure, save_figure
 from tetra_drake.robot.structure import BASE
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -56,7 +57,7 @@ def on_incline(slope: float, *, stiffness: float = STIFFNESS, forward: float = 1
     """The thesis's ground, tilted by `slope` (rad), with Coulomb friction."""
     law = Coulomb(static=STATIC, kinetic=KINETIC, stiffness=stiffness, forward=forward)
     return load_scenario("thesis").with_changes(
-        {"name": "tetrahedron_on_incline", "terrain": Incline(slope), "friction": law}
+        {"name": "tetrahedron_on_incline", "terrain": Incline(slope=slope), "friction": law}
     )
 
 

@@ -69,7 +69,7 @@ _SOUND = {"require": {"clearance": "0.125 in", "tension": 0.0}}
 
 def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, Any]:
     """Changes of an experiment on the compiled engine."""
-    sizes = {"evolution.trials": trials, "evolution.max_evaluations": evaluations}
+    sizes = {"evolution.trials": trials, "evolution.evaluations": evaluations}
     return {**_COMPILED, "optimizer": optimizer, **sizes}
 
 
@@ -81,7 +81,7 @@ EXPERIMENTS = {
     "thesis-drake": Experiment(
         "the same evolved on the Drake diagram itself",
         "thesis",
-        {"evolution.trials": 1, "evolution.max_iterations": 100},
+        {"evolution.trials": 1, "evolution.evaluations": 250},
     ),
     "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
     "coulomb": Experiment("the same under friction that grows with the load", "coulomb", _COMPILED),

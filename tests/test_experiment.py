@@ -18,6 +18,7 @@ from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import read_manifest
+from tetra_drake.optimizers import quality_diversity
 from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity
@@ -228,7 +229,7 @@ def test_the_scenarios_optimiser_is_used_recorded_and_resumed(
     tiny, tmp_path, interrupting, refused
 ):
     scenario = tiny.with_changes(
-        {"optimizer": CmaEs(population=4, sample=0), "evolution.max_evaluations": 10}
+        {"optimizer": CmaEs(population=4, sample=0), "evolution.evaluations": 10}
     )
     whole, run = tmp_path / "whole", tmp_path / "run"
     own = {"reevaluate": False, "report": False}
@@ -248,8 +249,12 @@ def test_the_gaits_of_a_map_are_simulated_on_disturbed_robots(
     tiny, tmp_path, interrupting, monkeypatch
 ):
     monkeypatch.setattr("tetra_drake.experiment.evaluate_again", lambda *_, **__: None)
-    kind = QualityDiversity(emitters=2, batch=2, floor=-1e3, draws=2)
-    scenario = tiny.with_changes({"optimizer": kind, "evolution.max_evaluations": 10})
+    monkeypatch.setattr(quality_diversity, "EMITTERS", 2)
+    monkeypatch.setattr(quality_diversity, "BATCH", 2)
+    monkeypatch.setattr(quality_diversity, "FLOOR", -1e3)
+    monkeypatch.setattr("tetra_drake.analysis.elites.FLOOR", -1e3)
+    kind = QualityDiversity(draws=2)
+    scenario = tiny.with_changes({"optimizer": kind, "evolution.evaluations": 10})
     whole, run = tmp_path / "whole", tmp_path / "run"
     found = elites(tetra_drake.evolve(scenario, whole, report=False, workers=1))
     assert len(found) > 1
@@ -279,7 +284,7 @@ def test_a_report_that_fails_is_no_failed_run_and_other_versions_are_told(
 # The command
 
 
-SMALL = ("--scenario", "quick", "--trials", "1", "--iterations", "3", "--workers", "1")
+SMALL = ("--scenario", "quick", "--trials", "1", "--evaluations", "18", "--workers", "1")
 
 
 @pytest.fixture
@@ -296,7 +301,7 @@ def test_the_command_runs_the_scenario_with_its_options(evolve, tmp_path, capsys
     manifest = read_manifest(out)
     assert manifest.seed == 4
     quick = load_scenario("quick")
-    assert manifest.scenario == quick.with_changes({"evolution.max_iterations": 3})
+    assert manifest.scenario == quick.with_changes({"evolution.evaluations": 18})
     assert load_scenario(out / "scenario.yaml") == manifest.scenario
     assert reports == [out]
     printed = capsys.readouterr().out
@@ -314,7 +319,7 @@ def test_a_switch_leaves_out_the_diagram_at_the_end(tiny, tmp_path, reports, opt
 
 
 def test_without_a_scenario_the_first_look_is_run(evolve, tmp_path, capsys):
-    assert evolve("--out", tmp_path / "run", "--iterations", "1") == 0
+    assert evolve("--out", tmp_path / "run", "--evaluations", "14") == 0
     assert read_manifest(tmp_path / "run").scenario.name == "quick"
     assert "--scenario thesis" in capsys.readouterr().out
 
@@ -331,7 +336,7 @@ def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, t
     assert capsys.readouterr().err == ""
     for option, value, key in (
         ("--trials", 2, "evolution.trials"),
-        ("--iterations", 4, "evolution.max_iterations"),
+        ("--evaluations", 20, "evolution.evaluations"),
         ("--engine", "compiled", "simulation.engine"),
         ("--scenario", "thesis", "simulation.duration"),
         ("--seed", 1, "seed"),
@@ -340,7 +345,7 @@ def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, t
         assert capsys.readouterr().err.startswith(f"tetra-drake: {out}: {key}: ")
 
 
-@pytest.mark.parametrize("option", ["--trials", "--iterations", "--workers"])
+@pytest.mark.parametrize("option", ["--trials", "--evaluations", "--workers"])
 @pytest.mark.parametrize("value", ["0", "-3", "many"])
 def test_counts_are_counts(evolve, tmp_path, option, value, capsys):
     with pytest.raises(SystemExit) as caught:

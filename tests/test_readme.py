@@ -22,7 +22,7 @@ QUICK = """\
 base: thesis
 name: quick
 simulation: {duration: 0.4 s, steady_from: 0.1 s}
-evolution: {population: 4, tournament: 2, trials: 1, max_iterations: 1}
+evolution: {population: 4, tournament: 2, trials: 1, evaluations: 6}
 """
 """Takes the place of the shipped scenario of this name."""
 

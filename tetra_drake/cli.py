@@ -159,8 +159,8 @@ def _evolve_options(command: Command) -> None:
     _add_count(command, "--trials", "number of independent trials, instead of the scenario's")
     _add_count(
         command,
-        "--iterations",
-        "greatest number of iterations per trial, instead of the scenario's",
+        "--evaluations",
+        "greatest number of evaluations per trial, instead of the scenario's",
     )
     command.add_argument("--seed", metavar="N", type=_integer(0), help="random seed (default: 0)")
     _add_workers(command)
@@ -235,7 +235,7 @@ def _scenario_to_evolve(options: Options) -> Scenario | None:
     asked = {
         "simulation.engine": options.engine,
         "evolution.trials": options.trials,
-        "evolution.max_iterations": options.iterations,
+        "evolution.evaluations": options.evaluations,
     }
     changes = {key: value for key, value in asked.items() if value is not None}
     if options.scenario is None and options.resume:
@@ -347,7 +347,7 @@ def _compare_options(command: Command) -> None:
         "--reach",
         metavar="LENGTH",
         type=_length,
-        help="a distance to be reached, as '14.34 in' (default: that of the scenario's reference)",
+        help="a distance to be reached, as '14.34 in'",
     )
     command.add_argument("--labels", metavar="LABEL", nargs="+", help="a name for each run")
     _add_path(command, "--out", "DIR", "write tables (CSV, JSON) and the figure into this folder")

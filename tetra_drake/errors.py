@@ -54,6 +54,10 @@ class SimulationFailure(RuntimeError):
         return functools.partial(type(self), time=self.time, reason=self.reason), ()
 
 
+MAX_SPEED = 10.16
+"""m/s (400 in/s): where a body is faster, a simulation has diverged."""
+
+
 class Diverged(SimulationFailure):
     """The motion left the physical range: not finite, too fast, or beyond the integrator."""
 

@@ -136,8 +136,8 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
     text = (
         f"{directory}: scenario {scenario.name}, seed {manifest.seed}, optimiser "
         f"{method.optimizer}, trials {scenario.evolution.trials}, each of at most "
-        f"{manifest.longest_trial}, engine {scenario.simulation.engine}, workers {workers}{draws}"
-        f"{own}"
+        f"{scenario.evolution.evaluations} evaluations, engine {scenario.simulation.engine}, "
+        f"workers {workers}{draws}{own}"
     )
     if report:
         text += (

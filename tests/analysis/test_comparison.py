@@ -10,7 +10,7 @@ from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 from tetra_drake.analysis.comparison import SIMULATIONS, compare, describe
 from tetra_drake.cli import main
 from tetra_drake.figures.search import search
-from tetra_drake.scenario.schema import DisturbancesScenario, ReferenceScenario
+from tetra_drake.scenario.disturbances import Disturbances
 from tetra_drake.scenario.units import INCH
 
 
@@ -86,17 +86,8 @@ def test_a_distance_is_reached_when_the_fittest_gait_walks_it(run):
     )
 
 
-def test_the_reference_is_the_distance_to_be_reached(run):
-    reference = ReferenceScenario("a paper", best_distance=2.0 * INCH)
-    paths = [run("a", trial(2.0)), run("b", trial(4.0), changes={"reference": reference})]
-    assert compare(paths[:1]).reach is None
-    found = compare(paths)
-    assert found.reach == 2.0 * INCH
-    assert found.trials["reached"].tolist() == [math.inf, 1.0]
-
-
 def test_runs_that_differ_in_draws_pay_by_simulations(run):
-    disturbed = {"disturbances": DisturbancesScenario(draws=3, start=0.1)}
+    disturbed = {"disturbances": Disturbances(draws=3, start=0.1)}
     paths = [run("calm", trial(1.0, 2.0)), run("rough", trial(3.0, 4.0), changes=disturbed)]
     found = compare(paths, reach=2.0 * INCH)
     assert (found.unit, found.common) == (SIMULATIONS, 2)
@@ -109,7 +100,7 @@ def test_runs_that_differ_in_draws_pay_by_simulations(run):
 
 def test_only_search_may_differ_without_a_note(run):
     base = run("a", trial(1.0))
-    searches = run("b", trial(1.0), trial(2.0), changes={"evolution.max_iterations": 7})
+    searches = run("b", trial(1.0), trial(2.0), changes={"evolution.evaluations": 99})
     assert compare([base, searches]).notes == []
     (note,) = compare([base, run("c", trial(1.0), changes={"cables.slack": True})]).notes
     assert "cables.slack" in note

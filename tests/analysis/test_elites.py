@@ -18,11 +18,10 @@ from tetra_drake.analysis.elites import (
 )
 from tetra_drake.analysis.robustness import by_gait, judge
 from tetra_drake.evolution.run import load_run
+from tetra_drake.optimizers.quality_diversity import FLOOR
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
-KIND = QualityDiversity(
-    measures={"speed": [0.0, 0.1], "lifted": [0.2, 0.8]}, cells=[5, 4], floor=1.0, draws=2
-)
+KIND = QualityDiversity(measures={"speed": [0.0, 0.1], "lifted": [0.2, 0.8]}, cells=[5, 4], draws=2)
 
 
 @pytest.fixture
@@ -53,14 +52,14 @@ def keys(gaits):
 
 def test_the_map_is_that_of_pyribs(run_of):
     generator = np.random.default_rng(4)
-    fitnesses = generator.normal(3.0, 2.0, 200).tolist()
+    fitnesses = generator.normal(2.0, 2.0, 200).tolist()
     # Some on the borders of cells, some beyond the map.
     places = [generator.uniform(-0.02, 0.12, 200), generator.uniform(0.1, 0.9, 200).round(2)]
     places = np.transpose(places).tolist()
     found = elites(run_of(dict(zip(fitnesses, places, strict=True))))
     ranges = [tuple(ends) for ends in KIND.measures.values()]
     archive = GridArchive(
-        solution_dim=1, dims=KIND.cells, ranges=ranges, threshold_min=1.0, learning_rate=1.0
+        solution_dim=1, dims=KIND.cells, ranges=ranges, threshold_min=FLOOR, learning_rate=1.0
     )
     archive.add(np.arange(200)[:, None], fitnesses, places)
     expected = archive.data(["index", "solution"])
@@ -70,7 +69,7 @@ def test_the_map_is_that_of_pyribs(run_of):
         wanted
     )
     assert found["fitness"].is_monotonic_decreasing
-    assert found["fitness"].min() > 1.0
+    assert found["fitness"].min() > FLOOR
 
 
 def test_all_trials_are_on_one_map_without_failures_and_what_lacks_a_measure(run_of):

@@ -32,8 +32,8 @@ from tetrahedron_on_incline import (
 
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.structure import BASE
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Coulomb
 from tetra_drake.scenario.units import INCH
 
 

@@ -15,7 +15,8 @@ from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.ground import ground_frames, make_ground
 from tetra_drake.robot.model import make_model
 from tetra_drake.robot.structure import MakeStructure, node_positions
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import (
     Flat,
     HeightField,
@@ -30,13 +31,15 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 INCH = 0.0254
 COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
 
-# Obstacles and steps are where the robot meets them at once.
+# Steps are where the robot meets them at once.
 TERRAINS: dict[str, Terrain] = {
     "flat": Flat(),
-    "incline": Incline(np.radians(5.0)),
-    "steps": Steps(-0.25 * INCH, 4.0 * INCH, 4, start=2.0 * INCH),
-    "rough": Rough(0.1 * INCH, 6.0 * INCH),
-    "obstacles": Obstacles(0.25 * INCH, 1.0 * INCH, 2.5 * INCH, start=14.0 * INCH),
+    "incline": Incline(slope=np.radians(5.0)),
+    "steps": Steps(height=-0.25 * INCH, depth=4.0 * INCH, count=4, start=2.0 * INCH),
+    "rough": Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
+    "obstacles": Obstacles(
+        height=0.25 * INCH, radius=1.0 * INCH, spacing=2.5 * INCH, start=14.0 * INCH
+    ),
 }
 
 
@@ -57,7 +60,7 @@ def height_field(tmp_path) -> HeightField:
     """Waves of 8 in, 0.1 in high, that lie across the way at an angle."""
     x, y = np.meshgrid(0.02 * np.arange(100), 0.02 * np.arange(50), indexing="ij")
     np.save(tmp_path / "waves.npy", 0.0012 * (np.sin(30.0 * x + 10.0 * y) - 1.0))
-    return HeightField(str(tmp_path / "waves.npy"), 0.02, corner=[-0.5, -0.5])
+    return HeightField(file=str(tmp_path / "waves.npy"), cell=0.02, corner=[-0.5, -0.5])
 
 
 @pytest.mark.parametrize("terrain", ["incline", "steps", "rough", "obstacles", "field"])
@@ -80,7 +83,7 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, heigh
 def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction, engine):
     slope, friction = np.radians(8.0), scenario.friction if friction == "reset" else friction
     short = converged(scenario, 0.3, friction=friction)
-    inclined = short.with_changes({"terrain": Incline(slope)})
+    inclined = short.with_changes({"terrain": Incline(slope=slope)})
     up_the_slope = trajectory(inclined, engine)["p_WN"].values[-1].reshape(-1, 3)
 
     diagram = MakeTensegrityDiagram(short, seeded_gait(short, 2))
@@ -101,7 +104,7 @@ def test_contact_never_gives_energy(scenario, friction):
     # can only hold what it has taken.
     friction = scenario.friction if friction == "reset" else friction
     fall = {"robot__offsets": [[0.0, 0.0, "5 mm"]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
-    rough = Rough(0.25 * INCH, 4.0 * INCH, seed=5)
+    rough = Rough(amplitude=0.25 * INCH, wavelength=4.0 * INCH, seed=5)
     falling = converged(scenario, 0.6, terrain=rough, friction=friction, **fall)
     structure, gravity = MakeStructure(falling), falling.robot.gravity
     body = make_model(falling, structure).body
@@ -130,7 +133,7 @@ def test_on_a_rough_grid_without_relief_the_robot_walks_as_on_flat_ground(scenar
     for friction in (scenario.friction, FIRM):
         both = [
             flat.with_changes({"terrain": t, "friction": friction})
-            for t in (Flat(), Rough(0.0, 1.0))
+            for t in (Flat(), Rough(amplitude=0.0, wavelength=1.0))
         ]
         first, second = simulate_many(scenario=both, gaits=[seeded_gait(flat)] * 2)
         assert second.metrics.distance == pytest.approx(first.metrics.distance, abs=1e-9)
@@ -143,7 +146,11 @@ def test_the_robot_stands_on_what_is_under_it(scenario):
         "simulation.steady_from": "2.0 s",
         "cpg.start_up": "2.5 s",
     }
-    rough = {"terrain": Rough(0.25 * INCH, 6.0 * INCH), "friction": FIRM, "robot.contacts": "all"}
+    rough = {
+        "terrain": Rough(amplitude=0.25 * INCH, wavelength=6.0 * INCH),
+        "friction": FIRM,
+        "robot.contacts": "all",
+    }
     resting = scenario.with_changes({**times, **rough})
     end = trajectory(resting, "compiled").isel(time=-1)
     structure, ground = MakeStructure(resting), make_ground(resting, MakeStructure(resting))
@@ -165,7 +172,6 @@ SLOWLY = {
         "simulation.accuracy": 1e-4,
         "simulation.max_step": "3e-4 s",
         "simulation.mode_changes": "witness",
-        "simulation.witness_window": "1e-6 s",
         "simulation.max_evaluations": 10**8,
     },
 }

@@ -15,7 +15,8 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -94,7 +95,7 @@ def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, struc
 def test_friction_opposes_motion_within_the_cone(short, structure):
     trajectory = trajectory_of(short.with_changes({"simulation.duration": "1.0 s"}))
     friction = trajectory["friction_force"].values
-    limit = short.mujoco.friction * trajectory["normal_force"].values
+    limit = MUJOCO_FRICTION * trajectory["normal_force"].values
     assert (np.linalg.norm(friction, axis=2) <= limit + 1e-6).all()
     velocity = trajectory["v_WN"].values.reshape(len(friction), -1, 3)[:, structure.contacts, :2]
     power = (friction * velocity).sum(axis=2)
@@ -104,23 +105,13 @@ def test_friction_opposes_motion_within_the_cone(short, structure):
 @needs_mujoco
 def test_steps_count_against_the_budget_of_evaluations(short):
     gait, steps = seeded_gait(short), 3200
-    short.simulation.max_evaluations = steps
+    short = short.with_changes({"simulation.max_evaluations": steps})
     implicit = simulate(scenario=short, gait=gait)
     assert implicit.integrator.scheme == "implicitfast"
     assert implicit.integrator.steps == implicit.integrator.derivative_evaluations == steps
-    short.simulation.max_evaluations = steps - 1
+    short = short.with_changes({"simulation.max_evaluations": steps - 1})
     with pytest.raises(StepBudgetExceeded):
         simulate(scenario=short, gait=gait)
-
-
-@needs_mujoco
-def test_the_integrators_of_mujoco_agree(short):
-    gait = seeded_gait(short)
-    implicit = simulate(scenario=short, gait=gait)
-    for integrator in ("Euler", "discrete"):
-        finer = short.with_changes({"mujoco.integrator": integrator, "mujoco.step": "0.0625e-3 s"})
-        distance = simulate(scenario=finer, gait=gait).metrics.distance_in
-        assert distance == pytest.approx(implicit.metrics.distance_in, abs=0.02)
 
 
 @needs_mujoco
@@ -128,7 +119,8 @@ def test_the_integrators_of_mujoco_agree(short):
 def test_too_long_a_step_diverges_without_a_log_file(short, integrator, tmp_path, monkeypatch):
     # With implicitfast the robot jumps for ever, but nothing overflows; Euler's state does.
     monkeypatch.chdir(tmp_path)
-    steps = {"mujoco.integrator": integrator, "mujoco.step": "4e-3 s"}
+    monkeypatch.setattr(engine, "INTEGRATOR", integrator)
+    steps = {"mujoco.step": "4e-3 s"}
     unstable = short.with_changes({"simulation.duration": "3.0 s", **steps})
     with pytest.raises(Diverged) as caught:
         simulate(scenario=unstable, gait=seeded_gait(unstable, 0))
@@ -173,7 +165,7 @@ def test_many_gaits_walk_as_each_alone(short, workers, monkeypatch):
 def test_gaits_that_fail_leave_the_others_alone(short, monkeypatch):
     monkeypatch.setattr(engine, "_STRETCH", 1000)
     gaits = [seeded_gait(short, seed) for seed in range(5)]
-    short.simulation.max_speed = 0.07  # m/s, which two of them exceed
+    monkeypatch.setattr(engine, "MAX_SPEED", 0.07)  # m/s, which two of them exceed
     found = simulate_many(scenario=short, gaits=gaits, workers=2)
     assert {type(outcome) for outcome in found} == {Diverged, SimulationResult}
     for gait, outcome in zip(gaits, found, strict=True):

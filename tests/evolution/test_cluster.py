@@ -117,7 +117,7 @@ def test_workers_with_other_versions_are_refused(cluster, refused):
 def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda scenario, objective: Bowl())
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
-    command = ["evolve", "--scenario", "quick", "--iterations", "2", "--workers", "1"]
+    command = ["evolve", "--scenario", "quick", "--evaluations", "16", "--workers", "1"]
     for name, executor in (("dask", ("--executor", "dask")), ("local", ())):
         assert cli.main([*command, "--out", str(tmp_path / name), *executor]) == 0
     assert read_record(tmp_path / "dask") == read_record(tmp_path / "local")

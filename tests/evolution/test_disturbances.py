@@ -31,8 +31,7 @@ from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
 from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
-from tetra_drake.scenario.schema import DisturbancesScenario
+from tetra_drake.scenario.disturbances import Disturbances, disturbed, draw_disturbances
 from tetra_drake.scenario.terrain_kinds import Steps
 
 STIFFNESS = {"cables.outer_stiffness": 0.05}
@@ -48,7 +47,7 @@ def tiny():
             "simulation.duration": "0.3 s",
             "simulation.steady_from": "0.1 s",
             "cpg.start_up": 0.0,
-            "disturbances": DisturbancesScenario(draws=3, spreads=STIFFNESS, start=0.02),
+            "disturbances": Disturbances(draws=3, spreads=STIFFNESS, start=0.02),
         }
     )
 
@@ -123,7 +122,7 @@ def test_an_objective_is_that_of_each_draw(tiny, vector):
     ],
 )
 def test_the_fitness_is_the_mean_over_the_worst_draws_by_default_over_all(tiny, vector, tail, ours):
-    settings = DisturbancesScenario(draws=3, spreads=STIFFNESS, start=0.02, **tail)
+    settings = Disturbances(draws=3, spreads=STIFFNESS, start=0.02, **tail)
     changed = tiny.with_changes({"disturbances": settings})
     found = GaitEvaluation(changed)(SeededVector(vector, SEED))
     assert found.fitness == approx(ours(*sorted(found.draws["fitness"])), rel=1e-14)

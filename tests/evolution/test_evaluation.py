@@ -18,7 +18,7 @@ from tetra_drake.evolution.draws import SeededVector
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import evaluate_all
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.scenario.schema import DisturbancesScenario
+from tetra_drake.scenario.disturbances import Disturbances
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vect
     ("changes", "objective", "kind"),
     [
         ({"simulation.max_evaluations": 50}, None, "step budget: "),
-        ({"simulation.max_speed": "1e-6 m/s"}, None, "diverged: "),
+        ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, None, "diverged: "),
         (
             {"simulation.duration": "15.0 s", "evolution.time_budget": "0.3 s"},
             None,
@@ -85,7 +85,7 @@ def test_evaluations_in_lanes_are_those_of_single_gaits_and_keep_their_budgets(t
             assert 0.0 < found.wall_time < alone.wall_time + 1.0
         for changes, kind in (
             ({"simulation.max_evaluations": 50}, "step budget: "),
-            ({"simulation.max_speed": "1e-6 m/s"}, "diverged: "),
+            ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, "diverged: "),
             (endless, "time budget: "),
         ):
             failed = GaitEvaluation(compiled.with_changes(changes), None, lanes)(vectors[0])
@@ -116,7 +116,7 @@ def test_time_budgets_hold_in_any_thread_and_end_with_their_evaluation(tiny, vec
 
 def test_many_gaits_in_lanes_are_those_gaits_one_by_one(tiny, vectors):
     compiled = tiny.with_changes({"simulation.engine": "compiled"})
-    draws = DisturbancesScenario(draws=2, start=0.1)
+    draws = Disturbances(draws=2, start=0.1)
     among = compiled.with_changes({"disturbances": draws})
     for scenario, tasks in (
         (compiled, vectors),

@@ -16,9 +16,8 @@ from tetra_drake.evolution.json_lines import append_lines, read_lines
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
-from tetra_drake.report.summary import comparisons, summary
+from tetra_drake.report.summary import results
 from tetra_drake.robot.gait import load_gait
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.units import INCH
 
 
@@ -169,33 +168,22 @@ def test_an_unfinished_run_says_how_far_it_has_come(tmp_path):
     assert (first.initial_best_distance_in, first.best_distance_in) == pytest.approx((0.5, 2.0))
     assert (second.failures, second.best_fitness) == (1, -math.inf)
     assert (third.iteration, third.evaluations) == (-1, 0)
-    ours = [row.ours for row in comparisons(run)]
+    ours = [value for _, value in results(run)]
     assert ours == ["0.50 in", "2.00 in", "+1.50 in", "+1.50 in", "1.00 s"]
 
 
 def test_improvements_are_percents_only_of_distances_that_are_not_near_nothing(tmp_path):
     # By trials, in inches: from 2 to 3, from 5 to 6, from 0.25 to 4.
     trials = [[[(4.0, 0)], [(6.0, 0)]], [[(10.0, 0)], [(12.0, 0)]]]
-    *_, mean, best, _ = comparisons(load_run(write_run(tmp_path / "far", trials)))
-    assert (mean.ours, best.ours) == ("+1.00 in (35 %)", "+1.00 in (20 %)")
+    *_, mean, best, _ = results(load_run(write_run(tmp_path / "far", trials)))
+    assert (mean[1], best[1]) == ("+1.00 in (35 %)", "+1.00 in (20 %)")
     trials.append([[(0.5, 0)], [(8.0, 0)]])
-    *_, mean, best, _ = comparisons(load_run(write_run(tmp_path / "near", trials)))
-    assert (mean.ours, best.ours) == ("+1.92 in", "+1.00 in (20 %)")
+    *_, mean, best, _ = results(load_run(write_run(tmp_path / "near", trials)))
+    assert (mean[1], best[1]) == ("+1.92 in", "+1.00 in (20 %)")
 
 
 def test_the_best_evolved_gait_is_the_fittest_of_the_run(tmp_path):
     far = {3.0: {"distance": 9.0 * INCH}}
     path = write_run(tmp_path / "run", [[[(2.0, 0)], [(3.0, 0)]], [[(4.0, 0)]]], metrics=far)
-    _, best, *_ = comparisons(load_run(path))
-    assert best.ours == "2.00 in"
-
-
-def test_the_reference_stands_beside_our_numbers_where_there_is_one(tmp_path):
-    scenario = load_scenario("thesis")
-    with_reference = load_run(write_run(tmp_path / "a", [[[(5.0, 0)]]], scenario=scenario))
-    numbers = [row.reference for row in comparisons(with_reference)]
-    assert numbers == ["6.6 in", "14.34 in", "32 %", "51 %", "22 s"]
-    assert "14.34 in" in summary(with_reference)
-    scenario.reference = None
-    without = load_run(write_run(tmp_path / "b", [[[(5.0, 0)]]], scenario=scenario))
-    assert {row.reference for row in comparisons(without)} == {""}
+    _, best, *_ = results(load_run(path))
+    assert best[1] == "2.00 in"

@@ -18,7 +18,6 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord, evaluation_entry, read_manifest
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.results.result import versions
-from tetra_drake.scenario.fields import TAG
 
 
 def cut(path, lost):
@@ -247,7 +246,7 @@ def with_changed(number, key):
 
 @pytest.mark.parametrize("kind", ["SteadyState", "CmaEs", "QualityDiversity", "RandomSearch"])
 def test_no_optimiser_takes_over_a_value_that_was_changed(run_small, refused, kind):
-    changes = {"optimizer": {TAG: f"!{kind}"}, "evolution.max_evaluations": 40}
+    changes = {"optimizer": f"!{kind}", "evolution.evaluations": 40}
     run = run_small(population=4, iterations=3, trials=1, changes=changes)
     whole = read_record(run)
     for path in sorted(run.glob("trial_00/*.jsonl")):

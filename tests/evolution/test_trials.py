@@ -58,7 +58,7 @@ def test_every_evaluation_has_its_line_and_those_of_the_iterations_follow(run_sm
         assert row["mean_fitness"] == pytest.approx(np.mean(alive), rel=1e-12)
         assert row["best_fitness"] == max(alive)
         assert entries[row["best_evaluation"]]["fitness"] == row["best_fitness"]
-    assert [row["stop"] for row in iterations] == [None] * 15 + ["all iterations done"]
+    assert [row["stop"] for row in iterations] == [None] * 15 + ["all evaluations done"]
 
 
 def test_neither_workers_nor_executor_nor_timing_change_the_record(run_small, tmp_path):

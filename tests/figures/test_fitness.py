@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from helpers.synthetic_run import PER_DISTANCE, with_reference, write_run
+from helpers.synthetic_run import PER_DISTANCE, write_run
 from matplotlib.container import BarContainer, ErrorbarContainer
 
 from tetra_drake.evolution.run import load_run
@@ -14,8 +14,6 @@ from tetra_drake.figures.fitness import (
     initial_fitness,
     two_best,
 )
-from tetra_drake.scenario.schema import ReferenceScenario
-from tetra_drake.scenario.units import INCH
 
 
 @pytest.fixture
@@ -51,14 +49,11 @@ def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of):
     run = run_of(
         initial(4.0, -6.0, None, 1.0), initial(None, None), [*initial(2.0, 3.0), [(9.0, 0)]]
     )
-    reference = ReferenceScenario("a paper", best_initial_distance=6.6 * INCH)
-    figure = initial_distances(with_reference(run, reference))
+    figure = initial_distances(run)
     best, worst = bars(figure)
     assert best == pytest.approx([4.0 / PER_DISTANCE, 3.0 / PER_DISTANCE])
     assert worst == pytest.approx([-6.0 / PER_DISTANCE, 2.0 / PER_DISTANCE])
     assert figure.axes[0].get_xticks().tolist() == [0, 2]
-    assert figure.axes[0].lines[-1].get_ydata()[0] == pytest.approx(6.6)
-    assert len(initial_distances(with_reference(run, None)).axes[0].lines) == 1  # zero only
 
 
 def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of):
@@ -124,20 +119,13 @@ def test_one_iteration_is_a_dot(run_of):
     assert line.get_marker() == "o"
 
 
-def test_the_two_best_gaits_beside_the_reference(run_of):
+def test_the_two_best_gaits_are_different(run_of):
     run = run_of([*initial(1.0, 4.0, 2.5, 5.0), [(5.0, 1), (3.0, None)]], initial(1.0, None))
-    weights = [0.1, 0.2, 0.3, 0.4]
-    reference = ReferenceScenario(
-        "a paper", two_best_fitness=0.5, two_best_weights=weights, two_best_tau=0.0
-    )
-    table = two_best(with_reference(run, reference), 0)
+    table = two_best(run, 0)
     # Equal fitnesses come with equal genomes, so the second best is the fittest different one.
     for column, index, fitness in (("best", 3, 5.0), ("second", 1, 4.0)):
         assert table[column].tolist() == [fitness, *run.vector(0, index)]
     difference = run.vector(0, 3) - run.vector(0, 1)
     assert table["difference"].tolist() == [1.0, *np.abs(difference)]
-    assert table["reference"].tolist() == [0.5, *weights, 0.0, 0.0]
     assert table.index.tolist()[-2:] == ["tau_A", "tau_B"]
-    of_another_robot = ReferenceScenario("a paper", two_best_weights=[0.1] * 24)
-    assert "reference" not in two_best(with_reference(run, of_another_robot), 0)
     assert two_best(run, 1) is None

@@ -16,8 +16,10 @@ import numpy as np
 
 from tetra_drake.evolution.draws import combine
 from tetra_drake.optimizers.base import Evaluation, Iteration
+from tetra_drake.optimizers.steady_state import CHILDREN
+from tetra_drake.scenario.disturbances import Disturbances
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import DisturbancesScenario, Scenario
+from tetra_drake.scenario.schema import Scenario
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def small_scenario(
         {
             "robot.tetrahedra": oscillators + 1,
             "evolution.population": population,
-            "evolution.max_iterations": iterations,
+            "evolution.evaluations": population + CHILDREN * iterations,
             "evolution.trials": trials,
         }
     )
@@ -103,7 +105,7 @@ def small_scenario(
 
 def drawn_scenario(**options) -> Scenario:
     """small_scenario() among draws, of which the tail counts."""
-    settings = DisturbancesScenario(draws=3, tail=TAIL)
+    settings = Disturbances(draws=3, tail=TAIL)
     return small_scenario(**options).with_changes({"disturbances": settings})
 
 

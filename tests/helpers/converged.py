@@ -8,12 +8,11 @@ FINE = {
     "simulation.accuracy": 1e-6,
     "simulation.max_step": "1e-4 s",
     "simulation.mode_changes": "witness",
-    "simulation.witness_window": "1e-8 s",
     "compiled.tolerance": "1e-8 m/s",
     "compiled.max_step": "3e-5 s",
     "compiled.look_ahead": "1e-8 s",
 }
-"""Settings at which both engines have converged, mode changes placed to 1e-8 s, for short walks
+"""Settings at which both engines have converged, mode changes placed to 2e-8 s, for short walks
 that are driven from the start."""
 
 

@@ -12,7 +12,6 @@ from helpers.analytic import DrawnBowl, drawn_scenario
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.run_record import MANIFEST, RunRecord
 from tetra_drake.evolution.trials import run_trials
-from tetra_drake.scenario.fields import TAG
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in jobs of a script
@@ -20,9 +19,7 @@ if __name__ == "__main__":
     if (directory / MANIFEST).exists():
         opened = RunRecord.resume(directory)
     else:
-        scenario = drawn_scenario(iterations=150).with_changes(
-            {"optimizer": {TAG: f"!{sys.argv[4]}"}}
-        )
+        scenario = drawn_scenario(iterations=150).with_changes({"optimizer": f"!{sys.argv[4]}"})
         opened = RunRecord.create(directory, scenario=scenario, seed=9)
     with opened as record:
         print("begun", flush=True)

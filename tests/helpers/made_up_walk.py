@@ -19,8 +19,8 @@ def make_walk(
     """Tetrahedra that move on at SPEED; T1, T3 ... are lifted in the first half of each PERIOD
     and T2, T4 ... in the second. The tip of the lead never touches the ground."""
     scenario = load_scenario("thesis")
-    scenario.robot.tetrahedra = bodies
-    scenario.robot.actuation = actuation or scenario.robot.actuation
+    groups = actuation or scenario.robot.actuation
+    scenario = scenario.with_changes({"robot.tetrahedra": bodies, "robot.actuation": groups})
     structure = MakeStructure(scenario)
     times = np.linspace(0.0, duration, round(duration / 0.01) + 1)
     phase = 2.0 * np.pi * times / PERIOD

@@ -1,6 +1,5 @@
 """Runs made up for tests of what is shown of them, written as the real ones are."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.evolution.run import Run
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord, evaluation_entry, trial_folder
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import ReferenceScenario, Scenario
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
 Child = tuple[float | None, int | None]
@@ -44,7 +42,7 @@ def write_run(
     in SI, by fitness.
     """
     scenario = scenario or tiny_scenario()
-    scenario.evolution.trials = len(trials)
+    scenario = scenario.with_changes({"evolution.trials": len(trials)})
     with RunRecord.create(directory, scenario=scenario, seed=7):
         for number, iterations in enumerate(trials):
             trial = TrialRecord(trial_folder(directory, number))
@@ -66,7 +64,7 @@ def write_run(
                     "mean_fitness": sum(finite) / len(finite) if finite else None,
                     "best_fitness": best.get("fitness"),
                     "best_evaluation": best.get("index"),
-                    "stop": "all iterations done" if ends else None,
+                    "stop": "all evaluations done" if ends else None,
                 }
                 trial.complete(entries[begin:], line)
     return directory
@@ -82,10 +80,3 @@ def _entry(index, iteration, fitness, scenario):
         metrics = {name: value * INCH for name, value in inches.items()}
         evaluation = Evaluation(fitness, metrics, wall_time=0.5)
     return evaluation_entry(index, iteration, genome, evaluation)
-
-
-def with_reference(run: Run, reference: ReferenceScenario | None) -> Run:
-    """The run with other numbers to be compared with."""
-    scenario = dataclasses.replace(run.manifest.scenario, reference=reference)
-    manifest = dataclasses.replace(run.manifest, scenario=scenario)
-    return dataclasses.replace(run, manifest=manifest)

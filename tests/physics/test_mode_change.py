@@ -17,7 +17,8 @@ from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import MakeStructure, Structure
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
 
 LAW = Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, damping=70.0)
@@ -70,7 +71,7 @@ class Sliding:
         return mode_margin(nodes, self.modes, self.ground, frames)
 
 
-@pytest.fixture(params=[Flat(), Incline(SLOPE)], ids=["flat", "incline"])
+@pytest.fixture(params=[Flat(), Incline(slope=SLOPE)], ids=["flat", "incline"])
 def sliding(request: pytest.FixtureRequest, scenario: Scenario) -> Sliding:
     return Sliding(scenario, request.param)
 

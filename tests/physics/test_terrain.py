@@ -33,7 +33,7 @@ def saved(heights: np.ndarray, folder) -> str:
 
 def test_a_plane_is_exact(ground, tmp_path):
     x, y = 0.5 * np.arange(-4, 5)[:, np.newaxis], 0.5 * np.arange(-3, 4)
-    made = ground(HeightField(saved(0.2 * x - 0.3 * y - 0.5, tmp_path), 0.5))
+    made = ground(HeightField(file=saved(0.2 * x - 0.3 * y - 0.5, tmp_path), cell=0.5))
     for place in ((0.0, 0.0), (0.123, -0.456), (-1.7, 1.2)):
         expected = 0.2 * place[0] - 0.3 * place[1] - 0.5, 0.2, -0.3
         assert at(made, *place) == pytest.approx(expected, abs=1e-14)
@@ -43,13 +43,15 @@ def test_a_lonely_height_is_a_biquadratic_spline(ground, tmp_path):
     # The quadratic B-spline is 3/4 at its control point, 1/2 half a cell away, 1/8 a cell away.
     heights = np.zeros((101, 9))
     heights[50, 4] = -1.0
-    made = ground(HeightField(saved(heights, tmp_path), 0.4, corner=[-19.0, -1.0]))
+    made = ground(HeightField(file=saved(heights, tmp_path), cell=0.4, corner=[-19.0, -1.0]))
     for dx, dy, expected in [(0, 0, 0.75 * 0.75), (0.2, 0, 0.5 * 0.75), (-0.4, 0.4, 1 / 64)]:
         assert at(made, 1.0 + dx, 0.6 + dy)[0] == pytest.approx(-expected, abs=1e-13)
     assert at(made, 1.0 + 0.61, 0.6) == (0.0, 0.0, 0.0), "one and a half cells away"
 
 
-@pytest.mark.parametrize("terrain", [ROUGH, Steps(0.25 * INCH, 6.0 * INCH, 3, start=20.0 * INCH)])
+@pytest.mark.parametrize(
+    "terrain", [ROUGH, Steps(height=0.25 * INCH, depth=6.0 * INCH, count=3, start=20.0 * INCH)]
+)
 def test_the_gradient_is_that_of_the_heights_and_continuous(ground, terrain):
     made, h = ground(terrain), 1e-7
     for x, y in np.random.default_rng(0).uniform(-0.5, 1.5, (200, 2)):
@@ -62,7 +64,7 @@ def test_the_gradient_is_that_of_the_heights_and_continuous(ground, terrain):
 
 def test_beyond_the_grid_the_surface_goes_on_as_it_is_at_the_edge(ground, tmp_path):
     x = 0.5 * np.arange(-4, 5)[:, np.newaxis]
-    made = ground(HeightField(saved(0.1 * x + np.zeros((9, 7)) - 0.5, tmp_path), 0.5))
+    made = ground(HeightField(file=saved(0.1 * x + np.zeros((9, 7)) - 0.5, tmp_path), cell=0.5))
     edge = at(made, 1.75, 0.1)  # half a cell within the last height
     for far in (1.76, 5.0, 1e9, np.inf, np.nan):
         assert at(made, far, 0.1) == (pytest.approx(edge[0], abs=1e-8), 0.0, 0.0)
@@ -95,8 +97,11 @@ def test_a_node_above_the_highest_point_has_the_frame_of_level_ground_there(grou
 def test_a_robot_that_starts_in_the_ground_or_off_the_grid_is_refused(ground, refused, tmp_path):
     # Steps of 1 in at 0, 6 and 12 in: T4 stands at 3 * 2.94 in = 8.82 in, on the second one.
     for terrain, found in (
-        (Steps(1.0 * INCH, 6.0 * INCH, 3, start=0.0), "T4 bottom_left 2 in below the ground"),
-        (HeightField(saved(np.zeros((3, 3)), tmp_path), 0.1), "off its grid"),
+        (
+            Steps(height=1.0 * INCH, depth=6.0 * INCH, count=3, start=0.0),
+            "T4 bottom_left 2 in below the ground",
+        ),
+        (HeightField(file=saved(np.zeros((3, 3)), tmp_path), cell=0.1), "off its grid"),
     ):
         with refused("thesis", "terrain", found):
             ground(terrain)

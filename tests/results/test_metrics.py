@@ -143,7 +143,7 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
 def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text):
     metrics = dict.fromkeys(METRICS, 0.0) | {"distance": 2.0 * INCH, "twist": 0.5 * INCH}
     metrics |= {"heading_change": math.pi, "cost_of_transport": 4.0, "speed": 0.1}
-    assert headline(dataclasses.replace(scenario, objective=objective), metrics) == text
+    assert headline(scenario.with_sections(objective=objective), metrics) == text
 
 
 def test_the_constants_of_equation_10_are_those_of_the_thesis_to_the_last_digit(

@@ -18,8 +18,8 @@ from tetra_drake.results.result import (
     summary,
 )
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Coulomb
 from tetra_drake.scenario.terrain_kinds import HeightField, Rough
 from tetra_drake.scenario.units import INCH
 

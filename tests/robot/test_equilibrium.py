@@ -1,6 +1,5 @@
 """The robot at rest: against an independent simulation, a walk that is not driven, and statics."""
 
-import itertools
 import json
 
 import numpy as np
@@ -13,7 +12,8 @@ from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.equilibrium import settled_lengths, settled_state
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import BOTTOM_LEFT, TIP, MakeStructure, node_positions
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -70,12 +70,11 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
 
 
 @pytest.mark.parametrize("contacts", ["thesis", "all"])
-@pytest.mark.parametrize("tetrahedra", [2, 3, 5, 12])
+@pytest.mark.parametrize("tetrahedra", [2, 5])
 def test_the_ground_bears_the_weight_whatever_the_stiffnesses(scenario, tetrahedra, contacts):
     scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra, "robot.contacts": contacts})
-    cables, ground, factors = scenario.cables, scenario.ground, (0.5, 1.0, 1.5)
-    choices = [*itertools.product(factors, factors, factors)]
-    for outer, inner, hard in choices if tetrahedra < 12 else [(1.0, 1.0, 1.0), (1.0, 1.5, 0.5)]:
+    cables, ground = scenario.cables, scenario.ground
+    for outer, inner, hard in [(1.0, 1.0, 1.0), (1.0, 1.5, 0.5), (0.5, 1.0, 1.5)]:
         changes = {
             "cables.outer_stiffness": with_unit(outer * cables.outer_stiffness, "N/m"),
             "cables.inner_stiffness": with_unit(inner * cables.inner_stiffness, "N/m"),

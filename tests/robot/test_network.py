@@ -7,7 +7,7 @@ import pytest
 
 from tetra_drake.errors import InputError
 from tetra_drake.robot.actuation import Actuation
-from tetra_drake.robot.gait import Gains, Gait, seeded_gait
+from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.network import make_network, make_senses, sample_turns, tonic_input
 from tetra_drake.robot.structure import MakeStructure
 
@@ -107,15 +107,7 @@ def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
     assert senses.carriers.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]
 
 
-@pytest.mark.parametrize(
-    ("changes", "key"),
-    [
-        ({"weights": (1.0,) * 23}, "weights"),
-        ({"turn": 0.5}, "turn"),
-        ({"gains": Gains(load=1.0)}, "gains.load"),
-    ],
-)
-def test_a_gait_that_does_not_fit_is_refused(scenario, structure, refused, changes, key):
-    gait = dataclasses.replace(seeded_gait(scenario), **changes)
-    with refused(f"gait {gait.name}", key, "expected"):
+def test_a_gait_that_does_not_fit_is_refused(scenario, structure, refused):
+    gait = dataclasses.replace(seeded_gait(scenario), weights=(1.0,) * 23)
+    with refused(f"gait {gait.name}", "weights", "expected"):
         make_network(scenario, structure, gait)

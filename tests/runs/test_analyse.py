@@ -11,8 +11,8 @@ from helpers.synthetic_run import tiny_scenario, write_run
 from tetra_drake.analysis.robustness import START, by_gait, default_disturbances, judge
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import load_run
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Coulomb
 
 TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1)]]]
 """Trial 1 has no gait with a fitness."""

@@ -17,7 +17,7 @@ TINY = record.Experiment(
     {
         **{"simulation.engine": "compiled", "simulation.duration": "0.4 s"},
         **{"simulation.steady_from": "0.1 s", "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)},
-        **{"evolution.trials": 2, "evolution.max_evaluations": 12},
+        **{"evolution.trials": 2, "evolution.evaluations": 12},
     },
     film=True,
 )

@@ -21,7 +21,6 @@ def loaded(tmp_path, text, name="mine.yaml"):
     ("text", "objective", "require"),
     [
         ("objective: {speed: 2 s/in, twist: -1 1/in}", {"speed": 2 / IN, "twist": -1 / IN}, {}),
-        ("objective: {path_curvature: 3 in}", {"path_curvature": 3 * IN}, {}),
         ("objective: {heading_change: 90 /deg}", {"heading_change": 90 * 180 / np.pi}, {}),
         (
             "objective: {lead: 1 /m}\nrequire: {twist: 0.5 in, speed: -1 mm/s}",
@@ -88,27 +87,21 @@ def test_displaced_starts_add_to_the_offsets_of_the_scenario(tmp_path):
     assert np.allclose(disturbed(scenario, draw).robot.offsets, draw.moves + offsets, atol=1e-15)
 
 
-def test_every_draw_may_have_another_terrain(tmp_path):
-    text = "terrain: !Rough {amplitude: 0.1 in, wavelength: 2 in}\ndisturbances: {draws: 2"
-    scenario = loaded(tmp_path, text + ", terrain: true}")
+def test_every_draw_has_another_terrain(tmp_path):
+    text = "terrain: !Rough {amplitude: 0.1 in, wavelength: 2 in}\ndisturbances: {draws: 2}"
+    scenario = loaded(tmp_path, text)
     seeds = {disturbed(scenario, draw_disturbances(scenario, (k,))).terrain.seed for k in range(9)}
     assert len(seeds) == 9
     assert scenario.terrain.seed == 0
-    same = loaded(tmp_path, text + "}")
-    assert disturbed(same, draw_disturbances(same, (3,))).terrain == same.terrain
 
 
 BAD = [
     ("objective: {sped: 1 s/in}", "objective.sped", "'speed'"),
     ("objective: {speed: 1 /in}", "objective.speed", "'1 /in'"),
-    ("objective: {speed: 1}", "objective.speed", "1 without a unit"),
     ("objective: {}", "objective", "no metric"),
     ("require: {twits: 1 in}", "require.twits", "'twist'"),
-    ("require: {twist: 1 lbf}", "require.twist", "'1 lbf'"),
-    ("disturbances: {draws: 0}", "disturbances.draws", "0"),
     ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
     ("disturbances: {draws: 2, tail: 0}", "disturbances.tail", "0"),
-    ("disturbances: {draws: 2, terrain: true}", "disturbances.terrain", "!Flat"),
     (
         "disturbances: {draws: 2, spreads: {cables.dampin: 0.1}}",
         *("disturbances.spreads.cables.dampin", "'cables.damping'"),

@@ -12,15 +12,15 @@ from tetra_drake.scenario.optimizer_kinds import (
 )
 from tetra_drake.scenario.units import INCH
 
-MINE = "base: thesis\nname: mine\nevolution: {max_evaluations: 900}\noptimizer: "
+MINE = "base: thesis\nname: mine\nevolution: {evaluations: 900}\noptimizer: "
 
 
 @pytest.mark.parametrize(
     ("text", "kind"),
     [
-        ("!CmaEs {sigma: 0.3, population: 20}", CmaEs(sigma=0.3, population=20)),
+        ("!CmaEs {sample: 7, population: 20}", CmaEs(sample=7, population=20)),
         ("!RandomSearch", RandomSearch()),
-        ("!QualityDiversity {floor: -9}", QualityDiversity(floor=-9.0)),
+        ("!QualityDiversity {draws: 9}", QualityDiversity(draws=9)),
         (
             "!QualityDiversity {measures: {speed: [0 in/s, 2 in/s], lifted: [0, 1]}}",
             QualityDiversity(measures={"speed": [0.0, 2.0 * INCH], "lifted": [0.0, 1.0]}),
@@ -32,24 +32,21 @@ def test_a_file_chooses_the_optimiser_and_its_budget(tmp_path, text, kind):
     file = tmp_path / "mine.yaml"
     file.write_text(MINE + text)
     loaded = load_scenario(file)
-    assert (loaded.optimizer, loaded.evolution.budget) == (kind, 900)
-    assert loaded.reference is not None  # as the experiment is the same
+    assert (loaded.optimizer, loaded.evolution.evaluations) == (kind, 900)
     file.write_text(dump_scenario(loaded))
     assert load_scenario(file) == loaded
-    changed = load_scenario().with_changes({"optimizer": kind})
-    assert (changed.optimizer, changed.evolution.budget) == (kind, 50 + 2 * 2000)
+    assert load_scenario().with_changes({"optimizer": kind}).optimizer == kind
 
 
 def test_the_thesiss_algorithm_is_the_default_and_is_not_written(scenario):
     assert scenario.optimizer == SteadyState()
     assert "optimizer" not in dump_scenario(scenario)
-    assert "max_evaluations" not in dump_scenario(scenario).partition("evolution:")[2]
 
 
 @pytest.mark.parametrize(
     ("text", "key"),
     [
-        ("!CmaEs {sigma: 0}", "optimizer.sigma"),
+        ("!CmaEs {starts: 0}", "optimizer.starts"),
         ("!CmaEs {populaton: 9}", "optimizer.populaton"),
         ("!CmaEs {population: 3}", "optimizer.population"),
         ("!SteadyState {population: 9}", "optimizer.population"),

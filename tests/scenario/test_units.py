@@ -19,15 +19,12 @@ def test_displayed_units_have_their_exact_definitions():
     [
         ("25 lbf/in", "N/m", 25 * LBF / IN),
         ("27 lbf*s/in^2", "N*s/m^2", 27 * LBF / IN**2),
-        ("27 lbf*s/in**2", "N*s/m^2", 27 * LBF / IN**2),
         ("0.72 s/in", "s/m", 0.72 / IN),
         ("2.7 g/cm^3", "kg/m^3", 2.7e-3 / 1e-6),
         ("0.5 ms", "s", 0.5e-3),
         ("-3 m", "m", -3.0),
-        (".5 m", "m", 0.5),
         ("5. m", "m", 5.0),
         ("1.5e-3 m", "m", 1.5e-3),
-        ("7m", "m", 7.0),
         ("  7   m ", "m", 7.0),
     ],
 )

@@ -41,7 +41,7 @@ def test_exports_what_a_user_plots(scenario, gait):
 def test_the_friction_brings_no_continuous_state(scenario, gait):
     context = MakeTensegrityDiagram(scenario, gait).CreateDefaultContext()
     assert context.num_continuous_states() == 13 * 5
-    scenario.cpg.signals = "live"
+    scenario = scenario.with_changes({"cpg.signals": "live"})
     live = MakeTensegrityDiagram(scenario, gait)
     assert isinstance(live.GetSubsystemByName("cpg"), MatsuokaCpg)
     assert live.CreateDefaultContext().num_continuous_states() == 13 * 5 + 4 * 4

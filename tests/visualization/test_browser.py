@@ -250,7 +250,7 @@ evolution: {population: 3, tournament: 2}
 def test_the_report_of_a_run_shows_its_figures_and_leads_to_the_replay(browser, tmp_path):
     (tmp_path / "tiny.yaml").write_text(TINY)
     options = ["--scenario", str(tmp_path / "tiny.yaml"), "--out", str(tmp_path / "run")]
-    counts = ["--trials", "1", "--iterations", "1", "--workers", "1"]
+    counts = ["--trials", "1", "--evaluations", "14", "--workers", "1"]
     assert main(["evolve", *options, *counts]) == 0
     with opened(browser, (tmp_path / "run" / "report.html").as_uri()) as page:
         page.wait_for_load_state("networkidle")

@@ -13,8 +13,8 @@ from pydrake.math import RotationMatrix
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.scenario.cable_names import CABLES
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import CABLES
 from tetra_drake.visualization.replay import (
     FRAMES_PER_SECOND,
     LEGEND,

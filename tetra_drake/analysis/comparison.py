@@ -69,7 +69,7 @@ def compare(
     """Compares how runs of one objective search, finished or not.
 
     labels: of the runs, by default the names of their folders.
-    reach: a distance (m), by default the best of the scenarios' first reference.
+    reach: a distance (m); the result says when it was walked.
 
     Raises InputError where objectives differ, labels are not one for each run, or a run has no
     fitness yet.
@@ -81,10 +81,6 @@ def compare(
     draws = {label: run.manifest.scenario.draws for label, run in runs.items()}
     unit = EVALUATIONS if len({*draws.values()}) == 1 else SIMULATIONS
     costs = {label: count if unit == SIMULATIONS else 1 for label, count in draws.items()}
-    if reach is None:
-        references = (run.manifest.scenario.reference for run in runs.values())
-        known = (each.best_distance for each in references if each)
-        reach = next((distance for distance in known if distance is not None), None)
     searches = {label: _trials(run, costs[label]) for label, run in runs.items()}
     ends = {label: _end(trials) for label, trials in searches.items()}
     common = min(ends.values())

@@ -18,6 +18,7 @@ from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import ELITES, read_entries, read_manifest
 from tetra_drake.files import json_number
+from tetra_drake.optimizers.quality_diversity import FLOOR
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def elites(run: Run) -> pandas.DataFrame:
     table, kind = run.whole, run.manifest.scenario.optimizer
     judged = pandas.DataFrame(read_entries(run.directory / ELITES), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
-        table = table[table["fitness"] > kind.floor].dropna(subset=list(kind.measures))
+        table = table[table["fitness"] > FLOOR].dropna(subset=list(kind.measures))
         table = table.assign(**dict(zip(CELLS, cells(table, kind), strict=True)))
         table = table.sort_values(["fitness", *_KEY], ascending=[False, True, True])
         table = table.drop_duplicates(CELLS)

@@ -18,10 +18,16 @@ from tetra_drake.formatting import aligned, fixed, ranged, signed
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult, versions
 from tetra_drake.robot.gait import Gait
-from tetra_drake.scenario.disturbances import Draw, disturbed, draw_disturbances, key_groups
-from tetra_drake.scenario.fields import tree_of
+from tetra_drake.scenario.disturbances import (
+    Disturbances,
+    Draw,
+    disturbed,
+    draw_disturbances,
+    separate,
+)
 from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import DisturbancesScenario, Scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.sections import tree_of
 from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
@@ -78,16 +84,14 @@ class Judgement:
         return table.assign(undisturbed=before, change=change, kept=kept)
 
 
-def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> DisturbancesScenario:
+def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
     """Those that spread each key of SPREAD that the scenario has, and displace starts, by so many
-    percent, and draw the terrain's seed if it has one."""
+    percent."""
     share = percent / 100.0
-    groups = key_groups(dict.fromkeys(SPREAD, share))
-    return DisturbancesScenario(
+    return Disturbances(
         draws=1,
-        spreads={joined: share for joined, keys in groups if _has(scenario, keys[0])},
+        spreads={joined: share for joined in SPREAD if _has(scenario, separate(joined)[0])},
         start=share,
-        terrain=hasattr(scenario.terrain, "seed"),
     )
 
 
@@ -147,9 +151,7 @@ def fresh_seed(seed: int, draw: int) -> tuple[int, ...]:
     return seed, draw, 0, 0, 0, 1
 
 
-def _alone(
-    settings: DisturbancesScenario, fresh: Sequence[Draw]
-) -> Iterator[tuple[dict[str, Any], Draw]]:
+def _alone(settings: Disturbances, fresh: Sequence[Draw]) -> Iterator[tuple[dict[str, Any], Draw]]:
     """Each change alone, with its labels."""
     for key, size in settings.spreads.items():
         for spread in (-size, size):

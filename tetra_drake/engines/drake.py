@@ -12,16 +12,17 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sample, Sampler, evaluate_ports, make_dataset
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.engines.viewer import Viewer
-from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.schema import Scenario, SimulationScenario
+from tetra_drake.scenario.schema import Scenario, SimulationSection
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
+_WITNESS_WINDOW = 2e-5  # s: how closely a witness localises, where the accuracy is 1e-3 or more
 _WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; how Drake's Simulator derives the isolation window
 _AIM_FACTOR, _AIM_BEYOND = 1.02, 5e-5  # and s: a step shall end just after the change it aims at
 _APPROACH = 0.8, 1e-3  # share and s: a change that is farther away is approached, then aimed at
@@ -100,14 +101,14 @@ def simulate_drake(
     )
 
 
-def MakeSimulator(diagram: Diagram, settings: SimulationScenario) -> Simulator:
+def MakeSimulator(diagram: Diagram, settings: SimulationSection) -> Simulator:
     """A simulator of the diagram with the scenario's integrator settings."""
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, settings.scheme, settings.max_step)
     integrator.set_target_accuracy(settings.accuracy)
     if settings.mode_changes == "witness":
-        accuracy = settings.witness_window / _WITNESS_WINDOW_PER_ACCURACY
-        simulator.get_mutable_context().SetAccuracy(accuracy)
+        window = _WITNESS_WINDOW * min(1.0, settings.accuracy / 1e-3)
+        simulator.get_mutable_context().SetAccuracy(window / _WITNESS_WINDOW_PER_ACCURACY)
     return simulator
 
 
@@ -138,12 +139,12 @@ class _Work:
         self._before = self.total()
 
 
-def _check(settings: SimulationScenario, now: float, velocities: np.ndarray, work: _Work) -> None:
+def _check(settings: SimulationSection, now: float, velocities: np.ndarray, work: _Work) -> None:
     """Raises Diverged or StepBudgetExceeded if the simulation has failed."""
     speed = np.abs(velocities.reshape(-1, 6)[:, 3:]).max()
     used = work.derivative_evaluations()
-    if not speed <= settings.max_speed:
-        reason = f"a body moves at {speed:g} m/s, the limit is {settings.max_speed:g} m/s"
+    if not speed <= MAX_SPEED:
+        reason = f"a body moves at {speed:g} m/s, the limit is {MAX_SPEED:g} m/s"
         raise Diverged(time=now, reason=reason)
     if used > settings.max_evaluations:
         reason = f"{used} derivative evaluations, the budget is {settings.max_evaluations}"
@@ -164,7 +165,7 @@ class _StepAimer:
     """
 
     def __init__(
-        self, diagram: Diagram, simulator: Simulator, settings: SimulationScenario, work: _Work
+        self, diagram: Diagram, simulator: Simulator, settings: SimulationSection, work: _Work
     ) -> None:
         self._integrator, self._settings = simulator.get_mutable_integrator(), settings
         self._work = work

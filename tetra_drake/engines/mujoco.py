@@ -5,7 +5,7 @@ contact with a cone of friction. The normal force has the scenario's stiffness, 
 damping: the scenario's at the depth of rest on the nodes of the thesis, which otherwise grows with
 depth. Coulomb friction without stiffness is the scenario's own, and robots walk as far as on the
 other engines. In place of the reset integrator, a node that sticks is held by the scenario's
-stiction damping, but breaks free where that exceeds `mujoco.friction` times the normal force, not
+stiction damping, but breaks free where that exceeds MUJOCO_FRICTION times the normal force, not
 after a deflection, and then does not slide almost freely.
 
 The ground is a plane, level or inclined; other terrains are refused.
@@ -34,7 +34,8 @@ from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-INSTALL = 'pip install "mujoco>=3.13"'  # the first version with the integrator `discrete`
+INSTALL = 'pip install "mujoco>=3.13"'
 
 _IMPEDANCE = 0.5
 """Of contacts. Nothing at rest depends on it, nor do converged distances by more than 0.01 in;
@@ -58,8 +59,11 @@ _OBSERVED = 8  # steps from one observation to the next: with the default step, 
 
 _GAITS = 8  # for each thread at a time; each takes some 10 MB, mostly for a stretch of states
 
-_MAX_SPEED = 1.0
-"""Of a body (m/s), where the scenario allows more. Too long a step throws a robot about for ever,
+INTEGRATOR = "implicitfast"
+"""Of MuJoCo."""
+
+MAX_SPEED = 1.0
+"""Of a body (m/s), less than in other engines. Too long a step throws a robot about for ever,
 at times far forward; a walking robot stays below 0.2 m/s."""
 
 
@@ -99,7 +103,7 @@ def simulate_in_rollouts(
     times = np.union1d(result_times(simulation), samples if record else ())
     recorded = np.searchsorted(times, samples)
     robot = _Robot(scenario)
-    work = IntegratorWork(scenario.mujoco.integrator, step, steps, steps)
+    work = IntegratorWork(INTEGRATOR, step, steps, steps)
     outcomes: list[SimulationResult | SimulationFailure] = []
     for first in range(0, len(gaits), threads * _GAITS):
         group = gaits[first : first + threads * _GAITS]
@@ -136,18 +140,18 @@ def simulate_in_rollouts(
 
 
 def installed() -> bool:
-    """Whether there is a MuJoCo that has all integrators of the scenario's choice."""
+    """Whether there is a MuJoCo with rollouts."""
     try:
-        import mujoco.rollout
+        from mujoco.rollout import Rollout  # noqa: F401
     except ImportError:
         return False
-    return hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE")
+    return True
 
 
 def make_mjcf(scenario: Scenario, structure: Structure, robot: Model) -> str:
     """The robot and its ground in MuJoCo's format, with one motor per driven cable."""
     model, settings = Element("mujoco", model=scenario.name), scenario.mujoco
-    steps = {"integrator": settings.integrator, "timestep": settings.step}
+    steps = {"integrator": INTEGRATOR, "timestep": settings.step}
     _add(model, "compiler", inertiafromgeom="false")
     _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], cone="elliptic", **steps)
     world = _add(model, "worldbody")
@@ -177,7 +181,6 @@ class _Robot:
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(scenario.name, "robot", problem) from error
-        self._max_speed = min(scenario.simulation.max_speed, _MAX_SPEED)
         driven = self.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # the signal of each motor
 
@@ -238,9 +241,9 @@ class _Robot:
         """How the states after step `first` and the next ones tell that a simulation failed."""
         step = self._scenario.mujoco.step
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
-        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= self._max_speed)
+        fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= MAX_SPEED)
         if fast.any():
-            reason = f"a body's velocity exceeds the limit of {self._max_speed:g} m/s"
+            reason = f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s"
             return Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
         # Where MuJoCo warns of instability, it starts again from time 0, or stops.
         times = step * (first + 1.0 + np.arange(len(states)))
@@ -361,7 +364,7 @@ def _contact(scenario: Scenario, structure: Structure, robot: Model) -> dict:
     if isinstance(law, Coulomb):
         friction, stiction_damping = law.kinetic, law.damping
     else:
-        friction, stiction_damping = scenario.mujoco.friction, law.stiction_damping
+        friction, stiction_damping = MUJOCO_FRICTION, law.stiction_damping
     mass, bodies = robot.body.mass[0], len(structure.bodies)
     borne = mass * bodies * scenario.robot.gravity / (2 * bodies + 1)  # by a foot of the thesis's
     rest_damping = ground.damping * borne / ground.stiffness

@@ -37,7 +37,6 @@ from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
-from tetra_drake.scenario.optimizer_kinds import SteadyState
 from tetra_drake.scenario.schema import Scenario
 
 _Lines = Sequence[dict[str, Any]]
@@ -140,14 +139,6 @@ class Manifest:
     method: Method
     thinned: bool = False
     """Whether most genomes were left out, as in the runs recorded beside the package."""
-
-    @property
-    def longest_trial(self) -> str:
-        """How long a trial is that does not end early, in words."""
-        settings, kind = self.scenario.evolution, type(self.scenario.optimizer)
-        if kind is SteadyState or self.method.optimizer != kind.__name__:
-            return f"{settings.max_iterations} iterations, population {settings.population}"
-        return f"{settings.budget} evaluations"
 
 
 def read_manifest(directory: Path) -> Manifest:

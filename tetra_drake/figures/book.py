@@ -57,9 +57,9 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
     walks = [(walk.label, walk.trajectory) for walk in (initial, best)]
-    scenario = run.manifest.scenario
-    pictures.append((motion.before_and_after, walks, scenario.reference))
-    return _save(folder, *pictures) | draw_trajectory(best.trajectory, scenario, folder)
+    pictures.append((motion.before_and_after, walks))
+    trajectory_figures = draw_trajectory(best.trajectory, run.manifest.scenario, folder)
+    return _save(folder, *pictures) | trajectory_figures
 
 
 def _save(folder: Path, *pictures: tuple[Any, ...]) -> dict[str, str]:

@@ -13,7 +13,6 @@ from tetra_drake.evolution.run import Run
 from tetra_drake.figures.style import (
     OKABE_ITO,
     common_style,
-    draw_reference,
     line_style,
     make_figure,
 )
@@ -47,7 +46,6 @@ def initial_distances(run: Run) -> Figure:
     axes.bar(best, extremes["best"], width, color=blue, label="fittest of a trial")
     axes.bar(worst, extremes["worst"], width, color=orange, label="least fit of a trial")
     axes.axhline(0.0, color="black", linewidth=0.8)
-    draw_reference(axes, scenario.reference, "best_initial_distance")
     margin = max(0.9, 2.0 - len(extremes) / 2)  # else the bars of a single trial fill the axes
     axes.set(
         xlabel="trial",
@@ -89,9 +87,7 @@ def initial_fitness(run: Run, trial: int) -> Figure:
     axes.legend(loc="best")
     title = f"Fitness of the initial population, trial {trial}\n"
     title += f"{fixed(100.0 * float(backward.mean()), 0)} % walk backward"
-    reference, failed = run.manifest.scenario.reference, len(initial) - len(walked)
-    if reference and reference.share_backward:
-        title += f" ({reference.source}: {reference.share_backward})"
+    failed = len(initial) - len(walked)
     figure.suptitle(title + (f"; {failed} failed" if failed else ""))
     return figure
 
@@ -141,19 +137,15 @@ def fitness_of_trials(run: Run) -> Figure:
 def two_best(run: Run, trial: int) -> pandas.DataFrame | None:
     """The two fittest different gaits of a trial. Index: fitness and the names of the parameters.
 
-    Columns: best, second, difference (absolute) and, where there is a reference with as many
-    parameters, reference. None if there are no two such gaits.
+    Columns: best, second and difference (absolute). None if there are no two such gaits.
     """
-    pair, scenario = run.best(2).query("trial == @trial"), run.manifest.scenario
+    pair = run.best(2).query("trial == @trial")
     if len(pair) < 2:
         return None
     rows = zip(pair["fitness"], pair["index"], strict=True)
     best, second = ([fitness, *run.vector(trial, index)] for fitness, index in rows)
-    names = pandas.Index(["fitness", *ParameterSpace.of(scenario).names], name="parameter")
+    parameters = ParameterSpace.of(run.manifest.scenario).names
+    names = pandas.Index(["fitness", *parameters], name="parameter")
     table = pandas.DataFrame({"best": best, "second": second}, index=names)
     table["difference"] = (table["best"] - table["second"]).abs()
-    theirs = scenario.reference
-    if theirs is not None and len(theirs.two_best_weights) == len(table) - 3:
-        taus = 2 * [theirs.two_best_tau]
-        table["reference"] = [theirs.two_best_fitness, *theirs.two_best_weights, *taus]
     return table

@@ -18,7 +18,6 @@ from tetra_drake.figures.style import (
     OKABE_ITO,
     add_grid,
     common_style,
-    draw_reference,
     legend_below,
     line_style,
     make_figure,
@@ -28,7 +27,6 @@ from tetra_drake.physics.contact import Ground
 from tetra_drake.results import measures
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.structure import BOTTOM_LEFT, STRUTS, TOP
-from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.units import INCH
 
 X, Y, Z = range(3)
@@ -87,20 +85,14 @@ def relative_distances(trajectory: xarray.Dataset) -> Figure:
 
 
 @common_style()
-def before_and_after(
-    walks: Sequence[tuple[str, xarray.Dataset]], reference: ReferenceScenario | None = None
-) -> Figure:
+def before_and_after(walks: Sequence[tuple[str, xarray.Dataset]]) -> Figure:
     """Distance walked over time by a run's best gait and the best initial one of its trial."""
     # `walks`: label and trajectory of each.
     figure, [panels] = make_figure(width_in=8.0, height_in=4.0, columns=2, sharey=True)
-    kinds = {
-        "best initial gait of the trial": "best_initial_distance",
-        "best evolved gait": "best_distance",
-    }
+    kinds = ("best initial gait of the trial", "best evolved gait")
     for panel, kind, (label, trajectory) in zip(panels, kinds, walks, strict=True):
         walked = measures.distance_walked(trajectory) / INCH
         panel.plot(walked.time, walked, color=OKABE_ITO["blue"])
-        draw_reference(panel, reference, kinds[kind])
         title = f"{kind}: {fixed(float(walked[-1]))} in\n{textwrap.shorten(label, 60)}"
         panel.set_title(title, parse_math=False)  # a name may hold a dollar sign
         panel.set_xlabel("time (s)")

@@ -24,8 +24,6 @@ from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 
 from tetra_drake.files import whole_file, write_whole
-from tetra_drake.scenario.schema import ReferenceScenario
-from tetra_drake.scenario.units import INCH
 
 OKABE_ITO = {
     "black": "#000000",
@@ -49,7 +47,7 @@ SHADE = "0.9"
 """Grey behind marked intervals of time."""
 
 REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
-"""Line style of reference values."""
+"""Line style of values to compare with."""
 
 
 def line_style(index: int) -> dict[str, Any]:
@@ -92,17 +90,6 @@ def legend_below(figure: Figure, lines: Mapping[str, Any], *others: Artist) -> N
     """Adds a legend of line styles, by label, and other artists below the axes."""
     handles = [*(Line2D([], [], label=text, **style) for text, style in lines.items()), *others]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-
-
-def draw_reference(axes: Axes, reference: ReferenceScenario | None, name: str) -> None:
-    """Draws a distance of the reference, if it has one, as a labelled horizontal line (in)."""
-    if reference is None or getattr(reference, name) is None:
-        return
-    inches = getattr(reference, name) / INCH
-    axes.axhline(inches, **REFERENCE)
-    place: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points"}
-    place["bbox"] = {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 1.0}
-    axes.annotate(f"{reference.source}: {inches:.4g} in", (0.02, inches), (0, 4), **place)
 
 
 def save_findings(

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tetra_drake.robot.gait import ParameterSpace, Vector
-from tetra_drake.scenario.schema import EvolutionScenario
+from tetra_drake.scenario.schema import EvolutionSection
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,6 @@ class Optimizer(Protocol):
         """Takes the evaluations in the order in which the vectors were asked for."""
 
 
-MakeOptimizer = Callable[[ParameterSpace, EvolutionScenario, np.random.Generator], Optimizer]
+MakeOptimizer = Callable[[ParameterSpace, EvolutionSection, np.random.Generator], Optimizer]
 """Makes the optimiser of one trial from the space to search, the scenario's `evolution` section
 and the trial's own generator."""

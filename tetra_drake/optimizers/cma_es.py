@@ -20,7 +20,20 @@ from tetra_drake.optimizers.generational import (
 )
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
-from tetra_drake.scenario.schema import EvolutionScenario
+from tetra_drake.scenario.schema import EvolutionSection
+
+TRYOUT = 350
+"""Evaluations in which each search is tried out."""
+
+SIGMA = 0.2
+"""Standard deviation at the start, as a share of each parameter's range in random gaits (in its
+middle; smaller near a floor)."""
+
+TOLERANCE = 0.05
+"""A search has converged where all standard deviations are below this share of the ranges."""
+
+GROWTH = 2.0
+"""Factor on the population at each restart (IPOP)."""
 
 
 class CmaEs(Generational):
@@ -36,13 +49,13 @@ class CmaEs(Generational):
     def __init__(
         self,
         space: ParameterSpace,
-        settings: EvolutionScenario,
+        settings: EvolutionSection,
         generator: np.random.Generator,
         own: kinds.CmaEs | None = None,
     ) -> None:
         super().__init__(space, settings, generator)
         self._own = own = own or kinds.CmaEs()
-        self._starts = min(own.starts, max(1, settings.budget // (2 * own.tryout)))
+        self._starts = min(own.starts, max(1, settings.evaluations // (2 * TRYOUT)))
         self._searches: list[_Search] = []
         """Empty during the sample."""
         if not own.sample:
@@ -51,7 +64,9 @@ class CmaEs(Generational):
 
     def _begin(self, starts: Matrix) -> None:
         chosen = starts[: self._starts]
-        self._searches = [_Search(self._own, self._ranges, self._generator, x) for x in chosen]
+        self._searches = [
+            _Search(self._own.population, self._ranges, self._generator, x) for x in chosen
+        ]
 
     def _draw(self) -> Matrix:
         return self._current.draw() if self._searches else self._random(self._own.sample)
@@ -67,7 +82,7 @@ class CmaEs(Generational):
     @property
     def _current(self) -> _Search:
         """The search that draws next, or has drawn."""
-        untried = (each for each in self._searches if each.evaluations < self._own.tryout)
+        untried = (each for each in self._searches if each.evaluations < TRYOUT)
         return next(untried, None) or max(self._searches, key=lambda each: each.best)
 
     def _state(self) -> Mapping[str, Any]:
@@ -83,10 +98,14 @@ class _Search:
     population."""
 
     def __init__(
-        self, own: kinds.CmaEs, ranges: Ranges, generator: np.random.Generator, start: Vector
+        self,
+        population: int | None,
+        ranges: Ranges,
+        generator: np.random.Generator,
+        start: Vector,
     ) -> None:
-        self._own, self._ranges, self._generator = own, ranges, generator
-        self._population = own.population or 4 + int(3.0 * math.log(max(2, ranges.size)))
+        self._ranges, self._generator = ranges, generator
+        self._population = population or 4 + int(3.0 * math.log(max(2, ranges.size)))
         self.evaluations = self.restarts = 0
         self.best = -math.inf
         """Fitness of the best point."""
@@ -117,7 +136,7 @@ class _Search:
         self._strategy.tell(list(told), (-fitnesses).tolist(), check_points=False)
         if self._strategy.stop():
             self.restarts += 1
-            self._population = round(self._own.growth * self._population)
+            self._population = round(GROWTH * self._population)
             self._strategy = self._make_strategy()
 
     def _make_strategy(self) -> Any:
@@ -125,10 +144,10 @@ class _Search:
 
         options = {
             "popsize": self._population,
-            "tolx": self._own.tolerance,
+            "tolx": TOLERANCE,
             "randn": lambda *shape: self._generator.standard_normal(shape),
             "seed": math.nan,  # leaves the generator of numpy alone
             "verbose": -10,  # and reads no file of signals
         }
         roots = np.pad(self._ranges.roots(self._best), (0, max(0, 2 - len(self._best))))
-        return cma.CMAEvolutionStrategy(roots, self._own.sigma, options)
+        return cma.CMAEvolutionStrategy(roots, SIGMA, options)

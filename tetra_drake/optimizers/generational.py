@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.robot.gait import TAU_B, ParameterSpace, Vector
-from tetra_drake.scenario.schema import EvolutionScenario
+from tetra_drake.scenario.schema import EvolutionSection
 
 Matrix = npt.NDArray[np.float64]
 
@@ -63,20 +63,20 @@ class Generational:
     """
 
     def __init__(
-        self, space: ParameterSpace, settings: EvolutionScenario, generator: np.random.Generator
+        self, space: ParameterSpace, settings: EvolutionSection, generator: np.random.Generator
     ) -> None:
         self._space = space
         self._settings = settings
         self._generator = generator
         self._ranges = Ranges(space)
-        self._left = settings.budget
+        self._left = settings.evaluations
         self._points: Matrix = np.empty((0, self._ranges.size))
         """Those drawn last."""
 
     @property
     def evaluations_at_most(self) -> int:
         """Number of evaluations of a trial."""
-        return self._settings.budget
+        return self._settings.evaluations
 
     def ask(self) -> list[Vector]:
         """The next batch."""

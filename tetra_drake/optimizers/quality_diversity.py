@@ -11,9 +11,24 @@ from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.generational import Generational, Matrix
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
-from tetra_drake.scenario.schema import EvolutionScenario
+from tetra_drake.scenario.schema import EvolutionSection
 
 INSTALL = 'pip install "tetra_drake[qd]"'
+
+FLOOR = 0.0
+"""The fitness that gaits on the map exceed: the level of all cells at the start."""
+
+LEARNING_RATE = 0.01
+"""Share of the way to a better gait's fitness by which it raises the level of its cell."""
+
+EMITTERS = 4
+"""Runs of CMA-ES side by side."""
+
+BATCH = 15
+"""Vectors of each emitter in an iteration."""
+
+SIGMA = 0.5
+"""As of CMA-ES; starts are random gaits and, where one begins anew, gaits of the map."""
 
 
 class QualityDiversity(Generational):
@@ -27,7 +42,7 @@ class QualityDiversity(Generational):
     def __init__(
         self,
         space: ParameterSpace,
-        settings: EvolutionScenario,
+        settings: EvolutionSection,
         generator: np.random.Generator,
         own: kinds.QualityDiversity | None = None,
     ) -> None:
@@ -44,22 +59,22 @@ class QualityDiversity(Generational):
             solution_dim=self._ranges.size,
             dims=own.cells,
             ranges=[(low, high) for low, high in own.measures.values()],
-            threshold_min=own.floor,
-            learning_rate=own.learning_rate,
+            threshold_min=FLOOR,
+            learning_rate=LEARNING_RATE,
             seed=self._seed(),
         )
         self._emitters = [
             EvolutionStrategyEmitter(
                 self._archive,
                 x0=self._ranges.roots(self._random(1))[0],
-                sigma0=own.sigma,
+                sigma0=SIGMA,
                 ranker="imp",
                 selection_rule="mu",
                 restart_rule="basic",
-                batch_size=own.batch,
+                batch_size=BATCH,
                 seed=self._seed(),
             )
-            for _ in range(own.emitters)
+            for _ in range(EMITTERS)
         ]
 
     def _seed(self) -> int:
@@ -95,7 +110,7 @@ class QualityDiversity(Generational):
             return
         told = {"solution": self._roots, **self._told}
         for i, emitter in enumerate(self._emitters):
-            own = slice(i * self._own.batch, (i + 1) * self._own.batch)
+            own = slice(i * BATCH, (i + 1) * BATCH)
             added = {key: values[own] for key, values in self._added.items()}
             emitter.tell(**{key: values[own] for key, values in told.items()}, add_info=added)
 

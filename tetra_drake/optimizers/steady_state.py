@@ -14,7 +14,7 @@ import numpy.typing as npt
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.robot.gait import ParameterSpace, Vector
-from tetra_drake.scenario.schema import EvolutionScenario
+from tetra_drake.scenario.schema import EvolutionSection
 
 CHILDREN = 2
 Fitnesses = npt.NDArray[np.float64]
@@ -28,7 +28,7 @@ class SteadyState:
     """
 
     def __init__(
-        self, space: ParameterSpace, settings: EvolutionScenario, generator: np.random.Generator
+        self, space: ParameterSpace, settings: EvolutionSection, generator: np.random.Generator
     ) -> None:
         self._space = space
         self._settings = settings
@@ -41,7 +41,7 @@ class SteadyState:
     @property
     def evaluations_at_most(self) -> int:
         """Number of evaluations of a trial that is not stopped early."""
-        return self._settings.population + CHILDREN * self._settings.max_iterations
+        return self._settings.evaluations
 
     def ask(self) -> list[Vector]:
         """The initial population, then two children at a time."""
@@ -88,8 +88,10 @@ class SteadyState:
 
     def _stop(self) -> str | None:
         settings = self._settings
-        if len(self._means) - 1 >= settings.max_iterations:
-            return "all iterations done"
+        iteration = len(self._means) - 1
+        evaluations = settings.population + CHILDREN * iteration
+        if evaluations + CHILDREN > settings.evaluations:
+            return "all evaluations done"
         rise, window, after = settings.stop_rise, settings.stop_window, settings.stop_after
         levelled_off = has_levelled_off(self._means, rise=rise, window=window, after=after)
         return "mean fitness levelled off" if levelled_off else None

@@ -20,7 +20,7 @@ from tetra_drake.figures.study import Study, study_run, walk_again
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import render
 from tetra_drake.report.result_folder import RESULT, RUN_MANIFEST, load_result_folder
-from tetra_drake.report.summary import comparisons, metric_rows
+from tetra_drake.report.summary import metric_rows, results
 from tetra_drake.results.metrics import headline
 from tetra_drake.results.result import ground_text, versions
 from tetra_drake.robot.gait import ParameterSpace, save_gait
@@ -117,7 +117,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         versions=versions(),
         json=json.dumps,
         differences=differences(manifest.scenario, load_scenario("thesis")),
-        comparisons=comparisons(run),
+        results=results(run),
         on_diagram={trial: distance for trial, _, distance in best_distances(run)},
         objective=_terms(manifest.scenario.objective, inverse),
         require=_terms(manifest.scenario.require, str),

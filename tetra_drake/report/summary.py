@@ -1,4 +1,4 @@
-"""The results of a run in a few lines, beside its scenario's reference."""
+"""The results of a run in a few lines."""
 
 from __future__ import annotations
 
@@ -16,18 +16,10 @@ from tetra_drake.formatting import aligned, duration, fixed, signed
 from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import INCH, customary
+from tetra_drake.scenario.units import customary
 
 if TYPE_CHECKING:
     import pandas
-
-
-class Comparison(NamedTuple):
-    """A number of ours and the reference's, with units; "" where the reference has none."""
-
-    name: str
-    ours: str
-    reference: str
 
 
 class MetricRow(NamedTuple):
@@ -63,10 +55,7 @@ def summary(run: Run) -> str:
     for trial, _, on_diagram in best_distances(run):
         if math.isfinite(on_diagram):
             lines[trial] += f" ({fixed(on_diagram)} in on the Drake diagram)"
-    reference = run.manifest.scenario.reference
-    source = reference.source if reference else ""
-    rows = [Comparison("", "this run", source), *comparisons(run)]
-    lines += [line.rstrip() for line in aligned(rows).splitlines()]
+    lines += aligned(results(run)).splitlines()
     lines += _metrics_of_the_best(run)
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
@@ -103,44 +92,33 @@ def whole_experiment(scenario: Scenario, *, seconds: float) -> str:
     """What evolving on a whole scenario takes on this machine's cores, and its command; seconds:
     wall time per evaluation on the compiled engine."""
     settings, cores, name = scenario.evolution, available_cores(), scenario.name
-    evaluations = settings.trials * settings.budget
-    time = duration(evaluations * seconds / cores)
+    time = duration(settings.trials * settings.evaluations * seconds / cores)
     return (
         f"this is a first look; scenario {name}, {settings.trials} trials of at most "
-        f"{settings.max_iterations} iterations, takes about {time} (h:mm:ss) on the {cores} cores "
+        f"{settings.evaluations} evaluations, takes about {time} (h:mm:ss) on the {cores} cores "
         f"here: tetra-drake evolve --scenario {name} --engine compiled --out runs/{name}"
     )
 
 
-def comparisons(run: Run) -> list[Comparison]:
-    """The results of a run beside the reference's.
+def results(run: Run) -> list[tuple[str, str]]:
+    """The results of a run by their names, with units.
 
     Distances are those of the fittest gaits; the best gait is the fittest of all. Improvements are
     in inches, and in percent where the initial distances are long enough to compare with.
     """
-    statuses, reference = run.statuses, run.manifest.scenario.reference
+    statuses = run.statuses
     best = max(statuses, key=lambda status: status.best_fitness)
     initial = [status.initial_best_distance_in for status in statuses]
     evaluations = sum(status.evaluations for status in statuses)
     wall_time = sum(status.wall_time for status in statuses)
     iteration_time = CHILDREN * wall_time / max(evaluations, 1)
 
-    def row(name: str, ours: str, key: str, unit: str) -> Comparison:
-        theirs = getattr(reference, key, None)
-        shown = "" if theirs is None else f"{theirs / (INCH if unit == 'in' else 1.0):.4g} {unit}"
-        return Comparison(name, ours, shown)
-
     return [
-        row(
-            "best initial gait",
-            f"{fixed(_finite(initial).max())} in",
-            "best_initial_distance",
-            "in",
-        ),
-        row("best evolved gait", f"{fixed(best.best_distance_in)} in", "best_distance", "in"),
-        row("improvement, mean of trials", _improvement(statuses), "mean_improvement", "%"),
-        row("improvement, best gait's trial", _improvement([best]), "best_improvement", "%"),
-        row("time per two evaluations", f"{fixed(iteration_time)} s", "iteration_time", "s"),
+        ("best initial gait", f"{fixed(_finite(initial).max())} in"),
+        ("best evolved gait", f"{fixed(best.best_distance_in)} in"),
+        ("improvement, mean of trials", _improvement(statuses)),
+        ("improvement, best gait's trial", _improvement([best])),
+        ("time per two evaluations", f"{fixed(iteration_time)} s"),
     ]
 
 

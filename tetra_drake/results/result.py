@@ -28,9 +28,10 @@ from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.fields import tree_of
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.metric_units import Metrics
-from tetra_drake.scenario.schema import Coulomb, Scenario, SimulationScenario
+from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario, SimulationSection
+from tetra_drake.scenario.sections import tree_of
 from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.scenario.units import INCH, POUND_FORCE, shown
 
@@ -72,16 +73,16 @@ class SimulationResult:
     """See results.trajectory.assemble_dataset; None unless asked for."""
 
 
-def result_times(simulation: SimulationScenario) -> np.ndarray:
+def result_times(simulation: SimulationSection) -> np.ndarray:
     """The times (s), ascending, at which make_result() needs the states of a simulation."""
     return np.unique([*_ends(simulation), *_path_times(simulation)])
 
 
-def _ends(simulation: SimulationScenario) -> tuple[float, float, float]:
+def _ends(simulation: SimulationSection) -> tuple[float, float, float]:
     return 0.0, simulation.steady_from, simulation.duration
 
 
-def _path_times(simulation: SimulationScenario) -> np.ndarray:
+def _path_times(simulation: SimulationSection) -> np.ndarray:
     return sample_times(simulation.duration, PERIOD)
 
 
@@ -182,14 +183,14 @@ def ground_text(scenario: Scenario) -> str:
     terrain, law = scenario.terrain, scenario.friction
     if isinstance(law, Coulomb):
         numbers = {"static": law.static, "kinetic": law.kinetic}
-        friction = f"Coulomb friction ({_listed(numbers | tree_of(law, shown, sparse=True))})"
+        friction = f"Coulomb friction ({_listed(numbers | tree_of(law, show=shown))})"
     elif scenario.simulation.engine == "mujoco":
-        friction = f"MuJoCo's friction (coefficient {scenario.mujoco.friction:g})"
+        friction = f"MuJoCo's friction (coefficient {MUJOCO_FRICTION:g})"
     elif isinstance(terrain, Flat):
         return ""
     else:
         friction = "the thesis's friction"
-    sizes = _listed(tree_of(terrain, shown, sparse=True))
+    sizes = _listed(tree_of(terrain, show=shown))
     return f"{type(terrain).__name__.lower()}{f' ({sizes})' if sizes else ''}, {friction}"
 
 
@@ -232,11 +233,6 @@ def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
     lines.append(f"  {'fitness':<17}{fixed(result.fitness):>7}")
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"  {text} (requirement not met)" for text in unmet]
-    reference = scenario.reference
-    if reference is not None:
-        best = {"random": reference.best_initial_distance, "evolved": reference.best_distance}
-        texts = [f"{name} {d / INCH:.4g} in" for name, d in best.items() if d is not None]
-        lines.append(f"  {reference.source}: best distances {', '.join(texts)}")
     speed = fixed(result.duration / result.wall_time, 1)
     lines.append(
         f"  simulated in {fixed(result.wall_time, 1)} s, {speed} times real time: "

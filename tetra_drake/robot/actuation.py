@@ -10,7 +10,8 @@ from typing import Self
 import numpy as np
 
 from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.scenario.schema import CABLES, SIDES, Scenario, mirrored
+from tetra_drake.scenario.cable_names import CABLES, SIDES, mirrored
+from tetra_drake.scenario.schema import Scenario
 
 KINDS = "extensor", "flexor"
 """Of neurons, by their number modulo 2."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -86,8 +85,8 @@ def settled_lengths(scenario: Scenario) -> np.ndarray:
 
 def _settle(scenario: Scenario) -> tuple[np.ndarray, Resting]:
     """The settled state, and the robot with its tables as they are there."""
-    undisturbed = dataclasses.replace(scenario.robot, offsets=[])
-    state, robot = _start(dataclasses.replace(scenario, terrain=Flat(), robot=undisturbed))
+    undisturbed = scenario.robot.model_copy(update={"offsets": []})
+    state, robot = _start(scenario.with_sections(terrain=Flat(), robot=undisturbed))
     reach = FIRST_REACH * robot.radius
     for _ in range(ITERATIONS):
         force = force_at_rest(robot, state)

@@ -1,24 +1,28 @@
 """A gait, its file, and the space of parameters that evolution searches."""
 
-import dataclasses
 import difflib
 import json
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, NoReturn, Self
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import aligned
 from tetra_drake.robot.actuation import KINDS, Actuation
-from tetra_drake.scenario.fields import Check, setting
-from tetra_drake.scenario.schema import PATHWAYS, Scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.sections import Section
 
 SCHEMA = 2
+
+LARGEST_GAIN, GAIN_MUTATION = 1.0, 0.2
+"""Of a feedback gain: the greatest absolute value of random gaits, and the largest change in one
+mutation."""
 
 Vector = npt.NDArray[np.float64]
 """The parameters of one gait in the order of ParameterSpace.names."""
@@ -30,13 +34,12 @@ TAU_B_PER_TAU_A = 2.0
 """The thesis keeps tau_B = 2 tau_A, so that the output resembles a sine wave."""
 
 
-@dataclass(frozen=True)
-class Gains:
-    """How strongly each pathway of physics.feedback acts, in units of the input u0."""
+class Gains(Section):
+    """Strength of each pathway of physics.feedback, in units of the input u0."""
 
-    length: float = setting(default=0.0)
-    load: float = setting(default=0.0)
-    pitch: float = setting(default=0.0)
+    length: float = 0.0
+    load: float = 0.0
+    pitch: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Gait:
     turn: float = 0.0
     """From -1 to 1: the input of oscillators is u0 (1 + turn) on the left, u0 (1 - turn) on the
     right."""
-    gains: Gains = Gains()
+    gains: Gains = field(default_factory=Gains)
     scenario: str = field(default="", compare=False)
     """Name of the scenario that the gait was made for; "" if that is not known."""
     weight_names: tuple[str, ...] = field(default=(), repr=False, compare=False)
@@ -63,8 +66,7 @@ class Gait:
         lines = [f"{self.name}: tau_A {self.tau_a:.4g} s, tau_B {self.tau_b:.4g} s"]
         if self.turn:
             lines.append(f"turn {self.turn:.4g}")
-        gains = dataclasses.asdict(self.gains)
-        lines += [f"gain of {name} {gain:.4g}" for name, gain in gains.items() if gain]
+        lines += [f"gain of {name} {gain:.4g}" for name, gain in self.gains if gain]
         if not self.weights or len(self.weight_names) != len(self.weights):
             weights = [f"{weight:.4g}" for weight in self.weights]
             return "\n".join([*lines, f"weights {' '.join(weights) or 'none'}"])
@@ -92,7 +94,7 @@ class Gait:
             content["tau_b_s"] = self.tau_b
         if self.turn:
             content["turn"] = self.turn
-        gains = {name: gain for name, gain in dataclasses.asdict(self.gains).items() if gain}
+        gains = {name: gain for name, gain in self.gains if gain}
         if gains:
             content["gains"] = gains
         return content
@@ -144,7 +146,7 @@ class ParameterSpace:
             high=np.array(high),
             steps=np.array(steps),
             floors=np.array(floors),
-            couples_tau_b=not scenario.evolution.independent_tau_b,
+            couples_tau_b=scenario.evolution.tau_mutation != "independent",
             weights=places,
             weight_names=weight_names,
             pathways=tuple(scenario.cpg.feedback),
@@ -187,19 +189,16 @@ class ParameterSpace:
 def _parameters(scenario: Scenario, weights: list[str]) -> list[tuple[str, *tuple[float, ...]]]:
     """Name, lower and upper bound, step and floor of each parameter."""
     bounds, settings = scenario.gait_bounds, scenario.evolution
-
-    def kind(name: str, step: float, floor: float) -> tuple[float, float, float, float]:
-        low, high = getattr(bounds, f"{name}_min"), getattr(bounds, f"{name}_max")
-        return low, high, 0.0 if low == high and name != "weight" else step, floor
-
-    weight = kind("weight", settings.weight_mutation, 0.0)
-    gain = kind("gain", settings.gain_mutation, -math.inf)
-    low, high, step, floor = kind("tau_a", settings.tau_mutation_range, bounds.tau_a_min)
+    weight = bounds.weight_min, bounds.weight_max, settings.weight_mutation, 0.0
+    gain = -LARGEST_GAIN, LARGEST_GAIN, GAIN_MUTATION, -math.inf
+    low, high, floor = bounds.tau_a_min, bounds.tau_a_max, bounds.tau_a_min
+    step = 0.0 if low == high else settings.tau_mutation_range
+    tau_a = low, high, 0.0 if settings.tau_mutation == "listing" else step, floor
     tau_b = (TAU_B_PER_TAU_A * number for number in (low, high, step, floor))
     return [
         *((f"weight {name}", *weight) for name in weights),
         *((f"gain {name}", *gain) for name in scenario.cpg.feedback),
-        ("tau_A", low, high, 0.0 if settings.tau_mutation == "listing" else step, floor),
+        ("tau_A", *tau_a),
         ("tau_B", *tau_b),
     ]
 
@@ -219,19 +218,21 @@ def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
     write_whole(path, json.dumps(gait.to_json(scenario), indent=1) + "\n")
 
 
-@dataclass(kw_only=True)
-class GaitFile:
-    """What a gait file holds; see Gait."""
+Weight = Annotated[float, Field(ge=0)]
 
-    schema: int = setting(at_least=1, at_most=SCHEMA)
-    name: str = setting(default="")
-    scenario: str = setting(default="")
-    weights: dict[str, float] | list[float] = setting(at_least=0)
+
+class GaitFile(Section):
+    """The content of a gait file; see Gait."""
+
+    version: int = Field(alias="schema", ge=1, le=SCHEMA)
+    name: str = ""
+    scenario: str = ""
+    weights: dict[str, Weight] | list[Weight]
     """By Actuation.weight_names, in any order; a list, which schema 1 has, in their order."""
-    tau_a_s: float = setting(above=0)
-    tau_b_s: float | None = setting(default=None, above=0)
-    turn: float = setting(default=0.0, at_least=-1, at_most=1)
-    gains: Gains = setting(default=Gains())
+    tau_a_s: float = Field(gt=0)
+    tau_b_s: float | None = Field(default=None, gt=0)
+    turn: float = Field(default=0.0, ge=-1, le=1)
+    gains: Gains = Gains()
 
 
 def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
@@ -268,30 +269,27 @@ def _read_file(path: str | Path, key: str) -> GaitFile:
         raise InputError(path, "", f"is not JSON: {error}") from error
     if key and isinstance(raw, dict):
         raw = raw.get(key)
-    file: GaitFile = Check(path, complete=True).value(GaitFile, raw, key)
-    return file
+    return GaitFile.from_tree(raw, path, key=key)
 
 
 def check_gait(
     gait: Gait, scenario: Scenario, actuation: Actuation, *, source: object, key: str = ""
 ) -> None:
     """Raises InputError, naming source and key, for what does not fit the scenario."""
-    weights, count, n = len(gait.weights), len(actuation.couplings), len(actuation.names)
-    pathways, gains = scenario.cpg.feedback, dataclasses.asdict(gait.gains)
-    gain = next((name for name in PATHWAYS if gains[name] and name not in pathways), "")
-    for wrong, name, found, expected in (
-        (weights != count, "weights", f"{weights} numbers", f"{count} for {n} oscillators"),
-        (gain, f"gains.{gain}", gains.get(gain), f"0, as cpg.feedback is {pathways}"),
-        (
-            gait.turn and not actuation.sides.any(),
-            "turn",
-            gait.turn,
-            "0, as no oscillator has a side",
-        ),
-    ):
-        if wrong:
-            problem = f"found {found}, expected {expected}"
-            raise InputError(source, f"{key}.{name}".strip("."), problem)
+
+    def refuse(name: str, problem: str) -> NoReturn:
+        raise InputError(source, f"{key}.{name}".strip("."), problem)
+
+    count, expected = len(gait.weights), len(actuation.couplings)
+    if count != expected:
+        problem = f"found {count} numbers, expected {expected}"
+        refuse("weights", f"{problem} for {len(actuation.names)} oscillators")
+    for name, gain in gait.gains:
+        if gain and name not in scenario.cpg.feedback:
+            problem = f"found {gain}, expected 0, as cpg.feedback is {scenario.cpg.feedback}"
+            refuse(f"gains.{name}", problem)
+    if gait.turn and not actuation.sides.any():
+        refuse("turn", f"found {gait.turn}, expected 0, as no oscillator has a side")
 
 
 def _check_names(found: tuple[str, ...], wanted: tuple[str, ...], source: object, key: str) -> None:

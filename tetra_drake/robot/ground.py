@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from tetra_drake.errors import InputError
@@ -28,7 +26,8 @@ from tetra_drake.physics.terrain import (
     find_frames,
 )
 from tetra_drake.robot.structure import Structure, moved_nodes
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Grid, make_grid
 from tetra_drake.scenario.units import INCH
 
@@ -50,7 +49,7 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     grid = make_grid(scenario.terrain, ahead=ahead, source=scenario.name)
     law, coulomb = np.zeros(1, dtype=LAW), isinstance(scenario.friction, Coulomb)
     law["stiffness"], law["damping"] = scenario.ground.stiffness, scenario.ground.damping
-    numbers = dataclasses.asdict(scenario.friction)
+    numbers = dict(scenario.friction)
     if coulomb:
         for name in ("stiffness", "damping"):
             numbers[f"bristle_{name}"] = numbers.pop(name)

@@ -15,7 +15,7 @@ from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.equilibrium import settled_lengths
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.structure import NODES, Structure
-from tetra_drake.scenario.schema import CpgScenario, Scenario
+from tetra_drake.scenario.schema import CpgSection, Scenario
 
 SteeringSignal = Callable[[float], float]
 """The turn, from -1 to 1, at a time in s."""
@@ -45,10 +45,11 @@ def make_network(scenario: Scenario, structure: Structure, gait: Gait) -> Networ
     )
 
 
-def initial_neurons(cpg: CpgScenario, oscillators: int) -> np.ndarray:
+def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:
     """(4n,): u, then v, of all neurons at t = 0 (Table 4)."""
-    u = np.full(2 * oscillators, cpg.inner_state)
-    v = np.tile([cpg.extensor_self_inhibition, cpg.flexor_self_inhibition], oscillators)
+    inner_state, extensor_self_inhibition, flexor_self_inhibition = cpg.initial_state
+    u = np.full(2 * oscillators, inner_state)
+    v = np.tile([extensor_self_inhibition, flexor_self_inhibition], oscillators)
     return np.concatenate([u, v])
 
 

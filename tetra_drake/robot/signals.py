@@ -6,7 +6,6 @@ and fed to the cables, as the thesis does.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from pathlib import Path
 
@@ -44,7 +43,7 @@ def raw_output(
     with feedback, whose signals depend on the robot.
     """
     cpg, structure = scenario.cpg, MakeStructure(scenario)
-    if any(dataclasses.asdict(gait.gains).values()):
+    if any(gain for _, gain in gait.gains):
         problem = "has feedback; its signals exist only while the robot is simulated"
         raise InputError(f"gait {gait.name}", "gains", problem)
     network = make_network(scenario, structure, gait)

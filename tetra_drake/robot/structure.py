@@ -10,7 +10,8 @@ import numpy as np
 from tetra_drake.physics.cable import CABLE
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN, move_nodes
 from tetra_drake.robot.actuation import Actuation
-from tetra_drake.scenario.schema import CABLES, Scenario
+from tetra_drake.scenario.cable_names import CABLES
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")

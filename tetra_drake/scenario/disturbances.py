@@ -1,22 +1,49 @@
-"""Draws of a scenario's disturbances, and the scenario changed by one."""
+"""Disturbances of robot and surroundings: settings, draws, and the scenario changed by a draw."""
 
 from __future__ import annotations
 
-import copy
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from pydantic import Field
 
-from tetra_drake.scenario.rules import key_groups
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.sections import Section
+
+if TYPE_CHECKING:
+    from tetra_drake.scenario.schema import Scenario
+
+Spread = Annotated[float, Field(gt=0, le=0.5)]
+
+
+class Disturbances(Section):
+    """The changes of robot and surroundings among which evolution looks for gaits.
+
+    Every gait is simulated once for each of `draws` draws; those of an iteration are the same for
+    all its gaits. Each draw also has another seed of the terrain, if that has one.
+    """
+
+    draws: int = Field(ge=1, le=10_000)
+    spreads: dict[str, Spread] = Field(default={})
+    """By scenario keys: each draw multiplies the number by 1 + up to +-spread, uniformly. Keys
+    joined by commas get the same factor."""
+    start: float = Field(default=0.0, ge=0, le=0.5)
+    """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing, forward or
+    back, sideways, and up."""
+    tail: float = Field(default=1.0, gt=0, le=1)
+    """The fitness is the mean over this share of the draws, the worst (the conditional value at
+    risk): 1 is the mean over all; one draw counts at least."""
+
+
+def separate(joined: str) -> list[str]:
+    """The scenario keys in a key of `spreads`, which joins them by commas."""
+    return [key.strip() for key in joined.split(",")]
 
 
 @dataclass(frozen=True)
 class Draw:
-    """What one draw changes."""
+    """The changes of one draw."""
 
     factors: Mapping[str, float]
     """By the keys of `disturbances.spreads`."""
@@ -39,7 +66,7 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
     return Draw(
         factors={key: 1.0 + size for key, size in sizes.items()},
         moves=reach * moves if reach else None,
-        terrain_seed=terrain_seed if settings.terrain else None,
+        terrain_seed=terrain_seed if hasattr(scenario.terrain, "seed") else None,
     )
 
 
@@ -48,17 +75,18 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
 
     Its values are not checked again: those of the largest changes are when a scenario is loaded.
     """
-    sections = {name: copy.copy(section) for name, section in vars(scenario).items()}
-    changed = dataclasses.replace(scenario, **sections | {"disturbances": None, "reference": None})
-    for joined, keys in key_groups(draw.factors):
-        for key in keys:
-            section, _, name = key.partition(".")
-            setattr(
-                getattr(changed, section), name, draw.factors[joined] * attrgetter(key)(scenario)
-            )
+    numbers = scenario.numbers()
+    changed = scenario.with_numbers(
+        {
+            key: factor * numbers[key]
+            for joined, factor in draw.factors.items()
+            for key in separate(joined)
+        }
+    )
+    robot, terrain = changed.robot, changed.terrain
     if draw.moves is not None:
-        offsets = scenario.robot.offsets or np.zeros_like(draw.moves)
-        changed.robot.offsets = (draw.moves + offsets).tolist()
+        offsets = draw.moves + (robot.offsets or np.zeros_like(draw.moves))
+        robot = robot.model_copy(update={"offsets": offsets.tolist()})
     if draw.terrain_seed is not None:
-        setattr(changed.terrain, "seed", draw.terrain_seed)  # noqa: B010 (kinds with a seed only)
-    return changed
+        terrain = terrain.model_copy(update={"seed": draw.terrain_seed})
+    return changed.with_sections(robot=robot, terrain=terrain, disturbances=None)

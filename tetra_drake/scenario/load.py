@@ -1,4 +1,4 @@
-"""Scenario files: read, merged with their bases, checked, written, and compared."""
+"""Scenario files: read with their bases, written, and compared."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.scenario import rules
-from tetra_drake.scenario.fields import TAG, Check, Tree, dump_yaml, parse_yaml, tree_of
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.sections import TAG, Tree, tree_of
 from tetra_drake.scenario.terrain_kinds import make_grid
+from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 MOST_BYTES = 2**20
-"""Of a scenario file."""
+"""Upper limit of the size of a scenario file."""
 
 
 def shipped_scenarios() -> list[str]:
@@ -30,34 +30,34 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     file that it names.
     """
     file = _file(str(name_or_file), Path())
-    scenario = Scenario.from_tree(_load_tree(file), file)
+    scenario = _load(file)
     make_grid(scenario.terrain, ahead=0.0, source=file)
     return scenario
 
 
 def dump_scenario(scenario: Scenario) -> str:
     """The scenario as a complete scenario file: SI units, loads back to the same numbers."""
-    show = "{!r} {}".format
-    return dump_yaml(tree_of(scenario, show, sparse=True))
+    return dump_yaml(tree_of(scenario))
 
 
 def differences(scenario: Scenario, base: Scenario) -> list[tuple[str, str]]:
-    """(key, value as text) of what a scenario has other than `base`, name and reference aside."""
-    ours, theirs = (
-        dict(_texts(tree_of(each, lambda number, unit: f"{number:.6g} {unit}")))
-        for each in (scenario, base)
-    )
-    changed = [(key, text) for key, text in ours.items() if theirs.get(key) != text]
-    return [(k, text) for k, text in changed if k.split(".")[0] not in ("name", "reference")]
+    """(key, value as text) of what a scenario has other than `base`, the name aside."""
+    ours, theirs = dict(_texts(scenario)), dict(_texts(base))
+    return [(key, text) for key, text in ours.items() if theirs.get(key) != text]
 
 
-def _texts(tree: Tree, prefix: str = "") -> Iterator[tuple[str, str]]:
-    for name, value in tree.items():
-        if isinstance(value, dict):
-            yield from _texts(value, f"{prefix}{name}.")
-        else:
-            text = f"{value:.6g}" if isinstance(value, float) else json.dumps(value)
-            yield (prefix + name).removesuffix(f".{TAG}"), text.replace('"', "")
+def _texts(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """The keys of a scenario with their values as texts."""
+
+    def texts(tree: Tree, prefix: str) -> Iterator[tuple[str, str]]:
+        for name, value in tree.items():
+            if isinstance(value, dict):
+                yield from texts(value, f"{prefix}{name}.")
+            elif name != "name" or prefix:
+                text = f"{value:.6g}" if isinstance(value, float) else json.dumps(value)
+                yield (prefix + name).removesuffix(f".{TAG}"), text.replace('"', "")
+
+    yield from texts(tree_of(scenario, show="{:.6g} {}".format, sparse=False), "")
 
 
 def _file(name: str, folder: Path) -> Path:
@@ -67,26 +67,28 @@ def _file(name: str, folder: Path) -> Path:
     return folder / name
 
 
-def _load_tree(file: Path, seen: tuple[Path, ...] = ()) -> Tree:
-    """The SI tree of a scenario file with its bases merged in."""
+def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
+    """The scenario of a file, whose bases are loaded first."""
     expected = f"scenario file (shipped: {', '.join(shipped_scenarios())})"
     content = read_text(file, expected, most=MOST_BYTES)
     if file.resolve() in seen:
         raise InputError(file, "base", "the scenario is based on itself")
-    raw = parse_yaml(content, file)
-    if not isinstance(raw, dict):  # which may be any file: nothing of it is shown
+    given = parse_yaml(content, file)
+    if not isinstance(given, dict):  # which may be any file: nothing of it is shown
         raise InputError(file, "", "holds no mapping of keys, expected a scenario")
-    base = raw.pop("base", None)
-    given: Tree = Check(file).value(Scenario, raw)
-    terrain = given.get("terrain", {})
-    if "file" in terrain:
-        terrain["file"] = os.path.abspath(file.parent / terrain["file"])
+    _resolve_height_file(given.get("terrain"), file)
+    base = given.pop("base", None)
     if base is None:
-        return given
+        return Scenario.from_tree(given, file)
     if not isinstance(base, str) or not base:
         raise InputError(file, "base", f"found {base!r}, expected the name of a scenario")
     base_file = _file(base, file.parent)
     if not os.path.exists(base_file):
         raise InputError(file, "base", f"'{base}': no such {expected}")
-    tree = _load_tree(base_file, (*seen, file.resolve()))
-    return rules.on_base(tree, given)
+    return _load(base_file, (*seen, file.resolve())).based_on_this(given, file)
+
+
+def _resolve_height_file(terrain: object, file: Path) -> None:
+    """Makes the path of a height file absolute: it starts at the scenario file that names it."""
+    if isinstance(terrain, dict) and isinstance(terrain.get("file"), str):
+        terrain["file"] = os.path.abspath(file.parent / terrain["file"])

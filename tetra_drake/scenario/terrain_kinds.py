@@ -4,8 +4,6 @@ The ground is the surface z = h(x, y) in the world: x forward, y left, z up. The
 the origin, T1's base at x = 0, and walks along +x. The surface is the uniform biquadratic B-spline
 whose control points are the heights of a grid: smooth, exact on planes, nowhere above the highest
 height around, with edges rounded by a cell; outside the grid it goes on as it is at the edge.
-
-(The annotations below are read as types, so they are not postponed.)
 """
 
 import io
@@ -13,12 +11,14 @@ import math
 import re
 import warnings
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes
-from tetra_drake.scenario.fields import quantity, setting
+from tetra_drake.scenario.sections import Kinds, Section, quantity
 from tetra_drake.scenario.units import INCH
 
 BEHIND, AHEAD, ASIDE = 24.0 * INCH, 120.0 * INCH, 30.0 * INCH
@@ -27,25 +27,22 @@ MOST_CELLS = 4_000_000
 STEEPEST = math.radians(60.0)
 
 
-@dataclass
-class Flat:
+class Flat(Section):
     """h = 0 everywhere: the thesis's floor, and the default."""
 
 
-@dataclass
-class Incline:
+class Incline(Section):
     """A plane that rises along +x.
 
     Without `start`, h = tan(slope) x everywhere, and the robot starts on it, turned with it; with
     it, h = tan(slope) max(0, x - start). A negative slope goes down.
     """
 
-    slope: float = quantity("rad", at_least=-STEEPEST, at_most=STEEPEST)  # 60 deg either way
+    slope: float = quantity("rad", ge=-STEEPEST, le=STEEPEST)  # 60 deg either way
     start: float | None = quantity("m", default=None)
 
 
-@dataclass
-class Steps:
+class Steps(Section):
     """Stairs across the way: h = height min(count, floor((x - start) / depth) + 1) from `start` on.
 
     The first step begins at `start`, 1 in ahead of the robot if not given. A negative height goes
@@ -54,27 +51,25 @@ class Steps:
     """
 
     height: float = quantity("m")  # of each step above the one before
-    depth: float = quantity("m", above=0)  # of each step along x
-    count: int = setting(at_least=1)
+    depth: float = quantity("m", gt=0)  # of each step along x
+    count: int = Field(ge=1)
     start: float | None = quantity("m", default=None)
 
 
-@dataclass
-class Rough:
+class Rough(Section):
     """Heights drawn uniformly between -2 amplitude and 0, independent, every half wavelength.
 
     So the mean is -amplitude, and a robot that stands at 0 touches but does not sink in. Flat, at
     0, before `start` if that is given. The same seed is the same ground.
     """
 
-    amplitude: float = quantity("m", at_least=0)
-    wavelength: float = quantity("m", above=0)
-    seed: int = setting(at_least=0, default=0)
+    amplitude: float = quantity("m", ge=0)
+    wavelength: float = quantity("m", gt=0)
+    seed: int = Field(ge=0, default=0)
     start: float | None = quantity("m", default=None)
 
 
-@dataclass
-class Obstacles:
+class Obstacles(Section):
     """Round bumps, h = height max(0, 1 - (r / radius)^2), the highest where two overlap.
 
     One stands at a random place in each square of side `spacing`, none reaches before `start`, 1 in
@@ -82,28 +77,27 @@ class Obstacles:
     is the same ground.
     """
 
-    height: float = quantity("m", above=0)
-    radius: float = quantity("m", above=0)
-    spacing: float = quantity("m", above=0)
-    seed: int = setting(at_least=0, default=0)
+    height: float = quantity("m", gt=0)
+    radius: float = quantity("m", gt=0)
+    spacing: float = quantity("m", gt=0)
+    seed: int = Field(ge=0, default=0)
     start: float | None = quantity("m", default=None)
 
 
-@dataclass
-class HeightField:
+class HeightField(Section):
     """Heights in m from a file: rows along x, columns along y, both upward.
 
     The file is numpy's `.npy`, or text of numbers separated by blanks or commas; at least 3 x 3.
     A relative path starts at the scenario file that names it.
     """
 
-    file: str = setting()
-    cell: float = quantity("m", above=0)  # between neighbours, along x and y
-    corner: list[float] | None = quantity("m", length=2, default=None)
+    file: str
+    cell: float = quantity("m", gt=0)  # between neighbours, along x and y
+    corner: list[float] | None = quantity("m", default=None, min_length=2, max_length=2)
     """x and y of the first height; the grid's centre is the origin if not given."""
 
 
-Terrain = Flat | Incline | Steps | Rough | Obstacles | HeightField
+Terrain = Annotated[Flat | Incline | Steps | Rough | Obstacles | HeightField, Kinds()]
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 
@@ -17,6 +18,7 @@ _FACTORS = rf"{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*")
 
 
+@functools.lru_cache(maxsize=1000)  # as files are read on top of their bases
 def quantity_to_si(text: str, unit: str) -> float:
     """Reads a quantity such as "25 lbf/in", or "1 /in", as a number in the SI unit `unit` ("N/m").
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 
 import numpy as np
@@ -84,7 +83,7 @@ def MakeTensegrityDiagram(
     if scenario.cpg.feedback:
         sensors = Feedback(
             make_senses(scenario, structure),
-            gains=dataclasses.astuple(gait.gains),
+            gains=[gain for _, gain in gait.gains],
             bodies=len(structure.bodies),
         )
         feedback = builder.AddNamedSystem("feedback", sensors)

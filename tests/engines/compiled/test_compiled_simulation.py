@@ -127,7 +127,7 @@ def test_the_recording_has_the_forces_of_the_diagrams(scenario):
 @pytest.mark.parametrize("signals", ["recorded", "live"])
 def test_signals_integrated_with_error_control_are_those_of_the_diagram(compiled, data, signals):
     # Gait c goes 0.4 in farther than on the listing's signals.
-    compiled.cpg.signals = signals
+    compiled = compiled.with_changes({"cpg.signals": signals})
     result = simulate(scenario=compiled, gait=load_gait(data / "gait_c.json", compiled))
     assert result.metrics.distance_in == pytest.approx(2.22, abs=0.05)
 

@@ -18,7 +18,8 @@ from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.model import JUNCTION_CABLES, Model, make_model
 from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.schema import Coulomb, ResetIntegrator, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -59,7 +60,9 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 5, 8])
-@pytest.mark.parametrize("changes", [{}, {"terrain": Rough(2e-4, 0.03), "friction": Coulomb()}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"terrain": Rough(amplitude=2e-4, wavelength=0.03), "friction": Coulomb()}]
+)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_accelerations_are_those_of_the_diagram(scenario, tetrahedra, changes, seed):
     scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra, **changes})
@@ -81,7 +84,18 @@ UNEVEN = Rough(amplitude=0.0005, wavelength=0.03, seed=1)
 
 
 @pytest.mark.parametrize("terrain", [Flat(), UNEVEN])
-@pytest.mark.parametrize("friction", [ResetIntegrator(1e-4, 70.0, 0.7, 0.0), Coulomb(static=50.0)])
+@pytest.mark.parametrize(
+    "friction",
+    [
+        ResetIntegrator(
+            stiction_range=1e-4,
+            stiction_damping=70.0,
+            stiction_switch=0.7,
+            proportional_stiction=0.0,
+        ),
+        Coulomb(static=50.0),
+    ],
+)
 def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario, terrain, friction):
     # With stiffness left out (it enters squared in time) and the small dependence of bristles
     # on speed switched off, d force / d velocity is minus the damping matrix. (A limit of Coulomb
@@ -114,7 +128,7 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario, terrain, 
 def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
     # At rest and without other stiffness, forces change with positions by the normal forces only.
     for key in ("outer_stiffness", "inner_stiffness"):
-        setattr(scenario.cables, key, 1e-12)
+        scenario = scenario.with_numbers({f"cables.{key}": 1e-12})
     robot, state, modes = disturbed_robot(scenario, 0)
     state[35:] = 0.0
 

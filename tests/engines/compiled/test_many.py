@@ -24,11 +24,15 @@ from tetra_drake.errors import (
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.scenario.schema import Coulomb, Scenario
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Rough
 
 FAR_TOO_STRONG = {"cpg.gain": "4e9 N"}
 """A pull that throws the robot about at the first step."""
+
+FALLING = {"robot.gravity": "1000 m/s^2", "robot.offsets": [["0 m", "0 m", "9 m"]] * 5}
+"""A fall that is too fast after 10 ms, high above the ground."""
 
 TOO_STRONG = {"cpg.gain": "300.0 N", "simulation.max_evaluations": 20_000}
 """One that winds it up until steps are tiny."""
@@ -82,9 +86,13 @@ def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short
 @pytest.mark.parametrize("width", WIDTHS)
 def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short, width):
     # Each lane has a grid of its own size, and constants of its own.
-    rough = {"robot.contacts": "all", "terrain": Rough(2e-3, 0.1), "friction": Coulomb()}
+    rough = {
+        "robot.contacts": "all",
+        "terrain": Rough(amplitude=2e-3, wavelength=0.1),
+        "friction": Coulomb(),
+    }
     firm = Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)
-    finer = rough | {"terrain": Rough(3e-3, 0.05, seed=1), "friction": firm}
+    finer = rough | {"terrain": Rough(amplitude=3e-3, wavelength=0.05, seed=1), "friction": firm}
     kinds = [short.with_changes(changes) for changes in (finer, rough, rough | FAR_TOO_STRONG)]
     walks = [Walk.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(kinds * 3)]
     alone = [courses([walk], 1)[0] for walk in walks]
@@ -127,7 +135,7 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
 
 def test_failures_stand_in_the_place_of_results(short):
     failing = {
-        "a body's velocity": {"simulation.max_speed": "1e-3 m/s"},
+        "a body's velocity": FALLING,
         "no step": {"compiled.tolerance": "1e-300 m/s"},
         "force evaluations": {"simulation.max_evaluations": 100},
         "": {},

@@ -15,7 +15,7 @@ from tetra_drake.engines.compiled.walk import (
     TOO_MANY_EVALUATIONS,
 )
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import LENGTH, PULL_COLUMNS, TENSION
 from tetra_drake.physics.contact import STICK_POINT
 from tetra_drake.physics.kinematics import NODE_COLUMNS
@@ -74,7 +74,7 @@ def make_outcome(walk: Walk, course: Course) -> SimulationResult:
 def _failure(course: Course, scenario: Scenario) -> SimulationFailure:
     settings = scenario.simulation
     reasons = {
-        TOO_FAST: f"a body's velocity exceeds the limit of {settings.max_speed:g} m/s",
+        TOO_FAST: f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s",
         STEP_TOO_SMALL: "no step is small enough for the tolerance",
         TOO_MANY_EVALUATIONS: f"force evaluations exceed the budget of {settings.max_evaluations}",
     }

@@ -33,6 +33,7 @@ from tetra_drake.engines.compiled.walk import (
     Walks,
     advance,
 )
+from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics.cable import PULL_COLUMNS, Cables
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, Law
 from tetra_drake.physics.feedback import Senses
@@ -210,13 +211,13 @@ class LaneEngine:
         network = make_network(scenario, each.structure, each.gait)
         senses = each.senses
         turns = sample_turns(scenario, each.structure, each.gait, each.steering)
-        numbers: dict[str, Any] = dataclasses.asdict(compiled)
-        numbers |= {name: getattr(simulation, name) for name in ("max_speed", "max_evaluations")}
+        numbers: dict[str, Any] = dict(compiled)
+        numbers |= {"max_speed": MAX_SPEED, "max_evaluations": simulation.max_evaluations}
         numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
         numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
         numbers["neurons"] = make_neurons(initial_neurons(cpg, scenario.oscillators))
         numbers["external_input"] = cpg.external_input
-        numbers["gains"] = dataclasses.astuple(each.gait.gains)
+        numbers["gains"] = [gain for _, gain in each.gait.gains]
         numbers["sides"] = np.repeat(each.structure.actuation.sides, 2)
         numbers["tonic"] = tonic_input(scenario, each.structure, turns)[0]
         for name, values in numbers.items():

@@ -1,0 +1,65 @@
+"""Kinds of friction and their constants."""
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from tetra_drake.scenario.sections import Kinds, Section, quantity, refuse
+from tetra_drake.scenario.units import INCH, POUND_FORCE
+
+
+class ResetIntegrator(Section):
+    """The friction of the thesis (Table 2, Eq. 3-5), which does not know the load.
+
+    For each contact and each of two tangents of the ground, with x the deflection from the stick
+    point and v the velocity: F = -(sigma_0 |v| (1 + a_c) x + sigma_1 v) in stick and
+    F = -sigma_0 |v| x in slip, where x is held at +-p0. A contact breaks free where |x| >= p0
+    moving outward, and sticks again, with x = 0, where v changes sign.
+    """
+
+    stiction_range: float = quantity("m", gt=0)
+    """p0: deflection at which a node breaks free."""
+    stiction_damping: float = quantity("N*s/m", ge=0)
+    """sigma_1."""
+    stiction_switch: float = Field(ge=0)
+    """a_c."""
+    proportional_stiction: float = quantity("N*s/m^2", ge=0)
+    """sigma_0."""
+
+
+class Coulomb(Section):
+    """Friction that grows with the load F_N, and may depend on the direction of travel.
+
+    In the tangent plane u = c v + k x, with x the deflection from the stick point (in stick only)
+    and v the velocity. F = -u min(1, mu F_N / s(u)), mu static in stick and kinetic in slip, and
+    s(u) = sqrt((u_f / a_f)^2 + (u_l / a_l)^2): u_f is along the body's heading at touchdown and
+    a_f is `forward` or `backward` by its sign, u_l is sideways and a_l is `lateral`. A contact
+    breaks free where s(u) > static F_N moving outward, and sticks again, with x = 0, where
+    s(c v) <= kinetic F_N. Without stiffness, and with static = kinetic, the law has no memory: it
+    is MuJoCo's soft friction.
+    """
+
+    static: float = Field(default=0.5, gt=0)
+    """mu in stick."""
+    kinetic: float = Field(default=0.5, gt=0)
+    """mu in slip; at most `static`."""
+    stiffness: float = quantity("N/m", default=0.0, ge=0)
+    """k."""
+    damping: float = quantity("N*s/m", default=0.4 * POUND_FORCE / INCH, gt=0)
+    """c."""
+    forward: float = Field(default=1.0, gt=0)
+    """Factor on mu for slip along the heading."""
+    backward: float = Field(default=1.0, gt=0)
+    """Factor on mu for slip against the heading."""
+    lateral: float = Field(default=1.0, gt=0)
+    """Factor on mu for sideways slip."""
+
+    @model_validator(mode="after")
+    def _check(self) -> "Coulomb":
+        if self.kinetic > self.static:
+            refuse("kinetic", f"found {self.kinetic}, expected at most static, {self.static}")
+        return self
+
+
+Friction = Annotated[ResetIntegrator | Coulomb, Kinds()]
+"""The tagged kinds of friction; without a tag it is the first."""

@@ -1,0 +1,63 @@
+"""YAML with tagged kinds."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import yaml
+
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.sections import TAG, Tree
+
+
+def parse_yaml(content: str, source: object) -> Any:
+    """What YAML text holds; raises InputError if it is not YAML."""
+    try:
+        return yaml.load(content, _Loader)
+    except yaml.MarkedYAMLError as error:
+        # Without the lines that the error shows: the file may be any.
+        mark = error.problem_mark or error.context_mark
+        place = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        raise InputError(source, "", f"is not YAML{place}: {error.problem}") from error
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise InputError(source, "", f"is not YAML: {error}") from error
+
+
+def dump_yaml(tree: Tree) -> str:
+    """The tree as YAML text."""
+    return yaml.dump(tree, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML with tagged kinds, in which no key may be given twice, and 1e-3 is a number."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for key in keys:
+            if keys.count(key) > 1:
+                problem = f"found the key '{key}' twice"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+        return super().construct_mapping(node, deep)
+
+    def construct_kind(self, name: str, node: Any) -> dict[Any, Any]:
+        if node.value and not isinstance(node, yaml.MappingNode):
+            problem = f"found !{name} without a mapping of keys"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+        return {TAG: name} | (self.construct_mapping(node, deep=True) if node.value else {})
+
+
+class _Dumper(yaml.SafeDumper):
+    """YAML with tagged kinds and without mappings on one line."""
+
+    def represent_dict(self, data: Any) -> yaml.MappingNode:
+        entries = {name: value for name, value in data.items() if name != TAG}
+        tag = f"!{data[TAG]}" if TAG in data else "tag:yaml.org,2002:map"
+        return self.represent_mapping(tag, entries, flow_style=False)
+
+
+_Loader.add_multi_constructor("!", _Loader.construct_kind)
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"), "-+0123456789"
+)
+_Dumper.add_representer(dict, _Dumper.represent_dict)
