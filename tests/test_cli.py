@@ -81,9 +81,6 @@ def unchanged(work):
         ("cpg --out a.csv --scenario feedback", "gait random gait 80", "gains:"),
         ("cpg --scenario short.yaml --out folder", "folder", ""),
         ("cpg --scenario short.yaml --out good.json/a.csv", "good.json/a.csv", ""),
-        ("diagram --out a.dot --scenario folder", "folder", ""),
-        ("diagram --scenario short.yaml --out good.json/a.dot", "good.json/a.dot", ""),
-        ("diagram --scenario short.yaml --out a.docx", "a.docx", ".docx"),
         ("replay --out new/a.html short.yaml", "short.yaml", ""),
         ("replay --out new/a.html missing", "missing", ""),
         ("replay good.json --out folder", "folder", ""),
@@ -135,10 +132,7 @@ def test_a_simulation_that_fails_says_when_and_why_with_status_1(unchanged, caps
     assert "t = 0.0" in line and "100" in line
 
 
-COMMANDS = (
-    *("simulate", "evolve", "replay", "figures"),
-    *("robustness", "compare", "cpg", "diagram"),
-)
+COMMANDS = ("simulate", "evolve", "replay", "figures", "robustness", "compare", "cpg")
 
 
 def printed(arguments, capsys) -> str:
@@ -248,11 +242,3 @@ def test_cpg_writes_a_column_for_each_oscillator_and_says_which_cables_it_drives
     header = next(line for line in lines if not line.startswith("#"))
     assert header.split(",") == ["time_s", *(f"signal_{i}" for i in range(1, 9))]
     assert "# signal_4: T2-T3 outer bottom_right" in lines
-
-
-def test_diagram_writes_graphviz_source_that_names_the_subsystems(work):
-    assert main(["diagram", "--scenario", "short.yaml", "--out", "robot.dot"]) == 0
-    text = (work / "robot.dot").read_text()
-    assert text.startswith("digraph")
-    for name in ("cpg", "start_up", "cables", "ground", "plant"):
-        assert name in text

@@ -72,9 +72,8 @@ def make_parser() -> Command:
         "central pattern generator, as a Drake diagram, and evolve its gaits.",
         epilog="`tetra-drake COMMAND --help` explains a command.",
     )
-    parser.add_argument(
-        "--version", action="version", version=f"tetra-drake {version('tetra_drake')}"
-    )
+    shown = f"tetra-drake {version('tetra_drake')}"
+    parser.add_argument("--version", action="version", version=shown)
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
     for run, add_options in _COMMANDS:
@@ -342,25 +341,6 @@ def _cpg(options: Options) -> None:
     save_signals(options.out, scenario, gait)
 
 
-def _diagram_options(command: Command) -> None:
-    _add_scenario(command, default="thesis")
-    _add_path(command, "--out", "FILE", "the file to write", required=True)
-
-
-def _diagram(options: Options) -> None:
-    """Draw the block diagram.
-
-    Draws the block diagram of the robot. FILE.dot is Graphviz source; .svg, .png and .pdf are
-    drawn by Graphviz's program `dot`, which must be installed.
-    """
-    from tetra_drake.figures.block_diagram import save_block_diagram
-    from tetra_drake.robot.gait import seeded_gait
-    from tetra_drake.systems.diagram import MakeTensegrityDiagram
-
-    scenario = load_scenario(options.scenario or "thesis")
-    save_block_diagram(MakeTensegrityDiagram(scenario, seeded_gait(scenario)), options.out)
-
-
 def _add_scenario(command: Command, *, default: str) -> None:
     names = ", ".join(shipped_scenarios())
     what = f"a shipped scenario ({names}) or a YAML file (default: {default})"
@@ -436,6 +416,5 @@ _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ..
     (_robustness, _robustness_options),
     (_compare, _compare_options),
     (_cpg, _cpg_options),
-    (_diagram, _diagram_options),
 )
 """Each command, whose docstring is its help, and what adds its options."""
