@@ -1,13 +1,10 @@
 """Making recorded runs: what is done is kept, and what is written can be read."""
 
-import json
-
 import pytest
 import record
 from analyse import ANALYSIS
 from helpers.meshcat_page import read_page
 
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import load_run
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 
@@ -66,23 +63,6 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     record.record("tiny", TINY, scratch=scratch, out=out)
     assert load_run(out / "tiny").evaluations.equals(run.evaluations)
     assert analysed == [scratch / "tiny"]
-    assert set(json.loads((out / record.TIMES).read_text())) == {"tiny"}
-
-
-def test_times_add_up_when_a_run_goes_on(tmp_path, monkeypatch):
-    file = tmp_path / "times.json"
-    for resume, expected in ((False, 10), (True, 20), (False, 10)):
-        with monkeypatch.context() as patch:
-            patch.setattr(record.time, "monotonic", iter([0.0, 10.0]).__next__)
-            with record._timed("a", file, resume=resume):
-                pass
-        assert json.loads(file.read_text()) == {"a": expected}
-    with pytest.raises(KeyboardInterrupt), record._timed("b", file, resume=False):
-        raise KeyboardInterrupt
-    assert json.loads(file.read_text())["b"] == 0
-    with pytest.raises(InputError), record._timed("a", file, resume=False):
-        raise InputError(file, "", "holds a run of another scenario")
-    assert json.loads(file.read_text())["a"] == 10
 
 
 def test_every_experiment_is_a_scenario():
