@@ -1,6 +1,6 @@
 """The robot: build its diagram, simulate one gait, write a page on which it walks.
 
-    python diagrams/robot.py [--gait FILE] [--duration S] [--out DIR]
+    python diagrams/robot.py [GAIT.json]
 
     cpg ──→ start_up ──→ cables ──┬──→ forces ──→ plant ──┬──→ state
                            ↑      │                       │
@@ -21,7 +21,7 @@ predicted to touch the ground or to break free.
 
 from __future__ import annotations
 
-import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -93,35 +93,28 @@ def make_diagram(scenario: Scenario, gait: Gait) -> Diagram:
     return diagram
 
 
-def main() -> None:
-    """Simulates a gait and writes the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--gait", metavar="FILE", type=Path, default=BEST_GAIT)
-    parser.add_argument("--duration", metavar="S", type=float, default=15.0)
-    parser.add_argument("--out", metavar="DIR", type=Path, default=DIAGRAMS)
-    options = parser.parse_args()
-
+def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = DIAGRAMS) -> None:
+    """Simulates the beginning of a gait and writes the pictures."""
     scenario = load_scenario("thesis")
-    scenario.simulation.duration = options.duration
-    gait = load_gait(options.gait, scenario)
+    gait = load_gait(gait_file, scenario)
     diagram = make_diagram(scenario, gait)
-    save_block_diagram(diagram, options.out / "robot.svg")
+    save_block_diagram(diagram, out / "robot.svg")
 
     # Contact and stiction change where a step ends, so no step may be long.
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.001)
     structure = MakeStructure(scenario)
-    sampler = Sampler(structure, sample_times(options.duration, 0.01))
+    sampler = Sampler(structure, sample_times(duration, 0.01))
     simulator.set_monitor(sampler.after_step)
-    simulator.AdvanceTo(options.duration)
+    simulator.AdvanceTo(duration)
 
     trajectory = make_dataset(diagram, structure, sampler.samples)
     inches = float(distance_walked(trajectory)[-1]) / INCH
-    title = f"{gait.name}: {inches:.2f} inches in {options.duration:g} s"
-    save_replay(options.out / "robot.html", scenario=scenario, trajectory=trajectory, title=title)
+    title = f"{gait.name}: {inches:.2f} inches in {duration:g} s"
+    save_replay(out / "robot.html", scenario=scenario, trajectory=trajectory, title=title)
     print(title)
-    print(f"open {options.out / 'robot.html'} in a browser to see it walk")
+    print(f"open {out / 'robot.html'} in a browser to see it walk")
 
 
 if __name__ == "__main__":
-    main()
+    main(*[Path(name) for name in sys.argv[1:2]])
