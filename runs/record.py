@@ -1,22 +1,21 @@
 """Makes the recorded runs beside this file from nothing.
 
-    python runs/record.py [--scratch DIR] [NAME ...]
+    python runs/record.py [NAME ...]
 
-Each experiment is evolved and analysed in a folder of DIR, out/runs by default, thinned into a
-folder here, and its best gait shown on a page and, by Chromium, in a picture there; those that
-README.md shows are filmed, too. Interrupted, it goes on; what is done is skipped.
-All pages share the viewer meshcat.js, of one version of Drake.
+Each experiment is evolved and analysed in a folder of out/runs, thinned into a folder here, and its
+best gait shown on a page and, by Chromium, in a picture there; those that README.md shows are
+filmed, too. Interrupted, it goes on; what is done is skipped. All pages share the viewer
+meshcat.js, of one version of Drake.
 """
 
 from __future__ import annotations
 
-import argparse
 import filecmp
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,7 +28,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.progress import Display
 from tetra_drake.evolution.run_record import MANIFEST
 from tetra_drake.experiment import evolve
-from tetra_drake.formatting import duration
+from tetra_drake.formatting import duration, listed
 from tetra_drake.report.replay_page import write_replay
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
@@ -37,6 +36,7 @@ from tetra_drake.scenario.optimizer_kinds import CmaEs, OptimizerKind, QualityDi
 from tetra_drake.scenario.schema import Scenario
 
 HERE = Path(__file__).parent
+SCRATCH = Path("out/runs")
 VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
 
 
@@ -156,21 +156,17 @@ def _same(first: Path, second: Path) -> bool:
     return first.exists() and second.exists() and filecmp.cmp(first, second, shallow=False)
 
 
-def main() -> None:
-    """Records the experiments of the given names, or all."""
-    assert __doc__
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("names", metavar="NAME", nargs="*", default=[*EXPERIMENTS])
-    parser.add_argument("--scratch", metavar="DIR", type=Path, default=Path("out/runs"))
-    options = parser.parse_args()
-    if unknown := {*options.names} - {*EXPERIMENTS}:
-        parser.error(f"found {', '.join(sorted(unknown))}; there are {', '.join(EXPERIMENTS)}")
-    try:
-        for name in options.names:
-            record(name, EXPERIMENTS[name], scratch=options.scratch, out=HERE)
-    except InputError as error:
-        sys.exit(f"record.py: {error}")
+def main(names: Sequence[str]) -> None:
+    """Records the experiments of the given names, or all. Raises InputError."""
+    if unknown := {*names} - {*EXPERIMENTS}:
+        problem = f"found {listed([*unknown])}, expected {listed([*EXPERIMENTS])}"
+        raise InputError("NAME", "", problem)
+    for name in names or EXPERIMENTS:
+        record(name, EXPERIMENTS[name], scratch=SCRATCH, out=HERE)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main(sys.argv[1:])
+    except InputError as error:
+        sys.exit(f"record.py: {error}")
