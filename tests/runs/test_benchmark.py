@@ -8,8 +8,8 @@ from tetra_drake.scenario.load import load_scenario
 QUICK = """
 base: thesis
 name: quick
-cpg: {start_up: 0.1 s}
-simulation: {duration: 0.3 s, steady_from: 0.2 s}
+cpg: {start_up: 0.05 s}
+simulation: {duration: 0.1 s, steady_from: 0.05 s}
 """
 
 

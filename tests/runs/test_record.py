@@ -1,5 +1,7 @@
 """Making recorded runs: what is done is kept, and what is written can be read."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 import record
 from analyse import ANALYSIS
@@ -14,7 +16,7 @@ TINY = record.Experiment(
     {
         **{"simulation.engine": "compiled", "simulation.duration": "0.4 s"},
         **{"simulation.steady_from": "0.1 s", "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)},
-        **{"evolution.trials": 2, "evolution.max_evaluations": 12},
+        **{"evolution.trials": 2, "evolution.max_evaluations": 8},
     },
     film=True,
 )
@@ -30,6 +32,7 @@ def analysed(monkeypatch):
         (directory / ANALYSIS).write_text("{}")
 
     monkeypatch.setattr(record, "analyse", analyse)
+    monkeypatch.setattr("tetra_drake.experiment.process_executor", ThreadPoolExecutor)
 
     def take_pictures(page, *pictures):
         for picture in pictures:
@@ -47,7 +50,7 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     record.record("tiny", TINY, scratch=scratch, out=out)
     run = load_run(out / "tiny")
     assert run.manifest.thinned and run.manifest.scenario == TINY.scenario("tiny")
-    assert run.evaluations.groupby("trial").size().tolist() == [12, 12]
+    assert run.evaluations.groupby("trial").size().tolist() == [8, 8]
     assert run.reevaluations["engine"].unique() == ["drake"]
     files = {file.name for file in (out / "tiny").iterdir()}
     assert files == {

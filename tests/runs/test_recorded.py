@@ -1,5 +1,8 @@
 """The recorded runs, whatever there are: their gaits walk as recorded, their pages are whole."""
 
+import itertools
+import json
+import lzma
 import subprocess
 
 import numpy as np
@@ -10,7 +13,7 @@ from analyse import best_gaits, load_analysis
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import read_entries, read_manifest
+from tetra_drake.evolution.run_record import read_manifest
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.results.result import versions
@@ -64,8 +67,9 @@ def test_a_run_begins_as_its_scenario_and_seed_say(name):
     seed = seeds.spawn(scenario.evolution.trials)[0]
     space, generator = ParameterSpace.of(scenario), np.random.default_rng(seed)
     asked = optimizer_of(scenario.optimizer)(space, scenario.evolution, generator).ask()
-    entries = read_entries(folder / "trial_00/evaluations.jsonl")[: len(asked)]
-    assert np.array_equal(asked, [entry["genome"] for entry in entries])
+    with lzma.open(folder / "trial_00/evaluations.jsonl.xz", "rt") as lines:
+        recorded = [json.loads(line)["genome"] for line in itertools.islice(lines, len(asked))]
+    assert np.array_equal(asked, recorded)
 
 
 @pytest.mark.slow
