@@ -233,12 +233,3 @@ def test_cpg_writes_the_signals_in_lbf_from_the_start_up_time_on(work):
     assert signals.shape == (601, 2)  # 0.3 s, two junctions
     assert not signals[:200].any() and signals[200:].any()  # starts at 0.1 s
     assert 0.01 < np.abs(signals).max() < 2.0
-
-
-def test_cpg_writes_a_column_for_each_oscillator_and_says_which_cables_it_drives(work):
-    (work / "short_undulation.yaml").write_text(SHORT.replace("thesis", "undulation"))
-    assert main(["cpg", "--scenario", "short_undulation.yaml", "--out", "a.csv"]) == 0
-    lines = (work / "a.csv").read_text().splitlines()
-    header = next(line for line in lines if not line.startswith("#"))
-    assert header.split(",") == ["time_s", *(f"signal_{i}" for i in range(1, 9))]
-    assert "# signal_4: T2-T3 outer bottom_right" in lines
