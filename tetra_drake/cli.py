@@ -6,16 +6,18 @@ import argparse
 import contextlib
 import inspect
 import os
+import re
 import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from tetra_drake import __version__
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder
+from tetra_drake.scenario.fields import hint
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import ENGINES, Scenario
 
@@ -38,7 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
     options, unknown = make_parser().parse_known_args(argv)
     if unknown:
-        options.command.error(f"there is no {unknown[0]}")
+        names = re.findall(r"--[\w-]+", options.command.format_usage())
+        options.command.error(f"there is no {unknown[0]}; {hint(unknown[0], names)}")
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a command as Ctrl-C does
     try:
@@ -72,8 +75,7 @@ def make_parser() -> Command:
         "central pattern generator, as a Drake diagram, and evolve its gaits.",
         epilog="`tetra-drake COMMAND --help` explains a command.",
     )
-    shown = f"tetra-drake {version('tetra_drake')}"
-    parser.add_argument("--version", action="version", version=shown)
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
     for run, add_options in _COMMANDS:
@@ -293,12 +295,8 @@ def _robustness(options: Options) -> None:
 def _compare_options(command: Command) -> None:
     runs = "folders written by `evolve`, finished or not, all with the same objective"
     _add_path(command, "runs", "RUN", runs, nargs="+")
-    command.add_argument(
-        "--reach",
-        metavar="LENGTH",
-        type=_length,
-        help="a distance to be reached, as '14.34 in' (default: that of the scenario's reference)",
-    )
+    reach = "a distance to be reached, as '14.34 in'"
+    command.add_argument("--reach", metavar="LENGTH", type=_length, help=reach)
     _add_path(command, "--out", "DIR", "write tables (CSV, JSON) and the figure into this folder")
 
 
