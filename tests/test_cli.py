@@ -103,7 +103,6 @@ def test_bad_files_and_places_are_refused_in_one_line(command, source, values, u
         ("walk", "tetra-drake: walk simulate evolve"),
         ("simulate --seed 1 --gait good.json", "tetra-drake simulate: --gait --seed"),
         ("simulate --seed -1", "tetra-drake simulate: --seed '-1'"),
-        ("simulate --fast", "tetra-drake simulate: --fast --gait"),
         ("simulate --sceanrio thesis", "tetra-drake simulate: --sceanrio '--scenario'?"),
         ("compare a --reach 14", "tetra-drake compare: --reach '14'"),
         ("cpg --seed 1", "tetra-drake cpg: --out"),
