@@ -1,6 +1,5 @@
 """The scripts in diagrams/ as they are run."""
 
-import functools
 import shutil
 
 import entrainment
@@ -14,18 +13,18 @@ import tetrahedron_on_incline
 
 @pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
 @pytest.mark.parametrize(
-    ("main", "files"),
+    ("script", "options", "files"),
     [
-        (single_oscillator.main, 3),
-        pytest.param(entrainment.main, 2, marks=pytest.mark.slow),
-        (settling_node.main, 2),
-        (sliding_tetrahedron.main, 1),
-        (tetrahedron_on_incline.main, 1),
-        (functools.partial(robot.main, duration=0.1), 2),
+        (single_oscillator, {}, 3),
+        pytest.param(entrainment, {}, 2, marks=pytest.mark.slow),
+        (settling_node, {}, 2),
+        (sliding_tetrahedron, {}, 1),
+        (tetrahedron_on_incline, {}, 1),
+        (robot, {"duration": 0.1}, 2),
     ],
 )
-def test_a_script_writes_its_pictures(main, files, tmp_path):
-    main(out=tmp_path)
+def test_a_script_writes_its_pictures(script, options, files, tmp_path):
+    script.main(out=tmp_path, **options)
     written = {path.name for path in tmp_path.iterdir() if path.stat().st_size > 1000}
     assert len(written) == files
     assert written - {"robot.html"} <= {path.name for path in robot.DIAGRAMS.glob("*.svg")}
