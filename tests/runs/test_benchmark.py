@@ -8,6 +8,7 @@ from tetra_drake.scenario.load import load_scenario
 QUICK = """
 base: thesis
 name: quick
+robot: {tetrahedra: 3}
 cpg: {start_up: 0.05 s}
 simulation: {duration: 0.1 s, steady_from: 0.05 s}
 """
