@@ -24,8 +24,7 @@ from tetra_drake.scenario.schema import ENGINES, Scenario
 if TYPE_CHECKING:
     from tetra_drake.robot.gait import Gait
 
-BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
-"""Exit statuses."""
+BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
 
 FIRST_SCENARIO = "quick"
 """The scenario that `evolve` starts without another: it ends in minutes."""
@@ -105,19 +104,22 @@ def _simulate(options: Options) -> None:
     in a browser) and scenario.yaml (the scenario in full).
     """
     from tetra_drake.engines.simulate import prepare, simulate
+    from tetra_drake.engines.viewer import check_can_be_watched
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.results.result import summary
 
     scenario, gait = _chosen_gait(options)
     if options.engine:
         scenario = scenario.with_changes({"simulation.engine": options.engine})
+    if options.meshcat:
+        check_can_be_watched(scenario)
     check_result_folder(options.out)
+    prepare(scenario)
     view = None
     if options.meshcat:
         from tetra_drake.visualization.live import open_view
 
         view = open_view(scenario, say=lambda text: print(text, flush=True))
-    prepare(scenario)
     result = simulate(scenario=scenario, gait=gait, record=True, viewer=view)
     print(summary(scenario, gait, result))
     save_result_folder(options.out, scenario=scenario, gait=gait, result=result)
