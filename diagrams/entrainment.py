@@ -1,6 +1,6 @@
 """A Matsuoka oscillator that drives a mass on a spring and feels it: which of them sets the pace?
 
-    python diagrams/entrainment.py [--out DIR]
+    python diagrams/entrainment.py
 
 The oscillator pushes the mass with its signal; the mass's displacement x excites the extensor by
 g x and the flexor by -g x. Theory is harmonic balance (K. Matsuoka, Analysis of a neural
@@ -24,7 +24,6 @@ leads, and it can follow a faster one.
 
 from __future__ import annotations
 
-import argparse
 import math
 from pathlib import Path
 
@@ -153,12 +152,8 @@ def draw(theory: dict[float, Points], simulated: dict[tuple[float, str], Points]
     return figure
 
 
-def main() -> None:
+def main(out: Path = Path(__file__).parent) -> None:
     """Simulates the loops and writes the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(__file__).parent)
-    out = parser.parse_args().out
-
     own = own_frequency()
     save_block_diagram(make_diagram(resonance=own, feedback=FEEDBACK), out / "entrainment.svg")
     alone = simulated_frequency(resonance=own, feedback=0.0)

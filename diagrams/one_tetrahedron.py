@@ -81,15 +81,16 @@ def start_axes(structure: Structure) -> np.ndarray:
     return RotationMatrix(Quaternion(structure.q_WB)).matrix().T
 
 
-def make_diagram(scenario: Scenario) -> Diagram:
-    """The tetrahedron and the ground under it, with logs of their outputs."""
+def make_diagram(scenario: Scenario, *, witness: bool = True) -> Diagram:
+    """The tetrahedron and the ground under it, with logs of their outputs; without `witness`, modes
+    change at the ends of steps only."""
     tetrahedron = make_standing_tetrahedron(scenario)
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
     AddTetrahedra(plant, tetrahedron)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
-    contact = GroundContact(tetrahedron, scenario, witness=True)
+    contact = GroundContact(tetrahedron, scenario, witness=witness)
     ground = builder.AddNamedSystem("ground", contact)
 
     state, force = plant.get_state_output_port(), ground.GetOutputPort("generalized_force")

@@ -1,6 +1,6 @@
 """A tetrahedron let go just above the ground: impact and settling of its nodes (thesis Figure 5).
 
-    python diagrams/settling_node.py [--out DIR]
+    python diagrams/settling_node.py
 
 The diagram is that of one_tetrahedron.py. Three nodes share the weight and move alike.
 
@@ -11,7 +11,6 @@ impact would, and they never leave it again. So the impact is repeated without g
 
 from __future__ import annotations
 
-import argparse
 import math
 from pathlib import Path
 
@@ -75,12 +74,8 @@ def draw(settling: Motion, bouncing: Motion) -> Figure:
     return figure
 
 
-def main() -> None:
+def main(out: Path = Path(__file__).parent) -> None:
     """Simulates both impacts, prints their numbers and writes the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(__file__).parent)
-    out = parser.parse_args().out
-
     scenario = load_scenario("thesis")
     save_block_diagram(make_diagram(scenario), out / "one_tetrahedron.svg")
     settling, bouncing = settle(scenario), bounce(scenario)

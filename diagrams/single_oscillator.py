@@ -1,6 +1,6 @@
 """One Matsuoka oscillator: its signal for several weights and ratios of time constants.
 
-    python diagrams/single_oscillator.py [--out DIR]
+    python diagrams/single_oscillator.py
 
 An oscillator is two neurons, extensor and flexor, that inhibit each other with the weight w (thesis
 Eq. 7). While both fire, their equations are linear; the differences d of the two u and e of the
@@ -16,7 +16,6 @@ where D vanishes: a sine of frequency 1 / (2 pi tau_A). A smaller ratio tau_B / 
 
 from __future__ import annotations
 
-import argparse
 import math
 from pathlib import Path
 
@@ -105,12 +104,8 @@ def draw(signals: dict[str, tuple[np.ndarray, np.ndarray]], title: str) -> Figur
     return figure
 
 
-def main() -> None:
+def main(out: Path = Path(__file__).parent) -> None:
     """Simulates the oscillators and writes the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(__file__).parent)
-    out = parser.parse_args().out
-
     scenario = load_scenario("thesis")
     save_block_diagram(make_diagram(scenario), out / "single_oscillator.svg")
 

@@ -1,6 +1,6 @@
 """A tetrahedron sliding to rest: its nodes break free, slip, and stick again (thesis Figure 6).
 
-    python diagrams/sliding_tetrahedron.py [--out DIR]
+    python diagrams/sliding_tetrahedron.py
 
 The diagram is that of one_tetrahedron.py. The tetrahedron starts at 30 in/s. Stiction brakes it to
 1 in/s within a millisecond and tips it, so that its two trailing nodes lift off. The leading node
@@ -12,14 +12,12 @@ sticks again. Below 23 in/s no node breaks free.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from one_tetrahedron import LEADING, TRAILING, Motion, let_go, make_diagram, weight
+from one_tetrahedron import LEADING, TRAILING, Motion, let_go, weight
 
-from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
 from tetra_drake.results.measures import intervals
 from tetra_drake.robot.structure import BASE, NODES
@@ -89,14 +87,9 @@ def draw(motion: Motion, *, stiction_range: float) -> Figure:
     return figure
 
 
-def main() -> None:
+def main(out: Path = Path(__file__).parent) -> None:
     """Simulates the motion, prints when which node slips, and writes the pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--out", metavar="DIR", type=Path, default=Path(__file__).parent)
-    out = parser.parse_args().out
-
     scenario = load_scenario("thesis")
-    save_block_diagram(make_diagram(scenario), out / "one_tetrahedron.svg")
     motion = slide(scenario)
     assert isinstance(scenario.friction, ResetIntegrator)
     figure = draw(motion, stiction_range=scenario.friction.stiction_range)

@@ -20,13 +20,12 @@ from typing import Any
 import pandas
 
 from tetra_drake.analysis.robustness import PERCENT, judge, to_json
-from tetra_drake.engines.simulate import available_cores, check_scenario, simulate
+from tetra_drake.engines.simulate import available_cores, check_scenario
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import evaluate_all, process_executor
-from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
-from tetra_drake.results.measures import dominant_frequency
 from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.load import load_scenario
@@ -34,7 +33,7 @@ from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.scenario.units import INCH
 
-SCHEMA = 3
+SCHEMA = 4
 ANALYSIS = "analysis.json"
 
 TIGHT, MUJOCO = "runge_kutta3, witness", "MuJoCo"
@@ -43,15 +42,17 @@ functions; MuJoCo's ground, with a coefficient of 0.5 in place of the reset inte
 LAWS = {"reset integrator": "thesis", "Coulomb": "coulomb"}
 """Settings on flat ground: the compiled engine with the friction of another shipped scenario."""
 
+SHOWN = ("cost_of_transport", "tension", "clearance")
+"""The metrics of the best gaits that pages show."""
+
 _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
 _COLUMNS = {
-    "best_gaits": ("trial", "evaluation", "frequencies_hz"),
-    "resimulations": ("trial", "setting", "distance_in", "failure"),
+    "best_gaits": ("trial", "evaluation", "evaluations", "fitness", *SHOWN),
+    "resimulations": ("trial", "setting", "distance_in"),
     "gaits": ("gait", "undisturbed", "5 %", "50 %", "95 %", *_MEAN, *_KEPT, "failed"),
-    "over_gaits": ("of", "median", "low", "high"),
     "changes": ("what", "median", "worst", "failed", "correlation", "correlation_size"),
 }
-_NUMBERS = ["distance_in", "correlation", "correlation_size"]
+_NUMBERS = [*SHOWN, "distance_in", "correlation", "correlation_size"]
 """What may be null in all rows."""
 
 
@@ -61,17 +62,30 @@ class Analysis:
 
     versions: Mapping[str, str]
     best_gaits: pandas.DataFrame
-    """The fittest gait of each trial: trial, evaluation, frequencies_hz (of the oscillators)."""
+    """The fittest gait of each trial. Index: trial. Columns: evaluation, evaluations (of the whole
+    trial), fitness and the metrics SHOWN, in SI units."""
     resimulations: pandas.DataFrame
     """Those gaits on other engines and under other laws of friction: trial, setting, distance_in
-    (NaN where it failed), failure."""
+    (NaN where it failed)."""
     gaits: pandas.DataFrame
     """Those gaits on the compiled engine under draws of the default disturbances, as of
-    robustness.by_gait(), in m."""
-    over_gaits: pandas.DataFrame
-    """As of robustness.over_gaits(), in m."""
+    robustness.by_gait(), in m. Index: trial."""
     changes: pandas.DataFrame
     """As of robustness.by_change(), in m."""
+
+    @property
+    def best_trial(self) -> int:
+        """The trial with the fittest gait."""
+        return int(self.best_gaits["fitness"].idxmax())
+
+    def again(self, trial: int, setting: str) -> float:
+        """Distance (in) of a trial's fittest gait with a setting; NaN without."""
+        rows = self.resimulations.query("trial == @trial and setting == @setting")
+        return float(rows["distance_in"].iloc[0]) if len(rows) else math.nan
+
+    def undisturbed(self, trial: int) -> float:
+        """Distance (in) of a trial's fittest gait on the compiled engine."""
+        return float(self.gaits.loc[trial, "undisturbed"]) / INCH
 
 
 def load_analysis(directory: Path) -> Analysis:
@@ -84,7 +98,13 @@ def load_analysis(directory: Path) -> Analysis:
         for frame in frames.values():
             numbers = frame.columns.intersection(_NUMBERS)
             frame[numbers] = frame[numbers].astype(float)
-        return Analysis(raw["versions"], **frames)
+        return Analysis(
+            raw["versions"],
+            best_gaits=frames["best_gaits"].set_index("trial"),
+            resimulations=frames["resimulations"],
+            gaits=frames["gaits"].set_index("gait"),
+            changes=frames["changes"],
+        )
     except (OSError, ValueError, KeyError, TypeError) as error:
         problem = f"cannot be read ({error}); run `python runs/analyse.py {directory}`"
         raise InputError(path, "", problem) from error
@@ -100,20 +120,29 @@ def analyse(
     run = load_run(directory)
     scenario = run.manifest.scenario
     run.fittest()  # InputError if there is none
-    best = [(int(trial), int(index)) for trial, index in run.best()[["trial", "index"]].to_numpy()]
-    gaits = {trial: run.gait(trial, index) for trial, index in best}
+    best = best_gaits(run)
+    gaits = {row["trial"]: run.gait(row["trial"], row["evaluation"]) for row in best}
     content = {
         "schema": SCHEMA,
         "versions": versions(),
-        "best_gaits": [
-            {"trial": t, "evaluation": i, "frequencies_hz": signal_frequencies(scenario, gaits[t])}
-            for t, i in best
-        ],
+        "best_gaits": best,
         "resimulations": resimulate(scenario, gaits, workers, executor),
         "robustness": to_json(judge(scenario, gaits, percent=PERCENT, workers=workers)),
     }
     text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
     write_whole(directory / ANALYSIS, text + "\n")
+
+
+def best_gaits(run: Run) -> list[dict[str, Any]]:
+    """The fittest gait of each trial, as in Analysis."""
+    made = {status.number: status.evaluations for status in run.statuses}
+    rows = []
+    for _, gait in run.best().iterrows():
+        trial = int(gait["trial"])
+        row = {"trial": trial, "evaluation": int(gait["index"]), "evaluations": made[trial]}
+        numbers = {name: json_number(float(gait[name])) for name in ("fitness", *SHOWN)}
+        rows.append(row | numbers)
+    return rows
 
 
 def resimulate(
@@ -157,18 +186,6 @@ def settings_of(scenario: Scenario) -> dict[str, Scenario]:
             check_scenario(changed)
             found[name] = changed
     return found
-
-
-def signal_frequencies(scenario: Scenario, gait: Gait) -> dict[str, float | None]:
-    """Frequency (Hz) of each oscillator's signal in the steady stretch, on the scenario's engine;
-    see dominant_frequency."""
-    trajectory = simulate(scenario=scenario, gait=gait, record=True).trajectory
-    assert trajectory is not None
-    signals = trajectory.signal.sel(time=slice(scenario.simulation.steady_from, None))
-    return {
-        str(name): json_number(dominant_frequency(signals.time.values, own))
-        for name, own in zip(signals.oscillator.values, signals.values.T, strict=True)
-    }
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -1,8 +1,9 @@
 """Measures the speed and the accuracy of the engines.
 
-    python runs/benchmark.py [--scenario NAME|FILE] [--gaits N] [TABLE ...]
+    python runs/benchmark.py [TABLE ...]
 
-Prints tables in Markdown, as in tetra_drake/engines/README.md, of random gaits of seeds 0, 1 ...:
+Prints tables in Markdown, as in tetra_drake/engines/README.md, of random gaits of seeds 0, 1 ...
+on the scenario `thesis`; without names, all but `integrators`:
 
     engines        speed and error of the engines, each with a few settings
     integrators    the same for settings of the diagram; takes longest
@@ -16,7 +17,6 @@ as its ground differs). Times are meaningful on an idle machine only.
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import sys
 import time
@@ -28,7 +28,7 @@ import numpy as np
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import available_cores, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.formatting import fixed, markdown_table
+from tetra_drake.formatting import fixed, listed, markdown_table
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.load import load_scenario
@@ -36,6 +36,7 @@ from tetra_drake.scenario.schema import Scenario
 
 Changes = Mapping[str, object]
 
+GAITS = 12  # for each setting
 BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time on the compiled engine
 MUJOCO_BATCH = 4  # gaits at a time in MuJoCo, for each core
 SIZES = (5, 10, 20, 40)  # numbers of tetrahedra
@@ -117,9 +118,9 @@ def timing_of(batch: Batch) -> Timing:
     return Timing(sum(result.duration for result in results) / seconds, cost, steps)
 
 
-def settings_table(scenario: Scenario, gaits: int, settings: Sequence[Changes]) -> str:
+def settings_table(scenario: Scenario, settings: Sequence[Changes]) -> str:
     """Speed and error of settings."""
-    walking = [seeded_gait(scenario, seed) for seed in range(gaits)]
+    walking = [seeded_gait(scenario, seed) for seed in range(GAITS)]
     exact_in: dict[str, np.ndarray] = {}
     rows = []
     for changes in settings:
@@ -134,12 +135,12 @@ def settings_table(scenario: Scenario, gaits: int, settings: Sequence[Changes]) 
         started = time.perf_counter()
         # One at a time: together they would share a core's lanes.
         outcomes = [simulate_many(scenario=changed, gaits=[g], workers=1)[0] for g in walking]
-        speed = gaits * changed.simulation.duration / (time.perf_counter() - started)
+        speed = GAITS * changed.simulation.duration / (time.perf_counter() - started)
         results = successes(changed, outcomes)
         errors_in = np.abs(distances_in(outcomes) - exact_in[engine])
         errors = [fixed(np.nanmedian(errors_in), 3), fixed(np.nanmax(errors_in), 3)]
         evaluations = [result.integrator.derivative_evaluations for result in results]
-        counts = [f"{statistics.mean(evaluations):,.0f}", str(gaits - len(results))]
+        counts = [f"{statistics.mean(evaluations):,.0f}", str(GAITS - len(results))]
         values = [f"{key.partition('.')[2]} {value}" for key, value in changes.items()]
         rows.append([engine, ", ".join(values[1:]) or "default", f"{speed:.3g}", *errors, *counts])
     headings = ["engine", "setting", "times real time per core", "median error, in"]
@@ -230,30 +231,21 @@ def grounds_table(scenario: Scenario) -> str:
 TABLES = {"batches": batches_table, "sizes": sizes_table, "grounds": grounds_table}
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Prints the tables of the given names, or all but `integrators`."""
-    assert __doc__
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("tables", metavar="TABLE", nargs="*", help="default: all but integrators")
-    parser.add_argument("--scenario", metavar="NAME|FILE", default="thesis")
-    parser.add_argument("--gaits", metavar="N", type=int, default=12, help="default: 12")
-    options = parser.parse_args(arguments)
-    names = [*SETTINGS, *TABLES]
-    if unknown := {*options.tables} - {*names}:
-        parser.error(f"found {', '.join(sorted(unknown))}; there are {', '.join(names)}")
-    try:
-        scenario = load_scenario(options.scenario)
-        for name in options.tables or ["engines", *TABLES]:
-            if name in SETTINGS:
-                table = settings_table(scenario, options.gaits, SETTINGS[name])
-            else:
-                table = TABLES[name](scenario)
-            print(f"{table}\n", flush=True)
-    except InputError as error:
-        sys.exit(f"benchmark.py: {error}")
+def main(names: Sequence[str], scenario: Scenario) -> None:
+    """Prints the tables of the given names, or all but `integrators`. Raises InputError."""
+    tables = [*SETTINGS, *TABLES]
+    if unknown := {*names} - {*tables}:
+        raise InputError("TABLE", "", f"found {listed([*unknown])}, expected {listed(tables)}")
+    for name in names or ["engines", *TABLES]:
+        if name in SETTINGS:
+            table = settings_table(scenario, SETTINGS[name])
+        else:
+            table = TABLES[name](scenario)
+        print(f"{table}\n", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main(sys.argv[1:], load_scenario("thesis"))
+    except InputError as error:
+        sys.exit(f"benchmark.py: {error}")

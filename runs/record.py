@@ -1,26 +1,21 @@
 """Makes the recorded runs beside this file from nothing.
 
-    python runs/record.py [--scratch DIR] [NAME ...]
+    python runs/record.py [NAME ...]
 
-Each experiment is evolved and analysed in a folder of DIR, out/runs by default, thinned into a
-folder here, and its best gait shown on a page and, by Chromium, in a picture there; those that
-README.md shows are filmed, too. Interrupted, it goes on; what is done is skipped.
-
-    times.json    how long each experiment took here, in s
-    meshcat.js    the viewer that all pages share, of one version of Drake
+Each experiment is evolved and analysed in a folder of out/runs, thinned into a folder here, and its
+best gait shown on a page and, by Chromium, in a picture there; those that README.md shows are
+filmed, too. Interrupted, it goes on; what is done is skipped. All pages share the viewer
+meshcat.js, of one version of Drake.
 """
 
 from __future__ import annotations
 
-import argparse
 import filecmp
-import json
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,8 +28,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.progress import Display
 from tetra_drake.evolution.run_record import MANIFEST
 from tetra_drake.experiment import evolve
-from tetra_drake.files import write_whole
-from tetra_drake.formatting import duration
+from tetra_drake.formatting import duration, listed
 from tetra_drake.report.replay_page import write_replay
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
@@ -42,7 +36,8 @@ from tetra_drake.scenario.optimizer_kinds import CmaEs, OptimizerKind, QualityDi
 from tetra_drake.scenario.schema import Scenario
 
 HERE = Path(__file__).parent
-TIMES, VIEWER, PICTURE, FILM = "times.json", "meshcat.js", "walking.png", "walking.gif"
+SCRATCH = Path("out/runs")
+VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
 
 
 @dataclass(frozen=True)
@@ -135,18 +130,19 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     made, shown = scratch / name, out / name
     if _same(made / ANALYSIS, shown / ANALYSIS):
         return
-    resume = (made / MANIFEST).exists()
-    with _timed(name, out / TIMES, resume=resume):
-        progress = Display(sys.stdout)
-        evolve(experiment.scenario(name), made, resume=resume, report=False, progress=progress)
-        if not (made / ANALYSIS).exists():
-            analyse(made, workers=available_cores())
-        for old in {*shown.glob("*")} - {shown / "README.md", *shown.glob("*.png")}:
-            shutil.rmtree(old) if old.is_dir() else old.unlink()
-        thin(made, shown)
-        write_replay(shown, shown / REPLAY, viewer=out / VIEWER)
-        take_pictures(shown / REPLAY, *[shown / FILM] * experiment.film, shown / PICTURE)
-        shutil.copy(made / ANALYSIS, shown / ANALYSIS)
+    begin, resume = time.monotonic(), (made / MANIFEST).exists()
+    progress = Display(sys.stdout)
+    evolve(experiment.scenario(name), made, resume=resume, report=False, progress=progress)
+    if not (made / ANALYSIS).exists():
+        analyse(made, workers=available_cores())
+    for old in {*shown.glob("*")} - {shown / "README.md", *shown.glob("*.png")}:
+        shutil.rmtree(old) if old.is_dir() else old.unlink()
+    thin(made, shown)
+    write_replay(shown, shown / REPLAY, viewer=out / VIEWER)
+    films = [shown / FILM] if experiment.film else []
+    take_pictures(shown / REPLAY, *films, shown / PICTURE)
+    shutil.copy(made / ANALYSIS, shown / ANALYSIS)
+    print(f"{name}: {duration(time.monotonic() - begin)}", flush=True)
 
 
 def take_pictures(page: Path, *pictures: Path) -> None:
@@ -160,39 +156,17 @@ def _same(first: Path, second: Path) -> bool:
     return first.exists() and second.exists() and filecmp.cmp(first, second, shallow=False)
 
 
-@contextmanager
-def _timed(name: str, file: Path, *, resume: bool) -> Iterator[None]:
-    """Prints how long the block takes and keeps it in a file, where it goes on added to what is
-    there; not where the block refuses its input."""
-    begin, refused = time.monotonic(), False
-    try:
-        yield
-    except InputError:
-        refused = True
-        raise
-    finally:
-        if not refused:
-            times = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-            times[name] = round(time.monotonic() - begin) + (times.get(name, 0) if resume else 0)
-            write_whole(file, json.dumps(times, indent=1) + "\n")
-            print(f"{name}: {duration(times[name])}", flush=True)
-
-
-def main() -> None:
-    """Records the experiments of the given names, or all."""
-    assert __doc__
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("names", metavar="NAME", nargs="*", default=[*EXPERIMENTS])
-    parser.add_argument("--scratch", metavar="DIR", type=Path, default=Path("out/runs"))
-    options = parser.parse_args()
-    if unknown := {*options.names} - {*EXPERIMENTS}:
-        parser.error(f"found {', '.join(sorted(unknown))}; there are {', '.join(EXPERIMENTS)}")
-    try:
-        for name in options.names:
-            record(name, EXPERIMENTS[name], scratch=options.scratch, out=HERE)
-    except InputError as error:
-        sys.exit(f"record.py: {error}")
+def main(names: Sequence[str]) -> None:
+    """Records the experiments of the given names, or all. Raises InputError."""
+    if unknown := {*names} - {*EXPERIMENTS}:
+        problem = f"found {listed([*unknown])}, expected {listed([*EXPERIMENTS])}"
+        raise InputError("NAME", "", problem)
+    for name in names or EXPERIMENTS:
+        record(name, EXPERIMENTS[name], scratch=SCRATCH, out=HERE)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main(sys.argv[1:])
+    except InputError as error:
+        sys.exit(f"record.py: {error}")

@@ -70,35 +70,21 @@ def unchanged(work):
         ("simulate --scenario key.yaml", "key.yaml", "robot.tetrahedron tetrahedra"),
         ("simulate --scenario missing.yaml", "missing.yaml", ""),
         ("simulate --engine compiled --meshcat", "scenario thesis", "simulation.engine compiled"),
-        ("cpg --out a.csv --scenario broken.yaml", "broken.yaml", ""),
-        ("diagram --out a.dot --scenario folder", "folder", ""),
         ("simulate --gait 23.json", "23.json", "weights 23 24"),
         # 2 n (n - 1) = 40 weights for the 5 oscillators of 6 tetrahedra.
         ("simulate --scenario six.yaml --gait good.json", "good.json", "weights 24 40"),
-        ("cpg --out a.csv --gait key.json", "key.json", "tau: tau_b_s"),
-        ("cpg --out a.csv --gait missing.json", "missing.json", ""),
-        ("cpg --out a.csv --scenario missing.yaml", "missing.yaml", ""),
-        ("cpg --out a.csv --scenario feedback", "gait random gait 80", "gains:"),
-        (
-            "cpg --out a.csv --scenario feedback --signals listing",
-            "scenario feedback",
-            "cpg.signals: 'live'",
-        ),
-        ("replay --out new/a.html short.yaml", "short.yaml", ""),
-        ("replay --out new/a.html missing", "missing", ""),
-        ("replay --out new/a.html --scenario six.yaml good.json", "good.json", "weights 24 40"),
         ("simulate --scenario short.yaml --out good.json", "good.json", ""),
         ("simulate --scenario short.yaml --out good.json/out", "good.json/out", ""),
+        ("cpg --out a.csv --scenario broken.yaml", "broken.yaml", ""),
+        ("cpg --out a.csv --gait key.json", "key.json", "tau: tau_b_s"),
+        ("cpg --out a.csv --gait missing.json", "missing.json", ""),
+        ("cpg --out a.csv --scenario feedback", "gait random gait 80", "gains:"),
         ("cpg --scenario short.yaml --out folder", "folder", ""),
         ("cpg --scenario short.yaml --out good.json/a.csv", "good.json/a.csv", ""),
-        ("diagram --scenario short.yaml --out folder", "folder", ""),
-        ("diagram --scenario short.yaml --out good.json/a.dot", "good.json/a.dot", ""),
-        ("diagram --scenario short.yaml --out a.docx", "a.docx", ".docx"),
+        ("replay --out new/a.html short.yaml", "short.yaml", ""),
+        ("replay --out new/a.html missing", "missing", ""),
         ("replay good.json --out folder", "folder", ""),
         ("replay good.json --out good.json/a.html", "good.json", ""),
-        ("replay good.json --out a.html --viewer folder", "folder", ""),
-        ("replay good.json --out a.html --viewer good.json/a.js", "good.json", ""),
-        ("replay good.json --out a.html --viewer six.yaml --scenario short.yaml", "six.yaml", ""),
     ],
 )
 def test_bad_files_and_places_are_refused_in_one_line(command, source, values, unchanged, capsys):
@@ -111,26 +97,25 @@ def test_bad_files_and_places_are_refused_in_one_line(command, source, values, u
 
 
 @pytest.mark.parametrize(
-    ("arguments", "value"),
+    ("arguments", "values"),
     [
-        ("", "COMMAND"),
-        ("walk", "walk"),
-        ("simulate --seed 1 --gait good.json", "--gait"),
-        ("simulate --seed -1", "-1"),
-        ("simulate --seed one", "one"),
-        ("simulate --fast", "--fast"),
-        ("cpg --rate 0 --out a.csv", "--rate"),
-        ("cpg --seed 1", "--out"),
+        ("", "tetra-drake: COMMAND"),
+        ("walk", "tetra-drake: walk simulate evolve"),
+        ("simulate --seed 1 --gait good.json", "tetra-drake simulate: --gait --seed"),
+        ("simulate --seed -1", "tetra-drake simulate: --seed '-1'"),
+        ("simulate --sceanrio thesis", "tetra-drake simulate: --sceanrio '--scenario'?"),
+        ("compare a --reach 14", "tetra-drake compare: --reach '14'"),
+        ("cpg --seed 1", "tetra-drake cpg: --out"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(arguments, value, unchanged, capsys):
+def test_options_that_make_no_sense_are_refused_in_one_line(arguments, values, unchanged, capsys):
     with pytest.raises(SystemExit) as caught:
         main(arguments.split())
     assert caught.value.code == 2
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err.startswith("usage: tetra-drake")
-    assert value in captured.err.splitlines()[-1]
+    (line,) = captured.err.splitlines()
+    assert all(value in line for value in values.split()), line
 
 
 def test_the_process_ends_with_the_status_and_no_traceback(unchanged):
@@ -147,10 +132,7 @@ def test_a_simulation_that_fails_says_when_and_why_with_status_1(unchanged, caps
     assert "t = 0.0" in line and "100" in line
 
 
-COMMANDS = (
-    *("simulate", "evolve", "replay", "figures"),
-    *("robustness", "compare", "cpg", "diagram"),
-)
+COMMANDS = ("simulate", "evolve", "replay", "figures", "robustness", "compare", "cpg")
 
 
 def printed(arguments, capsys) -> str:
@@ -160,11 +142,11 @@ def printed(arguments, capsys) -> str:
     return capsys.readouterr().out
 
 
-def test_version_completion_and_the_help_of_every_command_are_printed(capsys):
+def test_version_and_the_help_of_every_command_are_printed(capsys):
     assert printed(["--version"], capsys).split() == ["tetra-drake", tetra_drake.__version__]
-    overview, script = printed(["--help"], capsys), printed(["--print-completion", "bash"], capsys)
+    overview = printed(["--help"], capsys)
     for command in COMMANDS:
-        assert command in overview and command in script
+        assert command in overview
         assert "--help" in printed([command, "--help"], capsys)
 
 
@@ -245,38 +227,9 @@ def test_replay_makes_the_page_of_simulate_from_its_recording_and_from_the_gait(
         assert capsys.readouterr().out.splitlines()[-1].endswith("again.html")
 
 
-def test_replay_writes_a_small_page_beside_a_viewer_that_pages_share(simulated, work):
-    for name in ("a", "b"):
-        arguments = ["replay", str(simulated[0]), "--out", f"{name}/replay.html"]
-        assert main([*arguments, "--viewer", "meshcat.js"]) == 0
-    assert Path("a/replay.html").read_bytes() == Path("b/replay.html").read_bytes()
-    assert Path("a/replay.html").stat().st_size < 200_000 < Path("meshcat.js").stat().st_size
-
-
-def test_cpg_writes_the_signals_that_its_options_ask_for(work):
-    tables = []
-    for options in ([], ["--raw"], ["--unit", "N", "--rate", "100"]):
-        command = ["cpg", "--scenario", "three.yaml", "--signals", "recorded", "--out", "a.csv"]
-        assert main([*command, *options]) == 0
-        tables.append(np.loadtxt("a.csv", delimiter=",", comments=("#", "t"))[:, 1:])
-    pounds, raw, newtons = tables
-    assert pounds.shape == raw.shape == (601, 2)  # 0.3 s, two junctions
-    assert raw[1:200].any() and not pounds[:200].any() and pounds[200:].any()  # starts at 0.1 s
-    np.testing.assert_allclose(newtons, 4.4482216152605 * pounds[::20], atol=1e-9)
-
-
-def test_cpg_writes_a_column_for_each_oscillator_and_says_which_cables_it_drives(work):
-    (work / "short_undulation.yaml").write_text(SHORT.replace("thesis", "undulation"))
-    assert main(["cpg", "--scenario", "short_undulation.yaml", "--out", "a.csv"]) == 0
-    lines = (work / "a.csv").read_text().splitlines()
-    header = next(line for line in lines if not line.startswith("#"))
-    assert header.split(",") == ["time_s", *(f"signal_{i}" for i in range(1, 9))]
-    assert "# signal_4: T2-T3 outer bottom_right" in lines
-
-
-def test_diagram_writes_graphviz_source_that_names_the_subsystems(work):
-    assert main(["diagram", "--scenario", "short.yaml", "--out", "robot.dot"]) == 0
-    text = (work / "robot.dot").read_text()
-    assert text.startswith("digraph")
-    for name in ("cpg", "start_up", "cables", "ground", "plant"):
-        assert name in text
+def test_cpg_writes_the_signals_in_lbf_from_the_start_up_time_on(work):
+    assert main(["cpg", "--scenario", "three.yaml", "--out", "a.csv"]) == 0
+    signals = np.loadtxt("a.csv", delimiter=",", comments=("#", "t"))[:, 1:]
+    assert signals.shape == (601, 2)  # 0.3 s, two junctions
+    assert not signals[:200].any() and signals[200:].any()  # starts at 0.1 s
+    assert 0.01 < np.abs(signals).max() < 2.0

@@ -13,21 +13,17 @@ import numpy as np
 import pytest
 import xarray
 
-from tetra_drake.errors import InputError
 from tetra_drake.figures.style import save_figure
 from tetra_drake.files import read_text, whole_file, write_whole
 from tetra_drake.results.trajectory import save_dataset
 
 
-@pytest.mark.parametrize("old", [None, "old and longer"])
-def test_a_written_file_holds_the_text_and_nothing_else_is_there(tmp_path, old):
+def test_a_written_file_holds_the_text_and_nothing_else_is_there(tmp_path):
     file = tmp_path / "new" / "a.txt"
-    if old:
-        file.parent.mkdir()
-        file.write_text(old)
-    write_whole(str(file), "λ = 27\n")
-    assert file.read_bytes() == "λ = 27\n".encode()
-    assert os.listdir(file.parent) == ["a.txt"]
+    for text in ("longer than λ", "λ = 27\n"):
+        write_whole(str(file), text)
+        assert file.read_bytes() == text.encode()
+        assert os.listdir(file.parent) == ["a.txt"]
 
 
 def test_the_temporary_file_is_on_the_same_disk_of_the_same_kind_and_unseen(tmp_path):
@@ -35,21 +31,17 @@ def test_the_temporary_file_is_on_the_same_disk_of_the_same_kind_and_unseen(tmp_
     file = tmp_path / "a.svg"
     with whole_file(file) as temporary:
         assert (temporary.parent, temporary.suffix) == (tmp_path, ".svg")
-        temporary.write_text("half")
-        assert not file.exists()
         temporary.write_text("whole")
+        assert not file.exists()
     assert file.read_text() == "whole"
 
 
-@pytest.mark.parametrize(
-    "interruption", [ValueError(), KeyboardInterrupt(), InputError("x", "", "y")], ids=repr
-)
-def test_a_block_that_raises_leaves_the_old_file_and_no_other(tmp_path, interruption):
+def test_a_block_that_raises_leaves_the_old_file_and_no_other(tmp_path):
     file = tmp_path / "a.txt"
     file.write_text("old")
-    with pytest.raises(type(interruption)), whole_file(file) as temporary:
+    with pytest.raises(KeyboardInterrupt), whole_file(file) as temporary:
         temporary.write_text("half")
-        raise interruption
+        raise KeyboardInterrupt
     assert file.read_text() == "old"
     assert os.listdir(tmp_path) == ["a.txt"]
 
@@ -63,9 +55,7 @@ def test_two_writers_of_one_file_do_not_meet(tmp_path):
     assert os.listdir(tmp_path) == ["a.txt"]
 
 
-@pytest.mark.parametrize(
-    ("mask", "mode"), [(0o022, 0o644), (0o027, 0o640), (0o077, 0o600), (0o002, 0o664)]
-)
+@pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o077, 0o600)])
 def test_the_mode_follows_the_umask(tmp_path, mask, mode):
     before = os.umask(mask)
     try:

@@ -12,7 +12,7 @@ import pytest
 from record import EXPERIMENTS
 
 import tetra_drake as td
-from tetra_drake.cli import main
+from tetra_drake.cli import main, make_parser
 
 CHECKOUT = Path(__file__).parents[1]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
@@ -37,17 +37,29 @@ def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def commands(page: str) -> list[list[str]]:
+    """The arguments of each command `tetra-drake` in the snippets of a page."""
+    lines = [line for snippet in snippets("sh", page) for line in snippet.splitlines()]
+    return [
+        shlex.split(line.rpartition("tetra-drake ")[2]) for line in lines if "tetra-drake " in line
+    ]
+
+
+def test_the_commands_of_all_pages_are_commands_with_their_options() -> None:
+    pages = [CHECKOUT / "README.md", *CHECKOUT.glob("[dt]*/**/README.md")]
+    written = [arguments for page in pages for arguments in commands(page.read_text("utf-8"))]
+    assert len(written) >= 7
+    for arguments in written:
+        make_parser().parse_args(arguments)  # ends the process if it cannot be parsed
+
+
+@pytest.mark.slow
 def test_the_commands_run(work: Path) -> None:
     (work / "short.yaml").write_text(QUICK)
-    lines = [line for snippet in snippets("sh") for line in snippet.splitlines()]
-    commands = [line.rpartition("tetra-drake ")[2] for line in lines if "tetra-drake " in line]
-    assert len(commands) == 4
-    for command in commands:
+    for arguments in commands(README):
         # Shorter simulations of the same kind; the rest is as it stands.
-        arguments = shlex.split(re.sub(r"--scenario \w+", "--scenario short.yaml", command))
-        if arguments[0] == "simulate":
-            arguments += ["--scenario", "short.yaml"]
-        assert main(arguments) == 0, command
+        short = ["--scenario", "short.yaml"] if arguments[0] in ("simulate", "evolve") else []
+        assert main([*arguments, *short]) == 0, arguments
     for page in ("out/replay.html", "runs/demo/replay.html", "runs/demo/report.html"):
         assert (work / page).is_file()
 
@@ -66,7 +78,8 @@ def shortened(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def test_the_python_runs(work: Path, shortened: None) -> None:
+def test_the_python_runs(work: Path, shortened: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
     (snippet,) = snippets("python")
     exec(compile(snippet, "README.md", "exec"), {})
     assert len(td.load_run("runs/python").evaluations) == 20
@@ -77,14 +90,11 @@ def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: 
     names: dict[str, Any] = {}
     exec(compile(snippet, "scenario/README.md", "exec"), names)
     assert names["result"].duration == names["simulator"].get_context().get_time() == 1.0
-    tonic = names["diagram"].GetSubsystemByName("steering").get_output_port()
-    context = (
-        names["diagram"]
-        .GetSubsystemByName("steering")
-        .GetMyContextFromRoot(names["simulator"].get_context())
-    )
+    steering = names["diagram"].GetSubsystemByName("steering")
+    context = steering.GetMyContextFromRoot(names["simulator"].get_context())
     # u0 (1 + 0.8) for extensor and flexor on the left, u0 (1 - 0.8) on the right.
-    assert tonic.Eval(context)[:4] == pytest.approx([0.9, 0.9, 0.1, 0.1], rel=1e-12)
+    tonic = steering.get_output_port().Eval(context)
+    assert tonic[:4] == pytest.approx([0.9, 0.9, 0.1, 0.1], rel=1e-12)
 
 
 def test_the_scenario_loads(work: Path) -> None:
@@ -114,8 +124,6 @@ FOLDERS = (
     *(f"runs/{name}" for name in EXPERIMENTS if (CHECKOUT / "runs" / name).is_dir()),
     *(f"tetra_drake/{name}" for name in ("engines", "evolution", "scenario")),
 )
-
-
 """Runs of one's own may lie beside the recorded ones."""
 
 

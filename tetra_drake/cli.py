@@ -5,24 +5,26 @@ from __future__ import annotations
 import argparse
 import contextlib
 import inspect
-import math
 import os
+import re
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from importlib.metadata import version
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
+from tetra_drake import __version__
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder
-from tetra_drake.robot.gait import WALKING_SEED, Gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import ENGINES, Scenario
+from tetra_drake.scenario.sections import hint
 
-BAD_INPUT, FAILED, INTERRUPTED, TERMINATED = 2, 1, 130, 143
-"""Exit statuses."""
+if TYPE_CHECKING:
+    from tetra_drake.robot.gait import Gait
+
+BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
 
 FIRST_SCENARIO = "quick"
 """The scenario that `evolve` starts without another: it ends in minutes."""
@@ -31,62 +33,48 @@ _OF_GAIT = "that of the run in whose folder the gait is, else thesis"
 """The default scenario of commands that take a gait."""
 
 Options = argparse.Namespace
-Command = argparse.ArgumentParser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
-    options = make_parser().parse_args(argv)
+    options, unknown = make_parser().parse_known_args(argv)
+    if unknown:
+        names = re.findall(r"--[\w-]+", options.command.format_usage())
+        options.command.error(f"there is no {unknown[0]}; {hint(unknown[0], names)}")
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a command as Ctrl-C does
     try:
-        with _ends_on_sigterm():
-            options.run(options)
+        options.run(options)
     except (InputError, SimulationFailure) as error:
         print(f"tetra-drake: {error}", file=sys.stderr)
         return BAD_INPUT if isinstance(error, InputError) else FAILED
     except BrokenPipeError:  # the reader of our output has closed it, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
-    except KeyboardInterrupt as error:
+    except KeyboardInterrupt:
         print("tetra-drake: interrupted", file=sys.stderr)
-        return TERMINATED if isinstance(error, _Terminated) else INTERRUPTED
+        return INTERRUPTED
     return 0
 
 
-class _Terminated(KeyboardInterrupt):
-    """SIGTERM, which ends a command as Ctrl-C does."""
+class Command(argparse.ArgumentParser):
+    """The parser of a command's options, whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Ends the process."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 
-@contextlib.contextmanager
-def _ends_on_sigterm() -> Iterator[None]:
-    """A block that a SIGTERM interrupts; signals reach the main thread only."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def end(*_: object) -> NoReturn:
-        raise _Terminated
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def make_parser() -> argparse.ArgumentParser:
-    """The parser of all commands; each sets `run`, a function of the parsed options."""
-    import shtab
-
-    parser = argparse.ArgumentParser(
+def make_parser() -> Command:
+    """The parser of all commands; each sets `run`, a function of the parsed options, and `command`,
+    its own parser."""
+    parser = Command(
         prog="tetra-drake",
         description="Simulate a walking tensegrity robot, nested tetrahedra driven by a Matsuoka "
         "central pattern generator, as a Drake diagram, and evolve its gaits.",
         epilog="`tetra-drake COMMAND --help` explains a command.",
     )
-    parser.add_argument(
-        "--version", action="version", version=f"tetra-drake {version('tetra_drake')}"
-    )
-    shtab.add_argument_to(parser, help="print a completion script for the shell: bash, zsh, tcsh")
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
     for run, add_options in _COMMANDS:
@@ -95,21 +83,17 @@ def make_parser() -> argparse.ArgumentParser:
         name = run.__name__.removeprefix("_")
         command = commands.add_parser(name, help=what.rstrip("."), description=description)
         add_options(command)
-        command.set_defaults(run=run)
+        command.set_defaults(run=run, command=command)
     return parser
 
 
 def _simulate_options(command: Command) -> None:
-    _add_scenario(command, default=None, note=_OF_GAIT)
+    _add_scenario(command, default=_OF_GAIT)
     _add_gait(command)
     _add_engine(command)
     _add_path(command, "--out", "DIR", "the folder to write to (default: out)", default=Path("out"))
-    command.add_argument(
-        "--meshcat",
-        action="store_true",
-        help="show the robot in a browser while the Drake diagram simulates it, at most in real "
-        "time (does not affect results)",
-    )
+    what = "show the robot in a browser while the Drake diagram simulates it, at most in real time"
+    command.add_argument("--meshcat", action="store_true", help=what)
 
 
 def _simulate(options: Options) -> None:
@@ -135,7 +119,7 @@ def _simulate(options: Options) -> None:
     if options.meshcat:
         from tetra_drake.visualization.live import open_view
 
-        view = open_view(scenario, say=_say)
+        view = open_view(scenario, say=lambda text: print(text, flush=True))
     result = simulate(scenario=scenario, gait=gait, record=True, viewer=view)
     print(summary(scenario, gait, result))
     save_result_folder(options.out, scenario=scenario, gait=gait, result=result)
@@ -149,11 +133,8 @@ def _simulate(options: Options) -> None:
 
 
 def _evolve_options(command: Command) -> None:
-    _add_scenario(
-        command,
-        default=None,
-        note=f"{FIRST_SCENARIO}, which takes minutes; with --resume, the run's",
-    )
+    default = f"{FIRST_SCENARIO}, which takes minutes; with --resume, the run's"
+    _add_scenario(command, default=default)
     _add_path(command, "--out", "DIR", "the run directory, as runs/NAME", required=True)
     _add_engine(command)
     _add_count(command, "--trials", "number of independent trials, instead of the scenario's")
@@ -164,22 +145,18 @@ def _evolve_options(command: Command) -> None:
     )
     command.add_argument("--seed", metavar="N", type=_integer(0), help="random seed (default: 0)")
     _add_workers(command)
-    command.add_argument(
-        "--executor",
-        metavar="dask[:ADDRESS]",
-        help="evaluate on a Dask cluster: of --workers processes on this machine, or yours, all of "
-        "it, by its scheduler's address, such as dask:tcp://node1:8786",
+    cluster = (
+        "evaluate on all of a Dask cluster, by its scheduler's address, such as tcp://node1:8786; "
+        "without an address, on one of --workers processes on this machine"
     )
-    command.add_argument(
-        "--resume", action="store_true", help="continue an interrupted run; needs only --out"
+    command.add_argument("--dask", metavar="ADDRESS", nargs="?", const="", help=cluster)
+    resume = "continue an interrupted run; needs only --out"
+    command.add_argument("--resume", action="store_true", help=resume)
+    again = (
+        "leave out what is simulated after the search: the best gaits on the Drake diagram if the "
+        "engine is another, those of a map on disturbed robots"
     )
-    command.add_argument(
-        "--no-reevaluate",
-        dest="reevaluate",
-        action="store_false",
-        help="leave out what is simulated after the search: the best gaits on the Drake diagram if "
-        "the engine is another, those of a map on disturbed robots",
-    )
+    command.add_argument("--no-reevaluate", dest="reevaluate", action="store_false", help=again)
 
 
 def _evolve(options: Options) -> None:
@@ -216,16 +193,12 @@ def _evolve(options: Options) -> None:
 
 
 def _executor(options: Options) -> contextlib.AbstractContextManager[Any]:
-    """What makes executors by --executor; None without it."""
-    if options.executor is None:
+    """What makes executors by --dask; None without it."""
+    if options.dask is None:
         return contextlib.nullcontext()
     from tetra_drake.evolution.cluster import dask_cluster
 
-    kind, colon, address = options.executor.partition(":")
-    if kind != "dask" or (colon and not address):
-        problem = f"found '{options.executor}', expected dask or dask:ADDRESS"
-        raise InputError("--executor", "", problem)
-    return dask_cluster(address or None, workers=options.workers)
+    return dask_cluster(options.dask or None, workers=options.workers)
 
 
 def _scenario_to_evolve(options: Options) -> Scenario | None:
@@ -246,29 +219,20 @@ def _scenario_to_evolve(options: Options) -> Scenario | None:
 def _replay_options(command: Command) -> None:
     source = "a folder written by `simulate`, a gait file, or a folder written by `evolve`"
     _add_path(command, "source", "RESULT_DIR|GAIT|RUN_DIR", source)
-    _add_scenario(command, default=None, note="the run's, else thesis; for gait files only")
+    _add_scenario(command, default="the run's, else thesis; for gait files only")
     _add_path(command, "--out", "FILE", "the HTML file to write", required=True)
-    _add_path(
-        command,
-        "--viewer",
-        "FILE",
-        "keep Meshcat's script, which is most of the page, in this JavaScript file, so that pages "
-        "of one version of Drake share it; it is written if it is not there",
-    )
 
 
 def _replay(options: Options) -> None:
     """Write a page that shows a gait in a browser.
 
-    Writes one HTML page (1.2 MB; 0.2 MB with --viewer) that shows the robot walking, in any
-    browser, without server or network: from the trajectory that `simulate` recorded, or by
-    simulating a gait file, or the best gait of a run of `evolve` on the run's scenario.
+    Writes one HTML page (1.2 MB) that shows the robot walking, in any browser, without server or
+    network: from the trajectory that `simulate` recorded, or by simulating a gait file, or the
+    best gait of a run of `evolve` on the run's scenario.
     """
     from tetra_drake.report.replay_page import write_replay
 
-    title = write_replay(
-        options.source, options.out, scenario=options.scenario, viewer=options.viewer, warn=_warn
-    )
+    title = write_replay(options.source, options.out, scenario=options.scenario, warn=_warn)
     print(f"{title}\nto watch the robot, open in a browser: {options.out}")
 
 
@@ -294,18 +258,10 @@ def _figures(options: Options) -> None:
 
 def _robustness_options(command: Command) -> None:
     _add_path(command, "source", "GAIT|RUN", "a gait file, or a folder written by `evolve`")
-    _add_scenario(command, default=None, note=_OF_GAIT)
+    _add_scenario(command, default=_OF_GAIT)
     _add_count(command, "--draws", "number of draws (default: 200)", default=200)
-    command.add_argument(
-        "--percent",
-        metavar="P",
-        type=_positive,
-        help="spread spacing, friction, cables, ground and start by P percent, instead of the "
-        "scenario's disturbances (default: 5, if it has none)",
-    )
-    command.add_argument(
-        "--seed", metavar="N", type=_integer(0), default=0, help="of the draws (default: 0)"
-    )
+    seed = "of the draws (default: 0)"
+    command.add_argument("--seed", metavar="N", type=_integer(0), default=0, help=seed)
     _add_workers(command)
     _add_path(command, "--out", "DIR", "write tables (CSV, JSON) and the figure into this folder")
 
@@ -314,10 +270,9 @@ def _robustness(options: Options) -> None:
     """Judge gaits on disturbances that no evolution has seen.
 
     Simulates a gait, or the best gait of each trial of a run, on the compiled engine: undisturbed,
-    under fresh draws of the scenario's disturbances, and under each change alone. Prints how
-    far it walks, how many draws it keeps (it loses at most a tenth of its undisturbed
-    distance), and what hurts most. Writes draws.csv, alone.csv, summary.json and the figure
-    robustness, if asked for.
+    under fresh draws of the scenario's disturbances (of 5 percent, if it has none), and under each
+    change alone. Prints how far it walks, how many draws it keeps (it loses at most a tenth of its
+    undisturbed distance), and what hurts most.
     """
     from tetra_drake.analysis.robustness import describe, judge
     from tetra_drake.evolution.source import load_source
@@ -328,7 +283,6 @@ def _robustness(options: Options) -> None:
     judgement = judge(
         source.scenario,
         source.gaits,
-        percent=options.percent,
         draws=options.draws,
         seed=options.seed,
         workers=options.workers,
@@ -343,13 +297,8 @@ def _robustness(options: Options) -> None:
 def _compare_options(command: Command) -> None:
     runs = "folders written by `evolve`, finished or not, all with the same objective"
     _add_path(command, "runs", "RUN", runs, nargs="+")
-    command.add_argument(
-        "--reach",
-        metavar="LENGTH",
-        type=_length,
-        help="a distance to be reached, as '14.34 in'",
-    )
-    command.add_argument("--labels", metavar="LABEL", nargs="+", help="a name for each run")
+    reach = "a distance to be reached, as '14.34 in'"
+    command.add_argument("--reach", metavar="LENGTH", type=_length, help=reach)
     _add_path(command, "--out", "DIR", "write tables (CSV, JSON) and the figure into this folder")
 
 
@@ -358,14 +307,13 @@ def _compare(options: Options) -> None:
 
     Compares runs by the best fitness of their trials so far, at the same number of evaluations,
     or of simulations where runs differ in draws of disturbances: trials, interquartile means with
-    bootstrap intervals, evaluations until the fittest gait walks a distance, and time. Writes
-    trials.csv, curves.csv, summary.json and the figure search, if asked for.
+    bootstrap intervals, evaluations until the fittest gait walks a distance, and time.
     """
     from tetra_drake.analysis.comparison import compare, describe
 
     if options.out:
         check_folder(options.out)
-    compared = compare(options.runs, labels=options.labels, reach=options.reach)
+    compared = compare(options.runs, reach=options.reach)
     print(describe(compared))
     if options.out:
         from tetra_drake.figures.search import save_comparison
@@ -374,77 +322,34 @@ def _compare(options: Options) -> None:
 
 
 def _cpg_options(command: Command) -> None:
-    _add_scenario(command, default=None, note=_OF_GAIT)
+    _add_scenario(command, default=_OF_GAIT)
     _add_gait(command)
     _add_path(command, "--out", "FILE", "the CSV file to write", required=True)
-    command.add_argument(
-        "--signals",
-        choices=("listing", "recorded"),
-        help="how the network is integrated, instead of the scenario's cpg.signals: forward Euler "
-        "as in the thesis's listing, or accurately",
-    )
-    command.add_argument("--unit", choices=("lbf", "N"), default="lbf", help="default: lbf")
-    command.add_argument(
-        "--rate", metavar="HZ", type=_positive, help="samples per second (default: 2000)"
-    )
-    command.add_argument(
-        "--raw",
-        action="store_true",
-        help="write y_extensor - y_flexor: no gain, and no zeros before the start-up time",
-    )
 
 
 def _cpg(options: Options) -> None:
     """Write the oscillator signals of a gait to a CSV file.
 
-    Writes the signals that the cables of a gait are fed: time_s, signal_1, signal_2 ..., a
-    column per oscillator, from 0 to the scenario's duration, zero before the start-up time. A
-    positive signal shortens the cables that its oscillator drives. The file's first lines, which
-    begin with #, say what each column is. Feedback depends on the robot: gaits with it are refused.
+    Writes the signals in lbf that the cables of a gait are fed: time_s, signal_1, signal_2 ..., a
+    column per oscillator, 2000 times a second, zero before the start-up time. A positive signal
+    shortens the cables that its oscillator drives. The file's first lines, which begin with #, say
+    what each column is. Feedback depends on the robot: gaits with it are refused.
     """
     from tetra_drake.robot.signals import save_signals
 
     scenario, gait = _chosen_gait(options)
-    if options.signals:
-        scenario = scenario.with_changes({"cpg.signals": options.signals})
-    save_signals(options.out, scenario, gait, unit=options.unit, rate=options.rate, raw=options.raw)
+    save_signals(options.out, scenario, gait)
 
 
-def _diagram_options(command: Command) -> None:
-    _add_scenario(command)
-    _add_path(command, "--out", "FILE", "the file to write", required=True)
-
-
-def _diagram(options: Options) -> None:
-    """Draw the block diagram.
-
-    Draws the block diagram of the robot. FILE.dot is Graphviz source; .svg, .png and .pdf are
-    drawn by Graphviz's program `dot`, which must be installed.
-    """
-    from tetra_drake.figures.block_diagram import save_block_diagram
-    from tetra_drake.systems.diagram import MakeTensegrityDiagram
-
-    scenario = load_scenario(options.scenario)
-    save_block_diagram(MakeTensegrityDiagram(scenario, seeded_gait(scenario)), options.out)
-
-
-def _add_scenario(command: Command, *, default: str | None = "thesis", note: str = "") -> None:
-    command.add_argument(
-        "--scenario",
-        metavar="NAME|FILE",
-        default=default,
-        help=f"a shipped scenario ({', '.join(shipped_scenarios())}) or a YAML file "
-        f"(default: {note or default})",
-    )
+def _add_scenario(command: Command, *, default: str) -> None:
+    names = ", ".join(shipped_scenarios())
+    what = f"a shipped scenario ({names}) or a YAML file (default: {default})"
+    command.add_argument("--scenario", metavar="NAME|FILE", help=what)
 
 
 def _add_engine(command: Command) -> None:
-    command.add_argument(
-        "--engine",
-        choices=ENGINES,
-        help="the Drake diagram, the same laws compiled end to end, or MuJoCo "
-        "(default: the scenario's)",
-    )
+    what = "the Drake diagram, the same laws compiled, or MuJoCo (default: the scenario's)"
+    command.add_argument("--engine", choices=ENGINES, help=what)
 
 
 def _add_path(command: Command, name: str, metavar: str, what: str, **more: Any) -> None:
@@ -463,22 +368,19 @@ def _add_gait(command: Command) -> None:
     group = command.add_mutually_exclusive_group()
     what = "a gait file (JSON), or a folder written by `evolve`, whose best gait it is"
     group.add_argument("--gait", metavar="FILE|RUN", type=Path, help=what)
-    group.add_argument(
-        "--seed",
-        metavar="N",
-        type=_integer(0),
-        default=WALKING_SEED,
-        help="instead, a random gait of this seed (default: %(default)s, which walks)",
-    )
+    seed = "instead, a random gait of this seed (default: one that walks)"
+    group.add_argument("--seed", metavar="N", type=_integer(0), help=seed)
 
 
 def _chosen_gait(options: Options) -> tuple[Scenario, Gait]:
     """The scenario and the gait to simulate on it."""
+    from tetra_drake.evolution.source import load_source
+    from tetra_drake.robot.gait import WALKING_SEED, seeded_gait
+
     if options.gait is None:
         scenario = load_scenario(options.scenario or "thesis")
-        return scenario, seeded_gait(scenario, options.seed)
-    from tetra_drake.evolution.source import load_source
-
+        seed = WALKING_SEED if options.seed is None else options.seed
+        return scenario, seeded_gait(scenario, seed)
     source = load_source(options.gait, scenario=options.scenario, warn=_warn)
     return source.scenario, source.best
 
@@ -493,13 +395,6 @@ def _integer(least: int) -> Callable[[str], int]:
     return parse
 
 
-def _positive(text: str) -> float:
-    with contextlib.suppress(ValueError):
-        if 0.0 < (value := float(text)) < math.inf:
-            return value
-    raise argparse.ArgumentTypeError(f"found '{text}', expected a number above 0")
-
-
 def _length(text: str) -> float:
     from tetra_drake.scenario.units import quantity_to_si
 
@@ -507,10 +402,6 @@ def _length(text: str) -> float:
         return quantity_to_si(text, "m")
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
-
-
-def _say(text: str) -> None:
-    print(text, flush=True)
 
 
 def _warn(text: str) -> None:
@@ -525,6 +416,5 @@ _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ..
     (_robustness, _robustness_options),
     (_compare, _compare_options),
     (_cpg, _cpg_options),
-    (_diagram, _diagram_options),
 )
 """Each command, whose docstring is its help, and what adds its options."""

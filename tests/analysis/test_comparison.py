@@ -135,14 +135,14 @@ def test_the_figure_has_a_line_and_a_band_for_each_run(run):
 
 def test_the_command_prints_and_writes(run, tmp_path, capsys):
     paths, out = [run("a", trial(1.0, 30.0)), run("b", trial(2.0))], tmp_path / "out"
-    options = ["--reach", "14.34 in", "--labels", "x", "y", "--out", str(out)]
+    options = ["--reach", "14.34 in", "--out", str(out)]
     assert main(["compare", *map(str, paths), *options]) == 0
     printed = capsys.readouterr().out
     assert all(text in printed for text in ("14.34 in", "never", "1 of 1", "0 of 1"))
     files = ["curves.csv", "search.png", "search.svg", "summary.json", "trials.csv"]
     assert sorted(path.name for path in out.iterdir()) == files
     summary = json.loads((out / "summary.json").read_text())
-    assert [row["run"] for row in summary["runs"]] == ["x", "y"]
+    assert [row["run"] for row in summary["runs"]] == ["a", "b"]
     assert [row["reached"] for row in summary["runs"]] == [2.0, None]
     assert pandas.read_csv(out / "trials.csv")["fitness"].tolist() == [30.0, 2.0]
     with pytest.raises(SystemExit):

@@ -18,21 +18,14 @@ def balance(ratio: float, feedback: float) -> list[float]:
     return [f / OWN for f in balanced_frequencies(resonance=ratio * OWN, feedback=feedback)]
 
 
-@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0])
-def test_without_feedback_the_oscillator_keeps_its_own_frequency(ratio):
-    assert balance(ratio, 0.0) == pytest.approx([1.0], rel=1e-4)
-    assert simulate(ratio, 0.0) == pytest.approx(1.0, rel=0.01)
+def test_without_feedback_the_oscillator_keeps_its_own_frequency():
+    assert balance(0.5, 0.0) == pytest.approx([1.0], rel=1e-4)
+    assert simulate(0.5, 0.0) == pytest.approx(1.0, rel=0.01)
 
 
 @pytest.mark.parametrize(
     ("ratio", "feedback", "near"),
-    [
-        (0.5, FEEDBACK, 0.1),
-        (0.65, FEEDBACK, 0.1),
-        (1.3, -FEEDBACK, 0.05),
-        (1.6, -FEEDBACK, 0.02),
-        (1.9, -FEEDBACK, 0.03),
-    ],
+    [(0.65, FEEDBACK, 0.1), (1.6, -FEEDBACK, 0.02)],
 )
 def test_it_follows_a_slower_mass_by_positive_and_a_faster_one_by_negative_feedback(
     ratio, feedback, near

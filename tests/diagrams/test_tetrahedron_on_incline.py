@@ -17,6 +17,7 @@ from tetrahedron_on_incline import (
     SPEED,
     STATIC,
     STEEP,
+    STIFFNESS,
     acceleration,
     analytic_travel,
     creep_speed,
@@ -110,16 +111,15 @@ def test_above_the_coefficient_it_slides():
     assert slope == pytest.approx(a, rel=1e-6)
 
 
-@pytest.mark.parametrize("forward", [1.0, 2.0])
-def test_thrown_uphill_it_stops_and_stays(forward):
-    scenario = on_incline(GENTLE, forward=forward)
+def test_thrown_uphill_it_stops_and_stays():
+    scenario = on_incline(GENTLE)
     motion = start(scenario, speed=SPEED, duration=0.35)
     a = acceleration(scenario, way=1.0)
     time, way = stopping(motion, scenario)
     ups = slips(motion) & (motion.times < -SPEED / a - 1e-3)
-    np.testing.assert_allclose(friction_ratio(motion)[ups], -forward * KINETIC, rtol=1e-12)
+    np.testing.assert_allclose(friction_ratio(motion)[ups], -KINETIC, rtol=1e-12)
     v, t = centre_velocity(motion, scenario)[ups], motion.times[ups]
-    gain = v[:, 0] + forward * KINETIC * v[:, 2]
+    gain = v[:, 0] + KINETIC * v[:, 2]
     np.testing.assert_allclose(gain - gain[0], a * (t - t[0]), atol=1e-9 * SPEED)
     # Below mu F_N / c, at most 1.5 mm/s, friction is damping, and the body rocks: 0.7 ms more.
     assert time == pytest.approx(-SPEED / a, abs=1e-3)
@@ -141,17 +141,20 @@ def test_thrown_downhill_it_stops_and_stays():
     assert np.ptp(way[motion.times > 0.3]) < 1e-4 * expected
 
 
-def test_the_lines_of_the_figure_are_those_of_the_simulation():
-    for slope, settings, speed, close in (
-        (GENTLE, {}, 0.0, 5e-6),
-        (GENTLE, {"stiffness": 0.0}, 0.0, 5e-6),
-        (STEEP, {}, 0.0, 5e-3),
-        (GENTLE, {}, SPEED, 5e-3),
-    ):
-        scenario = on_incline(slope, **settings)
-        motion = start(scenario, speed=speed, duration=0.1)
-        analytic = analytic_travel(motion, scenario)
-        np.testing.assert_allclose(travel(motion, scenario), analytic, rtol=0, atol=close * INCH)
+@pytest.mark.parametrize(
+    ("slope", "stiffness", "speed", "close"),
+    [
+        (GENTLE, STIFFNESS, 0.0, 5e-6),
+        (GENTLE, 0.0, 0.0, 5e-6),
+        (STEEP, STIFFNESS, 0.0, 5e-3),
+        (GENTLE, STIFFNESS, SPEED, 5e-3),
+    ],
+)
+def test_the_analytic_lines_of_the_figure_fit(slope, stiffness, speed, close):
+    scenario = on_incline(slope, stiffness=stiffness)
+    motion = start(scenario, speed=speed, duration=0.1)
+    analytic = analytic_travel(motion, scenario)
+    np.testing.assert_allclose(travel(motion, scenario), analytic, rtol=0, atol=close * INCH)
 
 
 FACTORS = {"forward": 1.5, "backward": 2.0, "lateral": 0.5}
@@ -163,7 +166,6 @@ FACTORS = {"forward": 1.5, "backward": 2.0, "lateral": 0.5}
         (0.0, 1.5),
         (180.0, 2.0),
         (90.0, 0.5),
-        (-90.0, 0.5),
         # On the ellipse: 1 / sqrt((cos / a_f)^2 + (sin / a_l)^2).
         (60.0, 1.0 / math.hypot(0.5 / 1.5, math.sqrt(0.75) / 0.5)),
         (120.0, 1.0 / math.hypot(0.5 / 2.0, math.sqrt(0.75) / 0.5)),
@@ -189,7 +191,6 @@ def test_friction_has_the_factor_of_the_direction_of_slip(degrees, factor):
     [
         (GENTLE, {}, SPEED),
         (GENTLE, {"stiffness": 0.0}, SPEED),
-        (GENTLE, {"forward": 2.0}, SPEED),
         (STEEP, {}, 0.0),
         (GENTLE, None, SPEED),
         (STEEP, None, 0.0),

@@ -118,11 +118,11 @@ def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monke
     monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda scenario, objective: Bowl())
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
     command = ["evolve", "--scenario", "quick", "--evaluations", "16", "--workers", "1"]
-    for name, executor in (("dask", ("--executor", "dask")), ("local", ())):
+    for name, executor in (("dask", ("--dask",)), ("local", ())):
         assert cli.main([*command, "--out", str(tmp_path / name), *executor]) == 0
     assert read_record(tmp_path / "dask") == read_record(tmp_path / "local")
     with dask.config.set({"distributed.comm.timeouts.connect": "0.2s"}):
-        for wrong in ("slurm", "dask:", "dask:tcp://127.0.0.1:1", "dask:gopher://here"):
-            assert cli.main([*command, "--out", str(tmp_path / "no"), "--executor", wrong]) == 2
+        for wrong in ("slurm", "tcp://127.0.0.1:1", "gopher://here"):
+            assert cli.main([*command, "--out", str(tmp_path / "no"), "--dask", wrong]) == 2
             assert "executor: " in capsys.readouterr().err
     assert not (tmp_path / "no").exists()

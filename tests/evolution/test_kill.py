@@ -128,7 +128,7 @@ def test_sigterm_ends_the_command_as_ctrl_c_does(tmp_path, engine):
         process.terminate()
         _, messages = process.communicate(timeout=60)
     wait_until_gone(process.pid)
-    assert process.returncode == 143
+    assert process.returncode == 130
     assert "--resume" in messages
     assert "leaked" not in messages and "Traceback" not in messages
     with RunRecord.resume(tmp_path / "run"):

@@ -77,7 +77,7 @@ def read_csv(path: Path) -> tuple[list[str], np.ndarray]:
 def test_the_csv_names_the_cables_of_each_signal(scenario, tmp_path):
     groups = [["outer top", "inner top"], ["outer bottom_left"]]
     scenario = scenario.with_changes({"robot.tetrahedra": 3, "robot.actuation": groups})
-    save_signals(tmp_path / "lbf.csv", scenario, seeded_gait(scenario), rate=10.0)
+    save_signals(tmp_path / "lbf.csv", scenario, seeded_gait(scenario))
     header, _ = read_csv(tmp_path / "lbf.csv")
     lines = (tmp_path / "lbf.csv").read_text().splitlines()
     assert header[1:] == [f"signal_{i}" for i in (1, 2, 3, 4)]
@@ -98,14 +98,3 @@ def test_the_csv_holds_what_the_cables_are_fed(scenario, gait, tmp_path):
     fed = signal_samples(scenario, gait)[: len(table)] / 4.4482216152605
     assert not table[~started, 1:].any()
     np.testing.assert_allclose(table[started, 1:], fed[started], atol=1e-10)
-
-
-def test_the_csv_comes_in_other_units_and_rates(scenario, gait, tmp_path):
-    samples = signal_samples(scenario, gait)
-    save_signals(tmp_path / "newton.csv", scenario, gait, unit="N", rate=100.0)
-    _, newtons = read_csv(tmp_path / "newton.csv")
-    np.testing.assert_allclose(newtons[:, 0], 0.01 * np.arange(1501), atol=1e-9)
-    np.testing.assert_allclose(newtons[200:, 1:], samples[4000:30_001:20], atol=1e-9)
-    save_signals(tmp_path / "raw.csv", scenario, gait, raw=True)
-    _, raw = read_csv(tmp_path / "raw.csv")
-    np.testing.assert_allclose(raw[:, 1:], samples[:30_001] / scenario.cpg.gain, atol=1e-10)

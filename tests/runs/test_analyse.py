@@ -17,12 +17,17 @@ from tetra_drake.scenario.load import load_scenario
 TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1)]]]
 """Trial 1 has no gait with a fitness."""
 
+METRICS = {"cost_of_transport": 4.0, "tension": 1.0, "clearance": 0.02}
+"""Of the best gaits."""
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """An analysed run of a robot of three tetrahedra."""
     scenario = tiny_scenario().with_changes({"simulation.engine": "compiled"})
-    run = write_run(tmp_path_factory.mktemp("runs") / "thesis", TRIALS, scenario=scenario)
+    metrics = {5.0: METRICS, 3.0: METRICS}
+    path = tmp_path_factory.mktemp("runs") / "thesis"
+    run = write_run(path, TRIALS, scenario=scenario, metrics=metrics)
     analyse.analyse(run, workers=1, executor=ThreadPoolExecutor)
     return run
 
@@ -35,9 +40,12 @@ def distances(run, scenario):
 
 
 def test_the_best_gait_of_each_trial_is_analysed(folder):
-    best = analyse.load_analysis(folder).best_gaits
-    assert best[["trial", "evaluation"]].to_numpy().tolist() == [[0, 2], [2, 0]]
-    assert all(list(hertz) == ["T1-T2", "T2-T3"] for hertz in best["frequencies_hz"])
+    analysis = analyse.load_analysis(folder)
+    counts = {"evaluation": [2, 0], "evaluations": [3, 2], "fitness": [5.0, 3.0]}
+    metrics = {name: [value, value] for name, value in METRICS.items()}
+    assert analysis.best_gaits.to_dict("list") == counts | metrics
+    assert analysis.best_gaits.index.tolist() == [0, 2]
+    assert analysis.best_trial == 0
 
 
 def test_they_are_simulated_on_other_engines_and_under_other_laws(folder):
@@ -68,7 +76,7 @@ def test_the_best_gaits_are_judged_on_the_default_disturbances(folder):
     spreads = default_disturbances(run.manifest.scenario).spreads
     assert set(found.changes["what"]) == {START, *spreads}
     gaits = {0: run.gait(0, 2), 2: run.gait(2, 0)}
-    expected = by_gait(judge(run.manifest.scenario, gaits)).reset_index()
+    expected = by_gait(judge(run.manifest.scenario, gaits))
     pandas.testing.assert_frame_equal(found.gaits, expected[list(found.gaits)])
 
 

@@ -3,11 +3,14 @@
 import benchmark
 import pytest
 
+from tetra_drake.scenario.load import load_scenario
+
 QUICK = """
 base: thesis
 name: quick
-cpg: {start_up: 0.1 s}
-simulation: {duration: 0.3 s, steady_from: 0.2 s}
+robot: {tetrahedra: 3}
+cpg: {start_up: 0.05 s}
+simulation: {duration: 0.1 s, steady_from: 0.05 s}
 """
 
 
@@ -16,7 +19,7 @@ def small(monkeypatch):
     """One core, one gait at a time and one size of robot, measured once; no MuJoCo."""
     monkeypatch.setattr(benchmark, "available_cores", lambda: 1)
     monkeypatch.setattr(benchmark, "installed", lambda: False)
-    few = {"BATCHES": (1,), "SIZES": (2,), "LANES": 1, "GROUND_BATCH": 1, "ROUNDS": 1}
+    few = {"GAITS": 2, "BATCHES": (1,), "SIZES": (2,), "LANES": 1, "GROUND_BATCH": 1, "ROUNDS": 1}
     for name, value in few.items():
         monkeypatch.setattr(benchmark, name, value)
 
@@ -27,7 +30,7 @@ def cells(line):
 
 def test_every_engine_robot_and_ground_is_measured(small, tmp_path, capsys):
     (tmp_path / "quick.yaml").write_text(QUICK)
-    benchmark.main(["--scenario", str(tmp_path / "quick.yaml"), "--gaits", "2"])
+    benchmark.main([], load_scenario(tmp_path / "quick.yaml"))
     tables = [table.splitlines() for table in capsys.readouterr().out.strip().split("\n\n")]
     engines, batches, sizes, grounds = ([cells(line) for line in table[2:]] for table in tables)
     assert [row[0] for row in engines] == ["drake", "drake", "compiled"]
@@ -42,7 +45,6 @@ def test_every_engine_robot_and_ground_is_measured(small, tmp_path, capsys):
     assert len(grounds) == 6 and all(float(row[-1]) > 0.0 for row in grounds)
 
 
-def test_a_table_that_does_not_exist_is_refused(capsys):
-    with pytest.raises(SystemExit):
-        benchmark.main(["engine"])
-    assert "engine" in capsys.readouterr().err
+def test_a_table_that_does_not_exist_is_refused(scenario, refused):
+    with refused("TABLE", "", "engine"):
+        benchmark.main(["engine"], scenario)

@@ -1,13 +1,12 @@
 """Making recorded runs: what is done is kept, and what is written can be read."""
 
-import json
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import record
 from analyse import ANALYSIS
 from helpers.meshcat_page import read_page
 
-from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import load_run
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 
@@ -17,7 +16,7 @@ TINY = record.Experiment(
     {
         **{"simulation.engine": "compiled", "simulation.duration": "0.4 s"},
         **{"simulation.steady_from": "0.1 s", "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)},
-        **{"evolution.trials": 2, "evolution.evaluations": 12},
+        **{"evolution.trials": 2, "evolution.evaluations": 8},
     },
     film=True,
 )
@@ -33,6 +32,7 @@ def analysed(monkeypatch):
         (directory / ANALYSIS).write_text("{}")
 
     monkeypatch.setattr(record, "analyse", analyse)
+    monkeypatch.setattr("tetra_drake.experiment.process_executor", ThreadPoolExecutor)
 
     def take_pictures(page, *pictures):
         for picture in pictures:
@@ -50,7 +50,7 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     record.record("tiny", TINY, scratch=scratch, out=out)
     run = load_run(out / "tiny")
     assert run.manifest.thinned and run.manifest.scenario == TINY.scenario("tiny")
-    assert run.evaluations.groupby("trial").size().tolist() == [12, 12]
+    assert run.evaluations.groupby("trial").size().tolist() == [8, 8]
     assert run.reevaluations["engine"].unique() == ["drake"]
     files = {file.name for file in (out / "tiny").iterdir()}
     assert files == {
@@ -66,23 +66,6 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     record.record("tiny", TINY, scratch=scratch, out=out)
     assert load_run(out / "tiny").evaluations.equals(run.evaluations)
     assert analysed == [scratch / "tiny"]
-    assert set(json.loads((out / record.TIMES).read_text())) == {"tiny"}
-
-
-def test_times_add_up_when_a_run_goes_on(tmp_path, monkeypatch):
-    file = tmp_path / "times.json"
-    for resume, expected in ((False, 10), (True, 20), (False, 10)):
-        with monkeypatch.context() as patch:
-            patch.setattr(record.time, "monotonic", iter([0.0, 10.0]).__next__)
-            with record._timed("a", file, resume=resume):
-                pass
-        assert json.loads(file.read_text()) == {"a": expected}
-    with pytest.raises(KeyboardInterrupt), record._timed("b", file, resume=False):
-        raise KeyboardInterrupt
-    assert json.loads(file.read_text())["b"] == 0
-    with pytest.raises(InputError), record._timed("a", file, resume=False):
-        raise InputError(file, "", "holds a run of another scenario")
-    assert json.loads(file.read_text())["a"] == 10
 
 
 def test_every_experiment_is_a_scenario():

@@ -1,15 +1,19 @@
 """The recorded runs, whatever there are: their gaits walk as recorded, their pages are whole."""
 
+import itertools
+import json
+import lzma
 import subprocess
 
 import numpy as np
 import pytest
 import record
 import tables
-from analyse import load_analysis
+from analyse import best_gaits, load_analysis
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.run_record import read_entries, read_manifest
+from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run_record import read_manifest
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.results.result import versions
@@ -47,7 +51,7 @@ def test_the_best_gaits_walk_as_recorded(name):
     analysis, scenario = load_analysis(folder), load_scenario(folder / "scenario.yaml")
     scenario = scenario.with_changes({"simulation.engine": "compiled"})
     tolerance = 0.0 if analysis.versions == versions() else TOLERANCE
-    recorded = analysis.gaits.set_index("gait")["undisturbed"] / INCH
+    recorded = analysis.gaits["undisturbed"] / INCH
     assert len(recorded) == scenario.evolution.trials
     for trial, distance in recorded.items():
         gait = load_gait(folder / f"trial_{trial:02d}/best_gait.json", scenario)
@@ -63,12 +67,21 @@ def test_a_run_begins_as_its_scenario_and_seed_say(name):
     seed = seeds.spawn(scenario.evolution.trials)[0]
     space, generator = ParameterSpace.of(scenario), np.random.default_rng(seed)
     asked = optimizer_of(scenario.optimizer)(space, scenario.evolution, generator).ask()
-    entries = read_entries(folder / "trial_00/evaluations.jsonl")[: len(asked)]
-    assert np.array_equal(asked, [entry["genome"] for entry in entries])
+    with lzma.open(folder / "trial_00/evaluations.jsonl.xz", "rt") as lines:
+        recorded = [json.loads(line)["genome"] for line in itertools.islice(lines, len(asked))]
+    assert np.array_equal(asked, recorded)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FOLDERS)
+def test_the_analysis_is_of_the_best_gaits_of_the_record(name):
+    folder = tables.HERE / name
+    best = load_analysis(folder).best_gaits.reset_index()
+    assert best.to_dict("records") == best_gaits(load_run(folder))
 
 
 def test_the_pages_show_the_recorded_runs():
-    runs = tables.load_all()  # once, as it takes ten seconds
+    runs = tables.load_all()
     assert set(runs) == set(FOLDERS)
     for page in tables.pages(runs):
         assert tables.made_again(page, runs) == page.read_text(encoding="utf-8"), page

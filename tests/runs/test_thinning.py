@@ -117,7 +117,11 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     assert ours.drop(columns="run").equals(theirs.drop(columns="run"))
     assert thinned.reevaluations["distance"].equals(run.reevaluations["distance"])
     assert math.isnan(thinned.reevaluations["tau_a_s"].item())
-    for page in write_report(thinned.directory):
+
+
+@pytest.mark.slow
+def test_the_report_of_a_thinned_run_can_be_written(runs):
+    for page in write_report(runs[1].directory):
         assert page.exists()
 
 

@@ -27,9 +27,6 @@ from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import POUND_FORCE
 
-UNITS = {"lbf": POUND_FORCE, "N": 1.0}
-"""Units of force that save_signals() writes, in N."""
-
 
 def raw_output(
     scenario: Scenario, gait: Gait, steering: SteeringSignal | None = None
@@ -81,46 +78,30 @@ def signals_at(
     gait: Gait,
     times: np.ndarray,
     *,
-    raw: bool = False,
     steering: SteeringSignal | None = None,
 ) -> np.ndarray:
-    """The signals (times, m) in N that cables are fed at `times` (s), zero before the start-up.
-
-    With `raw`, y_extensor - y_flexor, with neither gain nor start-up applied.
-    """
-    samples = signal_samples(scenario, gait, steering) / (scenario.cpg.gain if raw else 1.0)
+    """The signals (times, m) in N that cables are fed at `times` (s), zero before the start-up."""
+    samples = signal_samples(scenario, gait, steering)
     grid = scenario.cpg.listing_step * np.arange(len(samples))
     signals = np.column_stack([np.interp(times, grid, column) for column in samples.T])
-    if not raw:
-        signals[times < scenario.cpg.start_up - 1e-9] = 0.0
+    signals[times < scenario.cpg.start_up - 1e-9] = 0.0
     return signals
 
 
-def save_signals(
-    path: str | Path,
-    scenario: Scenario,
-    gait: Gait,
-    *,
-    unit: str = "lbf",
-    rate: float | None = None,
-    raw: bool = False,
-) -> None:
-    """Writes the signals that the cables of a gait are fed as CSV: time_s, signal_1 ... signal_m.
+def save_signals(path: str | Path, scenario: Scenario, gait: Gait) -> None:
+    """Writes the signals that the cables of a gait are fed as CSV: time_s, signal_1 ... signal_m,
+    in lbf, one sample per `cpg.listing_step`.
 
-    The first lines, which begin with #, say what the columns are. `unit` is one of UNITS;
-    `rate` (samples per second) defaults to one sample per `cpg.listing_step`. With `raw`, the
-    columns are y_extensor - y_flexor, with neither gain nor start-up applied.
+    The first lines, which begin with #, say what the columns are.
     """
     cpg, duration = scenario.cpg, scenario.simulation.duration
-    period = 1.0 / rate if rate else cpg.listing_step
-    times = period * np.arange(math.floor(duration / period + 1e-9) + 1)
-    signals = signals_at(scenario, gait, times, raw=raw) / (1.0 if raw else UNITS[unit])
+    times = cpg.listing_step * np.arange(math.floor(duration / cpg.listing_step + 1e-9) + 1)
+    signals = signals_at(scenario, gait, times) / POUND_FORCE
     names = [f"signal_{i + 1}" for i in range(scenario.oscillators)]
-    kind = "y_extensor - y_flexor (no unit)" if raw else f"force in {unit} that shortens the cables"
     cables = zip(names, Actuation.of(scenario).cables, strict=True)
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",
-        f"# time_s: time in s; signal_i: {kind}",
+        "# time_s: time in s; signal_i: force in lbf that shortens the cables",
         *(f"# {name}: {driven}" for name, driven in cables),
         ",".join(["time_s", *names]),
     ]
