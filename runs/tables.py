@@ -24,12 +24,11 @@ from analyse import ANALYSIS, LAWS, MUJOCO, TIGHT, Analysis, load_analysis
 from record import EXPERIMENTS, PICTURE, TIMES
 
 from tetra_drake.analysis.comparison import compare
-from tetra_drake.analysis.robustness import percents
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import MANIFEST
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import duration, fixed, listed, markdown_table, ranged, signed
+from tetra_drake.formatting import Table, duration, fixed, listed, percents, ranged, signed
 from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.results.measures import dominant_frequency
@@ -138,7 +137,7 @@ def gallery_table(runs: Runs) -> str:
     """All runs with the distances of their best gaits."""
     headings = ["", "experiment", "distance, in", "on the Drake diagram, in", "keeps"]
     rows = [[*_introduced(run), *_best_distances(run)] for run in runs.values()]
-    return markdown_table(headings, rows, text_columns=(0, 1))
+    return Table(headings, rows, text_columns=(0, 1)).markdown()
 
 
 def _introduced(run: Recorded) -> list[str]:
@@ -159,7 +158,7 @@ def effort_table(runs: Runs) -> str:
     total = sum(run.seconds for run in runs.values())
     rows.append(["**all**", "", "", "", "", duration(total)])
     headings = ["experiment", "optimiser", "trials", "evaluations", "failed", "h:mm:ss"]
-    return markdown_table(headings, rows, text_columns=(0, 1))
+    return Table(headings, rows, text_columns=(0, 1)).markdown()
 
 
 def _search(run: Recorded) -> list[str]:
@@ -187,7 +186,7 @@ def trials_table(run: Recorded) -> str:
         counts = [f"{trial}", f"{gait['evaluations']}", fixed(gait["fitness"])]
         rows.append([*counts, *map(fixed, distances), kept, *map(fixed, metrics)])
     headings = ["trial", "evaluations", "fitness", "compiled, in", "diagram, in", "MuJoCo, in"]
-    table = markdown_table([*headings, "disturbed, in", "keeps", *names], rows)
+    table = Table([*headings, "disturbed, in", "keeps", *names], rows).markdown()
     where = f"in trial{'s' * (len(apart) > 1)} {listed(apart)}"
     return table + f"\n\nThe engines differ by more than {APART} in {where}." * bool(apart)
 
@@ -196,7 +195,7 @@ def changes_table(run: Recorded) -> str:
     """What hurts the best gaits most."""
     rows = [[row["what"], *_change_cells(row)] for _, row in run.analysis.changes.iterrows()]
     headings = ["changed by 5 %", "alone: median change (worst), in"]
-    return markdown_table([*headings, "rank correlation: mean (median size)"], rows)
+    return Table([*headings, "rank correlation: mean (median size)"], rows).markdown()
 
 
 def _change_cells(row: pandas.Series) -> list[str]:
@@ -218,7 +217,7 @@ def laws_table(runs: Runs) -> str:
         rows.append([f"`{name}`: median", *map(fixed, table.median())])
         rows.append([f"`{name}`: least to most", *map(_from_to, table.T.to_numpy())])
         rows.append([f"`{name}`: median share", *(f"{share:.0f} %" for share in shares)])
-    return markdown_table(["best gaits, distance in inches", *settings], rows)
+    return Table(["best gaits, distance in inches", *settings], rows).markdown()
 
 
 def search_table(runs: Runs) -> str:
@@ -237,14 +236,14 @@ def search_table(runs: Runs) -> str:
         rows.append([f"`{name}`", f"{row['cost']:.0f}", *ends, cost, there])
     headings = ["run", "evaluations of a trial, median", "fitness", "distance, in"]
     reach = f"{fixed((compared.reach or math.nan) / INCH)} in"
-    return markdown_table([*headings, f"evaluations to {reach}, median", "trials"], rows)
+    return Table([*headings, f"evaluations to {reach}, median", "trials"], rows).markdown()
 
 
 def comparison_table(runs: Runs) -> str:
     """The thesis's numbers beside those of its repetitions."""
     headings = ["", "thesis", *(f"ours, `{name}`" for name in RUNS)]
     rows = [[what, theirs, *(ours(runs[n]) for n in RUNS)] for what, theirs, ours in COMPARISON]
-    return markdown_table(headings, rows)
+    return Table(headings, rows).markdown()
 
 
 def summary_table(runs: Runs) -> str:
@@ -256,7 +255,7 @@ def summary_table(runs: Runs) -> str:
         *(f"[`{n}`](runs/{n}/{README})" for n in names),
     ]
     rows = [[what, theirs, *(ours(runs[n]) for n in names)] for what, theirs, ours in SUMMARY]
-    return markdown_table(headings, rows)
+    return Table(headings, rows).markdown()
 
 
 def _iterations(run: Recorded) -> str:
@@ -383,7 +382,7 @@ def engines_table(runs: Runs) -> str:
         both = distances_on_both(run.record)
         if len(both.dropna()):
             rows.append([f"`{run.name}`, best gaits", *_agreement(both)])
-    return markdown_table(headings, rows)
+    return Table(headings, rows).markdown()
 
 
 def distances_on_both(run: Run) -> pandas.DataFrame:

@@ -16,7 +16,7 @@ from tetra_drake.evolution.json_lines import append_lines, read_lines
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
-from tetra_drake.report.summary import comparisons, summary
+from tetra_drake.report.summary import comparisons, run_text
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.units import INCH
@@ -195,7 +195,7 @@ def test_the_reference_stands_beside_our_numbers_where_there_is_one(tmp_path):
     with_reference = load_run(write_run(tmp_path / "a", [[[(5.0, 0)]]], scenario=scenario))
     numbers = [row.reference for row in comparisons(with_reference)]
     assert numbers == ["6.6 in", "14.34 in", "32 %", "51 %", "22 s"]
-    assert "14.34 in" in summary(with_reference)
+    assert "14.34 in" in run_text(with_reference)
     scenario.reference = None
     without = load_run(write_run(tmp_path / "b", [[[(5.0, 0)]]], scenario=scenario))
     assert {row.reference for row in comparisons(without)} == {""}

@@ -12,7 +12,6 @@ from tetra_drake.figures.fitness import (
     fitness_of_trials,
     initial_distances,
     initial_fitness,
-    two_best,
 )
 from tetra_drake.scenario.schema import ReferenceScenario
 from tetra_drake.scenario.units import INCH
@@ -122,22 +121,3 @@ def test_one_iteration_is_a_dot(run_of):
     (line,) = fitness_of_trials(run_of(initial(1.0, 2.0))).axes[0].lines
     assert line.get_xydata().tolist() == [[0, 1.5]]
     assert line.get_marker() == "o"
-
-
-def test_the_two_best_gaits_beside_the_reference(run_of):
-    run = run_of([*initial(1.0, 4.0, 2.5, 5.0), [(5.0, 1), (3.0, None)]], initial(1.0, None))
-    weights = [0.1, 0.2, 0.3, 0.4]
-    reference = ReferenceScenario(
-        "a paper", two_best_fitness=0.5, two_best_weights=weights, two_best_tau=0.0
-    )
-    table = two_best(with_reference(run, reference), 0)
-    # Equal fitnesses come with equal genomes, so the second best is the fittest different one.
-    for column, index, fitness in (("best", 3, 5.0), ("second", 1, 4.0)):
-        assert table[column].tolist() == [fitness, *run.vector(0, index)]
-    difference = run.vector(0, 3) - run.vector(0, 1)
-    assert table["difference"].tolist() == [1.0, *np.abs(difference)]
-    assert table["reference"].tolist() == [0.5, *weights, 0.0, 0.0]
-    assert table.index.tolist()[-2:] == ["tau_A", "tau_B"]
-    of_another_robot = ReferenceScenario("a paper", two_best_weights=[0.1] * 24)
-    assert "reference" not in two_best(with_reference(run, of_another_robot), 0)
-    assert two_best(run, 1) is None

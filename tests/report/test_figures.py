@@ -42,7 +42,7 @@ def test_a_run_gets_figures_report_and_replay_unless_they_go_elsewhere(run, tmp_
     assert write_figures(run) == [run / "figures", run / "replay.html", run / "report.html"]
     after = contents(run)
     assert {name: after[name] for name in before} == before
-    assert {"report.html", "replay.html", "figures/two_best.csv"} <= after.keys()
+    assert {"report.html", "replay.html"} <= after.keys()
     assert figures_in(run / "figures") == OF_A_RUN
 
 
@@ -64,7 +64,6 @@ def test_an_unfinished_run_is_drawn_as_far_as_it_has_come(tmp_path, trials, miss
     (run / "trial_00" / "in_progress.jsonl").write_text('{"index": 1, "torn')
     write_figures(run)
     assert figures_in(run / "figures") == OF_A_RUN - missing
-    assert not (run / "figures" / "two_best.csv").exists()
 
 
 def test_what_cannot_be_drawn_or_written_is_refused_before_anything_is_simulated(

@@ -18,7 +18,6 @@ from tetra_drake.figures.style import (
     make_figure,
 )
 from tetra_drake.formatting import fixed
-from tetra_drake.robot.gait import ParameterSpace
 
 _LEGEND_ROWS = 14
 """Trials per column of a legend beside the axes."""
@@ -136,24 +135,3 @@ def fitness_of_trials(run: Run) -> Figure:
     figure.legend(loc="outside right center", ncols=columns, handlelength=3.2)
     figure.suptitle(f"Fitness of each trial\nrises in {(last > first).sum()} of {len(last)}")
     return figure
-
-
-def two_best(run: Run, trial: int) -> pandas.DataFrame | None:
-    """The two fittest different gaits of a trial. Index: fitness and the names of the parameters.
-
-    Columns: best, second, difference (absolute) and, where there is a reference with as many
-    parameters, reference. None if there are no two such gaits.
-    """
-    pair, scenario = run.best(2).query("trial == @trial"), run.manifest.scenario
-    if len(pair) < 2:
-        return None
-    rows = zip(pair["fitness"], pair["index"], strict=True)
-    best, second = ([fitness, *run.vector(trial, index)] for fitness, index in rows)
-    names = pandas.Index(["fitness", *ParameterSpace.of(scenario).names], name="parameter")
-    table = pandas.DataFrame({"best": best, "second": second}, index=names)
-    table["difference"] = (table["best"] - table["second"]).abs()
-    theirs = scenario.reference
-    if theirs is not None and len(theirs.two_best_weights) == len(table) - 3:
-        taus = 2 * [theirs.two_best_tau]
-        table["reference"] = [theirs.two_best_fitness, *theirs.two_best_weights, *taus]
-    return table
