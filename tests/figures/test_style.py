@@ -55,6 +55,7 @@ def test_series_differ_in_colour_and_many_in_colour_and_dashes():
     assert OKABE_ITO["yellow"] not in LINE_COLOURS  # too faint on white
 
 
+@pytest.mark.slow
 def test_figures_need_no_pyplot_and_so_no_display():
     modules = ("book", "disturbed", "search")
     lines = [f"import tetra_drake.figures.{module}" for module in modules]

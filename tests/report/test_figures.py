@@ -15,17 +15,6 @@ OF_A_RUN = OF_ONE_GAIT | {"fitness_of_trials", "initial_distances", "initial_fit
 OF_A_RUN |= {"before_and_after"}
 
 
-@pytest.fixture(autouse=True)
-def quick_drawing(monkeypatch):
-    """Figures are drawn, but only their names are written."""
-
-    def save(figure, folder, name):
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / f"{name}.svg").write_text("<svg/>")
-
-    monkeypatch.setattr("tetra_drake.figures.book.save_figure", save)
-
-
 def contents(folder):
     return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 

@@ -99,10 +99,8 @@ def render(study, **changes):
 
 
 def test_figures_are_files_and_in_the_page(run, page):
-    files = {path.name for path in (run / "figures").iterdir()}
-    stems = {name.removesuffix(".svg") for name in files if name.endswith(".svg")}
-    assert files == {f"{s}{kind}" for s in stems for kind in (".svg", ".png")}
-    drawn = {(run / "figures" / f"{stem}.svg").read_text() for stem in stems}
+    drawn = [path.read_text(encoding="utf-8") for path in (run / "figures").glob("*.svg")]
+    assert len(drawn) >= 9
     images = [values["src"].split(",", 1) for tag, values in page.tags if tag == "img"]
     assert {kind for kind, _ in images} == {"data:image/svg+xml"}
     assert {unquote(svg) for _, svg in images} == {" ".join(svg.split()) for svg in drawn}
