@@ -48,7 +48,6 @@ _COLUMNS = {
     "best_gaits": ("trial", "evaluation", "frequencies_hz"),
     "resimulations": ("trial", "setting", "distance_in", "failure"),
     "gaits": ("gait", "undisturbed", "5 %", "50 %", "95 %", *_MEAN, *_KEPT, "failed"),
-    "over_gaits": ("of", "median", "low", "high"),
     "changes": ("what", "median", "worst", "failed", "correlation", "correlation_size"),
 }
 _NUMBERS = ["distance_in", "correlation", "correlation_size"]
@@ -68,8 +67,6 @@ class Analysis:
     gaits: pandas.DataFrame
     """Those gaits on the compiled engine under draws of the default disturbances, as of
     robustness.by_gait(), in m."""
-    over_gaits: pandas.DataFrame
-    """As of robustness.over_gaits(), in m."""
     changes: pandas.DataFrame
     """As of robustness.by_change(), in m."""
 

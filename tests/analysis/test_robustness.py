@@ -20,7 +20,6 @@ from tetra_drake.analysis.robustness import (
     default_disturbances,
     fresh_seed,
     judge,
-    over_gaits,
     rank_correlations,
 )
 from tetra_drake.analysis.statistics import share_interval
@@ -205,10 +204,6 @@ def test_the_summary_of_gaits(made):
     assert a[["kept_low", "kept_high"]].tolist() == list(share_interval(2, 4))
     assert b["mean"] == pytest.approx(-29.1 / 4.0)
     assert b["mean_low"] < b["mean"] < b["mean_high"]
-    over = over_gaits(made)["median"]
-    assert over.to_dict() == pytest.approx(
-        {"undisturbed": 0.0, "mean": (29.9 / 3.0 - 29.1 / 4.0) / 2.0, "kept": 0.5}
-    )
 
 
 def test_the_summary_of_changes_begins_with_what_hurts_most_alone(made):

@@ -50,10 +50,6 @@ def write_analysis(path, best):
                 | {"kept": 0.5, "kept_low": 0.4, "kept_high": 0.61}
                 for trial, (_, distance) in best.items()
             ],
-            "over_gaits": [
-                {"of": name, "median": 0.5, "low": 0.25, "high": 1.0}
-                for name in ("undisturbed", "mean", "kept")
-            ],
             "changes": [
                 {"what": what, "median": 0.6 * INCH, "worst": -INCH, "failed": failed}
                 | {"correlation": correlation, "correlation_size": correlation}

@@ -8,8 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from tetra_drake.analysis.statistics import interval, share_interval
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
@@ -224,17 +222,6 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
     return pandas.DataFrame.from_dict(rows, orient="index").rename_axis("gait")
 
 
-def over_gaits(judgement: Judgement) -> pandas.DataFrame:
-    """Medians over the gaits of columns of by_gait(): undisturbed, mean, kept. Columns: median, and
-    low and high, the 95 % confidence interval if gaits are drawn anew."""
-    import pandas
-
-    gaits = by_gait(judgement)[["undisturbed", "mean", "kept"]]
-    rows = {name: [values.median(), *interval(values, np.median)] for name, values in gaits.items()}
-    table = pandas.DataFrame.from_dict(rows, orient="index", columns=["median", "low", "high"])
-    return table.rename_axis("of")
-
-
 def by_change(judgement: Judgement) -> pandas.DataFrame:
     """A row per change, first what hurts most alone.
 
@@ -260,16 +247,16 @@ def rank_correlations(judgement: Judgement) -> pandas.DataFrame:
 
     settings = judgement.scenario.disturbances
     keys = list(settings.spreads) if settings else []
-    rows = {}
-    for gait, draws in judgement.draws.dropna(subset="distance").groupby("gait", sort=False):
-        ranks = draws[["distance", *keys]].rank()
-        rows[gait] = [ranks["distance"].corr(ranks[key]) for key in keys]
+    rows = {
+        gait: draws[["distance", *keys]].corr(method="spearman").loc["distance", keys]
+        for gait, draws in judgement.draws.dropna(subset="distance").groupby("gait", sort=False)
+    }
     return pandas.DataFrame.from_dict(rows, orient="index", columns=keys)
 
 
 def robustness_numbers(judgement: Judgement) -> dict[str, Any]:
-    """The content of summary.json, in SI: gaits, over_gaits and changes, and what they are of."""
-    tables = {"gaits": by_gait, "over_gaits": over_gaits, "changes": by_change}
+    """The content of summary.json, in SI: gaits and changes, and what they are of."""
+    tables = {"gaits": by_gait, "changes": by_change}
     return {
         "versions": versions(),
         "scenario": judgement.scenario.name,

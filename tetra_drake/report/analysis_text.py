@@ -6,14 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from tetra_drake.analysis.comparison import Compared
-from tetra_drake.analysis.robustness import (
-    LOSS,
-    Judgement,
-    by_change,
-    by_gait,
-    chance,
-    over_gaits,
-)
+from tetra_drake.analysis.robustness import LOSS, Judgement, by_change, by_gait, chance
 from tetra_drake.formatting import Table, fixed, percents, ranged, signed
 from tetra_drake.scenario.units import INCH, shown
 
@@ -34,20 +27,12 @@ def robustness_text(judgement: Judgement) -> str:
         f"it loses at\nmost {100.0 * LOSS:g} % of its undisturbed distance{misses}.\n"
         "In brackets: 95 % confidence intervals.",
         _gaits_table(gaits, with_missed=require).text(),
-    ]
-    if len(gaits) > 1:
-        over = over_gaits(judgement)
-        before, mean = (ranged(*over.loc[name] / INCH) for name in ("undisturbed", "mean"))
-        texts.append(
-            f"Median over {len(gaits)} gaits: undisturbed {before}, mean {mean},\n"
-            f"keeps {percents(*over.loc['kept'])} of the draws."
-        )
-    texts.append(
         "What hurts most: change of the distance by one change alone, in inches; Spearman's rank\n"
         "correlation of factor and distance over the draws of a gait, mean and median size.\n"
-        f"Chance alone gives up to {chance(count):.2f}."
-    )
-    return "\n\n".join([*texts, _changes_table(by_change(judgement)).text()])
+        f"Chance alone gives up to {chance(count):.2f}.",
+        _changes_table(by_change(judgement)).text(),
+    ]
+    return "\n\n".join(texts)
 
 
 def _gaits_table(gaits: pandas.DataFrame, *, with_missed: bool) -> Table:
