@@ -115,9 +115,3 @@ def test_the_average_over_trials(run_of, means, unfinished, average):
     assert line.get_ydata().tolist() == pytest.approx(average)
     deviation = np.ptp(segments.get_segments()[0][:, 1]) / 2
     assert deviation == pytest.approx(np.std([mean[0] for mean in means], ddof=1))
-
-
-def test_one_iteration_is_a_dot(run_of):
-    (line,) = fitness_of_trials(run_of(initial(1.0, 2.0))).axes[0].lines
-    assert line.get_xydata().tolist() == [[0, 1.5]]
-    assert line.get_marker() == "o"

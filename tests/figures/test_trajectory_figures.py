@@ -94,13 +94,6 @@ def check_page(figure):
         assert overlap.min() <= 0.0
 
 
-def test_lines_of_twelve_tetrahedra_differ():
-    [panel] = relative_distances(walk_of(12)).axes
-    lines = [line for line in panel.lines if line.get_label().startswith("T")]
-    looks = {(line.get_color(), str(line._dash_pattern)) for line in lines}
-    assert len(looks) == len(lines) == 12
-
-
 @pytest.mark.parametrize("draw", [time_lapse, one_step])
 def test_rows_of_a_walk_that_turns_do_not_overlap(walk, draw):
     """Its last instant is turned by 90 degrees."""
