@@ -19,7 +19,7 @@ from typing import Any
 
 import pandas
 
-from tetra_drake.analysis.robustness import PERCENT, judge, to_json
+from tetra_drake.analysis.robustness import PERCENT, judge, robustness_numbers
 from tetra_drake.engines.simulate import available_cores, check_scenario
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
@@ -127,7 +127,7 @@ def analyse(
         "versions": versions(),
         "best_gaits": best,
         "resimulations": resimulate(scenario, gaits, workers, executor),
-        "robustness": to_json(judge(scenario, gaits, percent=PERCENT, workers=workers)),
+        "robustness": robustness_numbers(judge(scenario, gaits, percent=PERCENT, workers=workers)),
     }
     text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
     write_whole(directory / ANALYSIS, text + "\n")

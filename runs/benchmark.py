@@ -28,7 +28,7 @@ import numpy as np
 from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import available_cores, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.formatting import fixed, listed, markdown_table
+from tetra_drake.formatting import Table, fixed, listed
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.load import load_scenario
@@ -145,7 +145,7 @@ def settings_table(scenario: Scenario, settings: Sequence[Changes]) -> str:
         rows.append([engine, ", ".join(values[1:]) or "default", f"{speed:.3g}", *errors, *counts])
     headings = ["engine", "setting", "times real time per core", "median error, in"]
     headings += ["worst error, in", "evaluations per gait", "failed"]
-    return markdown_table(headings, rows, text_columns=(0, 1))
+    return Table(headings, rows, text_columns=(0, 1)).markdown()
 
 
 def successes(
@@ -185,7 +185,7 @@ def batches_table(scenario: Scenario) -> str:
         if engine == "mujoco":
             engine += f", steps of {1e3 * batch.scenario.mujoco.step:g} ms"
         rows.append([engine, str(batch.gaits), str(batch.cores), f"{timing.speed:,.1f}"])
-    return markdown_table(["engine", "gaits at a time", "cores", "times real time"], rows)
+    return Table(["engine", "gaits at a time", "cores", "times real time"], rows).markdown()
 
 
 def sizes_table(scenario: Scenario) -> str:
@@ -199,7 +199,7 @@ def sizes_table(scenario: Scenario) -> str:
         rows.append([str(size), f"{alone.steps:,.0f}", *map(fixed, costs)])
     headings = ["tetrahedra", "steps", "μs per step", "and tetrahedron"]
     headings += [f"one of {LANES}: μs per step", "and tetrahedron"]
-    return markdown_table(headings, rows, text_columns=())
+    return Table(headings, rows, text_columns=()).markdown()
 
 
 def grounds_table(scenario: Scenario) -> str:
@@ -225,7 +225,7 @@ def grounds_table(scenario: Scenario) -> str:
         speeds = [f"{alone.speed:,.0f}", f"{many.speed:,.0f}", fixed(diagram.speed)]
         rows.append([name, f"{many.steps / GROUND_BATCH:,.0f}", *speeds])
     headings = ["ground", "steps per gait", "compiled, one gait", f"{GROUND_BATCH} gaits", "drake"]
-    return markdown_table(headings, rows)
+    return Table(headings, rows).markdown()
 
 
 TABLES = {"batches": batches_table, "sizes": sizes_table, "grounds": grounds_table}

@@ -20,11 +20,10 @@ import pandas
 from analyse import MUJOCO, SHOWN, TIGHT, Analysis, load_analysis
 from record import EXPERIMENTS, PICTURE
 
-from tetra_drake.analysis.robustness import percents
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.run_record import MANIFEST
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import fixed, listed, markdown_table, signed
+from tetra_drake.formatting import Table, fixed, listed, percents, signed
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.units import INCH, customary
@@ -53,7 +52,7 @@ def gallery_table(runs: Runs) -> str:
     """All runs with the distances of their best gaits."""
     headings = ["", "experiment", "distance, in", "on the Drake diagram, in", "keeps"]
     rows = [[*_introduced(name), *_best_distances(run)] for name, run in runs.items()]
-    return markdown_table(headings, rows, text_columns=(0, 1))
+    return Table(headings, rows, text_columns=(0, 1)).markdown()
 
 
 def _introduced(name: str) -> list[str]:
@@ -85,7 +84,7 @@ def trials_table(run: Analysis) -> str:
         counts = [f"{trial}", f"{gait['evaluations']:.0f}", fixed(gait["fitness"])]
         rows.append([*counts, *map(fixed, distances), kept, *map(fixed, metrics)])
     headings = ["trial", "evaluations", "fitness", "compiled, in", "diagram, in", "MuJoCo, in"]
-    table = markdown_table([*headings, "disturbed, in", "keeps", *names], rows)
+    table = Table([*headings, "disturbed, in", "keeps", *names], rows).markdown()
     where = f"in trial{'s' * (len(apart) > 1)} {listed(apart)}"
     return table + f"\n\nThe engines differ by more than {APART} in {where}." * bool(apart)
 
@@ -94,7 +93,7 @@ def changes_table(run: Analysis) -> str:
     """What hurts the best gaits most."""
     rows = [[row["what"], *_change_cells(row)] for _, row in run.changes.iterrows()]
     headings = ["changed by 5 %", "alone: median change (worst), in"]
-    return markdown_table([*headings, "rank correlation: mean (median size)"], rows)
+    return Table([*headings, "rank correlation: mean (median size)"], rows).markdown()
 
 
 def _change_cells(row: pandas.Series) -> list[str]:

@@ -178,7 +178,7 @@ def test_simulate_writes_its_files_and_prints_the_distance_and_the_page(simulate
     assert sorted(os.listdir(folder)) == names
     lines = printed.splitlines()
     distance = next(line.split() for line in lines if line.split()[0] == "distance")
-    assert distance[1:] == [fixed(result["distance_in"]), "in"]
+    assert distance[1:] == ["(in)", fixed(result["distance_in"], 3)]
     assert lines[-1].endswith(str(folder / "replay.html"))
     # The scenario is shorter than the thesis's, whose distances are not comparable.
     assert "14.34" not in printed

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from tetra_drake.formatting import duration, fixed, listed, markdown_table, signed
+from tetra_drake.formatting import Table, duration, fixed, listed, percents, signed
 
 
 @pytest.mark.parametrize(
@@ -30,6 +30,14 @@ def test_values_as_text(write, value, text):
     assert write(value) == text
 
 
-def test_markdown_tables_align_numbers_to_the_right():
-    table = "| name | in |\n| --- | ---: |\n| a | 1.00 |"
-    assert markdown_table(["name", "in"], [["a", "1.00"]]) == table
+def test_a_table_aligns_numbers_to_the_right():
+    table = Table(["name", "in"], [["a", "1.00"], ["long name", "10.00"]])
+    assert table.text() == "name          in\na           1.00\nlong name  10.00"
+    rule = "| --- | ---: |"
+    assert table.markdown() == f"| name | in |\n{rule}\n| a | 1.00 |\n| long name | 10.00 |"
+    assert Table(["in", "note"], [["1", "b"]], text_columns=(1,)).text() == "in  note\n 1  b"
+
+
+def test_a_range_without_width_is_not_shown():
+    assert percents(1.0, 0.91, 1.0) == "100 % (91 to 100)"
+    assert percents(1.0, 1.0, 1.0) == "100 %"

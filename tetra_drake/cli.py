@@ -106,7 +106,7 @@ def _simulate(options: Options) -> None:
     from tetra_drake.engines.simulate import prepare, simulate
     from tetra_drake.engines.viewer import check_can_be_watched
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
-    from tetra_drake.results.result import summary
+    from tetra_drake.report.summary import result_text
 
     scenario, gait = _chosen_gait(options)
     if options.engine:
@@ -121,7 +121,7 @@ def _simulate(options: Options) -> None:
 
         view = open_view(scenario, say=lambda text: print(text, flush=True))
     result = simulate(scenario=scenario, gait=gait, record=True, viewer=view)
-    print(summary(scenario, gait, result))
+    print(result_text(scenario, gait, result))
     save_result_folder(options.out, scenario=scenario, gait=gait, result=result)
     print(
         f"wrote result.json, trajectory.nc, scenario.yaml and replay.html to {options.out}/\n"
@@ -169,7 +169,7 @@ def _evolve(options: Options) -> None:
     """
     from tetra_drake.evolution.progress import Display
     from tetra_drake.experiment import evolve
-    from tetra_drake.report.summary import summary, whole_experiment
+    from tetra_drake.report.summary import run_text, whole_experiment
 
     if options.scenario is None and not options.resume:
         print(whole_experiment(load_scenario("thesis"), seconds=0.2), flush=True)
@@ -189,7 +189,7 @@ def _evolve(options: Options) -> None:
         resume = f"tetra-drake evolve --out {options.out} --resume"
         print(f"\nnothing is lost; continue with: {resume}", file=sys.stderr)
         raise
-    print(summary(run))
+    print(run_text(run))
 
 
 def _executor(options: Options) -> contextlib.AbstractContextManager[Any]:
@@ -245,10 +245,9 @@ def _figures_options(command: Command) -> None:
 def _figures(options: Options) -> None:
     """Draw the figures of a run or a simulation.
 
-    Draws figures as SVG and PNG, and the table of the two best gaits as CSV. For a run of
-    `evolve`, finished or not: into figures/ in its directory, where report.html, replay.html and
-    elites/ are written anew, too. For a folder written by `simulate`: the figures of one gait,
-    into figures/ in it.
+    Draws figures as SVG and PNG. For a run of `evolve`, finished or not: into figures/ in its
+    directory, where report.html, replay.html and elites/ are written anew, too. For a folder
+    written by `simulate`: the figures of one gait, into figures/ in it.
     """
     from tetra_drake.report.run_page import write_figures
 
@@ -274,8 +273,9 @@ def _robustness(options: Options) -> None:
     change alone. Prints how far it walks, how many draws it keeps (it loses at most a tenth of its
     undisturbed distance), and what hurts most.
     """
-    from tetra_drake.analysis.robustness import describe, judge
+    from tetra_drake.analysis.robustness import judge
     from tetra_drake.evolution.source import load_source
+    from tetra_drake.report.analysis_text import robustness_text
 
     source = load_source(options.source, scenario=options.scenario, warn=_warn)
     if options.out:
@@ -287,7 +287,7 @@ def _robustness(options: Options) -> None:
         seed=options.seed,
         workers=options.workers,
     )
-    print(describe(judgement))
+    print(robustness_text(judgement))
     if options.out:
         from tetra_drake.figures.disturbed import save_judgement
 
@@ -305,16 +305,18 @@ def _compare_options(command: Command) -> None:
 def _compare(options: Options) -> None:
     """Compare how well runs search.
 
-    Compares runs by the best fitness of their trials so far, at the same number of evaluations,
-    or of simulations where runs differ in draws of disturbances: trials, interquartile means with
-    bootstrap intervals, evaluations until the fittest gait walks a distance, and time.
+    Compares runs by the best fitness of their trials so far, at the same number of simulations,
+    of which an evaluation has one in each draw of disturbances: trials, interquartile means with
+    bootstrap intervals, simulations until the fittest gait walks a distance, and time. Writes
+    trials.csv, curves.csv, summary.json and the figure search, if asked for.
     """
-    from tetra_drake.analysis.comparison import compare, describe
+    from tetra_drake.analysis.comparison import compare
+    from tetra_drake.report.analysis_text import comparison_text
 
     if options.out:
         check_folder(options.out)
     compared = compare(options.runs, reach=options.reach)
-    print(describe(compared))
+    print(comparison_text(compared))
     if options.out:
         from tetra_drake.figures.search import save_comparison
 

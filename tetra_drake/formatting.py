@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import resources
 
 
@@ -41,21 +42,36 @@ def ranged(value: float, low: float, high: float) -> str:
     return f"{fixed(value)} ({fixed(low)} to {fixed(high)})"
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of cells as aligned lines, the first cell to the left, the others to the right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])]) for row in rows
-    )
+def percents(share: float, low: float, high: float) -> str:
+    """A share in percent with a range that belongs to it, which is left out if it has no width."""
+    text = f"{100.0 * share:.0f} %"
+    return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"
 
 
-def markdown_table(
-    headings: Sequence[str], rows: Sequence[Sequence[str]], text_columns: Sequence[int] = (0,)
-) -> str:
-    """A Markdown table, without a line feed at its end; columns other than `text_columns` are
-    aligned to the right."""
-    rule = ["---" if i in text_columns else "---:" for i in range(len(headings))]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in [headings, rule, *rows])
+@dataclass(frozen=True)
+class Table:
+    """Rows of texts under headings; report.html.jinja shows one on a page."""
+
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    text_columns: Sequence[int] = (0,)
+    """Columns that are aligned to the left; the others, of numbers, to the right."""
+
+    def text(self) -> str:
+        """The table as aligned lines."""
+        lines = [self.headings, *self.rows]
+        columns = []
+        for place, cells in enumerate(zip(*lines, strict=True)):
+            width = max(map(len, cells))
+            align = str.ljust if place in self.text_columns else str.rjust
+            columns.append([align(cell, width) for cell in cells])
+        return "\n".join("  ".join(cells).rstrip() for cells in zip(*columns, strict=True))
+
+    def markdown(self) -> str:
+        """The table in Markdown, without a line feed at its end."""
+        rule = ["---" if i in self.text_columns else "---:" for i in range(len(self.headings))]
+        lines = [self.headings, rule, *self.rows]
+        return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
 def render(template: str, **values: object) -> str:

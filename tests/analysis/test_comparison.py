@@ -7,9 +7,10 @@ import pandas
 import pytest
 from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 
-from tetra_drake.analysis.comparison import SIMULATIONS, compare, describe
+from tetra_drake.analysis.comparison import compare
 from tetra_drake.cli import main
 from tetra_drake.figures.search import search
+from tetra_drake.report.analysis_text import comparison_text
 from tetra_drake.scenario.disturbances import Disturbances
 from tetra_drake.scenario.units import INCH
 
@@ -60,12 +61,12 @@ def test_the_curve_of_a_run_that_goes_on_ends_with_its_first_trial(run):
 
 def test_runs_are_compared_where_the_shortest_ends_and_in_their_ends(run):
     long = run("long", trial(1.0, 2.0, 3.0, 9.0), trial(0.0, 4.0, 5.0, 7.0))
-    found = compare([long, run("short", trial(3.0, 2.0), trial(5.0))], labels=["x", "y"])
+    found = compare([long, run("short", trial(3.0, 2.0), trial(5.0))])
     assert found.common == 2
-    assert found.runs.loc["x", ["at_common", "fitness"]].tolist() == [3.0, 8.0]
-    assert found.runs.loc["y", ["at_common", "fitness"]].tolist() == [4.0, 4.0]
+    assert found.runs.loc["long", ["at_common", "fitness"]].tolist() == [3.0, 8.0]
+    assert found.runs.loc["short", ["at_common", "fitness"]].tolist() == [4.0, 4.0]
     # Of two trials drawn anew, both are the same in half of the cases.
-    assert found.runs.loc["x", ["fitness_low", "fitness_high"]].tolist() == [7.0, 9.0]
+    assert found.runs.loc["long", ["fitness_low", "fitness_high"]].tolist() == [7.0, 9.0]
 
 
 def test_a_distance_is_reached_when_the_fittest_gait_walks_it(run):
@@ -80,21 +81,20 @@ def test_a_distance_is_reached_when_the_fittest_gait_walks_it(run):
     # Means are over those with a fitness: 6, 5, 4 and 3.5 without the greatest and the least.
     assert (row["fitness_mean"], row["fitness"]) == (4.5, 4.5)
     assert any("1 of 5" in note for note in found.notes)
-    assert "4 (2 to never)" in describe(found)
+    assert "4 (2 to never)" in comparison_text(found)
     assert compare([run("b", trial(1.0), trial(1.0))], reach=INCH).runs.loc["b", "reached"] == (
         math.inf
     )
 
 
-def test_runs_that_differ_in_draws_pay_by_simulations(run):
+def test_costs_are_simulations_of_which_an_evaluation_has_one_in_each_draw(run):
     disturbed = {"disturbances": Disturbances(draws=3, start=0.1)}
     paths = [run("calm", trial(1.0, 2.0)), run("rough", trial(3.0, 4.0), changes=disturbed)]
     found = compare(paths, reach=2.0 * INCH)
-    assert (found.unit, found.common) == (SIMULATIONS, 2)
+    assert found.common == 2
     assert [cost for cost, *_ in curve(found, "rough")] == [3, 6]
     assert found.trials["reached"].tolist() == [math.inf, 6.0]
     assert math.isnan(found.runs.loc["rough", "at_common"])  # no gait is done
-    assert compare(paths[1:]).trials["cost"].tolist() == [2]
     assert any("disturbances.draws" in note for note in found.notes)
 
 
@@ -106,14 +106,13 @@ def test_only_search_may_differ_without_a_note(run):
     assert "cables.slack" in note
 
 
-def test_different_objectives_and_wrong_labels_are_refused(run, refused):
+def test_different_objectives_and_runs_given_twice_are_refused(run, refused):
     base = run("a", trial(1.0))
     other = run("b", trial(1.0), changes={"objective": {"speed": "1 s/m"}})
     with refused(other, "objective", "a"):
         compare([base, other])
-    for labels in (["x"], ["x", "x"]):
-        with refused("labels", "", "2"):
-            compare([base, base], labels=labels)
+    with refused(base, "", "twice"):
+        compare([base, base])
     failed = run("d", trial(None))
     with refused(failed, "", "fitness"):
         compare([failed])

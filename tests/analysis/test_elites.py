@@ -11,7 +11,6 @@ from ribs.archives import GridArchive
 from tetra_drake.analysis.elites import (
     CELLS,
     chosen,
-    distinct_gaits,
     elites,
     judge_elites,
     robust,
@@ -122,10 +121,3 @@ def test_elites_are_simulated_on_disturbed_robots_once(run_of):
     written = path.read_bytes()
     judge_elites(run.directory, workers=1)
     assert path.read_bytes() == written
-
-
-def test_a_gait_with_two_names_is_one_gait(run_of):
-    _, gait, other = run_of({2.0: (0.05, 0.5), 3.0: (0.05, 0.3), 4.0: (0.01, 0.5)}).evaluations.iloc
-    distinct = distinct_gaits({"fittest": gait, "low": other, "high": gait})
-    assert [names for names, _ in distinct] == [["fittest", "high"], ["low"]]
-    assert [row["index"] for _, row in distinct] == [1, 2]

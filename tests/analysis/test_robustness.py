@@ -17,16 +17,14 @@ from tetra_drake.analysis.robustness import (
     by_change,
     by_gait,
     default_disturbances,
-    describe,
     fresh_seed,
     judge,
-    over_gaits,
-    percents,
     rank_correlations,
 )
 from tetra_drake.analysis.statistics import share_interval
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.report.analysis_text import robustness_text
 from tetra_drake.robot.gait import save_gait, seeded_gait
 from tetra_drake.scenario.disturbances import Disturbances, disturbed, draw_disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
@@ -151,7 +149,7 @@ def test_a_simulation_that_fails_has_a_reason_and_no_distance_and_keeps_nothing(
     assert (row["failed"], row["kept"]) == (2, 0.0)
     assert row[["50 %", "mean", "mean_low"]].isna().all()
     assert (by_change(found)["failed"] > 0).all()
-    assert describe(found)
+    assert robustness_text(found)
 
 
 @pytest.fixture
@@ -203,15 +201,6 @@ def test_the_summary_of_gaits(made):
     assert a[["kept_low", "kept_high"]].tolist() == list(share_interval(2, 4))
     assert b["mean"] == pytest.approx(-29.1 / 4.0)
     assert b["mean_low"] < b["mean"] < b["mean_high"]
-    over = over_gaits(made)["median"]
-    assert over.to_dict() == pytest.approx(
-        {"undisturbed": 0.0, "mean": (29.9 / 3.0 - 29.1 / 4.0) / 2.0, "kept": 0.5}
-    )
-
-
-def test_an_interval_without_width_is_not_shown():
-    assert percents(1.0, 0.91, 1.0) == "100 % (91 to 100)"
-    assert percents(1.0, 1.0, 1.0) == "100 %"
 
 
 def test_the_summary_of_changes_begins_with_what_hurts_most_alone(made):

@@ -13,7 +13,7 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import run_trials
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.report.summary import summary
+from tetra_drake.report.summary import run_text
 
 
 def lines(path):
@@ -119,4 +119,4 @@ def test_another_optimiser_reports_its_own_numbers(tmp_path):
     farthest = run.evaluations.groupby("trial")["distance"].max()
     assert run.iterations.groupby("trial")["farthest"].last().tolist() == farthest.tolist()
     assert set(run.iterations["note"]) == {"wide"}
-    assert "mean fitness" not in summary(run)
+    assert "mean fitness" not in run_text(run)

@@ -12,7 +12,6 @@ from tetra_drake.figures.fitness import (
     fitness_of_trials,
     initial_distances,
     initial_fitness,
-    two_best,
 )
 
 
@@ -111,21 +110,3 @@ def test_the_average_over_trials(run_of, means, unfinished, average):
     assert line.get_ydata().tolist() == pytest.approx(average)
     deviation = np.ptp(segments.get_segments()[0][:, 1]) / 2
     assert deviation == pytest.approx(np.std([mean[0] for mean in means], ddof=1))
-
-
-def test_one_iteration_is_a_dot(run_of):
-    (line,) = fitness_of_trials(run_of(initial(1.0, 2.0))).axes[0].lines
-    assert line.get_xydata().tolist() == [[0, 1.5]]
-    assert line.get_marker() == "o"
-
-
-def test_the_two_best_gaits_are_different(run_of):
-    run = run_of([*initial(1.0, 4.0, 2.5, 5.0), [(5.0, 1), (3.0, None)]], initial(1.0, None))
-    table = two_best(run, 0)
-    # Equal fitnesses come with equal genomes, so the second best is the fittest different one.
-    for column, index, fitness in (("best", 3, 5.0), ("second", 1, 4.0)):
-        assert table[column].tolist() == [fitness, *run.vector(0, index)]
-    difference = run.vector(0, 3) - run.vector(0, 1)
-    assert table["difference"].tolist() == [1.0, *np.abs(difference)]
-    assert table.index.tolist()[-2:] == ["tau_A", "tau_B"]
-    assert two_best(run, 1) is None

@@ -63,7 +63,4 @@ def test_lucky_gaits_are_crosses_and_the_share_of_draws_is_beside(draw):
     np.testing.assert_allclose(kept, [[100.0, 40.0, np.nan], [np.nan, np.nan, 50.0]])
     (crosses,) = figure.axes[0].lines
     np.testing.assert_allclose(crosses.get_xydata(), [[1.5, 0.25]])
-
-
-def test_a_map_of_lucky_gaits_only_can_be_drawn(draw):
     assert "0 of 6" in draw({0: 0.0, 1: 0.0, 2: 0.0}).get_suptitle()

@@ -55,8 +55,9 @@ def test_series_differ_in_colour_and_many_in_colour_and_dashes():
     assert OKABE_ITO["yellow"] not in LINE_COLOURS  # too faint on white
 
 
+@pytest.mark.slow
 def test_figures_need_no_pyplot_and_so_no_display():
-    modules = ("forces", "motion", "fitness")
+    modules = ("book", "disturbed", "search")
     lines = [f"import tetra_drake.figures.{module}" for module in modules]
     program = "\n".join([*lines, "import sys; sys.exit('matplotlib.pyplot' in sys.modules)"])
     assert subprocess.run([sys.executable, "-c", program]).returncode == 0

@@ -3,6 +3,7 @@
 import shutil
 
 import pytest
+from helpers import quick_figures
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.engines.simulate import simulate
@@ -17,6 +18,14 @@ TRIALS = [
 
 COSTS = {4.0: 0.9, 3.0: 0.5, 2.5: 0.7, 2.0: 0.25, 1.5: 0.1}
 """Costs of transport by fitness."""
+
+
+@pytest.fixture(scope="package", autouse=True)
+def quick_drawing():
+    """All but one of the figures are blank, as it takes seconds to write them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tetra_drake.figures.book.save_figure", quick_figures.save_figure)
+        yield
 
 
 @pytest.fixture(scope="package")

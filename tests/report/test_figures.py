@@ -15,17 +15,6 @@ OF_A_RUN = OF_ONE_GAIT | {"fitness_of_trials", "initial_distances", "initial_fit
 OF_A_RUN |= {"before_and_after"}
 
 
-@pytest.fixture(autouse=True)
-def quick_drawing(monkeypatch):
-    """Figures are drawn, but only their names are written."""
-
-    def save(figure, folder, name):
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / f"{name}.svg").write_text("<svg/>")
-
-    monkeypatch.setattr("tetra_drake.figures.book.save_figure", save)
-
-
 def contents(folder):
     return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
@@ -42,7 +31,7 @@ def test_a_run_gets_figures_report_and_replay_unless_they_go_elsewhere(run, tmp_
     assert write_figures(run) == [run / "figures", run / "replay.html", run / "report.html"]
     after = contents(run)
     assert {name: after[name] for name in before} == before
-    assert {"report.html", "replay.html", "figures/two_best.csv"} <= after.keys()
+    assert {"report.html", "replay.html"} <= after.keys()
     assert figures_in(run / "figures") == OF_A_RUN
 
 
@@ -64,7 +53,6 @@ def test_an_unfinished_run_is_drawn_as_far_as_it_has_come(tmp_path, trials, miss
     (run / "trial_00" / "in_progress.jsonl").write_text('{"index": 1, "torn')
     write_figures(run)
     assert figures_in(run / "figures") == OF_A_RUN - missing
-    assert not (run / "figures" / "two_best.csv").exists()
 
 
 def test_what_cannot_be_drawn_or_written_is_refused_before_anything_is_simulated(

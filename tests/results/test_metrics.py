@@ -16,7 +16,7 @@ from tetra_drake.results.metrics import (
 )
 from tetra_drake.results.path import CentrePath
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics, inverse
+from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
 
 INCH = 0.0254
@@ -152,11 +152,6 @@ def test_the_constants_of_equation_10_are_those_of_the_thesis_to_the_last_digit(
     for name, phi in (("steady_distance", 1.0), ("twist", -10.0), ("lateral_drift", -1.0)):
         metrics = Metrics(**dict.fromkeys(METRICS, 0.0) | {name: 0.1234567})
         assert compute_fitness(metrics, scenario.objective) == phi * (0.1234567 / INCH)
-
-
-def test_the_inverse_of_a_unit_times_the_unit_is_one() -> None:
-    units = {"": "", "m": "1/m", "m/s": "s/m", "1/m": "m", "N/s": "s/N"}
-    assert {unit: inverse(unit) for unit in units} == units
 
 
 @pytest.mark.parametrize(

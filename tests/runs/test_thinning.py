@@ -18,7 +18,7 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.source import load_source
 from tetra_drake.report.run_page import write_report
-from tetra_drake.report.summary import summary
+from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
 AGAIN, ALONE, EDGE, BEYOND = range(20, 24)
@@ -108,7 +108,7 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     run, thinned = runs
     assert thinned.fittest() == run.fittest()
     assert thinned.best(99)["tau_a_s"].notna().all()
-    assert summary(thinned).replace(str(thinned.directory), str(run.directory)) == summary(run)
+    assert run_text(thinned).replace(str(thinned.directory), str(run.directory)) == run_text(run)
     on_map = [table[["trial", "index"]].to_numpy().tolist() for table in map(elites, runs)]
     assert on_map[0] == on_map[1]
     assert [0, ALONE] in on_map[0] and [0, BEYOND] in on_map[0] and [0, EDGE] not in on_map[0]

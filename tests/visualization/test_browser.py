@@ -14,13 +14,15 @@ import sys
 import animation
 import numpy as np
 import pytest
+from helpers import quick_figures
 from helpers.meshcat_page import unpack
+from helpers.synthetic_run import tiny_scenario, write_run
 from matplotlib.colors import hex2color, rgb_to_hsv
 from matplotlib.image import imread
 from PIL import Image, ImageSequence
 
-from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.report.run_page import write_report
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.visualization.replay import frame_samples, save_replay
@@ -88,6 +90,7 @@ def page(browser, replay):
         yield loaded
 
 
+@pytest.mark.slow
 def test_pages_that_share_a_viewer_play_and_say_so_where_it_is_missing(
     browser, trajectory, tmp_path
 ):
@@ -128,13 +131,13 @@ def test_cables_are_seen_and_move_to_the_right(page):
     columns = []
     for time in (0.0, 5.0):
         animation.show_instant(page, time)
-        url = page.evaluate("viewer.capture_image(900, 600)")  # without the texts over it
+        url = page.evaluate("viewer.capture_image(600, 400)")  # without the texts over it
         png = base64.b64decode(url.removeprefix("data:image/png;base64,"))
         pixels = {
             name: pixels_of(imread(io.BytesIO(png), format="png")[..., :3], name)
             for name in ("actuated", "outer", "inner")
         }
-        assert min(map(len, pixels.values())) > 100
+        assert min(map(len, pixels.values())) > 20
         columns.append(pixels["inner"][:, 1].mean())
     assert columns[1] > columns[0] + 10
 
@@ -166,7 +169,7 @@ def test_traces_grow_while_the_page_plays(page):
 def test_every_window_shows_the_whole_robot_and_its_path(page, trajectory):
     animation.show_instant(page, 0.0)
     points = trajectory["p_WN"].values[::50].reshape(-1, 3).tolist()
-    for width, height in ((500, 700), (640, 360), (300, 600), (1000, 300)):
+    for width, height in ((300, 600), (1000, 300)):
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_function(f"viewer.renderer.domElement.width == {width}")
         seen = page.evaluate(
@@ -213,6 +216,7 @@ def test_a_page_is_filmed_and_its_end_pictured_as_wide_as_files_may_be_large(
     assert dark[0] == 0 < 100 < dark[1], "only the picture shows the paths"
 
 
+@pytest.mark.slow
 def test_a_simulation_can_be_watched_as_it_runs(browser, tmp_path):
     short = "base: thesis\nname: short\nsimulation: {duration: 1 s, steady_from: 0.5 s}\n"
     (tmp_path / "short.yaml").write_text(short)
@@ -239,29 +243,22 @@ def test_a_simulation_can_be_watched_as_it_runs(browser, tmp_path):
     assert len(matrices) > 10, "it was shown moving"
 
 
-TINY = """\
-base: thesis
-name: tiny <i>"run"</i> &
-simulation: {duration: 0.3 s, steady_from: 0.1 s, engine: compiled}
-evolution: {population: 3, tournament: 2}
-"""
-
-
-def test_the_report_of_a_run_shows_its_figures_and_leads_to_the_replay(browser, tmp_path):
-    (tmp_path / "tiny.yaml").write_text(TINY)
-    options = ["--scenario", str(tmp_path / "tiny.yaml"), "--out", str(tmp_path / "run")]
-    counts = ["--trials", "1", "--evaluations", "14", "--workers", "1"]
-    assert main(["evolve", *options, *counts]) == 0
-    with opened(browser, (tmp_path / "run" / "report.html").as_uri()) as page:
+def test_the_report_of_a_run_shows_its_figures_and_leads_to_the_replay(
+    browser, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("tetra_drake.figures.book.save_figure", quick_figures.save_figure)
+    scenario = tiny_scenario(name='tiny <i>"run"</i> &')
+    run = write_run(tmp_path / "run", [[[(1.0, 0), (2.0, 1)]]], scenario=scenario)
+    _, replay, report = write_report(run)
+    with opened(browser, report.as_uri()) as page:
         page.wait_for_load_state("networkidle")
-        assert page.title().startswith('tiny <i>"run"</i> &, seed 0')
+        assert page.title().startswith('tiny <i>"run"</i> &, seed 7')
         assert page.locator("i").count() == 0
-        drawn = list((tmp_path / "run" / "figures").glob("*.svg"))
-        assert page.locator("img").count() == len(drawn) >= 9
+        assert page.locator("img").count() >= 9
         assert page.evaluate("[...document.images].every(image => image.naturalWidth > 100)")
         for width in (400, 1280):
             page.set_viewport_size({"width": width, "height": 800})
             assert page.evaluate("document.documentElement.scrollWidth") <= width
-        page.locator("a[href='replay.html']").first.click()
+        page.locator(f"a[href='{replay.name}']").first.click()
         animation.wait_until_loaded(page)
         assert page.evaluate("viewer.animator.duration") == pytest.approx(0.3)

@@ -41,9 +41,8 @@ class FakeTime:
 
 @pytest.fixture
 def short(scenario):
-    return scenario.with_changes(
-        {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
-    )
+    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
+    return scenario.with_changes({"robot.tetrahedra": 2} | times)
 
 
 @pytest.fixture

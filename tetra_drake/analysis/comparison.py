@@ -1,4 +1,7 @@
-"""How well runs search: the best of their trials against evaluations, side by side."""
+"""How well runs search: the best of their trials against what they cost, side by side.
+
+Costs are numbers of simulations: an evaluation has one in each draw of disturbances.
+"""
 
 from __future__ import annotations
 
@@ -16,16 +19,10 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.method import FITNESS
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number
-from tetra_drake.formatting import aligned, fixed, ranged
 from tetra_drake.scenario.load import differences
-from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
     import pandas
-
-EVALUATIONS, SIMULATIONS = "evaluations", "simulations"
-"""What search is paid in: simulations where runs differ in how many draws of disturbances an
-evaluation has."""
 
 QUARTILES = (0.25, 0.5, 0.75)
 
@@ -37,8 +34,6 @@ _SEARCH = ("evolution", "optimizer")
 class Compared:
     """What compare() has found. Fitness is what all runs maximise, so it is what is compared."""
 
-    unit: str
-    """EVALUATIONS or SIMULATIONS, of which all costs are numbers."""
     common: int
     """Where the run with the least cost ends."""
     reach: float | None
@@ -63,25 +58,20 @@ class Compared:
 def compare(
     directories: Sequence[str | Path],
     *,
-    labels: Sequence[str] | None = None,
     reach: float | None = None,
 ) -> Compared:
     """Compares how runs of one objective search, finished or not.
 
-    labels: of the runs, by default the names of their folders.
     reach: a distance (m); the result says when it was walked.
 
-    Raises InputError where objectives differ, labels are not one for each run, or a run has no
-    fitness yet.
+    Raises InputError where objectives differ, a run is given twice, or one has no fitness yet.
     """
     import pandas
 
-    runs = _labelled([load_run(directory) for directory in directories], labels)
+    runs = _labelled([load_run(directory) for directory in directories])
     notes = _differences(runs)
     draws = {label: run.manifest.scenario.draws for label, run in runs.items()}
-    unit = EVALUATIONS if len({*draws.values()}) == 1 else SIMULATIONS
-    costs = {label: count if unit == SIMULATIONS else 1 for label, count in draws.items()}
-    searches = {label: _trials(run, costs[label]) for label, run in runs.items()}
+    searches = {label: _trials(run, draws[label]) for label, run in runs.items()}
     ends = {label: _end(trials) for label, trials in searches.items()}
     common = min(ends.values())
     rows = [
@@ -105,7 +95,6 @@ def compare(
     }
     curves = [_curve(t, ends[label]).assign(run=label) for label, t in searches.items()]
     return Compared(
-        unit=unit,
         common=common,
         reach=reach,
         trials=table,
@@ -198,16 +187,17 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     return found | {"share": float(np.isfinite(trials["reached"]).mean())}
 
 
-def _labelled(runs: Sequence[Run], labels: Sequence[str] | None) -> dict[str, Run]:
-    """The runs by different labels; InputError where there are none."""
-    if labels is None:
-        labels = [run.directory.resolve().name for run in runs]
-        if len({*labels}) < len(labels):
-            labels = [str(run.directory) for run in runs]
-    if len({*labels}) < len(labels) or len(labels) != len(runs):
-        problem = f"found {', '.join(labels)}; expected {len(runs)} different ones, one for a run"
-        raise InputError("labels", "", problem)
-    return dict(zip(labels, runs, strict=True))
+def _labelled(runs: Sequence[Run]) -> dict[str, Run]:
+    """The runs by the names of their folders, by their paths where names are the same."""
+    labels = [run.directory.resolve().name for run in runs]
+    if len({*labels}) < len(labels):
+        labels = [str(run.directory) for run in runs]
+    labelled: dict[str, Run] = {}
+    for label, run in zip(labels, runs, strict=True):
+        if label in labelled:
+            raise InputError(label, "", "is given twice, expected different runs")
+        labelled[label] = run
+    return labelled
 
 
 def _differences(runs: Mapping[str, Run]) -> list[str]:
@@ -236,70 +226,12 @@ def _objective(run: Run) -> tuple[str, Mapping[str, float]]:
     return name, terms if name == FITNESS else {}
 
 
-def to_json(compared: Compared) -> dict[str, Any]:
-    """The summary as JSON holds it, lengths in m; null for what is infinite or unknown."""
+def comparison_numbers(compared: Compared) -> dict[str, Any]:
+    """The content of summary.json, lengths in m; null for what is infinite or unknown."""
     rows = compared.runs.reset_index().to_dict("records")
     return {
-        "unit": compared.unit,
         "common": compared.common,
         "reach": compared.reach,
         "notes": compared.notes,
         "runs": [{key: json_number(value) for key, value in row.items()} for row in rows],
     }
-
-
-def describe(compared: Compared) -> str:
-    """The summary as tables for printing, distances in inches."""
-    unit, common = compared.unit, compared.common
-    texts = [
-        f"Fitness of the best of each trial at {common} {unit}, where the shortest run ends, and "
-        "in\nthe end: interquartile mean over trials, in brackets its 95 % confidence interval.",
-        aligned(
-            [["run", "trials", unit, f"at {common}", "in the end"]]
-            + [[label, *_fitness(row)] for label, row in compared.runs.iterrows()]
-        ),
-        "Distance of the fittest gait of each trial in inches, likewise; seconds per evaluation"
-        + _reach_note(compared),
-        aligned(
-            [["run", "distance", "seconds", *_reach_headings(compared)]]
-            + [[label, *_distance(compared, row)] for label, row in compared.runs.iterrows()]
-        ),
-    ]
-    return "\n\n".join([*texts, *(f"note: {note}" for note in compared.notes)])
-
-
-def reach_text(reach: float) -> str:
-    """The distance to be reached, in inches."""
-    return f"{reach / INCH:.4g} in"
-
-
-def _fitness(row: pandas.Series) -> list[str]:
-    means = (ranged(*row[[f"{n}_mean", f"{n}_low", f"{n}_high"]]) for n in ("at_common", "fitness"))
-    return [f"{row['trials']:.0f}", f"{row['cost']:.0f}", *means]
-
-
-def _reach_note(compared: Compared) -> str:
-    if compared.reach is None:
-        return "."
-    return (
-        f";\n{compared.unit} until the fittest so far walks {reach_text(compared.reach)}, median "
-        "over the trials, in brackets\nquartiles; trials in which it does."
-    )
-
-
-def _reach_headings(compared: Compared) -> list[str]:
-    return [] if compared.reach is None else [f"to {reach_text(compared.reach)}", "trials"]
-
-
-def _distance(compared: Compared, row: pandas.Series) -> list[str]:
-    mean = ranged(*(row[["distance_mean", "distance_low", "distance_high"]] / INCH))
-    cells = [mean, fixed(row["wall_time"], 3)]
-    if compared.reach is not None:
-        low, median, high = map(_cost, row[["reached_low", "reached", "reached_high"]])
-        there = row["share"] * row["trials"]
-        cells += [f"{median} ({low} to {high})", f"{there:.0f} of {row['trials']:.0f}"]
-    return cells
-
-
-def _cost(cost: float) -> str:
-    return f"{cost:.0f}" if math.isfinite(cost) else "never"

@@ -8,13 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from tetra_drake.analysis.statistics import interval, share_interval
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import json_number
-from tetra_drake.formatting import aligned, fixed, ranged, signed
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult, versions
 from tetra_drake.robot.gait import Gait
@@ -28,7 +25,6 @@ from tetra_drake.scenario.disturbances import (
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import tree_of
-from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
     import pandas
@@ -216,34 +212,16 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
     rows = {}
     for gait, draws in judgement.compared(judgement.draws).groupby("gait", sort=False):
         distance, kept = draws["distance"], draws["kept"]
-        rows[gait] = {
-            "undisturbed": draws["undisturbed"].iloc[0],
-            **{name: distance.quantile(share) for name, share in QUANTILES.items()},
-            "mean": distance.mean(),
-            **dict(zip(("mean_low", "mean_high"), interval(distance), strict=True)),
-            "kept": kept.mean(),
-            **dict(
-                zip(
-                    ("kept_low", "kept_high"),
-                    share_interval(int(kept.sum()), len(kept)),
-                    strict=True,
-                )
-            ),
-            "failed": int(draws["failure"].notna().sum()),
-            "missed": int((draws["missed"] != "").sum()),
-        }
+        row = {"undisturbed": draws["undisturbed"].iloc[0]}
+        row |= {name: distance.quantile(share) for name, share in QUANTILES.items()}
+        row["mean"] = distance.mean()
+        row["mean_low"], row["mean_high"] = interval(distance)
+        row["kept"] = kept.mean()
+        row["kept_low"], row["kept_high"] = share_interval(int(kept.sum()), len(kept))
+        row["failed"] = int(draws["failure"].notna().sum())
+        row["missed"] = int((draws["missed"] != "").sum())
+        rows[gait] = row
     return pandas.DataFrame.from_dict(rows, orient="index").rename_axis("gait")
-
-
-def over_gaits(judgement: Judgement) -> pandas.DataFrame:
-    """Medians over the gaits of columns of by_gait(): undisturbed, mean, kept. Columns: median, and
-    low and high, the 95 % confidence interval if gaits are drawn anew."""
-    import pandas
-
-    gaits = by_gait(judgement)[["undisturbed", "mean", "kept"]]
-    rows = {name: [values.median(), *interval(values, np.median)] for name, values in gaits.items()}
-    table = pandas.DataFrame.from_dict(rows, orient="index", columns=["median", "low", "high"])
-    return table.rename_axis("of")
 
 
 def by_change(judgement: Judgement) -> pandas.DataFrame:
@@ -271,17 +249,16 @@ def rank_correlations(judgement: Judgement) -> pandas.DataFrame:
 
     settings = judgement.scenario.disturbances
     keys = list(settings.spreads) if settings else []
-    rows = {}
-    for gait, draws in judgement.draws.dropna(subset="distance").groupby("gait", sort=False):
-        ranks = draws[["distance", *keys]].rank()
-        rows[gait] = [ranks["distance"].corr(ranks[key]) for key in keys]
+    rows = {
+        gait: draws[["distance", *keys]].corr(method="spearman").loc["distance", keys]
+        for gait, draws in judgement.draws.dropna(subset="distance").groupby("gait", sort=False)
+    }
     return pandas.DataFrame.from_dict(rows, orient="index", columns=keys)
 
 
-def to_json(judgement: Judgement) -> dict[str, Any]:
-    """The summaries as JSON holds them, in SI: gaits, over_gaits and changes, and what they are
-    of."""
-    tables = {"gaits": by_gait, "over_gaits": over_gaits, "changes": by_change}
+def robustness_numbers(judgement: Judgement) -> dict[str, Any]:
+    """The content of summary.json, in SI: gaits and changes, and what they are of."""
+    tables = {"gaits": by_gait, "changes": by_change}
     return {
         "versions": versions(),
         "scenario": judgement.scenario.name,
@@ -297,63 +274,6 @@ def to_json(judgement: Judgement) -> dict[str, Any]:
     }
 
 
-def describe(judgement: Judgement) -> str:
-    """The summaries as tables for printing, distances in inches."""
-    gaits, count = by_gait(judgement), judgement.draws["draw"].nunique()
-    require = bool(judgement.scenario.require)
-    texts = [
-        f"Distance in inches under {count} draws of the disturbances. A gait keeps a draw in which "
-        f"it loses at\nmost {100.0 * LOSS:g} % of its undisturbed distance"
-        f"{' and misses no requirement' * require}.\nIn brackets: 95 % confidence intervals.",
-        aligned(_gait_cells(gaits, missed=require)),
-    ]
-    if len(gaits) > 1:
-        over = over_gaits(judgement)
-        before, mean = (inches(*over.loc[name]) for name in ("undisturbed", "mean"))
-        texts.append(
-            f"Median over {len(gaits)} gaits: undisturbed {before}, mean {mean},\n"
-            f"keeps {percents(*over.loc['kept'])} of the draws."
-        )
-    texts.append(
-        "What hurts most: change of the distance by one change alone, in inches; Spearman's rank\n"
-        "correlation of factor and distance over the draws of a gait, mean and median size.\n"
-        f"Chance alone gives up to {chance(count):.2f}."
-    )
-    return "\n\n".join([*texts, aligned(_change_cells(by_change(judgement)))])
-
-
 def chance(draws: int) -> float:
     """The size that 95 % of the rank correlations of unrelated numbers do not reach."""
     return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))
-
-
-def _gait_cells(gaits: pandas.DataFrame, *, missed: bool) -> list[list[str]]:
-    numbers, counts = ("undisturbed", "5 %", "50 %", "95 %"), ("failed", "missed")[: 1 + missed]
-    rows = [["gait", *numbers, "mean", "keeps", *counts]]
-    for gait, row in gaits.iterrows():
-        mean = inches(*row[["mean", "mean_low", "mean_high"]])
-        kept = percents(*row[["kept", "kept_low", "kept_high"]])
-        lengths, integers = (row[name] / INCH for name in numbers), (row[name] for name in counts)
-        name = str(gait) if len(str(gait)) < 12 else f"{str(gait)[:11]}…"
-        rows.append([name, *map(fixed, lengths), mean, kept, *map("{:.0f}".format, integers)])
-    return rows
-
-
-def _change_cells(changes: pandas.DataFrame) -> list[list[str]]:
-    rows = [["changed", "median change", "worst", "failed", "correlation", "size"]]
-    for what, row in changes.iterrows():
-        lengths = [fixed(row["median"] / INCH), signed(row["worst"] / INCH)]
-        ranks = [signed(row["correlation"]), fixed(row["correlation_size"])]
-        rows.append([str(what), *lengths, f"{row['failed']:.0f}", *ranks])
-    return rows
-
-
-def inches(value: float, low: float, high: float) -> str:
-    """A length (m) with its confidence interval."""
-    return ranged(value / INCH, low / INCH, high / INCH)
-
-
-def percents(value: float, low: float, high: float) -> str:
-    """A share with its confidence interval, which is left out where it has no width."""
-    text = f"{100.0 * value:.0f} %"
-    return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"

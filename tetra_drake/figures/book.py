@@ -16,12 +16,9 @@ from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.study import Study
 from tetra_drake.figures.style import save_figure
-from tetra_drake.files import write_whole
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
-
-TWO_BEST = "two_best.csv"
 
 
 def draw_trajectory(trajectory: xarray.Dataset, scenario: Scenario, folder: Path) -> dict[str, str]:
@@ -42,12 +39,8 @@ def draw_trajectory(trajectory: xarray.Dataset, scenario: Scenario, folder: Path
 
 
 def draw_run(study: Study, folder: Path) -> dict[str, str]:
-    """As draw_trajectory() of its best gait, with the figures of a run and, as CSV, the table of
-    its two best gaits."""
+    """As draw_trajectory() of its best gait, with the figures of a run."""
     run, initial, best = study.run, study.initial, study.best
-    table = fitness.two_best(run, study.trial)
-    if table is not None:
-        write_whole(folder / TWO_BEST, table.to_csv())
     pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
     trials = fitness.initial_extremes(run).index
     if len(trials):

@@ -15,7 +15,7 @@ from tetra_drake.analysis.robustness import (
     by_change,
     by_gait,
     chance,
-    to_json,
+    robustness_numbers,
 )
 from tetra_drake.figures.style import OKABE_ITO, REFERENCE, SHADE, common_style, save_findings
 from tetra_drake.formatting import fixed
@@ -32,7 +32,7 @@ def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
     folder; returns the names. Raises InputError if a file cannot be written."""
     given = {"draws": judgement.draws, "alone": judgement.alone}
     tables = {name: judgement.compared(table) for name, table in given.items()}
-    figure, summary = robustness(judgement), to_json(judgement)
+    figure, summary = robustness(judgement), robustness_numbers(judgement)
     return save_findings(figure, folder, "robustness", tables=tables, summary=summary)
 
 

@@ -17,7 +17,6 @@ from tetra_drake.figures.style import (
     make_figure,
 )
 from tetra_drake.formatting import fixed
-from tetra_drake.robot.gait import ParameterSpace
 
 _LEGEND_ROWS = 14
 """Trials per column of a legend beside the axes."""
@@ -132,20 +131,3 @@ def fitness_of_trials(run: Run) -> Figure:
     figure.legend(loc="outside right center", ncols=columns, handlelength=3.2)
     figure.suptitle(f"Fitness of each trial\nrises in {(last > first).sum()} of {len(last)}")
     return figure
-
-
-def two_best(run: Run, trial: int) -> pandas.DataFrame | None:
-    """The two fittest different gaits of a trial. Index: fitness and the names of the parameters.
-
-    Columns: best, second and difference (absolute). None if there are no two such gaits.
-    """
-    pair = run.best(2).query("trial == @trial")
-    if len(pair) < 2:
-        return None
-    rows = zip(pair["fitness"], pair["index"], strict=True)
-    best, second = ([fitness, *run.vector(trial, index)] for fitness, index in rows)
-    parameters = ParameterSpace.of(run.manifest.scenario).names
-    names = pandas.Index(["fitness", *parameters], name="parameter")
-    table = pandas.DataFrame({"best": best, "second": second}, index=names)
-    table["difference"] = (table["best"] - table["second"]).abs()
-    return table

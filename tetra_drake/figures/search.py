@@ -11,13 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from tetra_drake.analysis.comparison import Compared, reach_text, to_json
+from tetra_drake.analysis.comparison import Compared, comparison_numbers
 from tetra_drake.figures.style import (
     common_style,
     line_style,
     make_figure,
     save_findings,
 )
+from tetra_drake.scenario.units import shown
 
 _LEGEND_WIDTH = 60
 """Letters below an axis."""
@@ -30,7 +31,7 @@ def save_comparison(compared: Compared, folder: Path) -> list[str]:
     """Writes trials.csv, curves.csv, summary.json (lengths in m) and the figure to the folder;
     returns the names. Raises InputError if a file cannot be written."""
     tables = {"trials": compared.trials, "curves": compared.curves}
-    figure, summary = search(compared), to_json(compared)
+    figure, summary = search(compared), comparison_numbers(compared)
     return save_findings(figure, folder, "search", tables=tables, summary=summary)
 
 
@@ -55,13 +56,13 @@ def search(compared: Compared) -> Figure:
         if compared.reach is not None:
             _draw_reached(row[1], compared, label, ends[label], style)
     for axes in row:
-        axes.set(xlabel=compared.unit, xscale="log", xlim=(first, 1.1 * ends.max()))
+        axes.set(xlabel="simulations", xscale="log", xlim=(first, 1.1 * ends.max()))
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
     row[0].set(title="median and quartiles", ylabel="best fitness so far")
     figure.legend(row[0].lines, labels, loc="outside lower center", ncols=across)
-    figure.suptitle(f"How well runs search, by {compared.unit}")
+    figure.suptitle("How well runs search, by simulations")
     return figure
 
 
@@ -79,4 +80,4 @@ def _draw_reached(axes: Axes, compared: Compared, label: str, end: int, style: A
     there = np.sort(trials["reached"][trials["reached"] <= end])
     shares = 100.0 * np.arange(len(there) + 1) / len(trials)
     axes.plot([0.0, *there, end], [*shares, shares[-1]], **style)
-    axes.set(title=f"{reach_text(compared.reach)} reached", ylabel="trials (%)", ylim=(-3.0, 103.0))
+    axes.set(title=f"{shown(compared.reach, 'm')} reached", ylabel="trials (%)", ylim=(-3.0, 103.0))

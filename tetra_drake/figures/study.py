@@ -9,33 +9,28 @@ import xarray
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run, gait_label
-from tetra_drake.results.measures import distance_walked
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait
-from tetra_drake.scenario.units import INCH
 
 
 @dataclass(frozen=True)
-class Walk:
-    """A gait of a run, simulated again."""
+class GaitMotion:
+    """A gait of a run and its motion, simulated again."""
 
     gait: Gait
     recorded: pandas.Series
     """Its row of the run's evaluations."""
     trajectory: xarray.Dataset
-    headline: str
-    """What the gait does, simulated again."""
+    title: str
+    """The gait's name and what it does, simulated again."""
+    distance_in: float
+    """The distance simulated again: as recorded, unless that was by other versions or among
+    disturbances, which are not simulated again."""
 
     @property
     def label(self) -> str:
         """Trial and number of the evaluation."""
         return gait_label(self.recorded)
-
-    @property
-    def distance_in(self) -> float:
-        """The distance simulated again: as recorded, unless that was by other versions or among
-        disturbances, which are not simulated again."""
-        return float(distance_walked(self.trajectory)[-1]) / INCH
 
 
 @dataclass(frozen=True)
@@ -45,9 +40,9 @@ class Study:
     run: Run
     trial: int
     """The best trial: the one with the fittest gait."""
-    initial: Walk
+    initial: GaitMotion
     """The fittest gait of the best trial's first iteration in which not all failed."""
-    best: Walk
+    best: GaitMotion
     """The fittest gait of the run."""
 
 
@@ -59,18 +54,19 @@ def study_run(run: Run) -> Study:
     """
     trial, index = run.fittest()
     first = run.initial_best(trial)
-    walks = {i: walk_again(run, trial, i) for i in {first, index}}
-    return Study(run=run, trial=trial, initial=walks[first], best=walks[index])
+    motions = {i: simulate_again(run, trial, i) for i in {first, index}}
+    return Study(run=run, trial=trial, initial=motions[first], best=motions[index])
 
 
-def walk_again(run: Run, trial: int, index: int) -> Walk:
+def simulate_again(run: Run, trial: int, index: int) -> GaitMotion:
     """A gait of a run, simulated again. Raises SimulationFailure."""
     gait, scenario = run.gait(trial, index), run.manifest.scenario
     result = simulate(scenario=scenario, gait=gait, record=True)
     assert result.trajectory is not None
-    return Walk(
+    return GaitMotion(
         gait=gait,
         recorded=run.evaluation(trial, index),
         trajectory=result.trajectory,
-        headline=headline(scenario, vars(result.metrics)),
+        title=f"{gait.name}: {headline(scenario, vars(result.metrics))}",
+        distance_in=result.metrics.distance_in,
     )

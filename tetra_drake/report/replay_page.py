@@ -21,7 +21,7 @@ def write_replay(
     viewer: Path | None = None,
     warn: Callable[[str], None] = lambda text: None,
 ) -> str:
-    """Writes the replay page of what load_recording() finds; returns the page's title.
+    """Writes the replay page of what load_or_simulate() finds; returns the page's title.
 
     With `viewer`, a file, the page shares Meshcat's script with others (see save_replay); `warn` as
     of load_source().
@@ -31,18 +31,18 @@ def write_replay(
         if file.is_dir():
             raise InputError(file, "", "is a directory, expected a file to write")
         check_folder(file.parent)
-    recording = load_recording(source, scenario=scenario, warn=warn)
+    stored = load_or_simulate(source, scenario=scenario, warn=warn)
     save_replay(
         out,
-        scenario=recording.scenario,
-        trajectory=recording.trajectory,
-        title=recording.title,
+        scenario=stored.scenario,
+        trajectory=stored.trajectory,
+        title=stored.title,
         viewer=viewer,
     )
-    return recording.title
+    return stored.title
 
 
-def load_recording(
+def load_or_simulate(
     source: Path,
     *,
     scenario: str | None = None,

@@ -11,18 +11,16 @@ import pandas
 
 from tetra_drake.analysis.elites import chosen, distinct_gaits, elites
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.evolution.run_record import BEST_GAIT, SCENARIO, trial_folder
-from tetra_drake.figures.book import TWO_BEST, draw_run, draw_trajectory
-from tetra_drake.figures.fitness import two_best
-from tetra_drake.figures.study import Study, study_run, walk_again
+from tetra_drake.figures.book import draw_run, draw_trajectory
+from tetra_drake.figures.study import Study, simulate_again, study_run
 from tetra_drake.files import check_folder, write_whole
-from tetra_drake.formatting import render
+from tetra_drake.formatting import Table, fixed, render
 from tetra_drake.report.result_folder import RESULT, RUN_MANIFEST, load_result_folder
-from tetra_drake.report.summary import metric_rows, results
+from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
-from tetra_drake.results.result import ground_text, versions
+from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import ParameterSpace, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.metric_units import METRICS, inverse
@@ -47,8 +45,8 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
         draw_run(study_run(load_run(source)), folder)
     elif (source / RESULT).exists():
         check_folder(folder)
-        recording = load_result_folder(source)
-        draw_trajectory(recording.trajectory, recording.scenario, folder)
+        stored = load_result_folder(source)
+        draw_trajectory(stored.trajectory, stored.scenario, folder)
     else:
         problem = f"holds neither {RUN_MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
         raise InputError(source, "", problem)
@@ -64,11 +62,10 @@ def write_report(directory: Path) -> list[Path]:
     """
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
     study = study_run(load_run(directory))
-    scenario, trajectory = study.run.manifest.scenario, study.best.trajectory
+    scenario, best = study.run.manifest.scenario, study.best
     captions = draw_run(study, figures)
     _write_map(study, directory)
-    title = f"{study.best.gait.name}: {study.best.headline}"
-    save_replay(replay, scenario=scenario, trajectory=trajectory, title=title)
+    save_replay(replay, scenario=scenario, trajectory=best.trajectory, title=best.title)
     write_whole(report, render_report(study, captions, folder=figures))
     return [figures, replay, report]
 
@@ -76,17 +73,16 @@ def write_report(directory: Path) -> list[Path]:
 def _write_map(study: Study, directory: Path) -> None:
     """Writes all gaits of the run's map as a table, and the chosen ones as gait files and, but for
     the run's best, replay pages."""
-    run = study.run
+    run, scenario = study.run, study.run.manifest.scenario
     on_map = distinct_gaits(chosen(run))
     if on_map:
         write_whole(directory / ELITES / ELITES_CSV, elites(run).to_csv(index=False))
     for names, row in on_map:
-        walk = walk_again(run, row["trial"], row["index"])
+        motion = simulate_again(run, row["trial"], row["index"])
         file, page = (directory / each for each in _map_files(names, row, study))
-        save_gait(walk.gait, file, run.manifest.scenario)
+        save_gait(motion.gait, file, scenario)
         if page != directory / REPLAY:
-            title, trajectory = f"{walk.gait.name}: {walk.headline}", walk.trajectory
-            save_replay(page, scenario=run.manifest.scenario, trajectory=trajectory, title=title)
+            save_replay(page, scenario=scenario, trajectory=motion.trajectory, title=motion.title)
 
 
 def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[Path, Path]:
@@ -103,8 +99,15 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
     named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded}
     gaits, on_map = distinct_gaits(named), distinct_gaits(chosen(run))
     on_map_files = {n: _map_files(each, gait, study) for each, gait in on_map for n in each}
-    walks = {walk.label: walk for walk in (study.best, study.initial)}
-    changes = {n: abs(walk.distance_in - walk.recorded["distance_in"]) for n, walk in walks.items()}
+    space = ParameterSpace.of(manifest.scenario)
+    best_values = zip(space.names, space.vector(study.best.gait), strict=True)
+    parameters = [[name, fixed(value, 4)] for name, value in best_values]
+    again, changed = {}, {}
+    for motion in (study.best, study.initial):
+        again[motion.label] = motion.distance_in
+        change = abs(motion.distance_in - motion.recorded["distance_in"])
+        if change > 1e-6:
+            changed[motion.label] = change
     return render(
         "report/report.html.jinja",
         run=run,
@@ -112,26 +115,27 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         ground=ground_text(manifest.scenario),
         best=study.best,
         walked=headline(manifest.scenario, study.best.recorded),
-        again={label: walk.distance_in for label, walk in walks.items()},
-        changed={label: inches for label, inches in changes.items() if inches > 1e-6},
+        again=again,
+        changed=changed,
         versions=versions(),
         json=json.dumps,
         differences=differences(manifest.scenario, load_scenario("thesis")),
         results=results(run),
-        on_diagram={trial: distance for trial, _, distance in best_distances(run)},
+        trials=trials_table(run),
         objective=_terms(manifest.scenario.objective, inverse),
         require=_terms(manifest.scenario.require, str),
-        gaits=[(names, gait_label(gait)) for names, gait in gaits],
+        gaits=gaits,
+        label=gait_label,
         links={"fittest": best_gait},
-        metrics=metric_rows([gait for _, gait in gaits]),
-        map=[(names, gait_label(gait)) for names, gait in on_map],
+        metrics=_metrics(gaits),
+        map=on_map,
         map_links={name: files[0] for name, files in on_map_files.items()},
         map_pages={name: files[1] for name, files in on_map_files.items()},
-        map_metrics=metric_rows([gait for _, gait in on_map]) if on_map else [],
-        parameters=_parameters(study),
+        map_metrics=_metrics(on_map) if on_map else None,
+        parameters=Table(["", "value"], parameters),
         pictures=[(_embedded(folder / f"{name}.svg"), captions[name]) for name in captions],
         gait=best_gait,
-        files={"scenario": SCENARIO, "replay": REPLAY, "figures": FIGURES, "two_best": TWO_BEST}
+        files={"scenario": SCENARIO, "replay": REPLAY, "figures": FIGURES}
         | {"elites": Path(ELITES) / ELITES_CSV},
         settings=dump_scenario(manifest.scenario),
     )
@@ -143,13 +147,9 @@ def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str]) -> str:
     return ", ".join(f"{n}: {shown(x, unit_of(METRICS[n]))}" for n, x in weights.items())
 
 
-def _parameters(study: Study) -> pandas.DataFrame:
-    """The best gait, beside the second best of its trial if there is one; rows: parameters."""
-    table = two_best(study.run, study.trial)
-    if table is not None:
-        return table
-    space = ParameterSpace.of(study.run.manifest.scenario)
-    return pandas.DataFrame({"best": space.vector(study.best.gait)}, index=space.names)
+def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]]) -> Table:
+    """The metrics of gaits that have names."""
+    return metrics_table({names[0]: gait for names, gait in gaits})
 
 
 def _embedded(picture: Path) -> str:

@@ -1,10 +1,11 @@
-"""The results of a run in a few lines."""
+"""Texts that `simulate` and `evolve` print: the numbers of a result, and those of a run."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,80 +13,141 @@ from tetra_drake.engines.simulate import available_cores
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import TrialStatus
-from tetra_drake.formatting import aligned, duration, fixed, signed
+from tetra_drake.formatting import Table, duration, fixed, signed
 from tetra_drake.optimizers.steady_state import CHILDREN
+from tetra_drake.results.metrics import headline_metric, unmet_requirements
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import customary
+from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario
+from tetra_drake.scenario.sections import tree_of
+from tetra_drake.scenario.terrain_kinds import Flat
+from tetra_drake.scenario.units import customary, shown
 
 if TYPE_CHECKING:
     import pandas
 
 
-class MetricRow(NamedTuple):
-    """A metric of some gaits as people read it."""
-
-    name: str
-    unit: str
-    values: list[str]
-
-
-def metric_rows(gaits: Sequence[pandas.Series]) -> list[MetricRow]:
-    """Fitness and metrics of gaits, rows of `Run.evaluations`; what none of them has, as in older
-    records, is left out. In the end, the share of time that each tetrahedron is lifted, in %."""
-    rows = [MetricRow("fitness", "", [fixed(gait["fitness"], 3) for gait in gaits])]
+def metrics_table(gaits: Mapping[str, Mapping[str, Any] | pandas.Series]) -> Table:
+    """Fitness and metrics of gaits, a column for each, given as rows of `Run.evaluations`; what
+    none of them has, as in older records, is left out."""
+    columns = [*gaits.values()]
+    rows = [["fitness", *(fixed(gait["fitness"], 3) for gait in columns)]]
     for name, unit in METRICS.items():
         size, read = customary(unit)
-        values = [fixed(gait[name] / size, 3) for gait in gaits]
-        rows.append(MetricRow(name.replace("_", " "), read, values))
+        title = name.replace("_", " ") + (f" ({read})" if read else "")
+        rows.append([title, *(fixed(gait[name] / size, 3) for gait in columns)])
         if name == "distance":
-            worst = [fixed(gait.get("worst_distance_in", math.nan), 3) for gait in gaits]
-            rows.append(MetricRow("distance, worst draw", "in", worst))
-    kept = [fixed(100.0 * gait.get("kept", math.nan), 0) for gait in gaits]
-    rows.append(MetricRow("draws kept, disturbed", "%", kept))
-    shares = [[gait[n] for n in gait.index if n.startswith("lifted_T")] for gait in gaits]
-    percents = [" ".join(fixed(100.0 * share, 0) for share in each) for each in shares]
-    rows.append(MetricRow(f"lifted, T1 to T{len(shares[0])}", "%", percents))
-    return [row for row in rows if any(value.strip("- ") for value in row.values)]
+            worst = (gait.get("worst_distance_in", math.nan) for gait in columns)
+            rows.append(["distance, worst draw (in)", *(fixed(inches, 3) for inches in worst)])
+    kept = (gait.get("kept", math.nan) for gait in columns)
+    rows.append(["draws kept, disturbed (%)", *(fixed(100.0 * share, 0) for share in kept)])
+    shares = [[x for name, x in gait.items() if name.startswith("lifted_T")] for gait in columns]
+    lifted = [" ".join(fixed(100.0 * share, 0) for share in each) for each in shares]
+    rows.append([f"lifted, T1 to T{len(shares[0])} (%)", *lifted])
+    with_numbers = [row for row in rows if any(value.strip("- ") for value in row[1:])]
+    return Table(["", *gaits], with_numbers)
 
 
-def summary(run: Run) -> str:
-    """The lines printed at the end of a run. Distances are those of the fittest gaits."""
-    lines = [_trial(status) for status in run.statuses]
-    for trial, _, on_diagram in best_distances(run):
-        if math.isfinite(on_diagram):
-            lines[trial] += f" ({fixed(on_diagram)} in on the Drake diagram)"
-    lines += aligned(results(run)).splitlines()
-    lines += _metrics_of_the_best(run)
-    replay, report = run.directory / "replay.html", run.directory / "report.html"
-    if replay.exists() and report.exists():
-        lines.append(f"open {replay} in a browser to see the best gait walk, {report} for more")
+def result_text(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
+    """The metrics of a simulation, what it missed, and what it took."""
+    metrics = result.metrics
+    lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
+    if ground := ground_text(scenario):
+        lines.append(f"ground: {ground}")
+    table = metrics_table({"": {"fitness": result.fitness} | vars(metrics)})
+    first = headline_metric(scenario.objective, vars(metrics)).replace("_", " ")
+    rows = sorted(table.rows, key=lambda row: not row[0].startswith(first))
+    lines.append(Table(["metric", "value"], rows).text())
+    unmet = unmet_requirements(metrics, scenario.require)
+    lines += [f"{text} (requirement not met)" for text in unmet]
+    seconds, speed = fixed(result.wall_time, 1), fixed(result.duration / result.wall_time, 1)
+    lines.append(f"simulated in {seconds} s, {speed} times real time: {_work_text(result)}")
     return "\n".join(lines)
 
 
-def _metrics_of_the_best(run: Run) -> list[str]:
-    """The metrics of the fittest gait beside those of its trial's best initial one."""
-    if run.best().empty:
-        return []
-    trial, best = run.fittest()
-    gaits = [run.evaluation(trial, index) for index in (run.initial_best(trial), best)]
-    rows = [MetricRow("", "", ["initial", "fittest"]), *metric_rows(gaits)]
-    widths = [max(len(row.values[i]) for row in rows) for i in range(2)]
-    lines = [f"fittest gait, {gait_label(gaits[1])}, beside its trial's fittest initial one:"]
-    for name, unit, values in rows:
-        cells = [value.rjust(width) for value, width in zip(values, widths, strict=True)]
-        lines.append(f"{name:<24}{'  '.join(cells)} {unit}".rstrip())
-    return lines
+def _work_text(result: SimulationResult) -> str:
+    """What the integrator of an engine was asked for, and what it took."""
+    work = result.integrator
+    if result.engine == "mujoco":
+        return f"{work.scheme}, {work.steps} steps of {1e3 * work.accuracy:g} ms"
+    asked = "accuracy {:g}" if result.engine == "drake" else "tolerance {:g} m/s"
+    evaluations = f"{work.derivative_evaluations} derivative evaluations"
+    return f"{work.scheme}, {asked.format(work.accuracy)}, {work.steps} steps, {evaluations}"
 
 
-def _trial(status: TrialStatus) -> str:
-    text = f"trial {status.number}: {status.stop or 'not ended'} after iteration {status.iteration}"
-    text += f", {status.evaluations} evaluations, {status.failures} failed; "
-    if math.isfinite(status.mean_fitness):
-        initial, mean = status.initial_mean_fitness, status.mean_fitness
-        text += f"mean fitness {fixed(initial)} -> {fixed(mean)}, "
-    initial, best = status.initial_best_distance_in, status.best_distance_in
-    return text + f"best distance {fixed(initial)} -> {fixed(best)} in"
+def ground_text(scenario: Scenario) -> str:
+    """On what the robot walks, in a line; empty for the thesis's flat ground and friction.
+
+    As "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)". Lengths are in inches;
+    values that are their defaults are left out, but for the coefficients of friction.
+    """
+    terrain, law = scenario.terrain, scenario.friction
+    if isinstance(law, Coulomb):
+        numbers = {"static": law.static, "kinetic": law.kinetic}
+        friction = f"Coulomb friction ({_listed(numbers | tree_of(law, show=shown))})"
+    elif scenario.simulation.engine == "mujoco":
+        friction = f"MuJoCo's friction (coefficient {MUJOCO_FRICTION:g})"
+    elif isinstance(terrain, Flat):
+        return ""
+    else:
+        friction = "the thesis's friction"
+    sizes = _listed(tree_of(terrain, show=shown))
+    return f"{type(terrain).__name__.lower()}{f' ({sizes})' if sizes else ''}, {friction}"
+
+
+def _listed(values: Mapping[str, Any]) -> str:
+    texts = {k: " ".join(v) if isinstance(v, list) else str(v) for k, v in values.items()}
+    return ", ".join(f"{k} {Path(v).name if k == 'file' else v}" for k, v in texts.items())
+
+
+def run_text(run: Run) -> str:
+    """The lines printed at the end of a run."""
+    texts = [
+        "Trials from the first to the last iteration; distances are those of the fittest gaits.",
+        trials_table(run).text(),
+        Table(["", "this run"], results(run)).text(),
+    ]
+    if not run.best().empty:
+        trial, best = run.fittest()
+        first = run.initial_best(trial)
+        gaits = {"initial": run.evaluation(trial, first), "fittest": run.evaluation(trial, best)}
+        label = gait_label(gaits["fittest"])
+        texts.append(f"The fittest gait, {label}, beside its trial's fittest initial one:")
+        texts.append(metrics_table(gaits).text())
+    replay, report = run.directory / "replay.html", run.directory / "report.html"
+    if replay.exists() and report.exists():
+        texts.append(f"open {replay} in a browser to see the best gait walk, {report} for more")
+    return "\n\n".join(texts)
+
+
+def trials_table(run: Run) -> Table:
+    """The trials of a run from the first to the last iteration, and their best gaits on the Drake
+    diagram if they were evaluated there, too."""
+    trials = run.statuses
+    columns = {
+        "trial": [f"{trial.number}" for trial in trials],
+        "best distance (in)": [
+            _rise(trial.initial_best_distance_in, trial.best_distance_in) for trial in trials
+        ],
+    }
+    if not run.reevaluations.empty:
+        distances = {trial: distance for trial, _, distance in best_distances(run)}
+        on_diagram = [distances.get(trial.number, math.nan) for trial in trials]
+        columns["on the diagram (in)"] = [fixed(distance) for distance in on_diagram]
+    if any(math.isfinite(trial.mean_fitness) for trial in trials):
+        rises = [_rise(trial.initial_mean_fitness, trial.mean_fitness) for trial in trials]
+        columns["mean fitness"] = rises
+    columns["iterations"] = [f"{max(trial.iteration, 0)}" for trial in trials]
+    columns["evaluations"] = [f"{trial.evaluations}" for trial in trials]
+    columns["failed"] = [f"{trial.failures}" for trial in trials]
+    columns["state"] = [trial.stop or "not ended" for trial in trials]
+    return Table([*columns], [*zip(*columns.values(), strict=True)])
+
+
+def _rise(before: float, after: float) -> str:
+    return f"{fixed(before)} → {fixed(after)}"
 
 
 def whole_experiment(scenario: Scenario, *, seconds: float) -> str:

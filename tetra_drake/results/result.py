@@ -1,39 +1,31 @@
-"""SimulationResult: what every engine returns; result.json and the summary made from it."""
+"""SimulationResult, which every engine returns, and result.json, made from it."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import os
 import platform
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tetra_drake.files import json_number, write_whole
-from tetra_drake.formatting import fixed
 from tetra_drake.results.metrics import (
     Totals,
     compute_fitness,
     compute_metrics,
-    headline_metric,
-    unmet_requirements,
 )
 from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.metric_units import Metrics
-from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario, SimulationSection
-from tetra_drake.scenario.sections import tree_of
-from tetra_drake.scenario.terrain_kinds import Flat
-from tetra_drake.scenario.units import INCH, POUND_FORCE, shown
+from tetra_drake.scenario.schema import Scenario, SimulationSection
+from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:
     import xarray
@@ -172,80 +164,3 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
         },
     }
     write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
-
-
-def ground_text(scenario: Scenario) -> str:
-    """On what the robot walks, in a line; empty for the thesis's flat ground and friction.
-
-    As "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)". Lengths are in inches;
-    values that are their defaults are left out, but for the coefficients of friction.
-    """
-    terrain, law = scenario.terrain, scenario.friction
-    if isinstance(law, Coulomb):
-        numbers = {"static": law.static, "kinetic": law.kinetic}
-        friction = f"Coulomb friction ({_listed(numbers | tree_of(law, show=shown))})"
-    elif scenario.simulation.engine == "mujoco":
-        friction = f"MuJoCo's friction (coefficient {MUJOCO_FRICTION:g})"
-    elif isinstance(terrain, Flat):
-        return ""
-    else:
-        friction = "the thesis's friction"
-    sizes = _listed(tree_of(terrain, show=shown))
-    return f"{type(terrain).__name__.lower()}{f' ({sizes})' if sizes else ''}, {friction}"
-
-
-def _listed(values: Mapping[str, Any]) -> str:
-    texts = {k: " ".join(v) if isinstance(v, list) else str(v) for k, v in values.items()}
-    return ", ".join(f"{k} {Path(v).name if k == 'file' else v}" for k, v in texts.items())
-
-
-def summary(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
-    """Metrics, lengths in inches, and what the simulation took, as lines for the terminal."""
-    metrics = result.metrics
-    after = f"from {scenario.simulation.steady_from:g} s on"
-    side = "to the left" if metrics.path_curvature > 0.0 else "to the right"
-    diameter = shown(scenario.robot.strut_diameter, "m")
-    clearance = f"least, between the axes of struts, which overlap below {diameter}"
-    bends = "straight" if math.isinf(metrics.path_radius) else side
-    rows = [
-        ("distance", metrics.distance / INCH, "in", ""),
-        ("steady distance", metrics.steady_distance / INCH, "in", after),
-        ("twist", metrics.twist / INCH, "in", "x1 - x2 at the end: turned about the vertical"),
-        ("lateral drift", metrics.lateral_drift / INCH, "in", ""),
-        ("heading change", math.degrees(metrics.heading_change), "deg", "positive to the left"),
-        ("path radius", metrics.path_radius / INCH, "in", f"{bends}, {after}"),
-        ("actuator work", metrics.actuator_work, "J", after),
-        ("cost of transport", metrics.cost_of_transport, "", "work over weight and way"),
-        ("signal rate", metrics.signal_rate / POUND_FORCE, "lbf/s", "root mean square"),
-        ("lifted", 100.0 * metrics.lifted, "%", "of the time, mean of the tetrahedra"),
-        ("clearance", metrics.clearance / INCH, "in", clearance),
-        ("tension", metrics.tension / POUND_FORCE, "lbf", "least of a cable"),
-        ("travelling", metrics.travelling_index, "", "index of the signals: 0 stand, 1 travel"),
-    ]
-    first = headline_metric(scenario.objective, vars(metrics)).replace("_", " ")
-    rows.sort(key=lambda row: row[0] != first)
-    lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
-    if ground := ground_text(scenario):
-        lines.append(f"  ground: {ground}")
-    for name, value, unit, note in rows:
-        line = f"  {name:<17}{fixed(value):>7} {unit:<5} {f'({note})' if note else ''}"
-        lines.append(line.rstrip())
-    lines.append(f"  {'fitness':<17}{fixed(result.fitness):>7}")
-    unmet = unmet_requirements(metrics, scenario.require)
-    lines += [f"  {text} (requirement not met)" for text in unmet]
-    speed = fixed(result.duration / result.wall_time, 1)
-    lines.append(
-        f"  simulated in {fixed(result.wall_time, 1)} s, {speed} times real time: "
-        f"{_work_text(result)}"
-    )
-    return "\n".join(lines)
-
-
-def _work_text(result: SimulationResult) -> str:
-    """What the integrator of an engine was asked for, and what it took."""
-    work = result.integrator
-    if result.engine == "mujoco":
-        return f"{work.scheme}, {work.steps} steps of {1e3 * work.accuracy:g} ms"
-    asked = "accuracy {:g}" if result.engine == "drake" else "tolerance {:g} m/s"
-    evaluations = f"{work.derivative_evaluations} derivative evaluations"
-    return f"{work.scheme}, {asked.format(work.accuracy)}, {work.steps} steps, {evaluations}"

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import aligned
+from tetra_drake.formatting import Table
 from tetra_drake.robot.actuation import KINDS, Actuation
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import Section
@@ -74,12 +74,12 @@ class Gait:
         numbers = {int(n) for name in by_name for n in name.split()[0].split("->")}
         oscillators = range(1, max(numbers) + 1)
         for kind in KINDS:
-            rows = [["onto", *map(str, oscillators)]]
+            rows = []
             for onto in oscillators:
                 cells = [by_name.get(f"{source}->{onto} {kind}") for source in oscillators]
                 rows.append([str(onto), *("-" if w is None else f"{w:.2f}" for w in cells)])
             lines += ["", f"weights of the {kind}s, a column for each oscillator they come from"]
-            lines.append(aligned(rows))
+            lines.append(Table(["onto", *map(str, oscillators)], rows).text())
         return "\n".join(lines)
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:

@@ -1,0 +1,117 @@
+"""What `robustness` and `compare` print: tables of an analysis, distances in inches."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tetra_drake.analysis.comparison import Compared
+from tetra_drake.analysis.robustness import LOSS, Judgement, by_change, by_gait, chance
+from tetra_drake.formatting import Table, fixed, percents, ranged, signed
+from tetra_drake.scenario.units import INCH, shown
+
+if TYPE_CHECKING:
+    import pandas
+
+_LONGEST_NAME = 12
+"""Letters of a gait's name; longer ones are cut."""
+
+
+def robustness_text(judgement: Judgement) -> str:
+    """How far gaits walk under disturbances, and which of these hurt most."""
+    gaits, count = by_gait(judgement), judgement.draws["draw"].nunique()
+    require = bool(judgement.scenario.require)
+    misses = " and misses no requirement" if require else ""
+    texts = [
+        f"Distance in inches under {count} draws of the disturbances. A gait keeps a draw in which "
+        f"it loses at\nmost {100.0 * LOSS:g} % of its undisturbed distance{misses}.\n"
+        "In brackets: 95 % confidence intervals.",
+        _gaits_table(gaits, with_missed=require).text(),
+        "What hurts most: change of the distance by one change alone, in inches; Spearman's rank\n"
+        "correlation of factor and distance over the draws of a gait, mean and median size.\n"
+        f"Chance alone gives up to {chance(count):.2f}.",
+        _changes_table(by_change(judgement)).text(),
+    ]
+    return "\n\n".join(texts)
+
+
+def _gaits_table(gaits: pandas.DataFrame, *, with_missed: bool) -> Table:
+    lengths = ["undisturbed", "5 %", "50 %", "95 %"]
+    counts = ["failed", "missed"] if with_missed else ["failed"]
+    rows = []
+    for gait, row in gaits.iterrows():
+        name = str(gait)
+        if len(name) >= _LONGEST_NAME:
+            name = f"{name[: _LONGEST_NAME - 1]}…"
+        cells = [name, *(fixed(row[length] / INCH) for length in lengths)]
+        cells.append(ranged(*row[["mean", "mean_low", "mean_high"]] / INCH))
+        cells.append(percents(*row[["kept", "kept_low", "kept_high"]]))
+        rows.append([*cells, *(f"{row[count]:.0f}" for count in counts)])
+    return Table(["gait", *lengths, "mean", "keeps", *counts], rows)
+
+
+def _changes_table(changes: pandas.DataFrame) -> Table:
+    rows = [
+        [
+            str(what),
+            fixed(row["median"] / INCH),
+            signed(row["worst"] / INCH),
+            f"{row['failed']:.0f}",
+            signed(row["correlation"]),
+            fixed(row["correlation_size"]),
+        ]
+        for what, row in changes.iterrows()
+    ]
+    return Table(["changed", "median change", "worst", "failed", "correlation", "size"], rows)
+
+
+def comparison_text(compared: Compared) -> str:
+    """How well runs search, side by side."""
+    texts = [
+        f"Fitness of the best of each trial after {compared.common} simulations, where the "
+        "shortest run ends, and\nin the end: interquartile mean over trials, in brackets its 95 % "
+        "confidence interval.",
+        _fitness_table(compared).text(),
+        "Distance of the fittest gait of each trial in inches, likewise; seconds per evaluation",
+        _distance_table(compared).text(),
+    ]
+    if compared.reach is not None:
+        texts[2] += (
+            f";\nsimulations until the fittest so far walks {shown(compared.reach, 'm')}, "
+            "median over the trials, in brackets\nquartiles; trials in which it does"
+        )
+    texts[2] += "."
+    return "\n\n".join([*texts, *(f"note: {note}" for note in compared.notes)])
+
+
+def _fitness_table(compared: Compared) -> Table:
+    rows = []
+    for label, row in compared.runs.iterrows():
+        at_common, in_the_end = (
+            ranged(*row[[f"{name}_mean", f"{name}_low", f"{name}_high"]])
+            for name in ("at_common", "fitness")
+        )
+        counts = [f"{row['trials']:.0f}", f"{row['cost']:.0f}"]
+        rows.append([str(label), *counts, at_common, in_the_end])
+    headings = ["run", "trials", "simulations", f"after {compared.common}", "in the end"]
+    return Table(headings, rows)
+
+
+def _distance_table(compared: Compared) -> Table:
+    headings = ["run", "distance", "seconds"]
+    if compared.reach is not None:
+        headings += [f"to {shown(compared.reach, 'm')}", "trials"]
+    rows = []
+    for label, row in compared.runs.iterrows():
+        mean = ranged(*row[["distance_mean", "distance_low", "distance_high"]] / INCH)
+        cells = [str(label), mean, fixed(row["wall_time"], 3)]
+        if compared.reach is not None:
+            low, median, high = map(_cost, row[["reached_low", "reached", "reached_high"]])
+            reached_by = row["share"] * row["trials"]
+            cells += [f"{median} ({low} to {high})", f"{reached_by:.0f} of {row['trials']:.0f}"]
+        rows.append(cells)
+    return Table(headings, rows)
+
+
+def _cost(cost: float) -> str:
+    return f"{cost:.0f}" if math.isfinite(cost) else "never"
