@@ -307,7 +307,7 @@ def _off_ground(run: Recorded) -> str:
 def _oscillator_frequency(run: Recorded) -> str:
     """Of a single oscillator with OSCILLATOR_TAU_A, from 5 s on."""
     single = run.scenario.with_changes(
-        {"robot.tetrahedra": 2, "cpg.signals": "recorded", "simulation.duration": "15.0 s"}
+        {"robot.tetrahedra": 2, "cpg.signals": "live", "simulation.duration": "15.0 s"}
     )
     gait = Gait("single", weights=(), tau_a=OSCILLATOR_TAU_A, tau_b=2.0 * OSCILLATOR_TAU_A)
     signal = signal_samples(single, gait)[:, 0]

@@ -256,7 +256,7 @@ def test_replay_writes_a_small_page_beside_a_viewer_that_pages_share(simulated, 
 def test_cpg_writes_the_signals_that_its_options_ask_for(work):
     tables = []
     for options in ([], ["--raw"], ["--unit", "N", "--rate", "100"]):
-        command = ["cpg", "--scenario", "three.yaml", "--signals", "recorded", "--out", "a.csv"]
+        command = ["cpg", "--scenario", "three.yaml", "--signals", "live", "--out", "a.csv"]
         assert main([*command, *options]) == 0
         tables.append(np.loadtxt("a.csv", delimiter=",", comments=("#", "t"))[:, 1:])
     pounds, raw, newtons = tables

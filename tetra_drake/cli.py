@@ -379,7 +379,7 @@ def _cpg_options(command: Command) -> None:
     _add_path(command, "--out", "FILE", "the CSV file to write", required=True)
     command.add_argument(
         "--signals",
-        choices=("listing", "recorded"),
+        choices=("listing", "live"),
         help="how the network is integrated, instead of the scenario's cpg.signals: forward Euler "
         "as in the thesis's listing, or accurately",
     )

@@ -38,9 +38,8 @@ def test_a_script_writes_its_pictures(script, files, tmp_path, monkeypatch):
     assert written - {"robot.html"} <= {path.name for path in robot.DIAGRAMS.glob("*.svg")}
 
 
-@pytest.mark.parametrize("signals", ["listing", "recorded"])
-def test_the_robot_of_the_script_is_that_of_the_package(scenario, signals):
-    scenario = scenario.with_changes({"cpg.signals": signals, "cpg.start_up": "0.02 s"})
+def test_the_robot_of_the_script_is_that_of_the_package(scenario):
+    scenario = scenario.with_changes({"cpg.start_up": "0.02 s"})
     gait = load_gait(robot.BEST_GAIT, scenario)
     states = []
     for diagram in (robot.make_diagram(scenario, gait), MakeTensegrityDiagram(scenario, gait)):

@@ -25,7 +25,8 @@ import numpy as np
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
-from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
+from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, cable_forces
+from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
@@ -33,7 +34,7 @@ from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
+from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Coulomb, Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
 
@@ -264,9 +265,12 @@ class _Robot:
         """The trajectory: MuJoCo's states at `times` (s) and the signals, and the forces there."""
         structure, states = self.structure, self.states(found)
         pulls = np.empty((len(times), len(structure.cables), PULL_COLUMNS))
+        nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
+        generalized = np.empty(6 * len(structure.bodies))
         for state, driving, pull in zip(states, signals, pulls, strict=True):
-            nodes = moved_nodes(structure, state)
-            add_cable_forces(nodes, driving, structure.cables, False, True, pull)
+            cable_forces(
+                state, driving, structure.p_BN, structure.cables, False, nodes, pull, generalized
+            )
         data = self._mujoco.MjData(self._model)
         rows = zip(found, signals, strict=True)
         ground = np.array([self._ground_forces(data, *row) for row in rows])

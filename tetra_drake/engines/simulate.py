@@ -127,11 +127,11 @@ def prepare(scenario: Scenario, *, many: bool = False) -> None:
     """Compiles the scenario's engine, so that no simulation, nor one of many gaits, has to wait for
     that. The kernels of `drake` and `mujoco` are compiled as a moment is simulated."""
     if scenario.simulation.engine == "compiled":
-        from tetra_drake.engines.compiled.lane_engine import LaneEngine, Walk, lanes_for
+        from tetra_drake.engines.compiled.lane_engine import LaneEngine, PreparedGait, lanes_for
 
-        walk = Walk.of(scenario, seeded_gait(scenario), record=False)
+        prepared = PreparedGait.of(scenario, seeded_gait(scenario), record=False)
         for width in {1, lanes_for(math.inf) if many else 1}:
-            LaneEngine(walk, width=width)
+            LaneEngine(prepared, width=width)
         return
     brief = max(_BRIEF, scenario.cpg.listing_step)
     if brief < scenario.simulation.duration:

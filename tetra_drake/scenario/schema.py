@@ -147,9 +147,8 @@ class CableScenario:
 class CpgScenario:
     """The Matsuoka oscillators (Table 4) and how their signal reaches the cables.
 
-    `signals`: the thesis's own `listing`, by forward Euler; `recorded`: the network integrated
-    beforehand by a Runge-Kutta method of order 4; both in steps of `listing_step`. `live`: the
-    network integrated with the robot, which feedback needs.
+    `signals`: the thesis's own `listing`, the network integrated beforehand by forward Euler in
+    steps of `listing_step`; `live`: the network integrated with the robot, which feedback needs.
     """
 
     self_inhibition_weight: float = setting(at_least=0)  # beta
@@ -160,7 +159,7 @@ class CpgScenario:
     partner_weight: float = setting(at_least=0)  # between extensor and flexor of an oscillator
     gain: float = quantity("N")  # force per unit of y_extensor - y_flexor
     start_up: float = quantity("s", at_least=0)  # until then the cables are not actuated
-    signals: str = setting(choices=("listing", "recorded", "live"))
+    signals: str = setting(choices=("listing", "live"))
     listing_step: float = quantity("s", at_least=1e-6)
     reach: int | None = setting(at_least=0, default=None)
     """Oscillators of junctions at most so far apart inhibit each other; all if not given."""

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk
-from tetra_drake.engines.compiled.walk import (
+from tetra_drake.engines.compiled.dynamics import Forces, forces_at
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, PreparedGait
+from tetra_drake.engines.compiled.loop import (
     DONE,
     STEP_TOO_SMALL,
     TOO_FAST,
@@ -37,7 +37,7 @@ def simulate_compiled(
     *, scenario: Scenario, gait: Gait, record: bool, steering: SteeringSignal | None = None
 ) -> SimulationResult:
     """Simulates a gait as simulate() does, without Drake. Other threads run meanwhile."""
-    walk = Walk.of(scenario, gait, record=record, steering=steering)
+    walk = PreparedGait.of(scenario, gait, record=record, steering=steering)
     engine = LaneEngine(walk, width=1)
     engine.load(0, walk)
     while not (ended := engine.advance(_BODY_STEPS)):
@@ -46,7 +46,7 @@ def simulate_compiled(
     return make_outcome(walk, course)
 
 
-def make_outcome(walk: Walk, course: Course) -> SimulationResult:
+def make_outcome(walk: PreparedGait, course: Course) -> SimulationResult:
     """The result of a walk; raises Diverged or StepBudgetExceeded if it failed."""
     scenario, structure = walk.scenario, walk.structure
     if course.status != DONE:
@@ -84,7 +84,7 @@ def _failure(course: Course, scenario: Scenario) -> SimulationFailure:
     return failure
 
 
-def _dataset(walk: Walk, course: Course, times: np.ndarray) -> xarray.Dataset:
+def _dataset(walk: PreparedGait, course: Course, times: np.ndarray) -> xarray.Dataset:
     """The recording at `times`, with the forces that the kernels find at its states."""
     chosen = np.searchsorted(course.times, times)
     states, modes, signals = course.states[chosen], course.modes[chosen], course.signals[chosen]
@@ -96,8 +96,7 @@ def _dataset(walk: Walk, course: Course, times: np.ndarray) -> xarray.Dataset:
     generalized = np.empty(6 * len(walk.structure.bodies))
     for i, state in enumerate(states):
         forces = Forces(moved, frames, pulls[i], pushes[i])
-        move_robot(model, state, forces)
-        compute_forces(model, modes[i], signals[i], True, forces, generalized)
+        forces_at(model, state, modes[i], signals[i], forces, generalized)
     return assemble_dataset(
         walk.structure,
         times=times,

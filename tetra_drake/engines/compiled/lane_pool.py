@@ -11,7 +11,7 @@ from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
 from tetra_drake.engines.compiled.engine import make_outcome
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk, lanes_for
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, PreparedGait, lanes_for
 from tetra_drake.errors import InputError, SimulationFailure, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
@@ -34,7 +34,7 @@ class _Job:
     gait: Gait
     record: bool
     time_budget: float
-    future: Future[tuple[Walk, Course]] = field(default_factory=Future)
+    future: Future[tuple[PreparedGait, Course]] = field(default_factory=Future)
     deadline: float = math.inf
 
 
@@ -82,7 +82,7 @@ class LanePool:
         return self.result(future)
 
     @staticmethod
-    def result(future: Future[tuple[Walk, Course]]) -> SimulationResult:
+    def result(future: Future[tuple[PreparedGait, Course]]) -> SimulationResult:
         """Waits for a walk of submit(); raises as simulate() does."""
         return make_outcome(*future.result())
 
@@ -92,7 +92,7 @@ class LanePool:
         *,
         record: bool = False,
         time_budget: float = math.inf,
-    ) -> list[Future[tuple[Walk, Course]]]:
+    ) -> list[Future[tuple[PreparedGait, Course]]]:
         """Puts gaits, each with its scenario, in the queue; result() waits for one."""
         jobs = [_Job(*walk, record, time_budget) for walk in walks]
         with self._changed:
@@ -135,14 +135,14 @@ class _Preparation:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._latest: dict[tuple[int, bool], Walk] = {}
+        self._latest: dict[tuple[int, bool], PreparedGait] = {}
         """By the scenario's identity, the one last used at the end."""
 
-    def __call__(self, job: _Job) -> Walk:
+    def __call__(self, job: _Job) -> PreparedGait:
         key = id(job.scenario), job.record
         with self._lock:
             walk = self._latest.pop(key, None)
-            walk = walk or Walk.of(job.scenario, job.gait, record=job.record)
+            walk = walk or PreparedGait.of(job.scenario, job.gait, record=job.record)
             self._latest[key] = walk  # with its scenario, so that no other one gets its id
             if len(self._latest) > _PREPARED:
                 del self._latest[next(iter(self._latest))]
@@ -204,7 +204,7 @@ class _Crew:
             job.future.set_exception(error)
         self.jobs, self._engine, self._engines = {}, None, {}
 
-    def _engine_for(self, walk: Walk, width: int) -> LaneEngine:
+    def _engine_for(self, walk: PreparedGait, width: int) -> LaneEngine:
         engine = self._engines.get(width)
         if engine is None or not engine.accepts(walk):
             engine = self._engines[width] = LaneEngine(walk, width=width)
