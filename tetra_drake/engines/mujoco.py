@@ -109,18 +109,18 @@ def simulate_in_rollouts(
         started = time.perf_counter()
         observers = [robot.observer() for _ in group]
         wanted = np.rint(times / step).astype(int)
-        walks = robot.walk(signals, wanted, observers, threads=threads)
+        courses = robot.simulate(signals, wanted, observers, threads=threads)
         wall_time = (time.perf_counter() - started) * min(threads, len(group)) / len(group)
-        for gait, walk, observer in zip(group, walks, observers, strict=True):
-            if isinstance(walk, Diverged):
-                walk.wall_time = wall_time
-                outcomes.append(walk)
+        for gait, course, observer in zip(group, courses, observers, strict=True):
+            if isinstance(course, Diverged):
+                course.wall_time = wall_time
+                outcomes.append(course)
                 continue
             result = make_result(
                 scenario,
                 robot.structure,
                 times=times,
-                states=robot.states(walk),
+                states=robot.states(course),
                 signals=signals_at(scenario, gait, times, steering=steering),
                 totals=observer.totals(),
                 mass=robot.mass,
@@ -130,7 +130,7 @@ def simulate_in_rollouts(
             )
             if record:
                 driving = signals_at(scenario, gait, samples, steering=steering)
-                trajectory = robot.dataset(samples, walk[recorded], driving)
+                trajectory = robot.dataset(samples, course[recorded], driving)
                 result = dataclasses.replace(result, trajectory=trajectory)
             outcomes.append(result)
     return outcomes
@@ -186,7 +186,7 @@ class _Robot:
         """A new observer of this robot, which takes normal forces for those of our law."""
         return Observer(self._scenario, self.structure, self._robot)
 
-    def walk(
+    def simulate(
         self,
         signals: Sequence[Array],
         wanted: Array,

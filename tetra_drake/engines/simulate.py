@@ -93,8 +93,8 @@ def simulate_many(
     if all(each.simulation.engine == "compiled" for each in scenarios):
         from tetra_drake.engines.compiled.lane_pool import simulate_in_lanes
 
-        walks = list(zip(scenarios, gaits, strict=True))
-        return simulate_in_lanes(walks, record=record, threads=threads)
+        pairs = list(zip(scenarios, gaits, strict=True))
+        return simulate_in_lanes(pairs, record=record, threads=threads)
     if isinstance(scenario, Scenario) and scenario.simulation.engine == "mujoco":
         from tetra_drake.engines.mujoco import simulate_in_rollouts
 
