@@ -5,8 +5,8 @@ step. A lane whose step is rejected repeats it with a shorter one in the next it
 
 The listing's network does not depend on the robot: it runs ahead in steps of its own, and its
 signals are interpolated. (A table of them made beforehand, one lane at a time, costs a tenth of the
-speed of one lane, and more in several.) A `live` network takes the robot's steps by Heun's method, which
-is explicit, as its rates are slow, and what ROS2 is without its matrix: both are of order 2
+speed of one lane, and more in several.) A `live` network takes the robot's steps by Heun's method,
+which is explicit, as its rates are slow, and what ROS2 is without its matrix: both are of order 2
 together.
 """
 
