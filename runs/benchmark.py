@@ -210,7 +210,7 @@ def grounds_table(scenario: Scenario) -> str:
     coulomb: Changes = {"friction": shipped.friction, "compiled.tolerance": tolerance}
     grounds: dict[str, Changes] = {
         "the scenario's": {},
-        "signals computed beforehand": {"cpg.signals": "recorded", "cpg.feedback": []},
+        "signals computed beforehand": {"cpg.signals": "listing", "cpg.feedback": []},
         "live network": {"cpg.signals": "live"},
         "Coulomb friction": coulomb,
         "rough": rough,

@@ -59,7 +59,7 @@ def image(gait: Gait, scenario: Scenario) -> Gait:
 def test_two_alike_oscillators_per_junction_walk_as_the_thesis_s_one(scenario, engine):
     # Each of the pair is inhibited by both of another junction, so each by half of the weight,
     # and not by the other of its own: then both sum to what the thesis's oscillator gets.
-    thesis = shortly(scenario, 2.0, cpg__signals="recorded")
+    thesis = shortly(scenario, 2.0, cpg__signals="listing")
     pairs = thesis.with_changes(SIDES)
     gait, sides = seeded_gait(thesis), Actuation.of(pairs)
     weight = dict(zip(map(tuple, Actuation.of(thesis).couplings), gait.weights, strict=True))
@@ -73,7 +73,7 @@ def test_two_alike_oscillators_per_junction_walk_as_the_thesis_s_one(scenario, e
 
 
 @BOTH
-@pytest.mark.parametrize("signals", ["recorded", "live"])
+@pytest.mark.parametrize("signals", ["listing", "live"])
 def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
     every = list(PATHWAYS) if signals == "live" else []
     changes = {"cpg__signals": signals, "cpg__feedback": every}
@@ -116,7 +116,7 @@ def test_engines_agree_with_each_feedback_and_it_matters(scenario, pathway):
     assert np.abs(none.signal - ours.signal).max() > 1e-3, "ten times what engines may differ by"
 
 
-@pytest.mark.parametrize("signals", ["listing", "recorded", "live"])
+@pytest.mark.parametrize("signals", ["listing", "live"])
 def test_engines_agree_on_a_steering_signal(signals):
     scenario = load_scenario("turning").with_changes({"gait_bounds.turn": 0.0})
     changes = FINE | {"cpg.signals": signals, "cpg.listing_step": "1e-4 s"}
@@ -136,7 +136,7 @@ def test_engines_agree_on_a_steering_signal(signals):
 
 
 @BOTH
-@pytest.mark.parametrize("signals", ["recorded", "live"])
+@pytest.mark.parametrize("signals", ["listing", "live"])
 def test_a_turn_beyond_1_is_refused_on_both_engines(engine, signals, refused):
     scenario = shortly(load_scenario("turning"), 0.2, cpg__signals=signals)
     with refused("steering", "at 0.1 s", "1.5"):
@@ -214,9 +214,8 @@ def test_lanes_with_other_gains_and_turns_keep_their_numbers(scenario):
 
 
 def test_feedback_is_refused_where_signals_are_computed_beforehand(scenario, refused):
-    for signals in ("listing", "recorded"):
-        with refused("scenario thesis", "cpg.signals", "live"):
-            scenario.with_changes({"cpg.signals": signals, "cpg.feedback": ["load"]})
+    with refused("scenario thesis", "cpg.signals", "live"):
+        scenario.with_changes({"cpg.signals": "listing", "cpg.feedback": ["load"]})
     live = {"cpg.signals": "live", "cpg.feedback": ["load"]}
     on_mujoco = scenario.with_changes({**live, "simulation.engine": "mujoco"})
     pytest.importorskip("mujoco")

@@ -19,7 +19,7 @@ from helpers.quantities import with_unit
 from pytest import approx
 
 from tetra_drake import evolve
-from tetra_drake.engines.compiled.lane_engine import Walk
+from tetra_drake.engines.compiled.lane_engine import PreparedGait
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mean
@@ -80,13 +80,13 @@ def test_a_gait_is_simulated_in_each_of_its_draws(tiny, vector):
 
 
 def test_in_lanes_each_draw_is_prepared_once_for_all_gaits_of_an_iteration(tiny, monkeypatch):
-    prepared, prepare = [], Walk.of
+    prepared, prepare = [], PreparedGait.of
 
     def counted(*given, **kwargs):
         prepared.append(given)
         return prepare(*given, **kwargs)
 
-    monkeypatch.setattr(Walk, "of", counted)
+    monkeypatch.setattr(PreparedGait, "of", counted)
     generator, space = np.random.default_rng(2), ParameterSpace.of(tiny)
     tasks = [SeededVector(space.random(generator), SEED) for _ in range(6)]
     with LanePool(2) as lanes:

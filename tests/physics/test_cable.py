@@ -6,10 +6,10 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.physics.cable import PULL_COLUMNS, TENSION, add_cable_forces, cable_tension
-from tetra_drake.physics.kinematics import gather_forces
+from tetra_drake.physics.cable import PULL_COLUMNS, TENSION, cable_forces, cable_tension
+from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.robot.bodies import AddTetrahedra
-from tetra_drake.robot.structure import Structure, moved_nodes, node_positions, node_velocities
+from tetra_drake.robot.structure import Structure, node_positions, node_velocities
 
 
 @pytest.fixture
@@ -22,10 +22,9 @@ def forces_of_cables(
     structure: Structure, state: np.ndarray, *signals: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The generalized force and the tensions."""
-    nodes, pulls = moved_nodes(structure, state), np.empty((24, PULL_COLUMNS))
-    force = np.empty(30)
-    add_cable_forces(nodes, np.array(signals), structure.cables, False, True, pulls)
-    gather_forces(nodes, force)
+    nodes, pulls, force = np.empty((20, NODE_COLUMNS)), np.empty((24, PULL_COLUMNS)), np.empty(30)
+    p_BN, cables = structure.p_BN, structure.cables
+    cable_forces(state, np.array(signals), p_BN, cables, False, nodes, pulls, force)
     return force, pulls[:, TENSION]
 
 

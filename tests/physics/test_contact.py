@@ -19,7 +19,7 @@ from tetra_drake.physics.contact import (
     update_modes,
 )
 from tetra_drake.physics.friction import STICK, next_reset_mode, reset_force
-from tetra_drake.physics.kinematics import FORCE, V_WN
+from tetra_drake.physics.kinematics import FORCE, NODE_COLUMNS
 from tetra_drake.physics.mode_change import first_zero, mode_margin, time_to_mode_change
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.ground import make_ground
@@ -101,6 +101,11 @@ class RobotOnGround:
         """Whether the modes have changed in that state."""
         return update_modes(self.state(**change), self.nodes(**change), *self.args, self.modes)
 
+    def margin(self, state: np.ndarray) -> float:
+        """Until the next mode change."""
+        nodes, p_BN = np.empty((20, NODE_COLUMNS)), self.structure.p_BN
+        return mode_margin(state, self.modes, p_BN, self.ground, nodes, self.frames)
+
 
 @pytest.fixture
 def ground(structure: Structure, scenario: Scenario) -> RobotOnGround:
@@ -154,10 +159,10 @@ def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground):
 
 def test_the_margin_crosses_zero_at_a_mode_change(ground):
     p0 = ground.ground.law["stiction_range"][0]
-    modes = ground.update(z=-1e-4)
+    ground.update(z=-1e-4)
 
     def margin(x: float = 0.0, z: float = -1e-4) -> float:
-        return mode_margin(ground.nodes(x=x, z=z), modes, *ground.args)
+        return ground.margin(ground.state(x=x, z=z))
 
     assert margin(x=0.9 * p0) > 0.0 > margin(x=1.1 * p0)
     assert margin(z=-1e-6) > 0.0 > margin(z=1e-6)
@@ -166,11 +171,11 @@ def test_the_margin_crosses_zero_at_a_mode_change(ground):
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("mode", [-1.0, 1.0])
 def test_the_margin_of_a_slipping_node_is_its_speed_that_way(ground, axis, mode):
-    modes, nodes = ground.update(z=-1e-4), ground.nodes(z=-1e-4)
-    modes[2, MODE + axis] = mode
+    ground.update(z=-1e-4)[2, MODE + axis] = mode  # of T2's bottom left
     for speed in (3e-6, -3e-6):  # the least of all margins; the others are 1e-4 m
-        nodes[4, V_WN + axis] = mode * speed  # contact node 2 is T2's bottom left, node 4
-        assert mode_margin(nodes, modes, *ground.args) == pytest.approx(speed, rel=1e-12)
+        state = ground.state(z=-1e-4)
+        state[35 + 6 + 3 + axis] = mode * speed
+        assert ground.margin(state) == pytest.approx(speed, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,9 @@ def law(*, k: float = K, forward: float = 1.0, backward: float = 1.0, lateral: f
 
 
 def slide(v=(0.0, 0.0), x=(0.0, 0.0), mode=(0.0, 0.0), heading=ALONG_X) -> Slide:
-    return Slide(v, x, mode, heading, NORMAL)
+    # Of NumPy's numbers, which may be divided by zero, as in a kernel.
+    v, x, mode, heading = (tuple(np.array(pair)) for pair in (v, x, mode, heading))
+    return Slide(v, x, mode, heading, np.float64(NORMAL))
 
 
 def test_in_stick_the_bristle_is_a_spring_and_a_damper():

@@ -67,8 +67,8 @@ class Sliding:
         return time_to_mode_change(state, acceleration, nodes, *args, 9.0)
 
     def margin(self, v: tuple, p=(0.0, 0.0, -1e-4)) -> float:
-        _, nodes, frames = self.at(v, p)
-        return mode_margin(nodes, self.modes, self.ground, frames)
+        state, nodes, frames = self.at(v, p)
+        return mode_margin(state, self.modes, self.structure.p_BN, self.ground, nodes, frames)
 
 
 @pytest.fixture(params=[Flat(), Incline(slope=SLOPE)], ids=["flat", "incline"])

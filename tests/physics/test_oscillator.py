@@ -60,7 +60,7 @@ def test_output_counts_only_firing_neurons():
 
 
 @pytest.mark.parametrize(
-    ("listing", "first_row", "order"), [(True, 1, 1), (False, 0, 4)], ids=["listing", "recorded"]
+    ("listing", "first_row", "order"), [(True, 1, 1), (False, 0, 4)], ids=["Euler", "Runge-Kutta"]
 )
 def test_integrators_have_their_order(listing, first_row, order):
     # While both neurons of one oscillator fire, Eq. 7 is linear, without kinks. Halving the

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from tetra_drake.physics.cable import CABLE, LENGTH, PASSIVE, PULL_COLUMNS, TENSION
+from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, Cables
 from tetra_drake.physics.tally import Tally, observe
 
-CABLES = np.array([(3, 4, 0, 1.0, 0.0, 0.0), (3, 5, PASSIVE, 1.0, 0.0, 0.0)], dtype=CABLE)
+CABLES = Cables([3, 3], [4, 5], [0, PASSIVE], [1.0, 1.0], [0.0, 0.0], [0.0, 0.0])
 """The first is driven."""
 
 CONTACTS = np.array([0, 1, 4])

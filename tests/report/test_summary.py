@@ -7,8 +7,8 @@ import pytest
 
 from tetra_drake.report.summary import ground_text, result_text
 from tetra_drake.results.result import IntegratorWork
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import HeightField, Rough
 from tetra_drake.scenario.units import INCH
 

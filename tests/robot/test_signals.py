@@ -35,16 +35,16 @@ def test_stepped_as_the_listing_steps_it_gives_the_listings_output(scenario, lis
 def test_the_converged_network_stays_within_the_listings_own_error(scenario, listing):
     # Euler's error reaches 1.4e-2 by 15 s on gait_a. The listing stamps a state one step early.
     gait, steps, reference = listing
-    scenario = scenario.with_changes({"cpg.signals": "recorded"})
+    scenario = scenario.with_changes({"cpg.signals": "live"})
     error = np.abs(raw_output(scenario, gait)[steps + 1] - reference).max(axis=1)
     assert error[steps * 0.5e-3 <= 3.0].max() < 2e-3
     assert error.max() < 2e-2
 
 
-def test_the_recorded_network_is_the_live_network(scenario, structure, gait):
+def test_the_network_beforehand_is_that_of_the_diagram(scenario, structure, gait):
     # Drake's error-controlled integration of the same equations; RK4 in steps of 0.5 ms meets a
     # kink of max(0, u) between samples, which costs it up to 1e-5.
-    scenario = scenario.with_changes({"cpg.signals": "recorded"})
+    scenario = scenario.with_changes({"cpg.signals": "live"})
     law, network = scenario.cpg, make_network(scenario, structure, gait)
     start = initial_neurons(law, 4)
     cpg = MatsuokaCpg(network, tonic=law.external_input, initial_state=start, gain=law.gain)
@@ -59,7 +59,7 @@ def test_the_recorded_network_is_the_live_network(scenario, structure, gait):
 
 
 def test_without_weights_all_oscillators_give_the_same_signal(scenario, data):
-    scenario = scenario.with_changes({"cpg.signals": "recorded"})
+    scenario = scenario.with_changes({"cpg.signals": "live"})
     samples = signal_samples(scenario, load_gait(data / "single_oscillators.json", scenario))
     np.testing.assert_allclose(samples, samples[:, :1] * np.ones(4), atol=1e-12)
     # Eq. 9 with a gain of 2 lbf: about a pound peak to peak.

@@ -25,7 +25,8 @@ import numpy as np
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
-from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
+from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, cable_forces
+from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
@@ -33,7 +34,7 @@ from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import MakeStructure, Structure, moved_nodes
+from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
@@ -112,18 +113,18 @@ def simulate_in_rollouts(
         started = time.perf_counter()
         observers = [robot.observer() for _ in group]
         wanted = np.rint(times / step).astype(int)
-        walks = robot.walk(signals, wanted, observers, threads=threads)
+        courses = robot.simulate(signals, wanted, observers, threads=threads)
         wall_time = (time.perf_counter() - started) * min(threads, len(group)) / len(group)
-        for gait, walk, observer in zip(group, walks, observers, strict=True):
-            if isinstance(walk, Diverged):
-                walk.wall_time = wall_time
-                outcomes.append(walk)
+        for gait, course, observer in zip(group, courses, observers, strict=True):
+            if isinstance(course, Diverged):
+                course.wall_time = wall_time
+                outcomes.append(course)
                 continue
             result = make_result(
                 scenario,
                 robot.structure,
                 times=times,
-                states=robot.states(walk),
+                states=robot.states(course),
                 signals=signals_at(scenario, gait, times, steering=steering),
                 totals=observer.totals(),
                 mass=robot.mass,
@@ -133,7 +134,7 @@ def simulate_in_rollouts(
             )
             if record:
                 driving = signals_at(scenario, gait, samples, steering=steering)
-                trajectory = robot.dataset(samples, walk[recorded], driving)
+                trajectory = robot.dataset(samples, course[recorded], driving)
                 result = dataclasses.replace(result, trajectory=trajectory)
             outcomes.append(result)
     return outcomes
@@ -188,7 +189,7 @@ class _Robot:
         """A new observer of this robot, which takes normal forces for those of our law."""
         return Observer(self._scenario, self.structure, self._robot)
 
-    def walk(
+    def simulate(
         self,
         signals: Sequence[Array],
         wanted: Array,
@@ -267,9 +268,12 @@ class _Robot:
         """The trajectory: MuJoCo's states at `times` (s) and the signals, and the forces there."""
         structure, states = self.structure, self.states(found)
         pulls = np.empty((len(times), len(structure.cables), PULL_COLUMNS))
+        nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
+        generalized = np.empty(6 * len(structure.bodies))
         for state, driving, pull in zip(states, signals, pulls, strict=True):
-            nodes = moved_nodes(structure, state)
-            add_cable_forces(nodes, driving, structure.cables, False, True, pull)
+            cable_forces(
+                state, driving, structure.p_BN, structure.cables, False, nodes, pull, generalized
+            )
         data = self._mujoco.MjData(self._model)
         rows = zip(found, signals, strict=True)
         ground = np.array([self._ground_forces(data, *row) for row in rows])

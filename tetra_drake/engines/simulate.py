@@ -93,8 +93,8 @@ def simulate_many(
     if all(each.simulation.engine == "compiled" for each in scenarios):
         from tetra_drake.engines.compiled.lane_pool import simulate_in_lanes
 
-        walks = list(zip(scenarios, gaits, strict=True))
-        return simulate_in_lanes(walks, record=record, threads=threads)
+        pairs = list(zip(scenarios, gaits, strict=True))
+        return simulate_in_lanes(pairs, record=record, threads=threads)
     if isinstance(scenario, Scenario) and scenario.simulation.engine == "mujoco":
         from tetra_drake.engines.mujoco import simulate_in_rollouts
 
@@ -127,11 +127,11 @@ def prepare(scenario: Scenario, *, many: bool = False) -> None:
     """Compiles the scenario's engine, so that no simulation, nor one of many gaits, has to wait for
     that. The kernels of `drake` and `mujoco` are compiled as a moment is simulated."""
     if scenario.simulation.engine == "compiled":
-        from tetra_drake.engines.compiled.lane_engine import LaneEngine, Walk, lanes_for
+        from tetra_drake.engines.compiled.lane_engine import LaneEngine, PreparedGait, lanes_for
 
-        walk = Walk.of(scenario, seeded_gait(scenario), record=False)
+        prepared = PreparedGait.of(scenario, seeded_gait(scenario), record=False)
         for width in {1, lanes_for(math.inf) if many else 1}:
-            LaneEngine(walk, width=width)
+            LaneEngine(prepared, width=width)
         return
     brief = max(_BRIEF, scenario.cpg.listing_step)
     if brief < scenario.simulation.duration:

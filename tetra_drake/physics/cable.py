@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.physics.kinematics import FORCE, P_WN, V_WN, gather_forces, move_nodes
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, inverse_sqrt, maximum
 
 PASSIVE = -1
@@ -33,7 +33,7 @@ DIRECTION, LENGTH, TENSION, PULL_COLUMNS = 0, 3, 4, 5
 (N); and their number."""
 
 
-@compiled
+@inlined
 def cable_tension(
     length: Real, rate: Real, signal: Real, stiffness: Real, damping: Real, free_length: Real
 ) -> Real:
@@ -44,7 +44,7 @@ def cable_tension(
     return stiffness * (length - free_length) + damping * rate + signal
 
 
-@compiled
+@inlined
 def add_cable_forces(
     nodes: Table, signals: Table, cables: Table, slack: bool, keep: bool, pulls: Table
 ) -> None:

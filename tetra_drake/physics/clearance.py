@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tetra_drake.physics.kinematics import P_WN
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, any_lane, maximum, minimum
 
 CORNERS = 4
@@ -16,7 +16,7 @@ _PARALLEL = 1e-12
 """Square of the sine of an angle that is none."""
 
 
-@compiled
+@inlined
 def least_strut_distance(nodes: Table, least: Real) -> Real:
     """Square of the least distance (m²) between struts of different tetrahedra, or `least` if that
     is less; `nodes` of physics.kinematics.
@@ -42,7 +42,7 @@ def least_strut_distance(nodes: Table, least: Real) -> Real:
     return least
 
 
-@compiled
+@inlined
 def room_between(nodes: Table, first: int, second: int) -> tuple[Real, Real, Real]:
     """How far the second tetrahedron begins behind the base, and behind all nodes, of the first
     along the vector between their centres, times its length; and its square."""
@@ -61,13 +61,13 @@ def room_between(nodes: Table, first: int, second: int) -> tuple[Real, Real, Rea
     return begin - end, begin - tip, u_x * u_x + u_y * u_y + u_z * u_z
 
 
-@compiled
+@inlined
 def along(nodes: Table, node: int, x: Real, y: Real, z: Real) -> Real:
     """The product of a node's position and a vector."""
     return x * nodes[node, P_WN] + y * nodes[node, P_WN + 1] + z * nodes[node, P_WN + 2]
 
 
-@compiled
+@inlined
 def nearest_strut(nodes: Table, a: int, b: int, second: int, per_square: Real) -> Real:
     """Square of the least distance (m²) of the strut from node a to b to those of the tetrahedron
     that begins with node `second`; see segment_distance."""
@@ -78,7 +78,7 @@ def nearest_strut(nodes: Table, a: int, b: int, second: int, per_square: Real) -
     return minimum(least, segment_distance(nodes, a, b, second + 2, second + 3, per_square))
 
 
-@compiled
+@inlined
 def segment_distance(nodes: Table, a: int, b: int, c: int, d: int, per_square: Real) -> Real:
     """Square of the distance (m²) between the segments from node a to b and from c to d, which have
     the same length; `per_square` is 1 over its square.
@@ -103,7 +103,7 @@ def segment_distance(nodes: Table, a: int, b: int, c: int, d: int, per_square: R
     return x * x + y * y + z * z
 
 
-@compiled
+@inlined
 def share(x: Real) -> Real:
     """The nearest number from 0 to 1."""
     return minimum(maximum(x, 0.0), 1.0)

@@ -32,7 +32,7 @@ from tetra_drake.physics.kinematics import (
     move_nodes,
 )
 from tetra_drake.physics.terrain import GAP, find_frames, to_frame, to_world
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import (
     Real,
     Table,
@@ -131,7 +131,7 @@ def law_of(ground: Ground) -> Law:
     )
 
 
-@compiled
+@inlined
 def meet_ground(state: Table, p_BN: Table, ground: Ground, nodes: Table, frames: Table) -> None:
     """Writes the `nodes` of `kinematics` for a state of the bodies, without forces, and where they
     meet the ground: `frames`, (contacts, FRAME_COLUMNS), which flat ground leaves as they are."""
@@ -140,7 +140,7 @@ def meet_ground(state: Table, p_BN: Table, ground: Ground, nodes: Table, frames:
         find_frames(nodes, ground.contacts, law_of(ground), ground.heights, frames)
 
 
-@compiled
+@inlined
 def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
     """Distance (m) of a contact node from the ground, negative in it."""
     if ground.flat:
@@ -148,7 +148,7 @@ def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
     return frames[i, GAP]
 
 
-@compiled
+@inlined
 def normal_force(depth: Real, depth_rate: Real, law: Law) -> Real:
     """Force (N) along the normal on a node `depth` (m) in the ground, which sinks at `depth_rate`
     (m/s).
@@ -159,7 +159,7 @@ def normal_force(depth: Real, depth_rate: Real, law: Law) -> Real:
     return select(depth > 0.0, maximum(force, 0.0), 0.0)
 
 
-@compiled
+@inlined
 def sliding(
     nodes: Table, modes: Table, ground: Ground, law: Law, frames: Table, i: int
 ) -> tuple[Slide, Real]:
@@ -177,7 +177,7 @@ def sliding(
     return Slide((v_1, v_2), (x_1, x_2), mode, heading, normal), v_n
 
 
-@compiled
+@inlined
 def friction_force(slide: Slide, law: Law, coulomb: bool) -> Pair:
     """Friction (N) along the tangents on a node that touches the ground."""
     if coulomb:
@@ -186,7 +186,7 @@ def friction_force(slide: Slide, law: Law, coulomb: bool) -> Pair:
     return reset_force(v_1, x_1, m_1, law), reset_force(v_2, x_2, m_2, law)
 
 
-@compiled
+@inlined
 def add_ground_forces(
     nodes: Table, modes: Table, ground: Ground, frames: Table, keep: bool, pushes: Table
 ) -> None:
@@ -237,7 +237,7 @@ def ground_forces(
     gather_forces(nodes, generalized_force)
 
 
-@compiled
+@inlined
 def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, modes: Table) -> Truth:
     """Brings `modes`, (contacts, MODE_COLUMNS), up to date with the nodes of a state; whether they
     changed.
@@ -284,7 +284,7 @@ def modes_after_step(
     return update_modes(state, nodes, ground, frames, modes)
 
 
-@compiled
+@inlined
 def move_stick_point(
     nodes: Table,
     ground: Ground,
@@ -310,7 +310,7 @@ def move_stick_point(
     modes[i, s + 2] = select(both, p_z, modes[i, s + 2] + z)
 
 
-@compiled
+@inlined
 def set_heading(
     state: Table, nodes: Table, ground: Ground, frames: Table, i: int, where: Truth, modes: Table
 ) -> None:

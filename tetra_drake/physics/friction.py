@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Truth, select
 
 STICK = 0.0
@@ -36,7 +36,7 @@ class Slide(NamedTuple):
 # The reset integrator, along one tangent.
 
 
-@compiled
+@inlined
 def reset_force(velocity: Real, deflection: Real, mode: Real, law: Any) -> Real:
     """Friction (N) along one tangent by the reset integrator (Eq. 3-5).
 
@@ -50,7 +50,7 @@ def reset_force(velocity: Real, deflection: Real, mode: Real, law: Any) -> Real:
     return select(mode == STICK, stick, slip)
 
 
-@compiled
+@inlined
 def next_reset_mode(velocity: Real, deflection: Real, mode: Real, stiction_range: Real) -> Real:
     """The mode that follows `mode`: breaks free at the stiction range moving outward,
     sticks again when the velocity changes sign."""
@@ -75,13 +75,13 @@ class Pull(NamedTuple):
     """Of the size, mu F_N."""
 
 
-@compiled
+@inlined
 def sticks(mode: Pair) -> Truth:
     """Whether a mode of Coulomb friction sticks."""
     return (mode[0] == STICK) & (mode[1] == STICK)
 
 
-@compiled
+@inlined
 def coulomb_pull(slide: Slide, law: Any) -> Pull:
     """The pull at the bristle. The directional factors make its size that of an ellipse, whose
     half-axis along the heading is `forward` or `backward` by the way u points."""
@@ -94,7 +94,7 @@ def coulomb_pull(slide: Slide, law: Any) -> Pull:
     return Pull((u_1, u_2), size, limit)
 
 
-@compiled
+@inlined
 def coulomb_size(u: Pair, heading: Pair, law: Any) -> Real:
     """The length of a vector, measured in directional factors."""
     along = u[0] * heading[0] + u[1] * heading[1]
@@ -104,7 +104,7 @@ def coulomb_size(u: Pair, heading: Pair, law: Any) -> Real:
     return math.sqrt(along * along + across * across)
 
 
-@compiled
+@inlined
 def coulomb_force(slide: Slide, law: Any) -> Pair:
     """Friction (N): -u, as far as the normal force allows."""
     pull = coulomb_pull(slide, law)
@@ -112,7 +112,7 @@ def coulomb_force(slide: Slide, law: Any) -> Pair:
     return -share * pull.u[0], -share * pull.u[1]
 
 
-@compiled
+@inlined
 def next_coulomb_mode(slide: Slide, law: Any) -> Pair:
     """The mode that follows: breaks free beyond the static limit moving outward, and sticks again
     where its damping alone holds it."""
@@ -127,7 +127,7 @@ def next_coulomb_mode(slide: Slide, law: Any) -> Pair:
     )
 
 
-@compiled
+@inlined
 def coulomb_damping(slide: Slide, time: Real, law: Any) -> tuple[Real, Real, Real]:
     """-(time d/dv + time² d/dx) of the friction: its components 11, 12 and 22; time in s.
 

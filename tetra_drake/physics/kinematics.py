@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, inverse_sqrt
 
 Array = np.ndarray
@@ -49,7 +49,7 @@ def move_nodes(state: Table, p_BN: Table, nodes: Table) -> None:
             nodes[node, FORCE], nodes[node, FORCE + 1], nodes[node, FORCE + 2] = 0.0, 0.0, 0.0
 
 
-@compiled
+@inlined
 def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> None:
     """Writes the positions of a state (13 bodies,) whose bodies have `moved` for a time (s) at
     velocities (6 bodies,); quaternions get the length 1."""
@@ -77,7 +77,7 @@ def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> No
         moved[q + 6] = state[q + 6] + time * velocities[v + 5]
 
 
-@compiled
+@inlined
 def forward_axis(state: Table, body: int) -> tuple[Real, Real, Real]:
     """The x axis of a body in World."""
     q = 7 * body
@@ -86,7 +86,7 @@ def forward_axis(state: Table, body: int) -> tuple[Real, Real, Real]:
     return 1.0 - s * (y * y + z * z), s * (x * y + w * z), s * (x * z - w * y)
 
 
-@compiled
+@inlined
 def node_acceleration(
     state: Table, acceleration: Table, nodes: Table, node: int
 ) -> tuple[Real, Real, Real]:
@@ -107,7 +107,7 @@ def node_acceleration(
     )
 
 
-@compiled
+@inlined
 def gather_forces(nodes: Table, generalized_force: Table) -> None:
     """Writes the forces on the nodes as [t_W; f_W] at each Bo, (6 bodies,): Drake's
     applied_generalized_force."""

@@ -12,27 +12,31 @@ from tetra_drake.physics.contact import (
     Law,
     gap,
     law_of,
+    meet_ground,
     modes_after_step,
     sliding,
 )
 from tetra_drake.physics.friction import STICK, Slide, coulomb_pull, coulomb_size, sticks
 from tetra_drake.physics.kinematics import node_acceleration
 from tetra_drake.physics.terrain import to_frame
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, maximum, minimum, select
 
 Array = np.ndarray
 
 
 @compiled
-def mode_margin(nodes: Array, modes: Array, ground: Ground, frames: Array) -> float:
+def mode_margin(
+    state: Array, modes: Array, p_BN: Array, ground: Ground, nodes: Array, frames: Array
+) -> float:
     """Positive while no mode is due to change; crosses zero where the first one is.
 
     The least of: gap in the air, depth on the ground (m); with the reset integrator stiction range
     less deflection (m), and in slip speed in its direction (m/s); with Coulomb friction what is
-    left of the limit, and in slip what exceeds it (N). Only its sign has a meaning. The arguments
-    are those of `add_ground_forces`.
+    left of the limit, and in slip what exceeds it (N). Only its sign has a meaning. Writes `nodes`
+    and `frames`.
     """
+    meet_ground(state, p_BN, ground, nodes, frames)
     margin, law = math.inf, law_of(ground)
     for i in range(ground.contacts.size):
         distance = gap(nodes, ground, frames, i)
@@ -52,13 +56,13 @@ def mode_margin(nodes: Array, modes: Array, ground: Ground, frames: Array) -> fl
     return margin
 
 
-@compiled
+@inlined
 def reset_margin(velocity: float, deflection: float, mode: float, law: Law) -> float:
-    """That of one tangent by the reset integrator."""
+    """Mode margin along one tangent (reset integrator)."""
     return law.stiction_range - abs(deflection) if mode == STICK else mode * velocity
 
 
-@compiled
+@inlined
 def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
     """First time in (0, horizon) at which value + rate t + rate_rate t²/2 falls to zero;
     the horizon where it does not, or where the value is not positive now."""
@@ -72,7 +76,7 @@ def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
     return select(falls, minimum(2.0 * value / select(falls, speed, 1.0), horizon), horizon)
 
 
-@compiled
+@inlined
 def time_to_mode_change(
     state: Table,
     acceleration: Table,
@@ -131,7 +135,7 @@ def next_mode_change(
     return due, time_to_mode_change(state, acceleration, nodes, modes, ground, frames, horizon)
 
 
-@compiled
+@inlined
 def time_to_reset_change(
     v: Real, x: Real, mode: Real, a: Real, touches: Truth, stiction_range: Real, horizon: Real
 ) -> Real:
@@ -146,7 +150,7 @@ def time_to_reset_change(
     return minimum(time, first_zero(select(slips, mode * v, 0.0), mode * a, 0.0, horizon))
 
 
-@compiled
+@inlined
 def time_to_coulomb_change(
     slide: Slide, acceleration: tuple[Real, Real], rate: Real, law: Law, horizon: Real
 ) -> Real:

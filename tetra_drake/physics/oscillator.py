@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, Truth, maximum, select
 
 Array = np.ndarray
@@ -63,7 +63,7 @@ def make_neurons(state: Array) -> Array:
     return neurons
 
 
-@compiled
+@inlined
 def steered_input(external_input: Real, turn: Table, side: Table) -> Table:
     """The tonic input by the turn, for neurons on the left (side 1), on the right (-1) or neither
     (0), as Matsuoka's snakes are steered (arXiv 2207.04899); numbers or arrays."""
@@ -96,7 +96,7 @@ def oscillator_output(neurons: Table, output: Table) -> None:
         output[k] = maximum(extensor, 0.0) - maximum(flexor, 0.0)
 
 
-@compiled
+@inlined
 def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
     """A step (s) of the forward Euler method, as in listing B.1."""
     neuron_rates(network, inputs, neurons)
@@ -105,7 +105,7 @@ def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> N
         neurons[i, V] += step * neurons[i, V_RATE]
 
 
-@compiled
+@inlined
 def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
     """A step (s) of the classical Runge-Kutta method of order 4."""
     for i in range(neurons.shape[0]):
@@ -126,35 +126,26 @@ def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table
 
 
 @compiled
-def next_output(
-    network: Network, inputs: Table, step: Real, listing: bool, neurons: Table, output: Table
-) -> None:
-    """The next sample of the outputs (n,), a step (s) after the last.
-
-    With `listing`, by forward Euler and after the step: listing B.1 stamps the state after i + 1
-    steps with the time of i. Otherwise by Runge-Kutta and before the step. A step of 0 changes
-    nothing.
-    """
-    if listing:
-        euler_step(network, inputs, step, neurons)
-        oscillator_output(neurons, output)
-    else:
-        oscillator_output(neurons, output)
-        runge_kutta_step(network, inputs, step, neurons)
-
-
-@compiled
 def network_output(
     network: Network, inputs: Array, step: float, listing: bool, neurons: Array, output: Array
 ) -> None:
-    """Writes `output`, (samples, n), the first samples of `next_output` without lanes; `inputs`,
-    (some, 2n), are those of the first steps, and the last row of all that follow."""
+    """Writes the outputs of a network without lanes, (samples, n), one a step (s); `inputs`,
+    (some, 2n), are those of the first steps, and the last row of all that follow.
+
+    With `listing`, by forward Euler and after each step: listing B.1 stamps the state after i + 1
+    steps with the time of i. Otherwise by Runge-Kutta, from the start on.
+    """
     last = inputs.shape[0] - 1
     for i in range(output.shape[0]):
-        next_output(network, inputs[min(i, last)], step, listing, neurons, output[i])
+        current = inputs[min(i, last)]
+        if listing:
+            euler_step(network, current, step, neurons)
+        oscillator_output(neurons, output[i])
+        if not listing:
+            runge_kutta_step(network, current, step, neurons)
 
 
-@compiled
+@inlined
 def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
     """The first half of Heun's method of order 2, a step (s) by Euler's; `inputs` of its start."""
     neuron_rates(network, inputs, neurons)
@@ -165,7 +156,7 @@ def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table)
         neurons[i, V] += step * neurons[i, V_RATE]
 
 
-@compiled
+@inlined
 def correct_neurons(
     network: Network, inputs: Table, step: Real, accepted: Truth, neurons: Table
 ) -> None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION, Cables
 from tetra_drake.physics.clearance import CORNERS, least_strut_distance
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
 
 
@@ -33,7 +33,7 @@ class Tally(NamedTuple):
     """(1,): the square of the least distance between struts, in m²; see physics.clearance."""
 
 
-@compiled
+@inlined
 def observe(
     tally: Tally,
     cables: Cables,
@@ -66,7 +66,7 @@ def observe(
     tally.time[0] = time
 
 
-@compiled
+@inlined
 def add_lifted(tally: Tally, contacts: Table, passed: Real, pushes: Table) -> None:
     """Adds the time (s) to that of lifted bodies; contact nodes are in the order of bodies."""
     i = 0
@@ -78,7 +78,7 @@ def add_lifted(tally: Tally, contacts: Table, passed: Real, pushes: Table) -> No
         tally.lifted[body] += select(load == 0.0, passed, 0.0)
 
 
-@compiled
+@inlined
 def look(tally: Tally, nodes: Table) -> None:
     """Takes note of the distances between struts; `nodes` of physics.kinematics."""
     tally.clearance[0] = least_strut_distance(nodes, tally.clearance[0])

@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 from tetra_drake.physics.kinematics import P_WN
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import (
     Real,
     Table,
@@ -31,7 +31,7 @@ GAP, N_X, N_Y, N_Z, T1_X, T1_Y, T1_Z, T2_Y, T2_Z, FRAME_COLUMNS = range(10)
 """Columns of `frames`, (contacts, 9): distance (m), n, t1, t2 (whose x is 0); and their number."""
 
 
-@compiled
+@inlined
 def surface(x: Real, y: Real, grid: Any, heights: Table) -> tuple[Real, Real, Real]:
     """Height (m) of the surface at x and y (m), and its gradient.
 
@@ -55,13 +55,13 @@ def surface(x: Real, y: Real, grid: Any, heights: Table) -> tuple[Real, Real, Re
     return height, h_x, h_y
 
 
-@compiled
+@inlined
 def _across_row(heights: Table, index: Real, b: Real) -> tuple[Real, Real]:
     three = gather(heights, index, 0), gather(heights, index, 1), gather(heights, index, 2)
     return _spline(three[0], three[1], three[2], b)
 
 
-@compiled
+@inlined
 def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Real]:
     """A quadratic B-spline and its derivative, `part` (-1/2 to 1/2) of a cell from a control
     point."""
@@ -95,7 +95,7 @@ def find_frames(nodes: Table, contacts: Table, grid: Any, heights: Table, frames
         frames[i, T2_Y], frames[i, T2_Z] = c, h_y * c
 
 
-@compiled
+@inlined
 def to_frame(
     x: Real, y: Real, z: Real, frames: Table, i: int, flat: bool
 ) -> tuple[Real, Real, Real]:
@@ -109,7 +109,7 @@ def to_frame(
     )
 
 
-@compiled
+@inlined
 def to_world(
     t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool
 ) -> tuple[Real, Real, Real]:

@@ -10,8 +10,7 @@ from tetra_drake.physics.contact import (
     MODE_COLUMNS,
     Ground,
     law_of,
-    meet_ground,
-    update_modes,
+    modes_after_step,
 )
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.physics.terrain import (
@@ -107,8 +106,7 @@ def starting_modes(structure: Structure, ground: Ground) -> np.ndarray:
     state, count = structure.initial_state, len(ground.contacts)
     nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
     modes, frames = np.zeros((count, MODE_COLUMNS)), np.empty((count, FRAME_COLUMNS))
-    meet_ground(state, structure.p_BN, ground, nodes, frames)
-    update_modes(state, nodes, ground, frames, modes)
+    modes_after_step(state, structure.p_BN, ground, nodes, frames, modes)
     return modes
 
 

@@ -34,9 +34,9 @@ def raw_output(
     """y_extensor - y_flexor (samples, m) at 0, one `listing_step`, two ... from `cpg.signals`.
 
     `listing`: forward Euler as in listing B, which stamps the state after i + 1 steps with the
-    time of i steps; the last sample is one step before the end. `recorded` and `live`: the
-    classical Runge-Kutta method of order 4, whose error is 1e-5, to the end or beyond. Within a
-    step the turn is that of its middle. Raises InputError for a gait that does not fit, or one
+    time of i steps; the last sample is one step before the end. `live`: the classical Runge-Kutta
+    method of order 4, whose error is 1e-5, to the end or beyond. Within a step the turn is that of
+    its middle. Raises InputError for a gait that does not fit, or one
     with feedback, whose signals depend on the robot.
     """
     cpg, structure = scenario.cpg, MakeStructure(scenario)
@@ -48,10 +48,8 @@ def raw_output(
     midway = 0.5 * (turns[:-1] + turns[1:]) if turns.size > 1 else turns
     inputs = tonic_input(scenario, structure, midway)
     neurons = make_neurons(initial_neurons(cpg, structure.signals))
-    output, listing = (
-        np.empty((sample_count(scenario), structure.signals)),
-        cpg.signals == "listing",
-    )
+    output = np.empty((sample_count(scenario), structure.signals))
+    listing = cpg.signals == "listing"
     network_output(network, inputs, cpg.listing_step, listing, neurons, output)
     return output
 

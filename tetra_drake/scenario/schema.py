@@ -113,10 +113,9 @@ class CpgSection(Section):
     """Force per unit of y_extensor - y_flexor."""
     start_up: float = quantity("s", ge=0)
     """Time until which the cables are not actuated."""
-    signals: Literal["listing", "recorded", "live"]
-    """`listing`: made beforehand by forward Euler, as in the thesis's listing; `recorded`: by a
-    Runge-Kutta method of order 4. `live`: the network is integrated with the robot, which feedback
-    needs."""
+    signals: Literal["listing", "live"]
+    """`listing`: made beforehand by forward Euler, as in the thesis's listing. `live`: the network
+    is integrated with the robot, which feedback needs."""
     listing_step: float = quantity("s", ge=1e-6)
     reach: int | None = Field(default=None, ge=0)
     """Oscillators of junctions at most so far apart inhibit each other; all if not given."""

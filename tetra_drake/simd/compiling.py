@@ -19,28 +19,61 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core.caching import CompileResultCacheImpl, NullCache
 from numba.core.serialize import dumps
+from numba.extending import overload
 
 F = TypeVar("F", bound=Callable[..., object])
 
 LOGGER = "tetra_drake"
 """The logger that gets a warning, once, when compilation takes longer than a moment."""
 
+_OPTIONS: dict[str, Any] = {
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "no_cfunc_wrapper": True,  # which C would call
+}
+
 _MOMENT = 2.0  # s
 
 
 def compiled(function: F, *, nogil: bool = False) -> F:
-    """Compiles a kernel, keeping the machine code beside the source or in the user's cache.
+    """Compiles a kernel that Python calls, keeping the machine code beside the source or in the
+    user's cache.
 
     Division follows NumPy (no check for zero); a product may be rounded together with the sum it
-    goes into. With `nogil`, other threads run meanwhile; other kernels become part of their
-    callers, since calls with many tables are slow.
+    goes into. With `nogil`, other threads run meanwhile; else a kernel becomes part of the kernels
+    that call it, too, since calls with many tables are slow.
 
     Where no folder can hold the cache (say, a read-only installation without a home), the
     kernel is compiled anew each time.
     """
-    kernel: Any = numba.njit(
-        error_model="numpy", fastmath={"contract"}, nogil=nogil, forceinline=not nogil
-    )(function)
+    return _kernel(function, nogil=nogil, forceinline=not nogil)
+
+
+def merged(function: F) -> F:
+    """A large kernel whose source becomes part of the one that calls it, before that is compiled.
+
+    So it is not compiled by itself, unless Python calls it.
+    """
+    return _kernel(function, inline="always")
+
+
+def inlined(function: F) -> F:
+    """A function that becomes part of the kernels that call it; from Python, a Python function.
+
+    So it is compiled without what a call from Python takes, which costs as much as itself.
+    """
+    options: Any = _OPTIONS | {"forceinline": True}
+
+    @overload(function, jit_options=options)
+    @functools.wraps(function)
+    def implementation(*_: object) -> F:
+        return function
+
+    return function
+
+
+def _kernel(function: F, **options: Any) -> F:
+    kernel: Any = numba.njit(**_OPTIONS, **options)(function)
     if hasattr(kernel, "_cache"):  # else compilation is switched off (NUMBA_DISABLE_JIT)
         kernel._cache = KernelCache(function)
     return cast(F, kernel)

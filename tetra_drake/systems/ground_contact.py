@@ -19,7 +19,6 @@ from tetra_drake.physics.contact import (
     MODE_COLUMNS,
     STICK_POINT,
     ground_forces,
-    meet_ground,
     modes_after_step,
 )
 from tetra_drake.physics.kinematics import NODE_COLUMNS
@@ -122,8 +121,14 @@ class GroundContact(LeafSystem):
         return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
     def _margin(self, context: Context) -> float:
-        meet_ground(self._state.Eval(context), self._p_BN, self._ground, self._nodes, self._frames)
-        return mode_margin(self._nodes, self._modes(context), self._ground, self._frames)
+        return mode_margin(
+            self._state.Eval(context),
+            self._modes(context),
+            self._p_BN,
+            self._ground,
+            self._nodes,
+            self._frames,
+        )
 
     def _push(self, context: Context) -> None:
         """Writes the generalized force and, by contact, friction along t1 and t2 and the normal

@@ -7,12 +7,11 @@ from helpers.states import disturbed
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
 from tetra_drake.engines.compiled.dynamics import (
     Forces,
-    compute_forces,
+    forces_at,
     implicit_matrix,
-    move_robot,
 )
 from tetra_drake.physics.cable import PULL_COLUMNS
-from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.contact import MODE_COLUMNS, modes_after_step
 from tetra_drake.physics.kinematics import NODE_COLUMNS, move_bodies
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.gait import seeded_gait
@@ -24,21 +23,19 @@ from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
-def moved(robot: Model, state: np.ndarray) -> Forces:
-    """The tables of forces, with the nodes where a state has them."""
-    contacts, bodies = len(robot.ground.contacts), len(state) // 13
+def tables_of(robot: Model, bodies: int) -> Forces:
+    """Tables of forces."""
+    contacts = len(robot.ground.contacts)
     nodes, frames = np.empty((4 * bodies, NODE_COLUMNS)), np.empty((contacts, FRAME_COLUMNS))
     pulls, pushes = np.empty((len(robot.cables), PULL_COLUMNS)), np.empty((contacts, 3))
-    forces = Forces(nodes, frames, pulls, pushes)
-    move_robot(robot, state, forces)
-    return forces
+    return Forces(nodes, frames, pulls, pushes)
 
 
-def forces_at(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Forces, np.ndarray]:
+def forces_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Forces, np.ndarray]:
     """All forces without actuation, and as forces on the bodies."""
     bodies = len(state) // 13
-    forces, generalized = moved(robot, state), np.empty(6 * bodies)
-    compute_forces(robot, modes, np.zeros(bodies - 1), True, forces, generalized)
+    forces, generalized = tables_of(robot, bodies), np.empty(6 * bodies)
+    forces_at(robot, state, modes, np.zeros(bodies - 1), forces, generalized)
     return forces, generalized
 
 
@@ -53,8 +50,8 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
     robot = make_model(scenario, structure)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
-    forces = moved(robot, state)
-    update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
+    forces = tables_of(robot, len(structure.bodies))
+    modes_after_step(state, robot.p_BN, robot.ground, forces.nodes, forces.frames, modes)
     assert np.count_nonzero(modes[:, 0]) > 0, "some nodes touch the ground"
     return robot, state, modes
 
@@ -67,7 +64,7 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
 def test_accelerations_are_those_of_the_diagram(scenario, tetrahedra, changes, seed):
     scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra, **changes})
     robot, state, modes = disturbed_robot(scenario, seed)
-    acceleration = forces_at(robot, state, modes)[1] / inertia_of(robot, tetrahedra)
+    acceleration = forces_of(robot, state, modes)[1] / inertia_of(robot, tetrahedra)
 
     diagram = MakeTensegrityDiagram(scenario, seeded_gait(scenario))
     context = diagram.CreateDefaultContext()
@@ -107,13 +104,13 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario, terrain, 
         return np.append(state[:35], velocity)
 
     columns = [
-        forces_at(robot, with_velocity(change), modes)[1]
-        - forces_at(robot, with_velocity(-change), modes)[1]
+        forces_of(robot, with_velocity(change), modes)[1]
+        - forces_of(robot, with_velocity(-change), modes)[1]
         for change in 1e-4 * np.eye(30)
     ]
     jacobian = np.array(columns).T / 2e-4
     time = 1e-9  # s, so short that time² stiffness counts for nothing
-    forces, _ = forces_at(robot, with_velocity(np.zeros(30)), modes)
+    forces, _ = forces_of(robot, with_velocity(np.zeros(30)), modes)
     rows, lines = np.zeros((5, BLOCK, ROW)), np.empty((JUNCTION_CABLES, 9))
     implicit_matrix(robot, modes, forces, time, lines, rows)
     full = np.zeros((30, 30 + BLOCK))
@@ -135,14 +132,14 @@ def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
     def forces_moved(motion: np.ndarray) -> np.ndarray:
         moved = state.copy()
         move_bodies(state, motion, 1.0, moved)
-        return forces_at(robot, moved, modes)[1]
+        return forces_of(robot, moved, modes)[1]
 
     columns = [forces_moved(m) - forces_moved(-m) for m in 1e-7 * np.eye(30)]
     jacobian = np.array(columns).T / 2e-7
 
     def matrix(time: float) -> np.ndarray:
         rows, lines = np.zeros((5, BLOCK, ROW)), np.empty((JUNCTION_CABLES, 9))
-        implicit_matrix(robot, modes, forces_at(robot, state, modes)[0], time, lines, rows)
+        implicit_matrix(robot, modes, forces_of(robot, state, modes)[0], time, lines, rows)
         return np.array([row[:, :BLOCK] for row in rows])
 
     # M + t D + t^2 K, at t = 0, 1, 2 s: the second difference is 2 K.

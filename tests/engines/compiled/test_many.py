@@ -10,9 +10,9 @@ import pytest
 import xarray
 from helpers.widths import WIDTHS
 
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, PreparedGait
 from tetra_drake.engines.compiled.lane_pool import LanePool
-from tetra_drake.engines.compiled.walk import DONE, ROUND, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
+from tetra_drake.engines.compiled.loop import DONE, ROUND, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import (
     Diverged,
@@ -49,7 +49,7 @@ def short(scenario: Scenario) -> Scenario:
     return scenario.with_changes({"simulation.engine": "compiled", **times})
 
 
-def courses(walks: list[Walk], width: int) -> list[Course]:
+def courses(walks: list[PreparedGait], width: int) -> list[Course]:
     """How walks go in an engine whose lanes take the next walk when one has ended."""
     engine = LaneEngine(walks[0], width=width)
     waiting, found = list(enumerate(walks)), dict[int, Course]()
@@ -74,7 +74,7 @@ def same(a: Course, b: Course) -> bool:
 def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, width):
     kinds = [short, short.with_changes(FAR_TOO_STRONG), short, short.with_changes(TOO_STRONG)]
     scenarios = [kinds[i % 4] for i in range(11)]
-    walks = [Walk.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(scenarios)]
+    walks = [PreparedGait.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(scenarios)]
     alone = [courses([walk], 1)[0] for walk in walks]
     statuses = [course.status for course in alone[:4]]
     assert statuses == [DONE, STEP_TOO_SMALL, DONE, TOO_MANY_EVALUATIONS]
@@ -94,7 +94,7 @@ def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short, wid
     firm = Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)
     finer = rough | {"terrain": Rough(amplitude=3e-3, wavelength=0.05, seed=1), "friction": firm}
     kinds = [short.with_changes(changes) for changes in (finer, rough, rough | FAR_TOO_STRONG)]
-    walks = [Walk.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(kinds * 3)]
+    walks = [PreparedGait.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(kinds * 3)]
     alone = [courses([walk], 1)[0] for walk in walks]
     assert [course.status for course in alone[:3]] == [DONE, DONE, STEP_TOO_SMALL]
     assert not same(alone[1], alone[4])
@@ -122,7 +122,7 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
         short.with_changes({"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}),
         short.with_changes({"simulation.duration": "0.8 s", "compiled.tolerance": "5e-5 m/s"}),
         short.with_changes({"robot.tetrahedra": 3}),
-        short.with_changes({"cpg.signals": "recorded", "cpg.gain": "1 lbf"}),
+        short.with_changes({"cpg.signals": "live", "cpg.gain": "1 lbf"}),
         short.with_changes({"cables.slack": True, "cpg.listing_step": "0.1 ms"}),
         short.with_changes({"robot.gravity": "1.6 m/s^2", "ground.stiffness": "20 lbf/in"}),
     ]
@@ -162,15 +162,13 @@ def test_recordings_are_those_of_single_gaits(short):
         xarray.testing.assert_identical(found.trajectory, alone.trajectory)
 
 
-@pytest.mark.parametrize("signals", ["listing", "recorded"])
-def test_cables_are_fed_the_signals_of_the_network(short, signals):
+def test_cables_are_fed_the_signals_of_the_network(short):
     # The engine computes them as it goes; here they are computed at once.
-    own = short.with_changes({"cpg.signals": signals})
-    gait = seeded_gait(own)
-    trajectory = simulate(scenario=own, gait=gait, record=True).trajectory
+    gait = seeded_gait(short)
+    trajectory = simulate(scenario=short, gait=gait, record=True).trajectory
     times = trajectory.time.values
-    times = times[np.abs(times - own.cpg.start_up) > 1e-9]  # there the signals jump
-    expected = signals_at(own, gait, times)
+    times = times[np.abs(times - short.cpg.start_up) > 1e-9]  # there the signals jump
+    expected = signals_at(short, gait, times)
     assert np.abs(expected).max() > 1.0, "N"
     np.testing.assert_allclose(trajectory.signal.sel(time=times), expected, atol=1e-12)
 
@@ -207,7 +205,7 @@ def test_of_a_large_robot_fewer_steps_are_made_without_a_look_at_the_time(
     short, monkeypatch, tetrahedra, rounds
 ):
     scenario = short.with_changes({"robot.tetrahedra": tetrahedra})
-    engine = LaneEngine(Walk.of(scenario, seeded_gait(scenario), record=False), width=1)
+    engine = LaneEngine(PreparedGait.of(scenario, seeded_gait(scenario), record=False), width=1)
     asked = []
     monkeypatch.setattr(engine, "_advance", lambda *arguments: asked.append(arguments[-1]))
     assert engine.advance(20 * ROUND) == []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
+from tetra_drake.engines.compiled.dynamics import Forces, forces_at
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.cable import PULL_COLUMNS
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
@@ -61,11 +61,9 @@ class Stepper:
         work.state[:] = self.start()
         estimates = []
         for i in range(steps):
-            move_robot(self.robot, work.state, self.forces)
-            signals = 1e2 * PULL * i * h
-            compute_forces(self.robot, self.modes, signals, True, self.forces, work.force)
-            signals = 1e2 * PULL * (i + 1) * h
             robot, modes, forces = self.robot, self.modes, self.forces
+            forces_at(robot, work.state, modes, 1e2 * PULL * i * h, forces, work.force)
+            signals = 1e2 * PULL * (i + 1) * h
             estimates.append(take_step(robot, work, modes, forces, signals, h, False))
             work.state[:] = work.end
         return work.state.copy(), estimates[0]

@@ -6,13 +6,13 @@ own block (columns 0 to 5) and its coupling to the next body (columns 6 to 11).
 
 from __future__ import annotations
 
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Table
 
 BLOCK, ROW = 6, 12
 
 
-@compiled
+@inlined
 def factorise(rows: Table) -> None:
     """Turns `rows` into its factors in place: L D Lᵀ with 1 / D on the diagonal."""
     bodies = rows.shape[0]
@@ -31,7 +31,7 @@ def factorise(rows: Table) -> None:
                     rows[i + 1, t - BLOCK, c - BLOCK] -= factor * rows[i, r, c]
 
 
-@compiled
+@inlined
 def solve(rows: Table, x: Table) -> None:
     """Solves with the factors; `x`, (6 bodies,), holds the right-hand side, then the solution.
 

@@ -23,7 +23,7 @@ from tetra_drake.physics.friction import STICK, coulomb_damping
 from tetra_drake.physics.kinematics import P_BN_W, gather_forces
 from tetra_drake.physics.terrain import to_world
 from tetra_drake.robot.model import JUNCTION_CABLES, Model
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import compiled, inlined, merged
 from tetra_drake.simd.lanes import Real, Table, any_lane, select
 
 
@@ -40,13 +40,13 @@ class Forces(NamedTuple):
     """(contacts, 3): of the ground."""
 
 
-@compiled
+@inlined
 def move_robot(robot: Model, state: Table, forces: Forces) -> None:
     """Moves the nodes to where a state (13 bodies,) has them; no forces act on them yet."""
     meet_ground(state, robot.p_BN, robot.ground, forces.nodes, forces.frames)
 
 
-@compiled
+@inlined
 def compute_forces(
     robot: Model, modes: Table, signals: Table, keep: bool, forces: Forces, generalized: Table
 ) -> None:
@@ -63,12 +63,21 @@ def compute_forces(
 
 
 @compiled
+def forces_at(
+    robot: Model, state: Table, modes: Table, signals: Table, forces: Forces, generalized: Table
+) -> None:
+    """Writes the `forces` and the generalized force at a state of the bodies, in its modes."""
+    move_robot(robot, state, forces)
+    compute_forces(robot, modes, signals, True, forces, generalized)
+
+
+@inlined
 def inertia(robot: Model, j: int) -> Real:
     """The diagonal of a body's mass matrix: of rotation for j = 0, 1, 2, else of translation."""
     return robot.body.moment[0] if j < 3 else robot.body.mass[0]
 
 
-@compiled
+@merged
 def implicit_matrix(
     robot: Model, modes: Table, forces: Forces, time: Real, lines: Table, rows: Table
 ) -> None:
@@ -92,7 +101,7 @@ def implicit_matrix(
             add_contact(modes, forces, robot.ground, law, i, time, rows)
 
 
-@compiled
+@inlined
 def add_junction(
     robot: Model, forces: Forces, time: Real, junction: int, lines: Table, rows: Table
 ) -> None:
@@ -151,7 +160,7 @@ def add_junction(
             rows[junction, 3 + c, 6 + r] = -wd
 
 
-@compiled
+@inlined
 def weighted(lines: Table, c: int, weights: tuple[Real, ...]) -> tuple[Real, ...]:
     """Column c of `lines`, times weights."""
     return (
@@ -164,7 +173,7 @@ def weighted(lines: Table, c: int, weights: tuple[Real, ...]) -> tuple[Real, ...
     )
 
 
-@compiled
+@inlined
 def product(column: tuple[Real, ...], lines: Table, c: int) -> Real:
     """The product of a column and column c of `lines`."""
     return (
@@ -177,7 +186,7 @@ def product(column: tuple[Real, ...], lines: Table, c: int) -> Real:
     )
 
 
-@compiled
+@inlined
 def add_contact(
     modes: Table, forces: Forces, ground: Ground, law: Law, i: int, time: Real, rows: Table
 ) -> None:
@@ -210,7 +219,7 @@ def add_contact(
     add_off_diagonal(nodes, node, body, (x[1], x[2], y[2]), rows)
 
 
-@compiled
+@inlined
 def add_diagonal(
     nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], rows: Table
 ) -> None:
@@ -235,7 +244,7 @@ def add_diagonal(
     rows[body, 5, 5] += k_z
 
 
-@compiled
+@inlined
 def add_off_diagonal(
     nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], rows: Table
 ) -> None:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk
-from tetra_drake.engines.compiled.walk import (
+from tetra_drake.engines.compiled.dynamics import Forces, forces_at
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, PreparedGait
+from tetra_drake.engines.compiled.loop import (
     DONE,
     STEP_TOO_SMALL,
     TOO_FAST,
@@ -37,25 +37,25 @@ def simulate_compiled(
     *, scenario: Scenario, gait: Gait, record: bool, steering: SteeringSignal | None = None
 ) -> SimulationResult:
     """Simulates a gait as simulate() does, without Drake. Other threads run meanwhile."""
-    walk = Walk.of(scenario, gait, record=record, steering=steering)
-    engine = LaneEngine(walk, width=1)
-    engine.load(0, walk)
+    prepared = PreparedGait.of(scenario, gait, record=record, steering=steering)
+    engine = LaneEngine(prepared, width=1)
+    engine.load(0, prepared)
     while not (ended := engine.advance(_BODY_STEPS)):
         check_time()
-    _, walk, course = ended[0]
-    return make_outcome(walk, course)
+    _, prepared, course = ended[0]
+    return make_outcome(prepared, course)
 
 
-def make_outcome(walk: Walk, course: Course) -> SimulationResult:
-    """The result of a walk; raises Diverged or StepBudgetExceeded if it failed."""
-    scenario, structure = walk.scenario, walk.structure
+def make_outcome(prepared: PreparedGait, course: Course) -> SimulationResult:
+    """The result of a simulation; raises Diverged or StepBudgetExceeded if it failed."""
+    scenario, structure = prepared.scenario, prepared.structure
     if course.status != DONE:
         raise _failure(course, scenario)
     trajectory = None
-    if walk.record:
+    if prepared.record:
         simulation = scenario.simulation
         times = sample_times(simulation.duration, simulation.sample_period)
-        trajectory = _dataset(walk, course, times)
+        trajectory = _dataset(prepared, course, times)
     steps, evaluations = course.steps, course.evaluations
     return make_result(
         scenario,
@@ -64,7 +64,7 @@ def make_outcome(walk: Walk, course: Course) -> SimulationResult:
         states=course.states,
         signals=course.signals,
         totals=course.totals,
-        mass=float(walk.model.body.mass[0]),
+        mass=float(prepared.model.body.mass[0]),
         wall_time=course.wall_time,
         integrator=IntegratorWork("ros2", scenario.compiled.tolerance, steps, evaluations),
         trajectory=trajectory,
@@ -84,22 +84,21 @@ def _failure(course: Course, scenario: Scenario) -> SimulationFailure:
     return failure
 
 
-def _dataset(walk: Walk, course: Course, times: np.ndarray) -> xarray.Dataset:
+def _dataset(prepared: PreparedGait, course: Course, times: np.ndarray) -> xarray.Dataset:
     """The recording at `times`, with the forces that the kernels find at its states."""
     chosen = np.searchsorted(course.times, times)
     states, modes, signals = course.states[chosen], course.modes[chosen], course.signals[chosen]
-    count, model = len(times), walk.model
+    count, model = len(times), prepared.model
     pulls = np.empty((count, len(model.cables), PULL_COLUMNS))
-    contacts, nodes = len(model.ground.contacts), len(walk.structure.node_names)
+    contacts, nodes = len(model.ground.contacts), len(prepared.structure.node_names)
     pushes = np.empty((count, contacts, 3))
     moved, frames = np.empty((nodes, NODE_COLUMNS)), np.empty((contacts, FRAME_COLUMNS))
-    generalized = np.empty(6 * len(walk.structure.bodies))
+    generalized = np.empty(6 * len(prepared.structure.bodies))
     for i, state in enumerate(states):
         forces = Forces(moved, frames, pulls[i], pushes[i])
-        move_robot(model, state, forces)
-        compute_forces(model, modes[i], signals[i], True, forces, generalized)
+        forces_at(model, state, modes[i], signals[i], forces, generalized)
     return assemble_dataset(
-        walk.structure,
+        prepared.structure,
         times=times,
         states=states,
         signals=signals,

@@ -1,10 +1,9 @@
-"""The tables of W walks in lanes, and how a walk gets into a lane and its result out of it."""
+"""The compiled engine's memory: loads a gait into a SIMD lane, runs it, and reads its course."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import operator
 import time
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -15,8 +14,7 @@ from numba.core import registry
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
 from tetra_drake.engines.compiled.dynamics import Forces
-from tetra_drake.engines.compiled.rosenbrock import Step
-from tetra_drake.engines.compiled.walk import (
+from tetra_drake.engines.compiled.loop import (
     CLOCK_ROWS,
     DUE,
     EVALUATIONS,
@@ -29,10 +27,11 @@ from tetra_drake.engines.compiled.walk import (
     TIME,
     TRIED,
     WALKING,
+    LaneTables,
     Log,
-    Walks,
     advance,
 )
+from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics.cable import PULL_COLUMNS, Cables
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, Law
@@ -64,7 +63,7 @@ _INDICES = 3  # the first fields of Senses, which lanes share
 
 
 @dataclass(frozen=True)
-class Walk:
+class PreparedGait:
     """A gait on a scenario, prepared for a lane."""
 
     scenario: Scenario
@@ -88,7 +87,7 @@ class Walk:
         *,
         record: bool,
         steering: SteeringSignal | None = None,
-    ) -> Walk:
+    ) -> PreparedGait:
         """Prepares a gait."""
         simulation, start_up = scenario.simulation, scenario.cpg.start_up
         structure = MakeStructure(scenario)
@@ -106,23 +105,29 @@ class Walk:
             senses=make_senses(scenario, structure),
         )
 
-    def with_gait(self, gait: Gait) -> Walk:
+    def with_gait(self, gait: Gait) -> PreparedGait:
         """Another gait on the same scenario."""
         return dataclasses.replace(self, gait=gait)
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What walks that share an engine must have in common."""
+        """What simulations that share an engine must have in common."""
         scenario, ground = self.scenario, self.model.ground
-        robot = scenario.robot.tetrahedra, len(ground.contacts), scenario.cables.slack
         drivers = tuple(self.structure.actuation.drivers.tolist())
-        return *robot, drivers, *self.signals, ground.flat, ground.coulomb
+        return (
+            scenario.robot.tetrahedra,
+            len(ground.contacts),
+            scenario.cables.slack,
+            drivers,
+            self.live,
+            ground.flat,
+            ground.coulomb,
+        )
 
     @property
-    def signals(self) -> tuple[bool, bool]:
-        """Whether they are the listing's, and whether the network is live."""
-        kind = self.scenario.cpg.signals
-        return kind == "listing", kind == "live"
+    def live(self) -> bool:
+        """Whether the network is integrated with the robot."""
+        return self.scenario.cpg.signals == "live"
 
     @property
     def recent_signals(self) -> int:
@@ -134,12 +139,13 @@ class Walk:
     @property
     def turn_samples(self) -> int:
         """How many samples of the turn an engine has to hold."""
-        steps = self.scenario.simulation.duration / self.scenario.cpg.listing_step
-        return 1 if self.steering is None else round(steps) + 1
+        if self.steering is None:
+            return 1
+        return round(self.scenario.simulation.duration / self.scenario.cpg.listing_step) + 1
 
 
 class Course(NamedTuple):
-    """How a walk went."""
+    """The course of a simulation."""
 
     status: int
     time: float
@@ -152,18 +158,18 @@ class Course(NamedTuple):
     signals: np.ndarray
     totals: Totals
     wall_time: float
-    """What it cost, in s: shared with the other walks on the same core."""
+    """What it cost, in s: shared with the other lanes of the same core."""
 
 
 class LaneEngine:
-    """Simulates walks of one kind in `width` lanes."""
+    """Simulates gaits of one kind in `width` lanes."""
 
-    def __init__(self, first: Walk, *, width: int) -> None:
-        """For walks like the first; see `accepts`. Compiles the engine where that is not done."""
+    def __init__(self, first: PreparedGait, *, width: int) -> None:
+        """For gaits like the first; see `accepts`. Compiles the engine where that is not done."""
         self._kind = first.kind
         robot, self._robot_tables = _lane_model(first.model, width)
         self._heights = robot.ground.heights.array.reshape(width, -1)
-        self._walks = _tables(first, robot, width)
+        self._tables = _zeros(first, robot, width)
         structure = first.structure
         self._bodies = len(structure.bodies)
         shape, signals = (width, len(first.times)), structure.signals
@@ -179,67 +185,70 @@ class LaneEngine:
             turns=np.zeros((width, first.turn_samples)),
         )
         log = Log(*(FieldArray(array, any_size=True) for array in self._log))
-        self._arguments = self._walks, log, *first.signals
+        self._arguments = self._tables, log, first.live
         # Called without looking for the types of all these tables each time.
         kinds = tuple(typeof(each) for each in (*self._arguments, 0))
         self._advance = advance.compile(kinds)  # type: ignore[attr-defined]
-        self._in_lane: list[Walk | None] = [None] * width
+        self._in_lane: list[PreparedGait | None] = [None] * width
         self._wall_times = [0.0] * width
         for lane in range(width):  # so that idle lanes compute with proper numbers
             self.load(lane, first)
             self.stop(lane)
 
-    def accepts(self, each: Walk) -> bool:
-        """Whether a walk can be simulated: one like the first in structure and kind of signals,
+    def accepts(self, prepared: PreparedGait) -> bool:
+        """Whether a gait can be simulated: one like the first in structure and kind of signals,
         and with no more to keep."""
-        log, heights = self._log, self._heights.shape[1]
-        room = log.times.shape[1] - 1, log.recent.shape[1], log.turns.shape[1], heights
-        own = each.model.ground.heights.size
-        needs = len(each.times), each.recent_signals, each.turn_samples, own
-        return each.kind == self._kind and all(map(operator.le, needs, room))
+        log = self._log
+        return (
+            prepared.kind == self._kind
+            and len(prepared.times) < log.times.shape[1]
+            and prepared.recent_signals <= log.recent.shape[1]
+            and prepared.turn_samples <= log.turns.shape[1]
+            and prepared.model.ground.heights.size <= self._heights.shape[1]
+        )
 
     @property
     def idle(self) -> list[int]:
-        """The lanes without a walk."""
-        return [lane for lane, each in enumerate(self._in_lane) if each is None]
+        """The lanes without a gait."""
+        return [lane for lane, prepared in enumerate(self._in_lane) if prepared is None]
 
-    def load(self, lane: int, each: Walk) -> None:
-        """Starts a walk in a lane; raises InputError if its gait does not fit its scenario."""
-        scenario, model, start = each.scenario, each.model, each.structure.initial_state
-        modes = starting_modes(each.structure, model.ground)
+    def load(self, lane: int, prepared: PreparedGait) -> None:
+        """Starts a gait in a lane; raises InputError if it does not fit its scenario."""
+        scenario, model, structure = prepared.scenario, prepared.model, prepared.structure
+        gait, start = prepared.gait, structure.initial_state
+        modes = starting_modes(structure, model.ground)
         cpg, simulation, compiled = scenario.cpg, scenario.simulation, scenario.compiled
-        network = make_network(scenario, each.structure, each.gait)
-        senses = each.senses
-        turns = sample_turns(scenario, each.structure, each.gait, each.steering)
+        network = make_network(scenario, structure, gait)
+        senses, turns = prepared.senses, sample_turns(scenario, structure, gait, prepared.steering)
         numbers: dict[str, Any] = dict(compiled)
         numbers |= {"max_speed": MAX_SPEED, "max_evaluations": simulation.max_evaluations}
         numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
         numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
         numbers["neurons"] = make_neurons(initial_neurons(cpg, scenario.oscillators))
         numbers["external_input"] = cpg.external_input
-        numbers["gains"] = [gain for _, gain in each.gait.gains]
-        numbers["sides"] = np.repeat(each.structure.actuation.sides, 2)
-        numbers["tonic"] = tonic_input(scenario, each.structure, turns)[0]
+        numbers["gains"] = [gain for _, gain in gait.gains]
+        numbers["sides"] = np.repeat(structure.actuation.sides, 2)
+        numbers["tonic"] = tonic_input(scenario, structure, turns)[0]
         for name, values in numbers.items():
-            getattr(self._walks, name).array[..., lane] = values
-        for table, value in zip(self._walks.tally, empty_tally(scenario), strict=True):
+            getattr(self._tables, name).array[..., lane] = values
+        for table, value in zip(self._tables.tally, empty_tally(scenario), strict=True):
             table.array[..., lane] = value
-        first, beyond, *tables = self._walks.network
+        first, beyond, *tables = self._tables.network
         first.array[:] = np.minimum(first.array, network.first)  # so that they hold for all lanes
         beyond.array[:] = np.maximum(beyond.array, network.beyond)
-        tables += [*self._robot_tables, *self._walks.senses[_INDICES:]]
+        tables += [*self._robot_tables, *self._tables.senses[_INDICES:]]
         constants = *network[2:], *_numbers(model), *senses[_INDICES:]
         for table, values in zip(tables, constants, strict=True):
             table.array[..., lane] = values
         heights = self._heights[lane]
         heights[: model.ground.heights.size] = model.ground.heights
-        self._walks.robot.ground.law.first.array[0, lane] = lane * heights.size
-        self._walks.step.state.array[:, lane] = start
+        self._tables.robot.ground.law.first.array[0, lane] = lane * heights.size
+        self._tables.step.state.array[:, lane] = start
 
-        log, clock = self._log, self._walks.clock.array
+        log, clock = self._log, self._tables.clock.array
         log.times[lane] = log.marks[lane] = math.inf
-        log.times[lane, : len(each.times)] = each.times
-        log.marks[lane, : len(each.marks)] = each.marks
+        log.times[lane, : len(prepared.times)] = prepared.times
+        log.marks[lane, : len(prepared.marks)] = prepared.marks
         log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
         log.states[lane, 0], log.modes[lane, 0], log.signals[lane, 0] = start, modes, 0.0
         log.kept[lane], log.passed[lane] = 1, 0
@@ -247,32 +256,32 @@ class LaneEngine:
         first_step = min(compiled.look_ahead, compiled.max_step)
         clock[STATUS, lane], clock[STEP, lane] = WALKING, first_step
         clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
-        self._in_lane[lane], self._wall_times[lane] = each, 0.0
+        self._in_lane[lane], self._wall_times[lane] = prepared, 0.0
 
     def stop(self, lane: int) -> float:
-        """Takes the walk out of a lane, wherever it is; returns what it cost, in s."""
+        """Takes the gait out of a lane, wherever it is; returns what it cost, in s."""
         self._in_lane[lane] = None
-        self._walks.clock.array[STATUS, lane] = IDLE
+        self._tables.clock.array[STATUS, lane] = IDLE
         return self._wall_times[lane]
 
-    def advance(self, body_steps: int) -> list[tuple[int, Walk, Course]]:
-        """Lets the lanes walk until one of them ends, or for about so many iterations times bodies;
-        returns lanes and walks that have ended, which are idle then. Other threads run meanwhile.
+    def advance(self, body_steps: int) -> list[tuple[int, PreparedGait, Course]]:
+        """Simulates until one of the lanes ends, or for about so many iterations times bodies;
+        returns lanes and gaits that have ended, which are idle then. Other threads run meanwhile.
         """
         started = time.perf_counter()
         self._advance(*self._arguments, max(1, body_steps // (ROUND * self._bodies)))
-        walks = [(lane, each) for lane, each in enumerate(self._in_lane) if each is not None]
-        share = (time.perf_counter() - started) / max(len(walks), 1)
+        busy = [(lane, gait) for lane, gait in enumerate(self._in_lane) if gait is not None]
+        share = (time.perf_counter() - started) / max(len(busy), 1)
         ended = []
-        for lane, each in walks:
+        for lane, prepared in busy:
             self._wall_times[lane] += share
-            if self._walks.clock.array[STATUS, lane] != WALKING:
-                ended.append((lane, each, self._course(lane)))
+            if self._tables.clock.array[STATUS, lane] != WALKING:
+                ended.append((lane, prepared, self._course(lane)))
                 self.stop(lane)
         return ended
 
     def _course(self, lane: int) -> Course:
-        clock, log = self._walks.clock.array[:, lane], self._log
+        clock, log = self._tables.clock.array[:, lane], self._log
         kept = slice(log.kept[lane])
         return Course(
             status=int(clock[STATUS]),
@@ -283,21 +292,21 @@ class LaneEngine:
             states=log.states[lane, kept].copy(),
             modes=log.modes[lane, kept].copy(),
             signals=log.signals[lane, kept].copy(),
-            totals=Totals.of(Tally(*(t.array[..., lane] for t in self._walks.tally))),
+            totals=Totals.of(Tally(*(t.array[..., lane] for t in self._tables.tally))),
             wall_time=self._wall_times[lane],
         )
 
 
-def lanes_for(walks: float) -> int:
-    """The number of lanes in which so many walks are simulated fastest on a core of this machine;
+def lanes_for(gaits: float) -> int:
+    """The number of lanes in which so many gaits are simulated fastest on a core of this machine;
     their numbers are the same with any.
 
     Eight doubles fill a register of AVX-512. With narrower registers, eight lanes need more of
     them than there are, and four are faster.
     """
-    if walks <= 1:
+    if gaits <= 1:
         return 1
-    return 8 if walks > 4 and "+avx512f" in processor_features() else 4
+    return 8 if gaits > 4 and "+avx512f" in processor_features() else 4
 
 
 def processor_features() -> str:
@@ -334,8 +343,8 @@ def _lane_model(model: Model, width: int) -> tuple[Model, list[FieldArray]]:
     return lanes, tables
 
 
-def _tables(first: Walk, robot: Model, width: int) -> Walks:
-    """The tables of walks like the first, zeros."""
+def _zeros(first: PreparedGait, robot: Model, width: int) -> LaneTables:
+    """The tables of gaits like the first, zeros."""
     structure, senses = first.structure, first.senses
     bodies, signals = len(structure.bodies), structure.signals
     contacts, size, neurons = len(structure.contacts), BLOCK * bodies, 2 * signals
@@ -344,7 +353,7 @@ def _tables(first: Walk, robot: Model, width: int) -> Walks:
         return lane_table(shape, width)
 
     vectors = {name: table(size) for name in ("force", "end_force", "change", "stage", "k1", "k2")}
-    tables: dict[str, Any] = {name: table(1) for name in Walks._fields}
+    tables: dict[str, Any] = {name: table(1) for name in LaneTables._fields}
     tables |= {name: table(signals) for name in ("output", "signals", "end_signals")}
     tables |= {
         "robot": robot,
@@ -395,4 +404,4 @@ def _tables(first: Walk, robot: Model, width: int) -> Walks:
             clearance=table(1),
         ),
     }
-    return Walks(**tables)
+    return LaneTables(**tables)

@@ -11,14 +11,14 @@ from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
 from tetra_drake.engines.compiled.engine import make_outcome
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Walk, lanes_for
+from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, PreparedGait, lanes_for
 from tetra_drake.errors import InputError, SimulationFailure, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.schema import Scenario
 
 _GATHERING = 1e-3
-"""Time (s) that a thread without work waits for more than one walk to come."""
+"""Time (s) that a thread without work waits for more than one gait to come."""
 
 _BODY_STEPS = 25_000
 """Iterations times bodies, some 30 ms, after which a thread looks for time budgets and the pool's
@@ -34,7 +34,7 @@ class _Job:
     gait: Gait
     record: bool
     time_budget: float
-    future: Future[tuple[Walk, Course]] = field(default_factory=Future)
+    future: Future[tuple[PreparedGait, Course]] = field(default_factory=Future)
     deadline: float = math.inf
 
 
@@ -82,26 +82,26 @@ class LanePool:
         return self.result(future)
 
     @staticmethod
-    def result(future: Future[tuple[Walk, Course]]) -> SimulationResult:
-        """Waits for a walk of submit(); raises as simulate() does."""
+    def result(future: Future[tuple[PreparedGait, Course]]) -> SimulationResult:
+        """Waits for a gait of submit(); raises as simulate() does."""
         return make_outcome(*future.result())
 
     def submit(
         self,
-        walks: Sequence[tuple[Scenario, Gait]],
+        gaits: Sequence[tuple[Scenario, Gait]],
         *,
         record: bool = False,
         time_budget: float = math.inf,
-    ) -> list[Future[tuple[Walk, Course]]]:
+    ) -> list[Future[tuple[PreparedGait, Course]]]:
         """Puts gaits, each with its scenario, in the queue; result() waits for one."""
-        jobs = [_Job(*walk, record, time_budget) for walk in walks]
+        jobs = [_Job(scenario, gait, record, time_budget) for scenario, gait in gaits]
         with self._changed:
             self._waiting.extend(jobs)
             self._changed.notify_all()
         return [job.future for job in jobs]
 
     def _work(self) -> None:
-        """What each thread does: fills idle lanes, lets them walk, hands over what has ended."""
+        """What each thread does: fills idle lanes, simulates, hands over what has ended."""
         crew = _Crew(self._prepare)
         while (jobs := self._take(crew)) is not None:
             for job in jobs:
@@ -131,22 +131,22 @@ class LanePool:
 
 
 class _Preparation:
-    """Prepares walks, each scenario once for all threads that need it at a time."""
+    """Prepares gaits, each scenario once for all threads that need it at a time."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._latest: dict[tuple[int, bool], Walk] = {}
+        self._latest: dict[tuple[int, bool], PreparedGait] = {}
         """By the scenario's identity, the one last used at the end."""
 
-    def __call__(self, job: _Job) -> Walk:
+    def __call__(self, job: _Job) -> PreparedGait:
         key = id(job.scenario), job.record
         with self._lock:
-            walk = self._latest.pop(key, None)
-            walk = walk or Walk.of(job.scenario, job.gait, record=job.record)
-            self._latest[key] = walk  # with its scenario, so that no other one gets its id
+            prepared = self._latest.pop(key, None)
+            prepared = prepared or PreparedGait.of(job.scenario, job.gait, record=job.record)
+            self._latest[key] = prepared  # with its scenario, so that no other one gets its id
             if len(self._latest) > _PREPARED:
                 del self._latest[next(iter(self._latest))]
-        return walk.with_gait(job.gait)
+        return prepared.with_gait(job.gait)
 
 
 class _Crew:
@@ -171,12 +171,12 @@ class _Crew:
         If they are, there will be lanes for as many jobs as it is `among`.
         """
         try:
-            walk = self._prepare(job)
-            engine = self._engine if self.jobs else self._engine_for(walk, lanes_for(among))
-            if engine is None or not engine.accepts(walk):
+            prepared = self._prepare(job)
+            engine = self._engine if self.jobs else self._engine_for(prepared, lanes_for(among))
+            if engine is None or not engine.accepts(prepared):
                 return False
             self._engine, lane = engine, engine.idle[0]
-            engine.load(lane, walk)
+            engine.load(lane, prepared)
         except Exception as error:  # such as a gait that does not fit the scenario
             job.future.set_exception(error)
             return True
@@ -185,12 +185,12 @@ class _Crew:
         return True
 
     def advance(self) -> None:
-        """Lets all lanes walk for a while; jobs that have ended leave."""
+        """Simulates for a while; jobs that have ended leave."""
         engine = self._engine
         if engine is None or not self.jobs:
             return
-        for lane, walk, course in engine.advance(_BODY_STEPS):
-            self.jobs.pop(lane).future.set_result((walk, course))
+        for lane, prepared, course in engine.advance(_BODY_STEPS):
+            self.jobs.pop(lane).future.set_result((prepared, course))
         now = time.perf_counter()
         for lane in [lane for lane, job in self.jobs.items() if now > job.deadline]:
             job = self.jobs.pop(lane)
@@ -204,15 +204,15 @@ class _Crew:
             job.future.set_exception(error)
         self.jobs, self._engine, self._engines = {}, None, {}
 
-    def _engine_for(self, walk: Walk, width: int) -> LaneEngine:
+    def _engine_for(self, prepared: PreparedGait, width: int) -> LaneEngine:
         engine = self._engines.get(width)
-        if engine is None or not engine.accepts(walk):
-            engine = self._engines[width] = LaneEngine(walk, width=width)
+        if engine is None or not engine.accepts(prepared):
+            engine = self._engines[width] = LaneEngine(prepared, width=width)
         return engine
 
 
 def simulate_in_lanes(
-    walks: Sequence[tuple[Scenario, Gait]],
+    gaits: Sequence[tuple[Scenario, Gait]],
     *,
     record: bool,
     threads: int,
@@ -220,7 +220,7 @@ def simulate_in_lanes(
     """The results of many gaits, each with its scenario, or their failures."""
     found: list[SimulationResult | SimulationFailure] = []
     with LanePool(threads) as pool:
-        for future in pool.submit(walks, record=record):
+        for future in pool.submit(gaits, record=record):
             try:
                 found.append(pool.result(future))
             except SimulationFailure as failure:

@@ -30,7 +30,7 @@ from tetra_drake.engines.compiled.dynamics import (
 )
 from tetra_drake.physics.kinematics import move_bodies
 from tetra_drake.robot.model import Model
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, select
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
@@ -54,7 +54,7 @@ class Step(NamedTuple):
     """(JUNCTION_CABLES, 9)."""
 
 
-@compiled
+@merged
 def take_step(
     robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, step: Real, keep: bool
 ) -> Real:
@@ -111,7 +111,7 @@ def take_step(
     return 0.5 * step * larger(robot.body.radius[0] * turn, shift)
 
 
-@compiled
+@inlined
 def larger(x: Real, y: Real) -> Real:
     """The larger; NaN if either is."""
     return select((y > x) | (y != y), y, x)

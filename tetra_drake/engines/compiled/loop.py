@@ -1,11 +1,13 @@
-"""The simulation loop: several walks in lanes, each with its own time, step, modes and signals.
+"""The simulation loop: several simulations in lanes, each with its own time, step and modes.
 
 All lanes go through the same iteration: forces, prediction of the next mode change, signals, one
 step. A lane whose step is rejected repeats it with a shorter one in the next iteration.
 
-A network that does not depend on the robot runs ahead in steps of its own, and its signals are
-interpolated. A `live` one takes the robot's steps by Heun's method, which is explicit, as its rates
-are slow, and what ROS2 is without its matrix: both are of order 2 together.
+The listing's network does not depend on the robot: it runs ahead in steps of its own, and its
+signals are interpolated. (A table of them made beforehand, one lane at a time, costs a tenth of the
+speed of one lane, and more in several.) A `live` network takes the robot's steps by Heun's method,
+which is explicit, as its rates are slow, and what ROS2 is without its matrix: both are of order 2
+together.
 """
 
 from __future__ import annotations
@@ -27,14 +29,14 @@ from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.oscillator import (
     Network,
     correct_neurons,
-    next_output,
+    euler_step,
     oscillator_output,
     predict_neurons,
     steered_input,
 )
 from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.robot.model import Model
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import compiled, inlined, merged
 from tetra_drake.simd.lanes import Real, Table, any_lane, by_lane, maximum, minimum, select
 
 Array = np.ndarray
@@ -60,14 +62,13 @@ find the least one to within 0.1 mm."""
 STATUS, TIME, STEP, END, MARK, DUE, ACTIVE, SAMPLES, FLAG, TRIED, TAKEN, CLOCK_ROWS = range(12)
 """Rows of `clock`, (CLOCK_ROWS,): status, time, length of the step tried and its end, times of the
 next mark and of the next sample to keep (s), whether signals act (0 or 1), number of samples of the
-signals that exist, a flag for what comes next, steps tried, steps taken; and their number."""
+signals that exist, a number for what comes next, steps tried, steps taken; and their number."""
 
 
-class Walks(NamedTuple):
-    """All that kernels need of several walks, in lanes; constants are tables of one.
+class LaneTables(NamedTuple):
+    """All that kernels need of several simulations, in lanes; constants are tables of one.
 
-    In SI units. The signals are samples at 0, `period`, 2 `period` ..., linear between them; they
-    act from `start_up` on.
+    In SI units. The signals act from `start_up` on.
     """
 
     robot: Model
@@ -92,8 +93,9 @@ class Walks(NamedTuple):
     gain: Table
     """Force per unit of an oscillator's output."""
     period: Table
+    """From one sample of the listing's signals, or of the turns, to the next."""
     samples: Table
-    """Number of samples of the signals; the last one lasts."""
+    """Number of samples of the listing's signals; the last one lasts."""
     start_up: Table
     neurons: Table
     """(2n, NEURON_COLUMNS)."""
@@ -107,13 +109,13 @@ class Walks(NamedTuple):
     acceleration: Table
     """(6 bodies,)."""
     signals: Table
-    """(n,), at the walk's time; `end_signals` at the end of its step."""
+    """(n,), at the lane's time; `end_signals` at the end of its step."""
     end_signals: Table
     tally: Tally
 
 
 class Log(NamedTuple):
-    """The course of each walk, a row a lane."""
+    """The course of each simulation, a row a lane."""
 
     marks: Table
     """(W, marks): times (s) at which steps end, ascending; infinite after the last."""
@@ -130,44 +132,51 @@ class Log(NamedTuple):
     signals: Table
     """(W, samples, n), in N."""
     recent: Table
-    """(W, RECENT, n): the latest samples of all signals; see row_of."""
+    """(W, RECENT, n): the latest samples of the listing's signals; see row_of."""
     turns: Table
     """(W, turns): at 0, one `period` ..., linear between them; the last one lasts. One alone is in
     `tonic` already."""
 
 
 @functools.partial(compiled, nogil=True)
-def advance(w: Walks, log: Log, listing: bool, live: bool, rounds: int) -> None:
-    """Lets the lanes walk to the end of the round in which one of them ends, or for a number of
-    rounds: so each walk's begin with its own, and lanes may be filled again in between.
+def advance(w: LaneTables, log: Log, live: bool, rounds: int) -> None:
+    """Simulates to the end of the round in which one of the lanes ends, or for a number of rounds:
+    so each simulation's begin with its own, and lanes may be filled again in between.
 
-    `listing`: see physics.oscillator.next_output. `live`: whether the network walks along.
+    `live`: whether the network is integrated with the robot.
     """
     for _ in range(rounds):
         ended = False
         for _ in range(ROUND):
-            ended |= iterate(w, log, listing, live)
+            ended |= iterate(w, log, live)
         move_robot(w.robot, w.step.state, w.forces)
         look(w.tally, w.forces.nodes)
         if ended:
             return
 
 
-@compiled
-def iterate(w: Walks, log: Log, listing: bool, live: bool) -> bool:
-    """Tries a step in all lanes; whether a walk has ended."""
+@merged
+def iterate(w: LaneTables, log: Log, live: bool) -> bool:
+    """Tries a step in all lanes; whether a simulation has ended."""
     clock, robot, forces = w.clock, w.robot, w.forces
     state, end, ended = w.step.state, w.step.end, False
     if any_lane((clock[STATUS] == WALKING) & (clock[TIME] >= clock[MARK])):
         if not live:
-            produce_signals(w, log, listing, clock[TIME])
+            run_ahead(w, log, clock[TIME])
         ended = pass_marks(w, log, live)
     walks = clock[STATUS] == WALKING
     move_robot(robot, state, forces)
     update_modes(state, forces.nodes, robot.ground, forces.frames, w.modes)
     compute_forces(robot, w.modes, w.signals, True, forces, w.step.force)
-    known = robot.cables, robot.ground.contacts, clock[TIME], w.signals
-    observe(w.tally, *known, forces.pulls, forces.pushes)
+    observe(
+        w.tally,
+        robot.cables,
+        robot.ground.contacts,
+        clock[TIME],
+        w.signals,
+        forces.pulls,
+        forces.pushes,
+    )
     step = select(walks, aim(w), 0.0)
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
@@ -176,7 +185,7 @@ def iterate(w: Walks, log: Log, listing: bool, live: bool) -> bool:
         predict_neurons(w.network, w.inputs, step, w.neurons)
         drive(w)
     else:
-        produce_signals(w, log, listing, step_end)
+        run_ahead(w, log, step_end)
         for lane in range(log.kept.size):
             interpolate(w, log, lane, by_lane(clock)[END, lane], by_lane(w.end_signals))
     error = take_step(robot, w.step, w.modes, forces, w.end_signals, step, live)
@@ -203,8 +212,8 @@ def iterate(w: Walks, log: Log, listing: bool, live: bool) -> bool:
     return ended
 
 
-@compiled
-def aim(w: Walks) -> Real:
+@merged
+def aim(w: LaneTables) -> Real:
     """The step (s) to try: at most the planned one, to just after the next mode change if that is
     nearer, and to the next mark or half the way to it if that is near."""
     robot, planned = w.robot, w.clock[STEP]
@@ -213,15 +222,22 @@ def aim(w: Walks) -> Real:
         for j in range(BLOCK):
             i = BLOCK * body + j
             w.acceleration[i] = w.step.force[i] * (per_moment if j < 3 else per_mass)
-    motion, where = (w.step.state, w.acceleration, w.forces.nodes), (robot.ground, w.forces.frames)
-    change = time_to_mode_change(*motion, w.modes, *where, planned)
+    change = time_to_mode_change(
+        w.step.state,
+        w.acceleration,
+        w.forces.nodes,
+        w.modes,
+        robot.ground,
+        w.forces.frames,
+        planned,
+    )
     step = minimum(planned, AIM_FACTOR * change + w.look_ahead[0])
     remaining = w.clock[MARK] - w.clock[TIME]
     halved = select(2.0 * step > remaining, 0.5 * remaining, step)
     return select(step > remaining - LEAST_STEP, remaining, halved)
 
 
-@compiled
+@inlined
 def next_step(error: Real, step: Real, tolerance: Real, max_step: Real) -> Real:
     """The step (s) that a method of order 2 should take after one with this error."""
     factor = SAFETY * math.sqrt(tolerance / maximum(error, 1e-12))
@@ -230,8 +246,8 @@ def next_step(error: Real, step: Real, tolerance: Real, max_step: Real) -> Real:
     return minimum(max_step, step * factor)
 
 
-@compiled
-def fate(w: Walks) -> Real:
+@inlined
+def fate(w: LaneTables) -> Real:
     """The status of each lane after a step, as if all were walking."""
     state, speed = w.step.state, 0.0
     bodies = state.size // 13
@@ -245,9 +261,9 @@ def fate(w: Walks) -> Real:
     return select(too_many, 1.0 * TOO_MANY_EVALUATIONS, status)
 
 
-@compiled
-def produce_signals(w: Walks, log: Log, listing: bool, until: Real) -> None:
-    """Lets the networks run until every walking lane has the samples around a time (s).
+@inlined
+def run_ahead(w: LaneTables, log: Log, until: Real) -> None:
+    """Lets the listing's networks run until every walking lane has the samples around a time (s).
 
     Others go along as far as there is room, so that few steps are taken for one lane alone.
     """
@@ -258,7 +274,8 @@ def produce_signals(w: Walks, log: Log, listing: bool, until: Real) -> None:
         goes = grows & (clock[SAMPLES] < w.samples[0]) & (clock[SAMPLES] < room)
         step = select(goes, period, 0.0)
         steer(w, log, clock[SAMPLES] + 0.5)
-        next_output(w.network, w.tonic, step, listing, w.neurons, w.output)
+        euler_step(w.network, w.tonic, step, w.neurons)
+        oscillator_output(w.neurons, w.output)
         clock[FLAG] = select(goes, 1.0, 0.0)
         for lane in range(log.kept.size):
             if floats[FLAG, lane] != 0.0:
@@ -269,8 +286,8 @@ def produce_signals(w: Walks, log: Log, listing: bool, until: Real) -> None:
         clock[SAMPLES] += clock[FLAG]
 
 
-@compiled
-def feel(w: Walks, log: Log, time: Real, state: Table) -> None:
+@inlined
+def feel(w: LaneTables, log: Log, time: Real, state: Table) -> None:
     """Writes the inputs of a live network at a time (s), for a state and its forces."""
     steer(w, log, time / w.period[0])
     for i in range(w.lengths.size):
@@ -282,8 +299,8 @@ def feel(w: Walks, log: Log, time: Real, state: Table) -> None:
         w.inputs[i] += w.tonic[i]
 
 
-@compiled
-def steer(w: Walks, log: Log, sample: Real) -> None:
+@inlined
+def steer(w: LaneTables, log: Log, sample: Real) -> None:
     """Writes the tonic input where the turns change; `sample` is a place between two of them."""
     turns, floats = log.turns.shape[1], by_lane(w.clock)
     if turns == 1:
@@ -298,16 +315,16 @@ def steer(w: Walks, log: Log, sample: Real) -> None:
             by_lane(w.tonic)[k, lane] = steered_input(external, turn, side)
 
 
-@compiled
-def drive(w: Walks) -> None:
+@inlined
+def drive(w: LaneTables) -> None:
     """Writes the signals at the end of the step, N, from a live network."""
     oscillator_output(w.neurons, w.output)
     for k in range(w.output.size):
         w.end_signals[k] = select(w.clock[ACTIVE] != 0.0, w.gain[0] * w.output[k], 0.0)
 
 
-@compiled
-def interpolate(w: Walks, log: Log, lane: int, time: float, signals: Table) -> None:
+@inlined
+def interpolate(w: LaneTables, log: Log, lane: int, time: float, signals: Table) -> None:
     """Writes a lane's `signals`, (n, W) in N, at a time (s)."""
     if by_lane(w.clock)[ACTIVE, lane] == 0.0:
         for k in range(signals.shape[0]):
@@ -321,15 +338,16 @@ def interpolate(w: Walks, log: Log, lane: int, time: float, signals: Table) -> N
         signals[k, lane] = before + (place - i) * (after - before)
 
 
-@compiled
+@inlined
 def row_of(sample: int, log: Log) -> int:
     """Where a sample is among the recent ones: its number modulo theirs, a power of two."""
     return sample & (log.recent.shape[1] - 1)
 
 
-@compiled
-def pass_marks(w: Walks, log: Log, live: bool) -> bool:
-    """Sets the next mark where one is reached, and the signals there; whether a walk is done."""
+@merged
+def pass_marks(w: LaneTables, log: Log, live: bool) -> bool:
+    """Sets the next mark where one is reached, and the signals there; whether a simulation
+    is done."""
     clock, signals, done = by_lane(w.clock), by_lane(w.signals), False
     oscillator_output(w.neurons, w.output)
     for lane in range(log.kept.size):
@@ -350,8 +368,8 @@ def pass_marks(w: Walks, log: Log, live: bool) -> bool:
     return done
 
 
-@compiled
-def keep_samples(w: Walks, log: Log, live: bool) -> None:
+@merged
+def keep_samples(w: LaneTables, log: Log, live: bool) -> None:
     """Keeps the samples that are due in the accepted step of each flagged lane."""
     clock, modes, lanes = by_lane(w.clock), by_lane(w.modes), log.kept.size
     signals = np.empty((w.signals.size, lanes))
@@ -376,7 +394,7 @@ def keep_samples(w: Walks, log: Log, live: bool) -> None:
             clock[DUE, lane] = log.times[lane, i + 1]
 
 
-@compiled
+@inlined
 def column(table: Table, lane: int) -> Array:
     """A copy of a lane of a table (..., W)."""
     copy = np.empty(table.shape[0])
