@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tetra_drake.analysis.elites import judge_elites
 from tetra_drake.engines.compiled.lane_pool import LanePool
-from tetra_drake.engines.simulate import available_cores, check_scenario, prepare
+from tetra_drake.engines.simulate import check_scenario, prepare
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import (
@@ -24,9 +24,9 @@ from tetra_drake.evolution.reevaluation import evaluate_again, on_diagram
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import Manifest, RunRecord, read_manifest
 from tetra_drake.evolution.trials import check_fitness, run_trials
+from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import MakeOptimizer
-from tetra_drake.results.result import versions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 

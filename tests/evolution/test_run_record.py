@@ -16,8 +16,8 @@ from tetra_drake.evolution.json_lines import json_line
 from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord, evaluation_entry, read_manifest
+from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.results.result import versions
 from tetra_drake.scenario.fields import TAG
 
 

@@ -28,8 +28,8 @@ from multiprocessing.connection import wait as wait_for_any
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Generic, TypeVar
 
-from tetra_drake.engines.simulate import available_cores
 from tetra_drake.errors import InputError
+from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import Evaluation
 
 MakeExecutor = Callable[[int], Executor]

@@ -33,8 +33,8 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import REMEDY, append_lines, read_lines, repair_torn_line
 from tetra_drake.evolution.method import Method
 from tetra_drake.files import check_folder, json_number, make_folder, read_text, write_whole
+from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import SteadyState

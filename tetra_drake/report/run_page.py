@@ -19,10 +19,11 @@ from tetra_drake.figures.fitness import two_best
 from tetra_drake.figures.study import Study, study_run, walk_again
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import render
+from tetra_drake.machine import versions
 from tetra_drake.report.result_folder import RESULT, RUN_MANIFEST, load_result_folder
 from tetra_drake.report.summary import comparisons, metric_rows
 from tetra_drake.results.metrics import headline
-from tetra_drake.results.result import ground_text, versions
+from tetra_drake.results.result import ground_text
 from tetra_drake.robot.gait import ParameterSpace, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.metric_units import METRICS, inverse

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.simulate import available_cores
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.formatting import aligned, duration, fixed, signed
+from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario

@@ -9,7 +9,6 @@ from typing import Self
 
 import numpy as np
 
-from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.scenario.schema import CABLES, SIDES, Scenario, mirrored
 
 KINDS = "extensor", "flexor"
@@ -46,6 +45,8 @@ class Actuation:
     @functools.lru_cache(maxsize=8)  # as draws of disturbances leave it as it is
     def _of(cls, groups: tuple[tuple[str, ...], ...], count: int, reach: int | None) -> Self:
         """Of so many junctions."""
+        from tetra_drake.physics.cable import PASSIVE  # here, as numba comes with it
+
         junctions = np.repeat(np.arange(count), len(groups))
         place = {cable: k for k, group in enumerate(groups) for cable in group}
         own = np.array([place.get(cable, PASSIVE) for cable in CABLES])
