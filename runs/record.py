@@ -29,8 +29,8 @@ from analyse import ANALYSIS, analyse
 from thinning import thin
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Display
-from tetra_drake.evolution.run_record import MANIFEST
 from tetra_drake.experiment import evolve
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration

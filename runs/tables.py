@@ -26,8 +26,8 @@ from record import EXPERIMENTS, PICTURE, TIMES
 from tetra_drake.analysis.comparison import compare
 from tetra_drake.analysis.robustness import percents
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.evolution.run_record import MANIFEST
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import duration, fixed, listed, markdown_table, ranged, signed
 from tetra_drake.optimizers.steady_state import CHILDREN

@@ -14,10 +14,10 @@ import tetra_drake
 from tetra_drake import cli
 from tetra_drake.analysis.elites import elites
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import read_manifest
 from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity
@@ -87,7 +87,7 @@ class Told(Progress):
         self.stages.append((done, total))
 
 
-def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, reports):
+def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, reports, monkeypatch):
     progress = Told()
     run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=2, progress=progress)
     assert run.manifest.seed == 3
@@ -97,6 +97,11 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     assert progress.shown[0] == 0 and progress.shown[-1] == 8
     assert progress.stages == [(done, 5) for done in range(6)]
     assert progress.warnings == []
+    # A run that is complete is resumed without an engine.
+    for name in ("GaitEvaluation.__call__", "prepare"):
+        monkeypatch.delattr(f"tetra_drake.experiment.{name}")
+    again = tetra_drake.evolve(None, tmp_path / "run", resume=True, progress=progress)
+    assert again.evaluations.equals(run.evaluations)
 
 
 @pytest.mark.parametrize("bodies", [2, pytest.param(7, marks=pytest.mark.slow)])

@@ -6,7 +6,7 @@ import pytest
 from helpers.analytic import Bowl, small_scenario
 
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import run_trials
+from tetra_drake.evolution.trials import open_trials, run_trials
 
 
 @pytest.fixture
@@ -22,7 +22,10 @@ def run_small(tmp_path):
             record = RunRecord.create(directory, scenario=scenario, seed=seed)
         with record:
             run_trials(
-                record, evaluate=evaluate or Bowl(), workers=workers, executor=ThreadPoolExecutor
+                open_trials(record),
+                evaluate=evaluate or Bowl(),
+                workers=workers,
+                executor=ThreadPoolExecutor,
             )
         return directory
 

@@ -25,7 +25,7 @@ from tetra_drake import cli
 from tetra_drake.evolution.cluster import dask_cluster, local_cluster
 from tetra_drake.evolution.executors import evaluate_all
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import run_trials
+from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.robot.gait import ParameterSpace
 
 dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
@@ -79,7 +79,7 @@ def record_on(executor, directory, *, iterations, **options):
     scenario = drawn_scenario(iterations=iterations)
     with RunRecord.create(directory, scenario=scenario, seed=9) as record:
         evaluate = Chunked(DrawnBowl(delay=0.05))
-        run_trials(record, evaluate=evaluate, workers=2, executor=executor, **options)
+        run_trials(open_trials(record), evaluate=evaluate, workers=2, executor=executor, **options)
     return read_record(directory)
 
 

@@ -28,8 +28,7 @@ from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.reevaluation import evaluate_again
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import run_trials
-from tetra_drake.optimizers.steady_state import SteadyState
+from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.schema import DisturbancesScenario
@@ -221,11 +220,11 @@ class Asked:
 def run_drawn(tmp_path):
     """run_drawn(name, ...): a small run among draws; its directory."""
 
-    def run(name, *, evaluate=None, executor=ThreadPoolExecutor, optimizer=SteadyState, **options):
+    def run(name, *, evaluate=None, executor=ThreadPoolExecutor, **options):
         workers, scenario = options.pop("workers", 1), drawn_scenario(**options)
-        way = {"workers": workers, "executor": executor, "optimizer": optimizer}
+        way = {"workers": workers, "executor": executor}
         with RunRecord.create(tmp_path / name, scenario=scenario, seed=5) as record:
-            run_trials(record, evaluate=evaluate or DrawnBowl(), **way)
+            run_trials(open_trials(record), evaluate=evaluate or DrawnBowl(), **way)
         return tmp_path / name
 
     return run

@@ -13,7 +13,7 @@ import pytest
 from helpers.analytic import DrawnBowl, drawn_scenario, read_record
 
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import run_trials
+from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.scenario.fields import TAG
 
 PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
@@ -54,7 +54,9 @@ def wait_until_gone(session):
 def uninterrupted_run(directory, kind="SteadyState"):
     scenario = drawn_scenario(iterations=150).with_changes({"optimizer": {TAG: f"!{kind}"}})
     with RunRecord.create(directory, scenario=scenario, seed=9) as record:
-        run_trials(record, evaluate=DrawnBowl(), workers=2, executor=ThreadPoolExecutor)
+        run_trials(
+            open_trials(record), evaluate=DrawnBowl(), workers=2, executor=ThreadPoolExecutor
+        )
     return read_record(directory)
 
 

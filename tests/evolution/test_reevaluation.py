@@ -10,6 +10,7 @@ from helpers.analytic import Bowl
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import best_distances, evaluate_again, reevaluate
 from tetra_drake.evolution.run import load_run
+from tetra_drake.evolution.run_record import RunRecord
 
 
 class Slope:
@@ -50,6 +51,13 @@ def test_gaits_are_not_evaluated_again_by_another_objective(run_small, refused):
     directory = run_small()
     with refused(directory, "objective", "Bowl"):
         reevaluate(directory, objective=Bowl())
+
+
+def test_a_run_that_a_process_is_at_work_on_is_left_alone(run_small, refused):
+    directory = run_small()
+    with RunRecord.resume(directory), refused(directory, "", "another process"):
+        reevaluate(directory)
+    assert load_run(directory).reevaluations.empty
 
 
 def test_a_stage_without_gaits_is_not_shown(run_small):

@@ -12,10 +12,11 @@ import pytest
 from helpers.analytic import Bowl, read_record, small_scenario
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.entries import evaluation_entry
 from tetra_drake.evolution.json_lines import json_line
-from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.manifest import Method, read_manifest
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import RunRecord, TrialRecord, evaluation_entry, read_manifest
+from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.scenario.fields import TAG

@@ -9,7 +9,8 @@ import tables
 from analyse import load_analysis
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.run_record import read_entries, read_manifest
+from tetra_drake.evolution.entries import read_entries
+from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.machine import versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY

@@ -7,8 +7,8 @@ import tables
 from analyse import ANALYSIS, MUJOCO, TIGHT
 from helpers.synthetic_run import tiny_scenario, write_run
 
+from tetra_drake.evolution.entries import REEVALUATIONS, trial_folder
 from tetra_drake.evolution.json_lines import read_lines
-from tetra_drake.evolution.run_record import REEVALUATIONS, trial_folder
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 INITIAL = [(8.0, 0), (-4.0, 1), (None, 2)]

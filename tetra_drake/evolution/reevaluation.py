@@ -10,18 +10,14 @@ import math
 from pathlib import Path
 
 from tetra_drake.evolution.draws import task_of
+from tetra_drake.evolution.entries import REEVALUATIONS, evaluation_entry, trial_folder
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import MakeExecutor, evaluate_all, process_executor
 from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
-from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.manifest import Method, read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.evolution.run_record import (
-    REEVALUATIONS,
-    evaluation_entry,
-    read_manifest,
-    trial_folder,
-)
+from tetra_drake.evolution.run_record import lock_run
 from tetra_drake.evolution.trials import check_fitness
 from tetra_drake.optimizers.base import Evaluate
 from tetra_drake.scenario.schema import Scenario
@@ -42,23 +38,25 @@ def reevaluate(
     """Evaluates a run's best gaits on the Drake diagram, adds them to its record and returns it.
     Gaits that have been evaluated so already are skipped.
 
-    Raises InputError where `objective` is not the run's, or where there is no run.
+    Raises InputError where `objective` is not the run's, where there is no run, or while another
+    process is at work on it.
     """
     directory = Path(directory)
     manifest = read_manifest(directory)
     scenario, method = manifest.scenario, manifest.method
     given = Method.of(scenario, objective=objective).objective
     method.check_same(dataclasses.replace(method, objective=given), directory)
-    if objective is not None:
-        ours = GaitEvaluation(scenario, objective)
-        check_fitness(directory, manifest, evaluate=ours, executor=executor)
-    return evaluate_again(
-        directory,
-        GaitEvaluation(on_diagram(scenario), objective),
-        workers=workers,
-        executor=executor,
-        progress=progress,
-    )
+    with lock_run(directory):
+        if objective is not None:
+            ours = GaitEvaluation(scenario, objective)
+            check_fitness(directory, manifest, evaluate=ours, executor=executor)
+        return evaluate_again(
+            directory,
+            GaitEvaluation(on_diagram(scenario), objective),
+            workers=workers,
+            executor=executor,
+            progress=progress,
+        )
 
 
 def on_diagram(scenario: Scenario) -> Scenario:
@@ -74,7 +72,7 @@ def evaluate_again(
     executor: MakeExecutor = process_executor,
     progress: Progress | None = None,
 ) -> Run:
-    """As reevaluate(), by an evaluation that has the run's objective."""
+    """As reevaluate(), of a run that is locked, by an evaluation that has its objective."""
     run = load_run(directory)
     scenario = run.manifest.scenario
     for trial in range(scenario.evolution.trials):

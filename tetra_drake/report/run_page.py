@@ -11,9 +11,10 @@ import pandas
 
 from tetra_drake.analysis.elites import chosen, distinct_gaits, elites
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
+from tetra_drake.evolution.manifest import SCENARIO
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.run import gait_label, load_run
-from tetra_drake.evolution.run_record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.figures.book import TWO_BEST, draw_run, draw_trajectory
 from tetra_drake.figures.fitness import two_best
 from tetra_drake.figures.study import Study, study_run, walk_again
