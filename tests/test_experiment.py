@@ -16,7 +16,6 @@ from tetra_drake.analysis.elites import elites
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.scenario.load import dump_scenario, load_scenario
@@ -211,8 +210,6 @@ def test_no_record_holds_fitnesses_of_two_objectives_of_the_same_name(
         for make in (make_objective(3.0), make_objective(-2.0)):
             with refused(run, "objective", "evaluation 0"):
                 tetra_drake.evolve(None, run, resume=True, objective=make, **own)
-        with refused(run, "objective", "evaluation 0"):
-            reevaluate(run, objective=make_objective(3.0), executor=ThreadPoolExecutor)
         assert read_record(run) == begun
 
 

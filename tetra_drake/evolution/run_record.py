@@ -69,7 +69,7 @@ class RunRecord:
         _refuse_a_used(directory)
         make_folder(directory)
         with contextlib.ExitStack() as undo:
-            lock = undo.enter_context(lock_run(directory))
+            lock = undo.enter_context(_lock(directory))
             _refuse_a_used(directory)  # Another process may have been faster.
             write_manifest(directory, manifest)
             undo.pop_all()
@@ -96,7 +96,7 @@ class RunRecord:
                 raise InputError(directory, key, problem)
         if method is not None:
             manifest.method.check_same(method, directory)
-        return cls(directory, manifest, lock_run(directory))
+        return cls(directory, manifest, _lock(directory))
 
     def __enter__(self) -> RunRecord:
         return self
@@ -186,7 +186,7 @@ def _refuse_a_used(directory: Path) -> None:
         raise InputError(directory, "", "is not empty, expected a new directory")
 
 
-def lock_run(directory: Path) -> BinaryIO:
+def _lock(directory: Path) -> BinaryIO:
     """The run's locked file, which the system releases whenever this process ends; InputError if
     another process has locked it."""
     with contextlib.ExitStack() as undo:
