@@ -83,7 +83,7 @@ def record_on(executor, directory, *, iterations, **options):
     return read_record(directory)
 
 
-@pytest.mark.parametrize("kills", [2, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [1, pytest.param(20, marks=pytest.mark.slow)])
 def test_killed_workers_leave_no_trace(cluster, tmp_path, kills):
     size, killer = {"iterations": 8 * kills}, Killer(cluster)
     whole = record_on(ThreadPoolExecutor, tmp_path / "whole", **size)
@@ -117,6 +117,8 @@ def test_workers_with_other_versions_are_refused(cluster, refused):
 def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda scenario, objective: Bowl())
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
+    monkeypatch.setattr("tetra_drake.experiment.process_executor", ThreadPoolExecutor)
+    monkeypatch.setattr("tetra_drake.experiment.prepare", lambda scenario, **_: None)
     command = ["evolve", "--scenario", "quick", "--iterations", "2", "--workers", "1"]
     for name, executor in (("dask", ("--executor", "dask")), ("local", ())):
         assert cli.main([*command, "--out", str(tmp_path / name), *executor]) == 0
