@@ -32,9 +32,17 @@ dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distribute
 
 
 @pytest.fixture(scope="module")
-def cluster():
+def one_cluster():
     with local_cluster(2) as cluster:
         yield cluster
+
+
+@pytest.fixture
+def cluster(one_cluster):
+    """The cluster with both workers: what a test has killed comes back."""
+    with distributed.Client(one_cluster) as client:
+        client.wait_for_workers(2)
+    return one_cluster
 
 
 @pytest.fixture
@@ -105,7 +113,6 @@ def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, vectors):
 
 def test_workers_with_other_versions_are_refused(cluster, refused):
     with distributed.Client(cluster) as client:
-        client.wait_for_workers(2)  # a killed one comes back
         client.run(setattr, metadata, "version", str.upper)
         with refused("executor", "", "found 'TETRA_DRAKE'"), dask_cluster(cluster):
             pass
