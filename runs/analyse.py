@@ -20,13 +20,13 @@ from typing import Any
 import pandas
 
 from tetra_drake.analysis.robustness import PERCENT, judge, robustness_numbers
-from tetra_drake.engines.simulate import available_cores, check_scenario
+from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import evaluate_all, process_executor
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
-from tetra_drake.results.result import versions
+from tetra_drake.machine import available_cores, versions
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario

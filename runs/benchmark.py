@@ -26,9 +26,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.engines.mujoco import installed
-from tetra_drake.engines.simulate import available_cores, simulate_many
+from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.formatting import Table, fixed, listed
+from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.load import load_scenario

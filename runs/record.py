@@ -23,12 +23,12 @@ from typing import Any
 from analyse import ANALYSIS, analyse
 from thinning import thin
 
-from tetra_drake.engines.simulate import available_cores
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Display
-from tetra_drake.evolution.run_record import MANIFEST
 from tetra_drake.experiment import evolve
 from tetra_drake.formatting import duration, listed
+from tetra_drake.machine import available_cores
 from tetra_drake.report.replay_page import write_replay
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario

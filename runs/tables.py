@@ -21,7 +21,7 @@ from analyse import MUJOCO, SHOWN, TIGHT, Analysis, load_analysis
 from record import EXPERIMENTS, PICTURE
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.run_record import MANIFEST
+from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import Table, fixed, listed, percents, signed
 from tetra_drake.report.result_folder import REPLAY

@@ -19,20 +19,19 @@ from pathlib import Path
 from typing import Any
 
 from tetra_drake.analysis.elites import elites
-from tetra_drake.evolution.json_lines import compressed
-from tetra_drake.evolution.reevaluation import BEST_GAITS
-from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.evolution.run_record import (
+from tetra_drake.evolution.entries import (
     BEST_GAIT,
     ELITES,
     EVALUATIONS,
     ITERATIONS,
-    MANIFEST,
     REEVALUATIONS,
-    SCENARIO,
     read_entries,
     trial_folder,
 )
+from tetra_drake.evolution.json_lines import compressed
+from tetra_drake.evolution.manifest import MANIFEST, SCENARIO
+from tetra_drake.evolution.reevaluation import BEST_GAITS
+from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import write_whole
 from tetra_drake.scenario.schema import Scenario
 

@@ -14,13 +14,11 @@ import tetra_drake
 from tetra_drake import cli
 from tetra_drake.analysis.elites import elites
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.reevaluation import reevaluate
-from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import read_manifest
 from tetra_drake.optimizers import quality_diversity
 from tetra_drake.optimizers.steady_state import SteadyState
-from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity
 from tetra_drake.scenario.terrain_kinds import Steps
 
@@ -88,7 +86,7 @@ class Told(Progress):
         self.stages.append((done, total))
 
 
-def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, reports):
+def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, reports, monkeypatch):
     progress = Told()
     run = tetra_drake.evolve(tiny, tmp_path / "run", seed=3, workers=2, progress=progress)
     assert run.manifest.seed == 3
@@ -98,6 +96,11 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     assert progress.shown[0] == 0 and progress.shown[-1] == 8
     assert progress.stages == [(done, 5) for done in range(6)]
     assert progress.warnings == []
+    # A run that is complete is resumed without an engine.
+    for name in ("GaitEvaluation.__call__", "prepare"):
+        monkeypatch.delattr(f"tetra_drake.experiment.{name}")
+    again = tetra_drake.evolve(None, tmp_path / "run", resume=True, progress=progress)
+    assert again.evaluations.equals(run.evaluations)
 
 
 @pytest.mark.parametrize("bodies", [2, pytest.param(7, marks=pytest.mark.slow)])
@@ -207,8 +210,6 @@ def test_no_record_holds_fitnesses_of_two_objectives_of_the_same_name(
         for make in (make_objective(3.0), make_objective(-2.0)):
             with refused(run, "objective", "evaluation 0"):
                 tetra_drake.evolve(None, run, resume=True, objective=make, **own)
-        with refused(run, "objective", "evaluation 0"):
-            reevaluate(run, objective=make_objective(3.0), executor=ThreadPoolExecutor)
         assert read_record(run) == begun
 
 
@@ -290,7 +291,8 @@ SMALL = ("--scenario", "quick", "--trials", "1", "--evaluations", "18", "--worke
 @pytest.fixture
 def evolve(monkeypatch, reports):
     """evolve("--out", ...): the command's exit status, on a cheap fitness and without a report."""
-    monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda scenario, objective: Bowl())
+    monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda *_: Bowl())
+    monkeypatch.setattr("tetra_drake.experiment.prepare", lambda scenario, **_: None)
     monkeypatch.setattr("tetra_drake.experiment.process_executor", ThreadPoolExecutor)
     return lambda *options: cli.main(["evolve", *map(str, options)])
 
@@ -309,13 +311,14 @@ def test_the_command_runs_the_scenario_with_its_options(evolve, tmp_path, capsys
         assert text in printed
 
 
-@pytest.mark.parametrize(("options", "again"), [((), True), (("--no-reevaluate",), False)])
-def test_a_switch_leaves_out_the_diagram_at_the_end(tiny, tmp_path, reports, options, again):
-    file = tmp_path / "tiny.yaml"
-    file.write_text(dump_scenario(tiny))
-    out = tmp_path / "run"
-    assert cli.main(["evolve", "--scenario", str(file), "--out", str(out), *options]) == 0
-    assert (len(load_run(out).reevaluations) > 0) == again
+def test_a_switch_leaves_out_the_diagram_at_the_end(evolve, tmp_path, monkeypatch):
+    again = []
+    monkeypatch.setattr(
+        "tetra_drake.experiment.evaluate_again", lambda out, *_, **__: again.append(out)
+    )
+    for name, options in (("run", ()), ("without", ("--no-reevaluate",))):
+        assert evolve(*SMALL, "--engine", "compiled", "--out", tmp_path / name, *options) == 0
+    assert again == [tmp_path / "run"]
 
 
 def test_without_a_scenario_the_first_look_is_run(evolve, tmp_path, capsys):
@@ -345,8 +348,9 @@ def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, t
         assert capsys.readouterr().err.startswith(f"tetra-drake: {out}: {key}: ")
 
 
-@pytest.mark.parametrize("option", ["--trials", "--evaluations", "--workers"])
-@pytest.mark.parametrize("value", ["0", "-3", "many"])
+@pytest.mark.parametrize(
+    ("option", "value"), [("--trials", "0"), ("--iterations", "-3"), ("--workers", "many")]
+)
 def test_counts_are_counts(evolve, tmp_path, option, value, capsys):
     with pytest.raises(SystemExit) as caught:
         evolve("--out", tmp_path / "run", f"{option}={value}")

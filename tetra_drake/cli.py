@@ -203,7 +203,7 @@ def _executor(options: Options) -> contextlib.AbstractContextManager[Any]:
 
 def _scenario_to_evolve(options: Options) -> Scenario | None:
     """The scenario with the options' changes; None if they leave a run to resume as it is."""
-    from tetra_drake.evolution.run_record import read_manifest
+    from tetra_drake.evolution.manifest import read_manifest
 
     asked = {
         "simulation.engine": options.engine,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tetra_drake.analysis.elites import judge_elites
 from tetra_drake.engines.compiled.lane_pool import LanePool
-from tetra_drake.engines.simulate import available_cores, check_scenario, prepare
+from tetra_drake.engines.simulate import check_scenario, prepare
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import (
@@ -18,15 +18,15 @@ from tetra_drake.evolution.executors import (
     process_executor,
     thread_executor,
 )
-from tetra_drake.evolution.method import FITNESS, Method
+from tetra_drake.evolution.manifest import FITNESS, Manifest, Method, read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import evaluate_again, on_diagram
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.evolution.run_record import Manifest, RunRecord, read_manifest
-from tetra_drake.evolution.trials import check_fitness, run_trials
+from tetra_drake.evolution.run_record import RunRecord
+from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
+from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import MakeOptimizer
-from tetra_drake.results.result import versions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -87,21 +87,22 @@ def evolve(
     with record, progress:
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
+        trials = open_trials(record, optimizer=make)
+        unfinished = any(trial.unevaluated for trial in trials)
+        if resume and (unfinished or objective is not None):
+            check_fitness(out, record.manifest, evaluate=evaluate, executor=where)
         with contextlib.ExitStack() as stack:
             at_a_time = workers
             if in_lanes:
                 lanes = stack.enter_context(LanePool(workers))
                 evaluate, at_a_time = GaitEvaluation(own, objective, lanes), lanes.capacity
-            else:
+            elif unfinished:
                 prepare(own, many=True)
-            if resume:
-                check_fitness(out, record.manifest, evaluate=evaluate, executor=where)
             run_trials(
-                record,
+                trials,
                 evaluate=evaluate,
                 workers=at_a_time,
                 executor=where,
-                optimizer=make,
                 show=progress.show,
             )
         if reevaluate and own.simulation.engine != "drake":

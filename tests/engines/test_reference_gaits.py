@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.results.result import SimulationResult, versions
+from tetra_drake.machine import versions
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.load import load_scenario
 

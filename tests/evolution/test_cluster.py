@@ -25,16 +25,24 @@ from tetra_drake import cli
 from tetra_drake.evolution.cluster import dask_cluster, local_cluster
 from tetra_drake.evolution.executors import evaluate_all
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import run_trials
+from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.robot.gait import ParameterSpace
 
 dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
 
 
 @pytest.fixture(scope="module")
-def cluster():
+def one_cluster():
     with local_cluster(2) as cluster:
         yield cluster
+
+
+@pytest.fixture
+def cluster(one_cluster):
+    """The cluster with both workers: what a test has killed comes back."""
+    with distributed.Client(one_cluster) as client:
+        client.wait_for_workers(2)
+    return one_cluster
 
 
 @pytest.fixture
@@ -79,11 +87,11 @@ def record_on(executor, directory, *, iterations, **options):
     scenario = drawn_scenario(iterations=iterations)
     with RunRecord.create(directory, scenario=scenario, seed=9) as record:
         evaluate = Chunked(DrawnBowl(delay=0.05))
-        run_trials(record, evaluate=evaluate, workers=2, executor=executor, **options)
+        run_trials(open_trials(record), evaluate=evaluate, workers=2, executor=executor, **options)
     return read_record(directory)
 
 
-@pytest.mark.parametrize("kills", [2, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [1, pytest.param(20, marks=pytest.mark.slow)])
 def test_killed_workers_leave_no_trace(cluster, tmp_path, kills):
     size, killer = {"iterations": 8 * kills}, Killer(cluster)
     whole = record_on(ThreadPoolExecutor, tmp_path / "whole", **size)
@@ -105,7 +113,6 @@ def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, vectors):
 
 def test_workers_with_other_versions_are_refused(cluster, refused):
     with distributed.Client(cluster) as client:
-        client.wait_for_workers(2)  # a killed one comes back
         client.run(setattr, metadata, "version", str.upper)
         with refused("executor", "", "found 'TETRA_DRAKE'"), dask_cluster(cluster):
             pass
@@ -117,6 +124,8 @@ def test_workers_with_other_versions_are_refused(cluster, refused):
 def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda scenario, objective: Bowl())
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
+    monkeypatch.setattr("tetra_drake.experiment.process_executor", ThreadPoolExecutor)
+    monkeypatch.setattr("tetra_drake.experiment.prepare", lambda scenario, **_: None)
     command = ["evolve", "--scenario", "quick", "--evaluations", "16", "--workers", "1"]
     for name, executor in (("dask", ("--dask",)), ("local", ())):
         assert cli.main([*command, "--out", str(tmp_path / name), *executor]) == 0

@@ -13,7 +13,7 @@ import pytest
 from helpers.analytic import DrawnBowl, drawn_scenario, read_record
 
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import run_trials
+from tetra_drake.evolution.trials import open_trials, run_trials
 
 PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
 
@@ -53,13 +53,15 @@ def wait_until_gone(session):
 def uninterrupted_run(directory, kind="SteadyState"):
     scenario = drawn_scenario(iterations=150).with_changes({"optimizer": f"!{kind}"})
     with RunRecord.create(directory, scenario=scenario, seed=9) as record:
-        run_trials(record, evaluate=DrawnBowl(), workers=2, executor=ThreadPoolExecutor)
+        run_trials(
+            open_trials(record), evaluate=DrawnBowl(), workers=2, executor=ThreadPoolExecutor
+        )
     return read_record(directory)
 
 
-@pytest.fixture
-def uninterrupted(tmp_path):
-    return uninterrupted_run(tmp_path / "whole")
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory):
+    return uninterrupted_run(tmp_path_factory.mktemp("uninterrupted") / "whole")
 
 
 def kill_again_and_again(directory, executor, *, kills, longest, delay=0.006, kind="SteadyState"):
@@ -78,7 +80,7 @@ def kill_again_and_again(directory, executor, *, kills, longest, delay=0.006, ki
 
 @pytest.mark.parametrize(
     ("executor", "kills", "longest"),
-    [("threads", 2, 0.3), pytest.param("processes", 1, 1.5, marks=pytest.mark.slow)],
+    [("threads", 1, 0.6), pytest.param("processes", 1, 1.5, marks=pytest.mark.slow)],
 )
 def test_a_run_killed_ends_like_one_that_was_not_and_leaves_no_process(
     tmp_path, uninterrupted, executor, kills, longest
@@ -110,7 +112,7 @@ def test_a_ctrl_c_ends_the_run_at_once_and_it_can_be_resumed(tmp_path, uninterru
     assert read_record(tmp_path / "run") == uninterrupted
 
 
-@pytest.mark.parametrize("engine", ["drake", "compiled"])
+@pytest.mark.parametrize("engine", ["drake", pytest.param("compiled", marks=pytest.mark.slow)])
 def test_sigterm_ends_the_command_as_ctrl_c_does(tmp_path, engine):
     program = PROGRAM.with_name("terminated_run.py")
     options = ["--engine", engine, "--workers", "2", "--out", tmp_path / "run"]

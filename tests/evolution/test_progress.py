@@ -56,19 +56,6 @@ def test_plain_lines_come_now_and_then_and_at_the_end_with_one_time_left(monkeyp
     assert lines[4:] == ["best gaits: 0 of 3", "best gaits: 3 of 3"]
 
 
-def test_no_time_left_is_estimated_from_the_first_evaluations(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr("tetra_drake.evolution.progress.time.monotonic", lambda: now[0])
-    stream = io.StringIO()
-    with Display(stream) as progress:
-        for done in range(10):
-            now[0] = 100.0 + 20.0 * done
-            progress.stage("best gaits", done, 10)
-    lines = stream.getvalue().splitlines()
-    assert [line.endswith("left") for line in lines] == [False] * 5 + [True] * 5
-    assert lines[9].endswith("0:00:20 left")
-
-
 def test_a_terminal_shows_one_bar_for_the_run_and_one_per_stage(monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
     stream = Terminal()

@@ -8,7 +8,7 @@ import pytest
 from helpers.analytic import Bowl
 
 from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.reevaluation import best_distances, evaluate_again, reevaluate
+from tetra_drake.evolution.reevaluation import best_distances, evaluate_again
 from tetra_drake.evolution.run import load_run
 
 
@@ -44,12 +44,6 @@ def test_the_five_best_of_each_trial_are_evaluated_again(run_small):
     assert (chosen["weight_7"] == best.loc[chosen.index, "weight_7"]).all()
     for _, recorded, on_diagram in best_distances(run):
         assert on_diagram == pytest.approx(recorded - 0.5 / 0.0254)
-
-
-def test_gaits_are_not_evaluated_again_by_another_objective(run_small, refused):
-    directory = run_small()
-    with refused(directory, "objective", "Bowl"):
-        reevaluate(directory, objective=Bowl())
 
 
 def test_a_stage_without_gaits_is_not_shown(run_small):

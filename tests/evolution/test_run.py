@@ -15,7 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines, read_lines
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import run_trials
+from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.report.summary import results
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.units import INCH
@@ -150,7 +150,7 @@ def test_best_gait_and_last_population_are_those_kept_by_hand(run_small, scenari
 def test_the_record_says_what_the_run_said_at_its_end(tmp_path):
     with RunRecord.create(tmp_path / "run", scenario=small_scenario(), seed=3) as record:
         ended = run_trials(
-            record, evaluate=Bowl(delay=0.001), workers=2, executor=ThreadPoolExecutor
+            open_trials(record), evaluate=Bowl(delay=0.001), workers=2, executor=ThreadPoolExecutor
         )
     recorded = load_run(tmp_path / "run").statuses
     alike = {"wall_time": 0.0, "evaluations_at_most": 0}

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from helpers.analytic import DrawnBowl, drawn_scenario
 from tetra_drake.evolution.executors import process_executor
-from tetra_drake.evolution.run_record import MANIFEST, RunRecord
-from tetra_drake.evolution.trials import run_trials
+from tetra_drake.evolution.manifest import MANIFEST
+from tetra_drake.evolution.run_record import RunRecord
+from tetra_drake.evolution.trials import open_trials, run_trials
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in jobs of a script
@@ -24,7 +25,7 @@ if __name__ == "__main__":
     with opened as record:
         print("begun", flush=True)
         run_trials(
-            record,
+            open_trials(record),
             evaluate=DrawnBowl(delay=float(sys.argv[3])),
             workers=2,
             executor=process_executor if sys.argv[2] == "processes" else ThreadPoolExecutor,

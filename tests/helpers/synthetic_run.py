@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.evolution.run_record import RunRecord, TrialRecord, evaluation_entry, trial_folder
+from tetra_drake.evolution.entries import evaluation_entry, trial_folder
+from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario

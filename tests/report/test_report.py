@@ -11,7 +11,7 @@ import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.cli import make_parser
-from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.study import study_run
 from tetra_drake.report.run_page import render_report, write_report

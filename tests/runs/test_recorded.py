@@ -12,11 +12,11 @@ import tables
 from analyse import best_gaits, load_analysis
 
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import read_manifest
+from tetra_drake.machine import versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
-from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import ParameterSpace, load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.units import INCH

@@ -6,7 +6,7 @@ import pytest
 import tables
 from analyse import ANALYSIS, MUJOCO, TIGHT
 
-from tetra_drake.evolution.run_record import MANIFEST
+from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 BEST = {"coulomb": {0: 12.0}, "thesis": {0: 20.0, 1: 5.0}}

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from tetra_drake.analysis.statistics import interquartile_mean, interval
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.method import FITNESS
+from tetra_drake.evolution.manifest import FITNESS
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number
 from tetra_drake.scenario.load import differences

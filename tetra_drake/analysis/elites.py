@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.analysis.robustness import by_gait, judge
+from tetra_drake.evolution.entries import ELITES, read_entries
 from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
+from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.evolution.run_record import ELITES, read_entries, read_manifest
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.quality_diversity import FLOOR
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity

@@ -12,8 +12,9 @@ from tetra_drake.analysis.statistics import interval, share_interval
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import json_number
+from tetra_drake.machine import versions
 from tetra_drake.results.metrics import unmet_requirements
-from tetra_drake.results.result import SimulationResult, versions
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.disturbances import (
     Disturbances,

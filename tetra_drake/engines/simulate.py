@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from tetra_drake.engines.viewer import Viewer, check_can_be_watched
 from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.model import make_model
@@ -106,11 +106,6 @@ def simulate_many(
         except SimulationFailure as failure:
             found.append(failure)
     return found
-
-
-def available_cores() -> int:
-    """The cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def check_scenario(scenario: Scenario) -> None:

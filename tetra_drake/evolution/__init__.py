@@ -1,7 +1,8 @@
 """Evolving gaits.
 
-optimizers/ ask for vectors and are told evaluations; evaluation: a vector's, by simulation
-executors: many evaluations at once; trials: the loop, fed by the workers
-method, record, json_lines: what a run is, on disk; tables: `load_run`, to read it as pandas tables;
-reevaluation: best gaits on the Drake diagram; summary, progress: what is printed
+trials: the loop over optimisers and evaluations, of all trials of a run
+evaluation, draws: from a vector to its fitness, by simulation; executors, cluster: many at once
+manifest, entries, json_lines, run_record: a run on disk, and how it is resumed
+run: `load_run`, a recorded run as pandas tables; source: its gaits for other commands
+reevaluation: best gaits on the Drake diagram; progress: what is shown meanwhile
 """

@@ -10,9 +10,9 @@ from concurrent.futures import Executor
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
-from tetra_drake.engines.simulate import available_cores
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.executors import check_guard, deaf_to_ctrl_c
+from tetra_drake.machine import available_cores
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster

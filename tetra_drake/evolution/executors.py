@@ -11,7 +11,6 @@ import signal
 import sys
 import tempfile
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
@@ -28,8 +27,8 @@ from multiprocessing.connection import wait as wait_for_any
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Generic, TypeVar
 
-from tetra_drake.engines.simulate import available_cores
 from tetra_drake.errors import InputError
+from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.base import Evaluation
 
 MakeExecutor = Callable[[int], Executor]
@@ -103,9 +102,6 @@ TaskT = TypeVar("TaskT")
 _HOPELESS = 3
 """Tasks that end their workers before any other has succeeded: then no task can run."""
 
-_CHUNK_TIME = 1.0
-"""Time (s) that a chunk of tasks shall take: sending it takes some ms."""
-
 
 class EvaluationImpossible(InputError):
     """No evaluation can run: workers do not start, or cannot load the function."""
@@ -115,8 +111,7 @@ class EvaluationPool(Generic[JobT]):
     """Evaluates tasks (mostly vectors), at most `workers` at a time; `job` identifies each.
 
     An evaluation that has `many(tasks)` and `side_by_side`, the number of tasks for which that is
-    fastest, gets tasks in chunks, as large as their measured time and the number of workers
-    suggest.
+    fastest, gets tasks in chunks of up to that number.
 
     If a worker dies, what was under way there runs again, one at a time; a task that ends its
     worker when alone counts as failed. Until any task has succeeded such failures are held back,
@@ -141,9 +136,7 @@ class EvaluationPool(Generic[JobT]):
         self._queue: deque[tuple[JobT, Any]] = deque()
         self._suspects: deque[tuple[JobT, Any]] = deque()
         """What was under way when a worker died."""
-        self._running: dict[Future[_Evaluated], list[tuple[JobT, Any]]] = {}
-        self._task_time = math.inf
-        """Of each task (s) in the chunk that ended last."""
+        self._running: dict[Future[list[Evaluation]], list[tuple[JobT, Any]]] = {}
         self._proven = False
         """Whether any task has succeeded."""
         self._held: list[tuple[JobT, Evaluation]] = []
@@ -202,9 +195,8 @@ class EvaluationPool(Generic[JobT]):
                 self._suspects.extend(chunk)
                 broken |= isinstance(error, BrokenExecutor)
                 continue
-            evaluations, seconds = future.result()
-            self._task_time = seconds / len(chunk)
-            found += [(job, each) for (job, _), each in zip(chunk, evaluations, strict=True)]
+            for (job, _), evaluation in zip(chunk, future.result(), strict=True):
+                found.append((job, evaluation))
         if broken:
             self._suspects.extend(each for chunk in self._running.values() for each in chunk)
             self._running.clear()
@@ -213,22 +205,18 @@ class EvaluationPool(Generic[JobT]):
 
     def _chunk_size(self) -> int:
         """How many tasks the next idle worker gets: its share of those that wait, but not more than
-        can be done in time; 0 if none is idle."""
+        are fast side by side; 0 if none is idle."""
         idle = getattr(self._make_executor, "workers", self._workers) - len(self._running)
         if idle <= 0:
             return 0
-        side_by_side = getattr(self._evaluate, "side_by_side", 1)
-        if side_by_side == 1:
-            return 1
-        size = min(math.ceil(len(self._queue) / idle), max(1, int(_CHUNK_TIME / self._task_time)))
-        return size - size % side_by_side or size
+        return min(math.ceil(len(self._queue) / idle), getattr(self._evaluate, "side_by_side", 1))
 
     def _try_suspect(self) -> list[tuple[JobT, Evaluation]]:
         """Evaluates a suspect in a worker of its own: if that dies, the suspect is the cause."""
         job, task = self._suspects.popleft()
         alone = self._make_executor(1)
         try:
-            (found,), _ = self._send(alone, [(job, task)]).result()
+            (evaluation,) = self._send(alone, [(job, task)]).result()
         except Exception as error:
             if not _is_death(error):
                 raise
@@ -236,9 +224,9 @@ class EvaluationPool(Generic[JobT]):
             return []
         finally:
             alone.shutdown(wait=False)
-        return [(job, found)]
+        return [(job, evaluation)]
 
-    def _send(self, executor: Executor, chunk: list[tuple[JobT, Any]]) -> Future[_Evaluated]:
+    def _send(self, executor: Executor, chunk: list[tuple[JobT, Any]]) -> Future[list[Evaluation]]:
         return executor.submit(_evaluate_chunk, self._evaluate, [task for _, task in chunk])
 
     def _renew(self) -> None:
@@ -249,22 +237,21 @@ class EvaluationPool(Generic[JobT]):
         self._executor = self._make_executor(self._workers)
 
 
-_Evaluated = tuple[list[Evaluation], float]
-"""Evaluations of a chunk, and the time they took (s)."""
-
-
-def _evaluate_chunk(evaluate: Callable[[Any], Evaluation], tasks: Sequence[Any]) -> _Evaluated:
+def _evaluate_chunk(
+    evaluate: Callable[[Any], Evaluation], tasks: Sequence[Any]
+) -> list[Evaluation]:
     """What a worker does."""
-    started = time.perf_counter()
-    many = getattr(evaluate, "many", None)
-    found = many(tasks) if many else [evaluate(task) for task in tasks]
-    return found, time.perf_counter() - started
+    if hasattr(evaluate, "many"):
+        return evaluate.many(tasks)
+    return [evaluate(task) for task in tasks]
 
 
 def _is_death(error: BaseException | None) -> bool:
     """Whether a worker died: one of Python's or MPI's, with its executor, or one of Dask's."""
+    if isinstance(error, BrokenExecutor):
+        return True
     dask = sys.modules.get("distributed")
-    return isinstance(error, (BrokenExecutor, *([dask.KilledWorker] if dask else [])))
+    return dask is not None and isinstance(error, dask.KilledWorker)
 
 
 def evaluate_all(

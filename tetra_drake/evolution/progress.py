@@ -13,12 +13,9 @@ from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.formatting import duration, fixed
 
 if TYPE_CHECKING:
-    from rich.progress import Task, TaskID
+    from rich.progress import TaskID
 
 _LINE_PERIOD = 10.0  # s, between plain lines
-
-_LEAST_MADE = 5
-"""What a stage has made before its time left is estimated: single evaluations vary too much."""
 
 
 class Progress:
@@ -51,22 +48,13 @@ class Display(Progress):
     def __init__(self, stream: TextIO) -> None:
         from rich import progress
         from rich.console import Console
-        from rich.text import Text
-
-        class TimeLeft(progress.ProgressColumn):
-            """The time left of a stage, as plain lines have it."""
-
-            max_refresh = 0.5
-
-            def render(self, task: progress.Task) -> Text:
-                return Text(_time_left(task), style="progress.remaining")
 
         self._plain = not stream.isatty()
         self._bars = progress.Progress(
             progress.TextColumn("{task.description}"),
             progress.BarColumn(bar_width=20),
             progress.MofNCompleteColumn(),
-            TimeLeft(),
+            progress.TimeRemainingColumn(),
             progress.TextColumn("{task.fields[text]}"),
             console=Console(file=stream),
             refresh_per_second=4,
@@ -75,8 +63,10 @@ class Display(Progress):
             disable=self._plain,
         )
         self._tasks: dict[str, TaskID] = {}
-        self._last = (-math.inf, "")
-        """When the last plain line was printed, and that line."""
+        self._printed = -math.inf
+        """When the last plain line was printed."""
+        self._line = ""
+        """The last plain line."""
 
     def __enter__(self) -> Progress:
         self._bars.start()
@@ -103,27 +93,21 @@ class Display(Progress):
     def stage(self, title: str, done: int, total: int, text: str = "") -> None:
         """Moves the stage's bar, or prints a line where one is due."""
         begins = title not in self._tasks
-        if begins:  # with what is done, so that the speed counts only what is made now
-            self._tasks[title] = self._bars.add_task(
-                title, completed=done, total=total, text=text, begun=done
-            )
-        self._bars.update(self._tasks[title], completed=done, total=total, text=text)
-        if self._plain:
-            left = _time_left(self._bars.tasks[self._tasks[title]])
-            line = f"{title}: {done} of {total}" + (f", {text}" if text else "")
-            line += f", {left} left" if left else ""
-            (printed, last), now = self._last, time.monotonic()
-            due = begins or done == total or now - printed >= _LINE_PERIOD
-            if due and line != last:
-                self._last = now, line
-                self.say(line)
-
-
-def _time_left(task: Task) -> str:
-    """The time left of a stage; "" before it is known, and at the end."""
-    made = task.completed - task.fields["begun"]
-    seconds = task.time_remaining if made >= _LEAST_MADE else None
-    return duration(seconds) if seconds else ""
+        if begins:
+            self._tasks[title] = self._bars.add_task(title, completed=done, total=total, text=text)
+        task = self._tasks[title]
+        self._bars.update(task, completed=done, total=total, text=text)
+        if not self._plain:
+            return
+        parts = [f"{title}: {done} of {total}", text]
+        if seconds := self._bars.tasks[task].time_remaining:
+            parts.append(f"{duration(seconds)} left")
+        line = ", ".join(part for part in parts if part)
+        now = time.monotonic()
+        due = begins or done == total or now - self._printed >= _LINE_PERIOD
+        if due and line != self._line:
+            self._printed, self._line = now, line
+            self.say(line)
 
 
 def overview(statuses: Sequence[TrialStatus]) -> str:
@@ -131,10 +115,12 @@ def overview(statuses: Sequence[TrialStatus]) -> str:
     fittest = max(statuses, key=lambda status: status.best_fitness)
     ended = sum(status.stop is not None for status in statuses)
     failures = sum(status.failures for status in statuses)
-    parts = {
-        f"best fitness {fixed(fittest.best_fitness)}": fittest.iteration >= 0,
-        f"fittest gait's distance {fixed(fittest.best_distance_in)} in": fittest.iteration >= 0,
-        f"{ended} of {len(statuses)} trials ended": len(statuses) > 1,
-        f"{failures} failed": failures > 0,
-    }
-    return ", ".join(part for part, known in parts.items() if known)
+    parts = []
+    if fittest.iteration >= 0:
+        parts.append(f"best fitness {fixed(fittest.best_fitness)}")
+        parts.append(f"fittest gait's distance {fixed(fittest.best_distance_in)} in")
+    if len(statuses) > 1:
+        parts.append(f"{ended} of {len(statuses)} trials ended")
+    if failures:
+        parts.append(f"{failures} failed")
+    return ", ".join(parts)

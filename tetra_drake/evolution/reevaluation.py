@@ -5,24 +5,15 @@ trial_00/reevaluations.jsonl    lines as in evaluations.jsonl, with the engine t
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from pathlib import Path
 
 from tetra_drake.evolution.draws import task_of
-from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
+from tetra_drake.evolution.entries import REEVALUATIONS, evaluation_entry, trial_folder
 from tetra_drake.evolution.executors import MakeExecutor, evaluate_all, process_executor
 from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
-from tetra_drake.evolution.method import Method
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.evolution.run_record import (
-    REEVALUATIONS,
-    evaluation_entry,
-    read_manifest,
-    trial_folder,
-)
-from tetra_drake.evolution.trials import check_fitness
 from tetra_drake.optimizers.base import Evaluate
 from tetra_drake.scenario.schema import Scenario
 
@@ -30,35 +21,7 @@ BEST_GAITS = 5
 """Number of best gaits per trial that are evaluated once more; among disturbances fewer, but one,
 so that there are about as many simulations."""
 
-
-def reevaluate(
-    directory: str | Path,
-    *,
-    workers: int | None = None,
-    executor: MakeExecutor = process_executor,
-    objective: Objective | None = None,
-    progress: Progress | None = None,
-) -> Run:
-    """Evaluates a run's best gaits on the Drake diagram, adds them to its record and returns it.
-    Gaits that have been evaluated so already are skipped.
-
-    Raises InputError where `objective` is not the run's, or where there is no run.
-    """
-    directory = Path(directory)
-    manifest = read_manifest(directory)
-    scenario, method = manifest.scenario, manifest.method
-    given = Method.of(scenario, objective=objective).objective
-    method.check_same(dataclasses.replace(method, objective=given), directory)
-    if objective is not None:
-        ours = GaitEvaluation(scenario, objective)
-        check_fitness(directory, manifest, evaluate=ours, executor=executor)
-    return evaluate_again(
-        directory,
-        GaitEvaluation(on_diagram(scenario), objective),
-        workers=workers,
-        executor=executor,
-        progress=progress,
-    )
+_TITLE = "best gaits on the Drake diagram"
 
 
 def on_diagram(scenario: Scenario) -> Scenario:
@@ -74,7 +37,11 @@ def evaluate_again(
     executor: MakeExecutor = process_executor,
     progress: Progress | None = None,
 ) -> Run:
-    """As reevaluate(), by an evaluation that has the run's objective."""
+    """Evaluates a run's best gaits once more, adds them to its record and returns it. Gaits that
+    have been evaluated so already are skipped.
+
+    `evaluate` has the run's objective, and the caller its lock.
+    """
     run = load_run(directory)
     scenario = run.manifest.scenario
     for trial in range(scenario.evolution.trials):
@@ -86,19 +53,18 @@ def evaluate_again(
     if not missing:
         return run
     vectors = [run.vector(trial, index) for trial, index, _ in missing]
-    progress = progress or Progress()
-    title = "best gaits on the Drake diagram"
-    progress.stage(title, 0, len(missing))
     tasks = [
         task_of(scenario, vector, (run.manifest.seed, trial, iteration))
         for vector, (trial, _, iteration) in zip(vectors, missing, strict=True)
     ]
+    progress = progress or Progress()
+    progress.stage(_TITLE, 0, len(missing))
     results = evaluate_all(evaluate, tasks, workers=workers, executor=executor)
     for finished, (i, evaluation) in enumerate(results, start=1):
         trial, index, iteration = missing[i]
         entry = evaluation_entry(index, iteration, vectors[i], evaluation)
         append_lines(trial_folder(run.directory, trial) / REEVALUATIONS, [entry])
-        progress.stage(title, finished, len(missing))
+        progress.stage(_TITLE, finished, len(missing))
     return load_run(directory)
 
 

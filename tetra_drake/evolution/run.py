@@ -12,15 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.run_record import (
+from tetra_drake.evolution.entries import (
     EVALUATIONS,
     ITERATIONS,
     REEVALUATIONS,
-    Manifest,
     read_entries,
-    read_manifest,
     trial_folder,
 )
+from tetra_drake.evolution.manifest import Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.metric_units import METRICS

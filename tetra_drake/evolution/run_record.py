@@ -1,14 +1,8 @@
-"""A run's record on disk: its files, their checks, and how a run is resumed.
+"""A run's record on disk: how it is begun, written, checked and resumed.
 
-    manifest.json             seed, versions, method (objective, optimiser), SHA-256 of
-    scenario.yaml             the scenario in full
-    .lock                     locked while a process is at work on the run
-    trial_00/
-      evaluations.jsonl       one line per evaluation, in the order asked; metrics in SI
-      iterations.jsonl        one line per iteration: best fitness, the optimiser's report
-      in_progress.jsonl       during an iteration: those of its evaluations that are done
-      best_gait.json          the fittest gait so far, a gait file
-      reevaluations.jsonl     gaits evaluated once more on the Drake diagram
+    manifest.json, scenario.yaml    what defines the run; see evolution.manifest
+    .lock                           locked while a process is at work on the run
+    trial_00/ ...                   see evolution.entries
 
 Evaluations become final lines iteration by iteration, so the record does not depend on
 which of them was ready first. A run is resumed by repeating it from the start with recorded
@@ -21,147 +15,39 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import fcntl
-import hashlib
-import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, BinaryIO
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.json_lines import REMEDY, append_lines, read_lines, repair_torn_line
-from tetra_drake.evolution.method import Method
-from tetra_drake.files import check_folder, json_number, make_folder, read_text, write_whole
+from tetra_drake.evolution.entries import (
+    BEST_GAIT,
+    EVALUATIONS,
+    IN_PROGRESS,
+    ITERATIONS,
+    read_entries,
+)
+from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
+from tetra_drake.evolution.manifest import (
+    MANIFEST,
+    SCENARIO,
+    Manifest,
+    Method,
+    read_manifest,
+    write_manifest,
+)
+from tetra_drake.files import check_folder, make_folder
+from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import Gait, Vector, save_gait
-from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
+from tetra_drake.scenario.load import differences
 from tetra_drake.scenario.schema import Scenario
 
+LOCK = ".lock"
+
 _Lines = Sequence[dict[str, Any]]
-
-SCHEMA = 3
-MANIFEST, SCENARIO, LOCK = "manifest.json", "scenario.yaml", ".lock"
-EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
-IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
-REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
-
-
-def _is_count(value: Any) -> bool:
-    return type(value) is int and 0 <= value < 2**63
-
-
-def _is_number(value: Any) -> bool:
-    return type(value) in (int, float) and abs(value) < 1e300
-
-
-def _are_numbers(value: Any) -> bool:
-    return isinstance(value, list) and all(_is_number(item) for item in value)
-
-
-def _are_metrics(value: Any) -> bool:
-    return isinstance(value, dict) and all(_is_metric(*item) for item in value.items())
-
-
-def _is_metric(name: str, value: Any) -> bool:
-    if name == "lifted_shares":
-        return _are_numbers(value)
-    return _is_number(value) or (value is None and name != "distance")
-
-
-def _are_draws(value: Any) -> bool:
-    return isinstance(value, dict) and all(
-        _are_numbers(value.get(key)) and value[key] for key in _DRAWS
-    )
-
-
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
-
-
-def _or_none(check: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: value is None or check(value)
-
-
-_DRAWS = ("fitness", "distance")
-_ITERATION: dict[str, Callable[[Any], bool]] = {
-    "iteration": _is_count,
-    "evaluations": _is_count,
-    "best_fitness": _or_none(_is_number),
-    "best_evaluation": _or_none(_is_count),
-    "stop": _or_none(_is_text),
-}
-_EVALUATION: dict[str, Callable[[Any], bool]] = {
-    "index": _is_count,
-    "iteration": _is_count,
-    "genome": _or_none(_are_numbers),
-    "metrics": _are_metrics,
-    "fitness": _or_none(_is_number),
-    "failure": _or_none(_is_text),
-    "wall_time_s": _is_number,
-    "engine": _is_text,
-}
-_ELITE: dict[str, Callable[[Any], bool]] = {
-    "trial": _is_count,
-    "index": _is_count,
-    "kept": _is_number,
-    "mean_distance": _or_none(_is_number),
-}
-_OPTIONAL: dict[str, Callable[[Any], bool]] = {
-    "draws": _are_draws,
-    "placed": _or_none(_is_count),
-    "mean_fitness": _or_none(_is_number),
-}
-"""What a line may have besides: draws where there are disturbances, the others by optimiser."""
-_WANTED = {ITERATIONS: _ITERATION, ELITES: _ELITE}
-_NUMBERED = {EVALUATIONS: "index", ITERATIONS: "iteration"}
-"""What counts the lines of a file."""
-_MANIFEST: dict[str, Callable[[Any], bool]] = {
-    "seed": lambda value: type(value) is int and value >= 0,
-    "versions": lambda value: isinstance(value, dict),
-    "thinned": lambda value: value in (None, False, True),
-}
-
-
-def trial_folder(directory: Path, number: int) -> Path:
-    """The folder of a trial."""
-    return directory / f"trial_{number:02d}"
-
-
-@dataclass(frozen=True)
-class Manifest:
-    """What defines a run."""
-
-    scenario: Scenario
-    seed: int
-    versions: Mapping[str, str]
-    method: Method
-    thinned: bool = False
-    """Whether most genomes were left out, as in the runs recorded beside the package."""
-
-
-def read_manifest(directory: Path) -> Manifest:
-    """The manifest of a run directory; InputError if there is none or it is damaged."""
-    path, scenario_file = directory / MANIFEST, directory / SCENARIO
-    if not path.exists():
-        raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
-    text = read_text(path, "manifest of a run")
-    try:
-        raw = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, "", f"cannot be read: {error}") from error
-    schema = raw.get("schema") if isinstance(raw, dict) else None
-    if schema != SCHEMA:
-        raise InputError(path, "schema", f"found {schema!r}, expected {SCHEMA}")
-    for key, holds in _MANIFEST.items():
-        if not holds(raw.get(key)):
-            raise InputError(path, key, "is missing or damaged")
-    scenario = load_scenario(scenario_file)
-    if raw.get("scenario_sha256") != _sha256(read_text(scenario_file, "scenario file")):
-        raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
-    method = Method.from_json(raw, path)
-    return Manifest(scenario, raw["seed"], raw["versions"], method, raw.get("thinned") is True)
 
 
 @dataclass(frozen=True)
@@ -185,7 +71,7 @@ class RunRecord:
         with contextlib.ExitStack() as undo:
             lock = undo.enter_context(_lock(directory))
             _refuse_a_used(directory)  # Another process may have been faster.
-            _write_manifest(directory, manifest)
+            write_manifest(directory, manifest)
             undo.pop_all()
         return cls(directory, manifest, lock)
 
@@ -290,71 +176,6 @@ class TrialRecord:
         raise InputError(self._folder / name, f"line {row + 1}", problem)
 
 
-def evaluation_entry(
-    index: int, iteration: int, vector: Vector, evaluation: Evaluation
-) -> dict[str, Any]:
-    """An evaluation as a line of the record; the fitness of a failure is null."""
-    draws = {} if evaluation.draws is None else {"draws": dict(evaluation.draws)}
-    return {
-        "index": index,
-        "iteration": iteration,
-        "genome": vector.tolist(),
-        "metrics": dict(evaluation.metrics),
-        "fitness": json_number(evaluation.fitness),
-        "failure": evaluation.failure,
-        "wall_time_s": round(evaluation.wall_time, 4),
-        "engine": evaluation.engine,
-        **draws,
-    }
-
-
-def first_with_fitness(directory: Path, trials: int) -> tuple[int, dict[str, Any]] | None:
-    """Trial and entry of the first recorded evaluation that has a fitness; None without any."""
-    for trial in range(trials):
-        for name in (EVALUATIONS, IN_PROGRESS):
-            for entry in read_entries(trial_folder(directory, trial) / name):
-                if entry["fitness"] is not None and entry["genome"] is not None:
-                    return trial, entry
-    return None
-
-
-def read_entries(path: Path, *, checksums: bool = False) -> list[dict[str, Any]]:
-    """The lines of a file of a record; InputError, naming file and line, where one is damaged; with
-    `checksums`, also where it lacks that."""
-    wanted = _WANTED.get(path.name, _EVALUATION)
-    entries, counter = read_lines(path, checksums=checksums), _NUMBERED.get(path.name)
-    for row, entry in enumerate(entries):
-        checks = wanted | {key: check for key, check in _OPTIONAL.items() if key in entry}
-        for key, check in checks.items():
-            if key not in entry or not check(entry[key]):
-                _refuse(path, row, f"{key} is missing or invalid")
-        if counter and entry[counter] != row:
-            _refuse(path, row, f"{counter} is {entry[counter]}, expected {row}")
-    return entries
-
-
-def _refuse(path: Path, row: int, problem: str) -> NoReturn:
-    raise InputError(path, f"line {row + 1}", f"is damaged: {problem}; {REMEDY}")
-
-
-def _write_manifest(directory: Path, manifest: Manifest) -> None:
-    # The manifest comes last: it makes the directory a run.
-    text = dump_scenario(manifest.scenario)
-    write_whole(directory / SCENARIO, text)
-    content = {
-        "schema": SCHEMA,
-        "seed": manifest.seed,
-        "versions": dict(manifest.versions),
-        "scenario_sha256": _sha256(text),
-        **dataclasses.asdict(manifest.method),
-    }
-    write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
-
-
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
 def _refuse_a_used(directory: Path) -> None:
     """Raises InputError if more is there than a run killed in its first moment leaves."""
     if (directory / MANIFEST).exists():
@@ -366,7 +187,8 @@ def _refuse_a_used(directory: Path) -> None:
 
 
 def _lock(directory: Path) -> BinaryIO:
-    """The run's locked file, which the system releases whenever this process ends."""
+    """The run's locked file, which the system releases whenever this process ends; InputError if
+    another process has locked it."""
     with contextlib.ExitStack() as undo:
         try:
             lock = undo.enter_context((directory / LOCK).open("ab"))

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from tetra_drake.evolution.manifest import MANIFEST, read_manifest
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import MANIFEST, read_manifest
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario

@@ -12,20 +12,21 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.draws import SeededVector, task_of
+from tetra_drake.evolution.entries import (
+    EVALUATIONS,
+    IN_PROGRESS,
+    evaluation_entry,
+    read_entries,
+    trial_folder,
+)
 from tetra_drake.evolution.executors import (
     EvaluationPool,
     MakeExecutor,
     evaluate_all,
     process_executor,
 )
-from tetra_drake.evolution.run_record import (
-    Manifest,
-    RunRecord,
-    TrialRecord,
-    evaluation_entry,
-    first_with_fitness,
-    trial_folder,
-)
+from tetra_drake.evolution.manifest import Manifest
+from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import (
     Evaluate,
@@ -191,34 +192,41 @@ class Trial:
         self.status.complete(line, best_distance_in=distance / INCH)
 
 
+def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) -> list[Trial]:
+    """All trials of a record, each as far as it is recorded; by default with the scenario's
+    optimiser. Trials share nothing: one more trial changes no other."""
+    scenario, seed = record.manifest.scenario, record.manifest.seed
+    make = optimizer or optimizer_of(scenario.optimizer)
+    space = ParameterSpace.of(scenario)
+    trials = []
+    for number, trial_seed in enumerate(
+        np.random.SeedSequence(seed).spawn(scenario.evolution.trials)
+    ):
+        generator = np.random.default_rng(trial_seed)
+        trial = Trial(
+            number,
+            scenario=scenario,
+            seed=seed,
+            optimizer=make(space, scenario.evolution, generator),
+            folder=trial_folder(record.directory, number),
+        )
+        trials.append(trial)
+    return trials
+
+
 def run_trials(
-    record: RunRecord,
+    trials: Sequence[Trial],
     *,
     evaluate: Evaluate,
     workers: int,
     executor: MakeExecutor = process_executor,
-    optimizer: MakeOptimizer | None = None,
     show: Callable[[Sequence[TrialStatus]], None] = lambda statuses: None,
 ) -> list[TrialStatus]:
-    """Runs all trials of a record to their ends, from wherever they are.
+    """Runs trials to their ends, from wherever they are.
 
-    The record depends on its scenario, method and seed only, not on the number of workers, the
-    executor, or interruptions. Trials share nothing: one more trial changes no other.
+    Their record depends on its scenario, method and seed only, not on the number of workers, the
+    executor, or interruptions.
     """
-    scenario, seed = record.manifest.scenario, record.manifest.seed
-    make = optimizer or optimizer_of(scenario.optimizer)
-    space = ParameterSpace.of(scenario)
-    seeds = np.random.SeedSequence(seed).spawn(scenario.evolution.trials)
-    trials = [
-        Trial(
-            number,
-            scenario=scenario,
-            seed=seed,
-            optimizer=make(space, scenario.evolution, np.random.default_rng(own_seed)),
-            folder=trial_folder(record.directory, number),
-        )
-        for number, own_seed in enumerate(seeds)
-    ]
     statuses = [trial.status for trial in trials]
     show(statuses)
     waiting = [trial for trial in trials if trial.unevaluated]
@@ -240,7 +248,7 @@ def check_fitness(
 ) -> None:
     """Evaluates the first recorded gait that has a fitness once more; InputError if its fitness is
     another now, so that no record ever holds two objectives."""
-    first = first_with_fitness(directory, manifest.scenario.evolution.trials)
+    first = _first_with_fitness(directory, manifest.scenario.evolution.trials)
     if first is None:
         return
     trial, entry = first
@@ -255,6 +263,16 @@ def check_fitness(
             "the packages and the kind of processor it was begun with"
         )
         raise InputError(directory, "objective", problem)
+
+
+def _first_with_fitness(directory: Path, trials: int) -> tuple[int, dict[str, Any]] | None:
+    """Trial and entry of the first recorded evaluation that has a fitness; None without any."""
+    for trial in range(trials):
+        for name in (EVALUATIONS, IN_PROGRESS):
+            for entry in read_entries(trial_folder(directory, trial) / name):
+                if entry["fitness"] is not None and entry["genome"] is not None:
+                    return trial, entry
+    return None
 
 
 def _number(value: Any) -> float:

@@ -11,16 +11,17 @@ import pandas
 
 from tetra_drake.analysis.elites import chosen, distinct_gaits, elites
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
+from tetra_drake.evolution.manifest import SCENARIO
 from tetra_drake.evolution.run import gait_label, load_run
-from tetra_drake.evolution.run_record import BEST_GAIT, SCENARIO, trial_folder
 from tetra_drake.figures.book import draw_run, draw_trajectory
 from tetra_drake.figures.study import Study, simulate_again, study_run
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, fixed, render
+from tetra_drake.machine import versions
 from tetra_drake.report.result_folder import RESULT, RUN_MANIFEST, load_result_folder
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
-from tetra_drake.results.result import versions
 from tetra_drake.robot.gait import ParameterSpace, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.metric_units import METRICS, inverse

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetra_drake.engines.simulate import available_cores
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.formatting import Table, duration, fixed, signed
+from tetra_drake.machine import available_cores
 from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import platform
 from dataclasses import dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tetra_drake.files import json_number, write_whole
+from tetra_drake.machine import versions
 from tetra_drake.results.metrics import (
     Totals,
     compute_fitness,
@@ -125,17 +123,6 @@ def make_result(
         path=path,
         trajectory=trajectory,
     )
-
-
-def versions(engine: str = "") -> dict[str, str]:
-    """The versions of packages, and the kind of processor, on which the last digits of a result
-    of an engine depend."""
-    from llvmlite.binding import get_host_cpu_name
-
-    names = ["tetra_drake", "drake", "numpy", "numba"] + ["mujoco"] * (engine == "mujoco")
-    packages = {name: metadata.version(name) for name in names}
-    processor = os.environ.get("NUMBA_CPU_NAME") or get_host_cpu_name()
-    return packages | {"python": platform.python_version(), "processor": processor}
 
 
 def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult) -> None:

@@ -47,6 +47,7 @@ class Actuation:
     @functools.lru_cache(maxsize=8)  # as draws of disturbances leave it as it is
     def _of(cls, groups: tuple[tuple[str, ...], ...], count: int, reach: int | None) -> Self:
         """Of so many junctions."""
+
         junctions = np.repeat(np.arange(count), len(groups))
         place = {cable: k for k, group in enumerate(groups) for cable in group}
         own = np.array([place.get(cable, PASSIVE) for cable in CABLES])

@@ -1,16 +1,13 @@
 """What the parts of a method are called, and what is refused by its name."""
 
-import dataclasses
 import functools
-import json
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from helpers.analytic import small_scenario
 
-from tetra_drake.errors import InputError
-from tetra_drake.evolution.method import Method
+from tetra_drake.evolution.manifest import Manifest, Method, read_manifest, write_manifest
 from tetra_drake.optimizers.steady_state import SteadyState
 
 
@@ -48,14 +45,12 @@ def test_what_is_given_from_python_has_its_module_and_fields_in_its_name(objecti
     assert method.given_from_python == ["objective"]
 
 
-def test_a_method_survives_its_file_and_what_the_package_brings_has_no_module():
+def test_a_method_survives_its_file_and_what_the_package_brings_has_no_module(tmp_path):
     method = Method.of(small_scenario(), objective=Weighted(2.5), optimizer=scaled)
     assert method.given_from_python == ["objective", "optimizer"]
-    raw = json.loads(json.dumps(dataclasses.asdict(method)))
-    assert Method.from_json(raw, "run") == method
-    with pytest.raises(InputError) as caught:
-        Method.from_json({"objective": {}}, "run")
-    assert caught.value.key == "objective"
+    manifest = Manifest(small_scenario(), 3, {"numpy": "2.0"}, method)
+    write_manifest(tmp_path, manifest)
+    assert read_manifest(tmp_path) == manifest
     built_in = Method.of(small_scenario())
     assert built_in.given_from_python == []
     assert built_in == Method(objective="fitness", optimizer="SteadyState")

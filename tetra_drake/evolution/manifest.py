@@ -1,0 +1,156 @@
+"""The manifest of a run: what defines it, on disk and in memory.
+
+    manifest.json    seed, versions, method (objective, optimiser), SHA-256 of
+    scenario.yaml    the scenario in full
+
+Objective and optimiser are names. A name is what a person compares, and what a run without its
+parts is refused by. What proves that the parts are the same when a run is resumed is its record:
+the optimiser must ask for the recorded vectors, and a recorded gait must get its fitness again (see
+trials.check_fitness).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import types
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tetra_drake.errors import InputError
+from tetra_drake.files import read_text, write_whole
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.schema import Scenario
+
+SCHEMA = 3
+MANIFEST, SCENARIO = "manifest.json", "scenario.yaml"
+
+FITNESS = "fitness"
+"""The name of the scenario's objective."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """The parts of a run that its scenario does not hold; those from Python have a module."""
+
+    objective: str
+    optimizer: str
+
+    @classmethod
+    def of(
+        cls,
+        scenario: Scenario,
+        *,
+        objective: object | None = None,
+        optimizer: object | None = None,
+    ) -> Method:
+        """The method of a run; what is not given is the scenario's."""
+        return cls(
+            objective=FITNESS if objective is None else _name(objective),
+            optimizer=_name(scenario.optimizer if optimizer is None else optimizer),
+        )
+
+    @property
+    def given_from_python(self) -> list[str]:
+        """The parts that a command line cannot give: "objective", "optimizer"."""
+        return [part for part, name in vars(self).items() if "." in name]
+
+    def check_same(self, other: Method, source: object) -> None:
+        """Raises InputError, with the part as key, unless `other` has the same names."""
+        for part, ours in vars(self).items():
+            theirs = getattr(other, part)
+            if ours == theirs:
+                continue
+            problem = f"the run was made with {ours}, not {theirs}"
+            if part in self.given_from_python:
+                call = f"tetra_drake.evolve(None, {str(source)!r}, resume=True, {part}=...)"
+                problem += f"; resume it from Python, with its own: {call}"
+            raise InputError(source, part, problem)
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What defines a run."""
+
+    scenario: Scenario
+    seed: int
+    versions: Mapping[str, str]
+    method: Method
+    thinned: bool = False
+    """Whether most genomes were left out, as in the runs recorded beside the package."""
+
+
+def read_manifest(directory: Path) -> Manifest:
+    """The manifest of a run directory; InputError if there is none or it is damaged."""
+    path = directory / MANIFEST
+    if not path.exists():
+        raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
+    raw = _read_json(path)
+    if raw.get("schema") != SCHEMA:
+        raise InputError(path, "schema", f"found {raw.get('schema')!r}, expected {SCHEMA}")
+    seed, versions, thinned = raw.get("seed"), raw.get("versions"), raw.get("thinned", False)
+    objective, optimizer = raw.get("objective"), raw.get("optimizer")
+    if type(seed) is not int or seed < 0:
+        raise _damaged(path, "seed")
+    if not isinstance(versions, dict):
+        raise _damaged(path, "versions")
+    if not isinstance(thinned, bool):
+        raise _damaged(path, "thinned")
+    if not isinstance(objective, str):
+        raise _damaged(path, "objective")
+    if not isinstance(optimizer, str):
+        raise _damaged(path, "optimizer")
+    scenario_file = directory / SCENARIO
+    scenario = load_scenario(scenario_file)
+    if raw.get("scenario_sha256") != _sha256(read_text(scenario_file, "scenario file")):
+        raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
+    return Manifest(scenario, seed, versions, Method(objective, optimizer), thinned)
+
+
+def write_manifest(directory: Path, manifest: Manifest) -> None:
+    """Makes a directory a run: the scenario's file first, the manifest last."""
+    text = dump_scenario(manifest.scenario)
+    write_whole(directory / SCENARIO, text)
+    content = {
+        "schema": SCHEMA,
+        "seed": manifest.seed,
+        "versions": dict(manifest.versions),
+        "scenario_sha256": _sha256(text),
+        "objective": manifest.method.objective,
+        "optimizer": manifest.method.optimizer,
+    }
+    write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    text = read_text(path, "manifest of a run")
+    try:
+        raw = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, "", f"cannot be read: {error}") from error
+    return raw if isinstance(raw, dict) else {}
+
+
+def _damaged(path: Path, key: str) -> InputError:
+    return InputError(path, key, "is missing or damaged")
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _name(given: object) -> str:
+    """What a function, a class or an instance is called: with its module, unless that is of this
+    package, and with the fields of a user's dataclass."""
+    kind: Any = given if isinstance(given, (type, types.FunctionType)) else type(given)
+    module = kind.__module__ or "__main__"  # code that was executed from a text has none
+    if module.startswith("tetra_drake."):
+        return str(kind.__qualname__)
+    name = f"{module}.{kind.__qualname__}"
+    if not dataclasses.is_dataclass(given) or isinstance(given, type):
+        return name
+    fields = {field.name: getattr(given, field.name) for field in dataclasses.fields(given)}
+    return f"{name} {json.dumps(fields, default=lambda value: type(value).__name__)}"
