@@ -38,13 +38,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=rank)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def scenario() -> Scenario:
-    """The thesis scenario, a fresh copy that a test may change."""
+    """The thesis scenario."""
     return load_scenario("thesis")
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def structure(scenario: Scenario) -> Structure:
     """That of the thesis's robot."""
     return MakeStructure(scenario)

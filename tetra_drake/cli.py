@@ -18,8 +18,9 @@ from tetra_drake import __version__
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
-from tetra_drake.scenario.schema import ENGINES, Scenario
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import hint
+from tetra_drake.scenario.settings import ENGINES
 
 if TYPE_CHECKING:
     from tetra_drake.robot.gait import Gait

@@ -11,7 +11,7 @@ from tetra_drake.analysis.comparison import compare
 from tetra_drake.cli import main
 from tetra_drake.figures.search import search
 from tetra_drake.report.analysis_text import comparison_text
-from tetra_drake.scenario.disturbances import Disturbances
+from tetra_drake.scenario.settings import Disturbances
 from tetra_drake.scenario.units import INCH
 
 

@@ -16,7 +16,8 @@ from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import MUJOCO_FRICTION
 from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 

@@ -16,7 +16,8 @@ from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import PATHWAYS, Scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import PATHWAYS
 from tetra_drake.scenario.units import INCH
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 

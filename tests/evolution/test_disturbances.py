@@ -29,7 +29,8 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.scenario.disturbances import Disturbances, disturbed, draw_disturbances
+from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.settings import Disturbances
 from tetra_drake.scenario.terrain_kinds import Steps
 
 STIFFNESS = {"cables.outer_stiffness": 0.05}

@@ -17,7 +17,7 @@ from tetra_drake.evolution.draws import SeededVector
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import evaluate_all
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.scenario.disturbances import Disturbances
+from tetra_drake.scenario.settings import Disturbances
 
 
 @pytest.fixture

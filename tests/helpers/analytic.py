@@ -17,9 +17,9 @@ import numpy as np
 from tetra_drake.evolution.draws import combine
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.steady_state import CHILDREN
-from tetra_drake.scenario.disturbances import Disturbances
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import Disturbances
 
 
 @dataclass(frozen=True)

@@ -16,16 +16,11 @@ from tetra_drake.machine import versions
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
-from tetra_drake.scenario.disturbances import (
-    Disturbances,
-    Draw,
-    disturbed,
-    draw_disturbances,
-    separate,
-)
+from tetra_drake.scenario.disturbances import Draw, disturbed, draw_disturbances
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import tree_of
+from tetra_drake.scenario.settings import Disturbances, separate
 
 if TYPE_CHECKING:
     import pandas

@@ -19,7 +19,8 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.structure import MakeStructure
-from tetra_drake.scenario.schema import Scenario, SimulationSection
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import SimulationSection
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 _WITNESS_WINDOW = 2e-5  # s: how closely a witness localises, where the accuracy is 1e-3 or more

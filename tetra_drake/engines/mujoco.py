@@ -36,7 +36,8 @@ from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import MUJOCO_FRICTION
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tetra_drake.robot.gait import ParameterSpace, Vector
-from tetra_drake.scenario.schema import EvolutionSection
+from tetra_drake.scenario.settings import EvolutionSection
 
 
 @dataclass(frozen=True)

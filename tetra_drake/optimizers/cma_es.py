@@ -20,7 +20,7 @@ from tetra_drake.optimizers.generational import (
 )
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
-from tetra_drake.scenario.schema import EvolutionSection
+from tetra_drake.scenario.settings import EvolutionSection
 
 TRYOUT = 350
 """Evaluations in which each search is tried out."""

@@ -11,7 +11,7 @@ from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.generational import Generational, Matrix
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
-from tetra_drake.scenario.schema import EvolutionSection
+from tetra_drake.scenario.settings import EvolutionSection
 
 INSTALL = 'pip install "tetra_drake[qd]"'
 

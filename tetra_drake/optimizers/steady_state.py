@@ -14,7 +14,7 @@ import numpy.typing as npt
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.robot.gait import ParameterSpace, Vector
-from tetra_drake.scenario.schema import EvolutionSection
+from tetra_drake.scenario.settings import EvolutionSection
 
 CHILDREN = 2
 Fitnesses = npt.NDArray[np.float64]

@@ -20,8 +20,9 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import MUJOCO_FRICTION, Scenario
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import tree_of
+from tetra_drake.scenario.settings import MUJOCO_FRICTION
 from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.scenario.units import customary, shown
 

@@ -22,7 +22,8 @@ from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.metric_units import Metrics
-from tetra_drake.scenario.schema import Scenario, SimulationSection
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import SimulationSection
 from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:

@@ -9,7 +9,6 @@ from typing import Self
 
 import numpy as np
 
-from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.scenario.cable_names import CABLES, SIDES, mirrored
 from tetra_drake.scenario.schema import Scenario
 
@@ -47,6 +46,7 @@ class Actuation:
     @functools.lru_cache(maxsize=8)  # as draws of disturbances leave it as it is
     def _of(cls, groups: tuple[tuple[str, ...], ...], count: int, reach: int | None) -> Self:
         """Of so many junctions."""
+        from tetra_drake.physics.cable import PASSIVE  # numba, which no optimiser needs
 
         junctions = np.repeat(np.arange(count), len(groups))
         place = {cable: k for k, group in enumerate(groups) for cable in group}

@@ -15,7 +15,8 @@ from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.equilibrium import settled_lengths
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.structure import NODES, Structure
-from tetra_drake.scenario.schema import CpgSection, Scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import CpgSection
 
 SteeringSignal = Callable[[float], float]
 """The turn, from -1 to 1, at a time in s."""

@@ -1,44 +1,14 @@
-"""Disturbances of robot and surroundings: settings, draws, and the scenario changed by a draw."""
+"""Draws of a scenario's disturbances, and the scenario changed by one."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from pydantic import Field
 
-from tetra_drake.scenario.sections import Section
-
-if TYPE_CHECKING:
-    from tetra_drake.scenario.schema import Scenario
-
-Spread = Annotated[float, Field(gt=0, le=0.5)]
-
-
-class Disturbances(Section):
-    """The changes of robot and surroundings among which evolution looks for gaits.
-
-    Every gait is simulated once for each of `draws` draws; those of an iteration are the same for
-    all its gaits. Each draw also has another seed of the terrain, if that has one.
-    """
-
-    draws: int = Field(ge=1, le=10_000)
-    spreads: dict[str, Spread] = Field(default={})
-    """By scenario keys: each draw multiplies the number by 1 + up to +-spread, uniformly. Keys
-    joined by commas get the same factor."""
-    start: float = Field(default=0.0, ge=0, le=0.5)
-    """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing, forward or
-    back, sideways, and up."""
-    tail: float = Field(default=1.0, gt=0, le=1)
-    """The fitness is the mean over this share of the draws, the worst (the conditional value at
-    risk): 1 is the mean over all; one draw counts at least."""
-
-
-def separate(joined: str) -> list[str]:
-    """The scenario keys in a key of `spreads`, which joins them by commas."""
-    return [key.strip() for key in joined.split(",")]
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import separate
 
 
 @dataclass(frozen=True)

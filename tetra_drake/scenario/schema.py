@@ -1,239 +1,50 @@
-"""A scenario: every number of an experiment, read from a YAML file with units.
-
-The file is text with units ("25 lbf/in"); the sections below hold SI numbers. A field gives its SI
-unit, its limits and, if a file may leave it out, its default.
-"""
+"""A scenario: every number of an experiment, and the rules between its sections."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Any, Self
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import PrivateAttr
 
-from tetra_drake.scenario.cable_names import Cable
-from tetra_drake.scenario.disturbances import Disturbances
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.cable_names import SIDES, mirrored
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
-from tetra_drake.scenario.relations import balanced_spacing, check_relations
 from tetra_drake.scenario.sections import (
     TAG,
     Section,
     Tree,
     Whole,
+    hint,
     merge,
     named_quantities,
-    quantity,
-    refuse,
     tree_of,
     tree_of_changes,
+)
+from tetra_drake.scenario.settings import (
+    CableSection,
+    CompiledSection,
+    CpgSection,
+    Disturbances,
+    EvolutionSection,
+    GaitBounds,
+    GroundSection,
+    MujocoSection,
+    RobotSection,
+    SimulationSection,
+    separate,
 )
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.yaml_text import dump_yaml
 
-EngineName = Literal["drake", "compiled", "mujoco"]
-ENGINES: tuple[str, ...] = get_args(EngineName)
+MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
+"""Upper limits of the values of all signals in one simulation: some 3 GB."""
 
-Pathway = Literal["length", "load", "pitch"]
-"""A signal that can be fed back to the oscillators; see physics.feedback."""
-
-PATHWAYS: tuple[str, ...] = get_args(Pathway)
-
-
-class RobotSection(Section):
-    """The tetrahedra and where they stand (thesis section 2.1, appendix C.1)."""
-
-    tetrahedra: int = Field(ge=2, le=200)
-    strut_length: float = quantity("m", gt=0)
-    strut_diameter: float = quantity("m", gt=0)
-    node_diameter: float = quantity("m", gt=0)
-    density: float = quantity("kg/m^3", gt=0)
-    spacing: float = quantity("m", ge=0, words={"balanced": 0.0})
-    """Distance of base triangles at t = 0. `balanced`, or 0, is the one at which outer and inner
-    cables balance. A file that changes strut length or the cables' stiffness or free length of its
-    base, but no spacing, gets it, too."""
-    gravity: float = quantity("m/s^2", ge=0)
-    offsets: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = quantity(
-        "m", default=[]
-    )
-    """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
-    contacts: Literal["thesis", "all"] = "thesis"
-    """Nodes that the ground can touch: those of the thesis, which are the two bottom nodes of every
-    tetrahedron and the tip of the first in line, or all four of every tetrahedron. Only flat
-    ground leaves the others untouched."""
-    actuation: list[list[Cable]] = Field(default=[["outer bottom_left", "outer bottom_right"]])
-    """Groups of a junction's cables that share an oscillator, the same for every junction."""
-
-    @model_validator(mode="after")
-    def _check(self) -> RobotSection:
-        if len(self.offsets) not in (0, self.tetrahedra):
-            problem = f"found {len(self.offsets)} items, expected none or {self.tetrahedra}"
-            refuse("offsets", f"{problem}, one for each tetrahedron")
-        if not self.actuation or not all(self.actuation):
-            refuse("actuation", f"found {self.actuation}, expected groups of at least one cable")
-        cables = [cable for group in self.actuation for cable in group]
-        for cable in cables:
-            if cables.count(cable) > 1:
-                refuse("actuation", f"found '{cable}' twice, expected each cable once at most")
-        return self
-
-
-class GroundSection(Section):
-    """The normal force (Table 1)."""
-
-    stiffness: float = quantity("N/m", gt=0)
-    damping: float = quantity("N*s/m^2", ge=0)
-    """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
-    speed v: e = 1 - alpha v (Eq. 2)."""
-
-
-class CableSection(Section):
-    """The tension members (Table 3). A slack cable has tension 0 where it would push."""
-
-    outer_stiffness: float = quantity("N/m", gt=0)
-    inner_stiffness: float = quantity("N/m", gt=0)
-    damping: float = quantity("N*s/m", ge=0)
-    free_length: float = quantity("m", ge=0)
-    slack: bool
-
-
-class CpgSection(Section):
-    """The Matsuoka oscillators (Table 4) and how their signal reaches the cables."""
-
-    self_inhibition_weight: float = Field(ge=0)
-    """beta."""
-    external_input: float
-    """u0."""
-    initial_state: Annotated[list[float], Field(min_length=3, max_length=3)]
-    """At t = 0: u of every neuron, v of extensors, v of flexors."""
-    partner_weight: float = Field(ge=0)
-    """Inhibition between extensor and flexor of an oscillator."""
-    gain: float = quantity("N")
-    """Force per unit of y_extensor - y_flexor."""
-    start_up: float = quantity("s", ge=0)
-    """Time until which the cables are not actuated."""
-    signals: Literal["listing", "live"]
-    """`listing`: made beforehand by forward Euler, as in the thesis's listing. `live`: the network
-    is integrated with the robot, which feedback needs."""
-    listing_step: float = quantity("s", ge=1e-6)
-    reach: int | None = Field(default=None, ge=0)
-    """Oscillators of junctions at most so far apart inhibit each other; all if not given."""
-    feedback: list[Pathway] = Field(default=[])
-    """What is fed back, by gains that are parameters of the gait."""
-
-    @model_validator(mode="after")
-    def _check(self) -> CpgSection:
-        if self.feedback and self.signals != "live":
-            refuse("signals", f"found '{self.signals}', expected 'live' for feedback")
-        return self
-
-
-class GaitBounds(Section):
-    """Where random gaits are drawn from (Table 5). Equal bounds fix a parameter."""
-
-    weight_min: float = Field(ge=0)
-    weight_max: float = Field(ge=0)
-    tau_a_min: float = quantity("s", gt=0)
-    tau_a_max: float = quantity("s", gt=0)
-    turn: float = Field(default=0.0, ge=-1, le=1)
-    """The turn of all gaits that are drawn or evolved."""
-    mirrored: bool = False
-    """Whether weights are drawn and evolved in pairs, left and right alike."""
-
-    @model_validator(mode="after")
-    def _check(self) -> GaitBounds:
-        if self.weight_min > self.weight_max:
-            problem = f"found {self.weight_min}, expected at most weight_max, {self.weight_max}"
-            refuse("weight_min", problem)
-        if self.tau_a_min > self.tau_a_max:
-            problem = f"found {self.tau_a_min} s, expected at most tau_a_max, {self.tau_a_max} s"
-            refuse("tau_a_min", problem)
-        return self
-
-
-class SimulationSection(Section):
-    """How long to simulate, on which engine, how finely, and when to give up.
-
-    From `scheme` to `look_ahead`, the settings are those of the engine `drake`. Contact and
-    stiction (modes) change at the end of steps, or are localised by a witness function.
-    """
-
-    engine: EngineName
-    duration: float = quantity("s", gt=0, le=1e5)
-    steady_from: float = quantity("s", ge=0)
-    """Time from which the fitness counts (section 2.3)."""
-    scheme: Literal["radau3", "runge_kutta3"]
-    accuracy: float = Field(gt=0)
-    """Target accuracy per step."""
-    max_step: float = quantity("s", gt=0)
-    mode_changes: Literal["step_end", "witness"]
-    look_ahead: float = quantity("s", ge=0)
-    """With step_end and radau3: shortest step that ends at a predicted mode change; 0 for none."""
-    max_evaluations: int = Field(ge=1)
-    """Evaluations of the derivatives in one simulation."""
-    sample_period: float = quantity("s", gt=0)
-    """Time between samples of a recorded trajectory."""
-
-    @model_validator(mode="after")
-    def _check(self) -> SimulationSection:
-        if self.steady_from >= self.duration:
-            problem = f"found {self.steady_from} s, expected less than the duration"
-            refuse("steady_from", f"{problem}, {self.duration} s")
-        return self
-
-
-SHORTEST_STEP = 1e-9
-"""Lower limit (s) of the steps of the engine `compiled`."""
-
-
-class CompiledSection(Section):
-    """How finely the engine `compiled` simulates."""
-
-    tolerance: float = quantity("m/s", gt=0)
-    """Error of a body's velocity, or of its strut tips' by rotation, allowed per step."""
-    max_step: float = quantity("s", gt=SHORTEST_STEP, le=1)
-    look_ahead: float = quantity("s", gt=SHORTEST_STEP, le=1)
-    """Time from a predicted mode change to the end of the step that aims at it."""
-
-
-MUJOCO_FRICTION = 0.5
-"""Coefficient of MuJoCo's friction, as of metal on a floor, in place of the thesis's law."""
-
-
-class MujocoSection(Section):
-    """How finely the engine `mujoco` simulates."""
-
-    step: float = quantity("s", default=0.125e-3, ge=1e-7, le=1)
-
-
-class EvolutionSection(Section):
-    """The evolutionary algorithm (Table 6, section 2.3, appendix A).
-
-    It stops when the mean fitness rose by less than `stop_rise` over `stop_window` iterations, not
-    before iteration `stop_after`.
-    """
-
-    population: int = Field(ge=2, le=100_000)
-    tournament: int = Field(ge=1, le=100_000)
-    trials: int = Field(ge=1, le=1000)
-    evaluations: int = Field(ge=1)
-    """Of a trial that does not end early, by any optimiser. !SteadyState makes one for each member
-    of the population, then two in each iteration."""
-    crossover_probability: float = Field(ge=0, le=1)
-    mutation_probability: float = Field(ge=0, le=1)
-    weight_mutation: float = Field(ge=0)
-    """Largest change of a weight in one mutation."""
-    tau_mutation_range: float = quantity("s", ge=0)
-    """Largest change of tau_A in one mutation."""
-    tau_mutation: Literal["intended", "listing", "independent"]
-    """`intended`: tau_A mutates, and tau_B stays 2 tau_A. `listing`: as in the thesis's listing,
-    neither does. `independent`: both do, and every optimiser varies tau_B by itself."""
-    stop_rise: float = Field(ge=0)
-    stop_window: int = Field(ge=1)
-    stop_after: int = Field(ge=0)
-    time_budget: float = quantity("s", gt=0)
-    """Wall time of a simulation; a longer one counts as failed."""
+MOST_SAMPLES = 2_000_000
+"""Upper limit of the recorded poses of all tetrahedra in one simulation: some 2 GB."""
 
 
 class Scenario(Section):
@@ -370,3 +181,101 @@ def _decisive(scenario: Scenario) -> tuple[float, ...]:
     cables = scenario.cables
     stiffness = cables.outer_stiffness, cables.inner_stiffness
     return *stiffness, cables.free_length, scenario.robot.strut_length
+
+
+def balanced_spacing(robot: RobotSection, cables: CableSection, source: object) -> float:
+    """The spacing (m) at which the cables of a junction balance along x.
+
+    Three outer cables of length s pull two tetrahedra together. Three inner ones, from a tip at
+    height h to base nodes at s along and R across, push them apart while s < h. Raises InputError
+    if there is no such spacing.
+    """
+    height, radius = robot.strut_length * math.sqrt(2.0 / 3.0), robot.strut_length / math.sqrt(3.0)
+
+    def pull(s: float) -> float:
+        length = math.hypot(radius, height - s)
+        inner = cables.inner_stiffness * (length - cables.free_length) * (height - s) / length
+        return cables.outer_stiffness * (s - cables.free_length) - inner
+
+    near, far = 0.0, height + cables.free_length
+    if pull(near) >= 0.0:
+        raise InputError(source, "robot.spacing", "the cables balance at no spacing; give one")
+    while near < (middle := 0.5 * (near + far)) < far:
+        near, far = (near, middle) if pull(middle) > 0.0 else (middle, far)
+    return far
+
+
+def check_relations(scenario: Scenario, source: object) -> None:
+    """Raises InputError where settings of different sections cannot go together."""
+    if not scenario.objective:
+        raise InputError(source, "objective", "found no metric, expected one at least")
+    step, duration = scenario.cpg.listing_step, scenario.simulation.duration
+    if step > duration:
+        problem = f"found {step} s, expected at most the duration, {duration} s"
+        raise InputError(source, "cpg.listing_step", problem)
+    evaluations, population = scenario.evolution.evaluations, scenario.evolution.population
+    if isinstance(scenario.optimizer, SteadyState) and evaluations < population:
+        problem = f"found {evaluations}, expected at least the population, {population}"
+        raise InputError(source, "evolution.evaluations", problem)
+    if "load" in scenario.cpg.feedback and scenario.robot.gravity == 0.0:
+        problem = "found 0 m/s^2, expected a weight, for feedback of the load"
+        raise InputError(source, "robot.gravity", problem)
+    _check_size(scenario, source)
+    _check_sides(scenario, source)
+    _check_disturbances(scenario, source)
+
+
+def _check_size(scenario: Scenario, source: object) -> None:
+    """Raises InputError for what does not fit in memory."""
+    simulation = scenario.simulation
+    most_signals = MOST_SIGNALS_OF_DRAKE if simulation.engine == "drake" else MOST_SIGNALS
+    per_signal = simulation.duration * scenario.oscillators / most_signals
+    per_sample = simulation.duration * scenario.robot.tetrahedra / MOST_SAMPLES
+    periods = {
+        "cpg.listing_step": (scenario.cpg.listing_step, per_signal),
+        "simulation.sample_period": (simulation.sample_period, per_sample),
+    }
+    if simulation.engine == "mujoco":
+        periods["mujoco.step"] = (scenario.mujoco.step, per_signal)
+    for key, (period, least) in periods.items():
+        if period < least:
+            problem = (
+                f"found {period} s, expected at least {least:.3g} s for this duration and robot"
+            )
+            raise InputError(source, key, f"{problem}, to fit in memory")
+
+
+def _check_sides(scenario: Scenario, source: object) -> None:
+    """Raises InputError if gaits turn, or are mirrored, where groups of cables have no sides."""
+    groups, bounds = scenario.robot.actuation, scenario.gait_bounds
+    sided = any(all(cable.endswith(side) for cable in g) for g in groups for side in SIDES)
+    if bounds.turn != 0.0 and not sided:
+        problem = f"found {bounds.turn}, expected 0, as no group is on one side"
+        raise InputError(source, "gait_bounds.turn", problem)
+    sets = [set(group) for group in groups]
+    for group in groups:
+        if bounds.mirrored and set(mirrored(group)) not in sets:
+            problem = f"found true, expected false, as {group} has no mirror image"
+            raise InputError(source, "gait_bounds.mirrored", problem)
+
+
+def _check_disturbances(scenario: Scenario, source: object) -> None:
+    """Raises InputError if a number that draws change cannot be changed that far."""
+    settings = scenario.disturbances
+    if settings is None:
+        return
+    undisturbed = scenario.with_sections(disturbances=None)
+    known = scenario.numbers()
+    for joined, spread in settings.spreads.items():
+        place, keys = f"disturbances.spreads.{joined}", separate(joined)
+        for key in keys:
+            if key not in known:
+                problem = f"'{key}' is no number of the scenario; {hint(key, known)}"
+                raise InputError(source, place, problem)
+        for factor in (1.0 - spread, 1.0 + spread):
+            changed = undisturbed.with_numbers({key: factor * known[key] for key in keys})
+            try:
+                type(scenario).from_tree(changed.tree, source)
+            except InputError as error:
+                problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
+                raise InputError(source, place, problem) from error

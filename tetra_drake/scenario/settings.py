@@ -1,0 +1,243 @@
+"""The sections of a scenario: what can be set, with units, limits and defaults.
+
+Numbers are SI. A field gives its SI unit, its limits and, if a file may leave it out, its default.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, get_args
+
+from pydantic import Field, model_validator
+
+from tetra_drake.scenario.cable_names import Cable
+from tetra_drake.scenario.sections import Section, quantity, refuse
+
+EngineName = Literal["drake", "compiled", "mujoco"]
+ENGINES: tuple[str, ...] = get_args(EngineName)
+
+Pathway = Literal["length", "load", "pitch"]
+"""A signal that can be fed back to the oscillators; see physics.feedback."""
+
+PATHWAYS: tuple[str, ...] = get_args(Pathway)
+
+
+class RobotSection(Section):
+    """The tetrahedra and where they stand (thesis section 2.1, appendix C.1)."""
+
+    tetrahedra: int = Field(ge=2, le=200)
+    strut_length: float = quantity("m", gt=0)
+    strut_diameter: float = quantity("m", gt=0)
+    node_diameter: float = quantity("m", gt=0)
+    density: float = quantity("kg/m^3", gt=0)
+    spacing: float = quantity("m", ge=0, words={"balanced": 0.0})
+    """Distance of base triangles at t = 0. `balanced`, or 0, is the one at which outer and inner
+    cables balance. A file that changes strut length or the cables' stiffness or free length of its
+    base, but no spacing, gets it, too."""
+    gravity: float = quantity("m/s^2", ge=0)
+    offsets: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = quantity(
+        "m", default=[]
+    )
+    """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
+    contacts: Literal["thesis", "all"] = "thesis"
+    """Nodes that the ground can touch: those of the thesis, which are the two bottom nodes of every
+    tetrahedron and the tip of the first in line, or all four of every tetrahedron. Only flat
+    ground leaves the others untouched."""
+    actuation: list[list[Cable]] = Field(default=[["outer bottom_left", "outer bottom_right"]])
+    """Groups of a junction's cables that share an oscillator, the same for every junction."""
+
+    @model_validator(mode="after")
+    def _check(self) -> RobotSection:
+        if len(self.offsets) not in (0, self.tetrahedra):
+            problem = f"found {len(self.offsets)} items, expected none or {self.tetrahedra}"
+            refuse("offsets", f"{problem}, one for each tetrahedron")
+        if not self.actuation or not all(self.actuation):
+            refuse("actuation", f"found {self.actuation}, expected groups of at least one cable")
+        cables = [cable for group in self.actuation for cable in group]
+        for cable in cables:
+            if cables.count(cable) > 1:
+                refuse("actuation", f"found '{cable}' twice, expected each cable once at most")
+        return self
+
+
+class GroundSection(Section):
+    """The normal force (Table 1)."""
+
+    stiffness: float = quantity("N/m", gt=0)
+    damping: float = quantity("N*s/m^2", ge=0)
+    """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
+    speed v: e = 1 - alpha v (Eq. 2)."""
+
+
+class CableSection(Section):
+    """The tension members (Table 3). A slack cable has tension 0 where it would push."""
+
+    outer_stiffness: float = quantity("N/m", gt=0)
+    inner_stiffness: float = quantity("N/m", gt=0)
+    damping: float = quantity("N*s/m", ge=0)
+    free_length: float = quantity("m", ge=0)
+    slack: bool
+
+
+class CpgSection(Section):
+    """The Matsuoka oscillators (Table 4) and how their signal reaches the cables."""
+
+    self_inhibition_weight: float = Field(ge=0)
+    """beta."""
+    external_input: float
+    """u0."""
+    initial_state: Annotated[list[float], Field(min_length=3, max_length=3)]
+    """At t = 0: u of every neuron, v of extensors, v of flexors."""
+    partner_weight: float = Field(ge=0)
+    """Inhibition between extensor and flexor of an oscillator."""
+    gain: float = quantity("N")
+    """Force per unit of y_extensor - y_flexor."""
+    start_up: float = quantity("s", ge=0)
+    """Time until which the cables are not actuated."""
+    signals: Literal["listing", "live"]
+    """`listing`: made beforehand by forward Euler, as in the thesis's listing. `live`: the network
+    is integrated with the robot, which feedback needs."""
+    listing_step: float = quantity("s", ge=1e-6)
+    reach: int | None = Field(default=None, ge=0)
+    """Oscillators of junctions at most so far apart inhibit each other; all if not given."""
+    feedback: list[Pathway] = Field(default=[])
+    """What is fed back, by gains that are parameters of the gait."""
+
+    @model_validator(mode="after")
+    def _check(self) -> CpgSection:
+        if self.feedback and self.signals != "live":
+            refuse("signals", f"found '{self.signals}', expected 'live' for feedback")
+        return self
+
+
+class GaitBounds(Section):
+    """Where random gaits are drawn from (Table 5). Equal bounds fix a parameter."""
+
+    weight_min: float = Field(ge=0)
+    weight_max: float = Field(ge=0)
+    tau_a_min: float = quantity("s", gt=0)
+    tau_a_max: float = quantity("s", gt=0)
+    turn: float = Field(default=0.0, ge=-1, le=1)
+    """The turn of all gaits that are drawn or evolved."""
+    mirrored: bool = False
+    """Whether weights are drawn and evolved in pairs, left and right alike."""
+
+    @model_validator(mode="after")
+    def _check(self) -> GaitBounds:
+        if self.weight_min > self.weight_max:
+            problem = f"found {self.weight_min}, expected at most weight_max, {self.weight_max}"
+            refuse("weight_min", problem)
+        if self.tau_a_min > self.tau_a_max:
+            problem = f"found {self.tau_a_min} s, expected at most tau_a_max, {self.tau_a_max} s"
+            refuse("tau_a_min", problem)
+        return self
+
+
+class SimulationSection(Section):
+    """How long to simulate, on which engine, how finely, and when to give up.
+
+    From `scheme` to `look_ahead`, the settings are those of the engine `drake`. Contact and
+    stiction (modes) change at the end of steps, or are localised by a witness function.
+    """
+
+    engine: EngineName
+    duration: float = quantity("s", gt=0, le=1e5)
+    steady_from: float = quantity("s", ge=0)
+    """Time from which the fitness counts (section 2.3)."""
+    scheme: Literal["radau3", "runge_kutta3"]
+    accuracy: float = Field(gt=0)
+    """Target accuracy per step."""
+    max_step: float = quantity("s", gt=0)
+    mode_changes: Literal["step_end", "witness"]
+    look_ahead: float = quantity("s", ge=0)
+    """With step_end and radau3: shortest step that ends at a predicted mode change; 0 for none."""
+    max_evaluations: int = Field(ge=1)
+    """Evaluations of the derivatives in one simulation."""
+    sample_period: float = quantity("s", gt=0)
+    """Time between samples of a recorded trajectory."""
+
+    @model_validator(mode="after")
+    def _check(self) -> SimulationSection:
+        if self.steady_from >= self.duration:
+            problem = f"found {self.steady_from} s, expected less than the duration"
+            refuse("steady_from", f"{problem}, {self.duration} s")
+        return self
+
+
+SHORTEST_STEP = 1e-9
+"""Lower limit (s) of the steps of the engine `compiled`."""
+
+
+class CompiledSection(Section):
+    """How finely the engine `compiled` simulates."""
+
+    tolerance: float = quantity("m/s", gt=0)
+    """Error of a body's velocity, or of its strut tips' by rotation, allowed per step."""
+    max_step: float = quantity("s", gt=SHORTEST_STEP, le=1)
+    look_ahead: float = quantity("s", gt=SHORTEST_STEP, le=1)
+    """Time from a predicted mode change to the end of the step that aims at it."""
+
+
+MUJOCO_FRICTION = 0.5
+"""Coefficient of MuJoCo's friction, as of metal on a floor, in place of the thesis's law."""
+
+
+class MujocoSection(Section):
+    """How finely the engine `mujoco` simulates."""
+
+    step: float = quantity("s", default=0.125e-3, ge=1e-7, le=1)
+
+
+class EvolutionSection(Section):
+    """The evolutionary algorithm (Table 6, section 2.3, appendix A).
+
+    It stops when the mean fitness rose by less than `stop_rise` over `stop_window` iterations, not
+    before iteration `stop_after`.
+    """
+
+    population: int = Field(ge=2, le=100_000)
+    tournament: int = Field(ge=1, le=100_000)
+    trials: int = Field(ge=1, le=1000)
+    evaluations: int = Field(ge=1)
+    """Of a trial that does not end early, by any optimiser. !SteadyState makes one for each member
+    of the population, then two in each iteration."""
+    crossover_probability: float = Field(ge=0, le=1)
+    mutation_probability: float = Field(ge=0, le=1)
+    weight_mutation: float = Field(ge=0)
+    """Largest change of a weight in one mutation."""
+    tau_mutation_range: float = quantity("s", ge=0)
+    """Largest change of tau_A in one mutation."""
+    tau_mutation: Literal["intended", "listing", "independent"]
+    """`intended`: tau_A mutates, and tau_B stays 2 tau_A. `listing`: as in the thesis's listing,
+    neither does. `independent`: both do, and every optimiser varies tau_B by itself."""
+    stop_rise: float = Field(ge=0)
+    stop_window: int = Field(ge=1)
+    stop_after: int = Field(ge=0)
+    time_budget: float = quantity("s", gt=0)
+    """Wall time of a simulation; a longer one counts as failed."""
+
+
+Spread = Annotated[float, Field(gt=0, le=0.5)]
+
+
+class Disturbances(Section):
+    """The changes of robot and surroundings among which evolution looks for gaits.
+
+    Every gait is simulated once for each of `draws` draws; those of an iteration are the same for
+    all its gaits. Each draw also has another seed of the terrain, if that has one.
+    """
+
+    draws: int = Field(ge=1, le=10_000)
+    spreads: dict[str, Spread] = Field(default={})
+    """By scenario keys: each draw multiplies the number by 1 + up to +-spread, uniformly. Keys
+    joined by commas get the same factor."""
+    start: float = Field(default=0.0, ge=0, le=0.5)
+    """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing, forward or
+    back, sideways, and up."""
+    tail: float = Field(default=1.0, gt=0, le=1)
+    """The fitness is the mean over this share of the draws, the worst (the conditional value at
+    risk): 1 is the mean over all; one draw counts at least."""
+
+
+def separate(joined: str) -> list[str]:
+    """The scenario keys in a key of `spreads`, which joins them by commas."""
+    return [key.strip() for key in joined.split(",")]
