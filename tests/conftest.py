@@ -44,7 +44,7 @@ def scenario() -> Scenario:
     return load_scenario("thesis")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def structure(scenario: Scenario) -> Structure:
     """That of the thesis's robot."""
     return MakeStructure(scenario)

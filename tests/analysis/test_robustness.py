@@ -116,7 +116,7 @@ def test_the_scenarios_own_disturbances_are_used_unless_a_percentage_is_given(sc
     own = Disturbances(draws=4, spreads={"cables.damping": 0.2})
     disturbing = scenario.with_changes({"disturbances": own, "require": {"distance": "1 m"}})
     found = judge(disturbing, gaits, draws=2)
-    assert set(found.alone["what"]) == {"cables.damping"}
+    assert set(found.alone["what"]) == {"cables.damping", TERRAIN}
     assert found.draws["cables.damping"].between(0.8, 1.2).all()
     assert by_gait(found)["missed"].tolist() == [2, 2]  # no gait walks a metre
     given = judge(disturbing, {"a": gaits["a"]}, percent=3.0, draws=1)

@@ -186,15 +186,6 @@ def test_gaits_of_a_run_with_disturbances_are_shown_undisturbed(tmp_path, study)
     assert f"{shown.best.label}: {shown.best.distance_in:.2f} in" in note
 
 
-def test_many_parameters_are_folded(tmp_path, study):
-    assert len(study.run.vector(0, 0)) == 6
-    assert not any("->" in text for text in render(study).texts["details"])
-    many = tiny_scenario().with_changes({"robot.tetrahedra": 7})  # 2 * 6 * 5 weights
-    page = render(study_run(load_run(write_run(tmp_path / "run", TRIALS, scenario=many))))
-    (folded,) = (text for text in page.texts["details"] if "->" in text)
-    assert folded.count("->") == 60
-
-
 def test_the_results_stand_on_the_page(study, page):
     for name, value in results(study.run):
         assert name in page.texts["th"] and value in page.texts["td"]
