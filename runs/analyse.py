@@ -169,16 +169,16 @@ def resimulate(
 def settings_of(scenario: Scenario) -> dict[str, Scenario]:
     """The scenario with each setting, by names; without those that cannot simulate it."""
     explicit = {"scheme": "runge_kutta3", "accuracy": 1e-3, "max_step": "2 ms"}
-    tight = {f"simulation.{key}": value for key, value in explicit.items()}
+    tight = {f"engine.{key}": value for key, value in explicit.items()}
     changes: dict[str, dict[str, Any]] = {
-        TIGHT: {"simulation.engine": "drake", "simulation.mode_changes": "witness"} | tight,
-        MUJOCO: {"simulation.engine": "mujoco"},
+        TIGHT: {"engine": "!Drake", "engine.mode_changes": "witness"} | tight,
+        MUJOCO: {"engine": "!Mujoco"},
     }
     if isinstance(scenario.terrain, Flat):
         for law, shipped in LAWS.items():
             other = load_scenario(shipped)
-            changes[law] = {"friction": other.friction, "compiled": other.compiled}
-            changes[law] |= {"simulation.engine": "compiled"}
+            compiled = other.with_changes({"engine": "!Compiled"})
+            changes[law] = {"friction": other.friction, "engine": compiled.engine}
     found = {}
     for name, change in changes.items():
         with contextlib.suppress(InputError):

@@ -32,6 +32,7 @@ from tetra_drake.formatting import Table, fixed, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -45,19 +46,19 @@ LANES = 8  # gaits at a time for the cost of a step
 GROUND_BATCH = 30  # gaits at a time on each ground
 ROUNDS = 3  # measurements, of which the medians count
 
-DRAKE = {"simulation.engine": "drake"}
-COMPILED = {"simulation.engine": "compiled"}
-MUJOCO = {"simulation.engine": "mujoco"}
+DRAKE = {"engine": "!Drake"}
+COMPILED = {"engine": "!Compiled"}
+MUJOCO = {"engine": "!Mujoco"}
 FINE = {"tolerance": "0.001 mm/s", "max_step": "0.5 ms", "look_ahead": "0.001 ms"}
-CONVERGED = COMPILED | {f"compiled.{key}": value for key, value in FINE.items()}
-MUJOCO_CONVERGED = MUJOCO | {"mujoco.step": "0.0625 ms"}
-FAST_MUJOCO = MUJOCO | {"mujoco.step": "2 ms"}
+CONVERGED = COMPILED | {f"engine.{key}": value for key, value in FINE.items()}
+MUJOCO_CONVERGED = MUJOCO | {"engine.step": "0.0625 ms"}
+FAST_MUJOCO = MUJOCO | {"engine.step": "2 ms"}
 EXPLICIT = {
-    "simulation.scheme": "runge_kutta3",
-    "simulation.accuracy": 1e-3,
-    "simulation.max_step": "2 ms",
+    "engine.scheme": "runge_kutta3",
+    "engine.accuracy": 1e-3,
+    "engine.max_step": "2 ms",
 }
-STEP_END, WITNESS = {"simulation.look_ahead": "0 s"}, {"simulation.mode_changes": "witness"}
+STEP_END, WITNESS = {"engine.look_ahead": "0 s"}, {"engine.mode_changes": "witness"}
 
 SETTINGS: dict[str, list[Changes]] = {
     "engines": [
@@ -71,7 +72,7 @@ SETTINGS: dict[str, list[Changes]] = {
         DRAKE,
         DRAKE | STEP_END,
         DRAKE | WITNESS,
-        DRAKE | {"simulation.accuracy": 1e-3},
+        DRAKE | {"engine.accuracy": 1e-3},
         DRAKE | EXPLICIT | STEP_END,
         DRAKE | EXPLICIT | WITNESS,
     ],
@@ -126,7 +127,7 @@ def settings_table(scenario: Scenario, settings: Sequence[Changes]) -> str:
     rows = []
     for changes in settings:
         changed = scenario.with_changes(changes)
-        engine = changed.simulation.engine
+        engine = changed.engine_name
         if engine == "mujoco" and not installed():
             continue
         if engine not in exact_in:
@@ -182,9 +183,10 @@ def batches_table(scenario: Scenario) -> str:
             batches.append(Batch(scenario.with_changes(changes), cores * MUJOCO_BATCH, cores))
     rows = []
     for batch, timing in zip(batches, measure(batches), strict=True):
-        engine: str = batch.scenario.simulation.engine
+        engine: str = batch.scenario.engine_name
         if engine == "mujoco":
-            engine += f", steps of {1e3 * batch.scenario.mujoco.step:g} ms"
+            step = batch.scenario.settings_of(Mujoco).step
+            engine += f", steps of {1e3 * step:g} ms"
         rows.append([engine, str(batch.gaits), str(batch.cores), f"{timing.speed:,.1f}"])
     return Table(["engine", "gaits at a time", "cores", "times real time"], rows).markdown()
 
@@ -207,8 +209,7 @@ def grounds_table(scenario: Scenario) -> str:
     """Speed on one core by ground, friction and network."""
     shipped = load_scenario("rough")
     rough: Changes = {"terrain": shipped.terrain, "robot.contacts": shipped.robot.contacts}
-    tolerance = f"{shipped.compiled.tolerance!r} m/s"
-    coulomb: Changes = {"friction": shipped.friction, "compiled.tolerance": tolerance}
+    coulomb: Changes = {"friction": shipped.friction, "engine": shipped.engine}
     grounds: dict[str, Changes] = {
         "the scenario's": {},
         "signals computed beforehand": {"cpg.signals": "listing", "cpg.feedback": []},

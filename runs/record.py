@@ -57,7 +57,7 @@ class Experiment:
         return load_scenario(self.base).with_changes({"name": name} | dict(self.changes))
 
 
-_COMPILED = {"simulation.engine": "compiled"}
+_COMPILED = {"engine": "!Compiled"}
 _SOUND = {"require": {"clearance": "0.125 in", "tension": 0.0}}
 """Struts do not touch, and cables need not push."""
 

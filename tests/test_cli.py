@@ -188,8 +188,8 @@ def test_the_result_holds_what_was_asked_for_and_done(simulated, result, scenari
     assert (result["schema"], result["scenario"], result["duration_s"]) == (1, "short", 0.3)
     assert load_gait(simulated[0] / "result.json", scenario, key="gait") == gait_3
     assert result["real_time_factor"] == pytest.approx(0.3 / result["wall_time_s"])
-    assert result["integrator"]["scheme"] == scenario.simulation.scheme
-    assert result["integrator"]["accuracy"] == scenario.simulation.accuracy
+    assert result["integrator"]["scheme"] == scenario.engine.scheme
+    assert result["integrator"]["accuracy"] == scenario.engine.accuracy
     assert 0 < result["integrator"]["steps"] < result["integrator"]["derivative_evaluations"]
     assert {"python", "drake", "numpy", "tetra_drake"} <= result["versions"].keys()
     inches = {key: value for key, value in result.items() if key.endswith("_in")}

@@ -28,7 +28,7 @@ def tiny():
     """Four gaits and two iterations of 0.3 s on the compiled engine."""
     return small_scenario(population=4, iterations=2, trials=1).with_changes(
         {
-            "simulation.engine": "compiled",
+            "engine": "!Compiled",
             "simulation.duration": "0.3 s",
             "simulation.steady_from": "0.1 s",
             "cpg.start_up": 0.0,
@@ -142,7 +142,7 @@ def OneByOne(workers):
 
 
 def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
-    on_diagram = tiny.with_changes({"simulation.engine": "drake"})
+    on_diagram = tiny.with_changes({"engine": "!Drake"})
     step = Steps(height=0.02, depth=1.0, count=1, start=0.02)
     for scenario, objective, problem in (
         ("quack", None, "quack"),
@@ -340,7 +340,7 @@ def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, t
     for option, value, key in (
         ("--trials", 2, "evolution.trials"),
         ("--evaluations", 20, "evolution.evaluations"),
-        ("--engine", "compiled", "simulation.engine"),
+        ("--engine", "compiled", "engine"),
         ("--scenario", "thesis", "simulation.duration"),
         ("--seed", 1, "seed"),
     ):

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from tetra_drake import __version__
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder
+from tetra_drake.scenario.engine_kinds import ENGINES
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import hint
-from tetra_drake.scenario.settings import ENGINES
 
 if TYPE_CHECKING:
     from tetra_drake.robot.gait import Gait
@@ -111,7 +111,7 @@ def _simulate(options: Options) -> None:
 
     scenario, gait = _chosen_gait(options)
     if options.engine:
-        scenario = scenario.with_changes({"simulation.engine": options.engine})
+        scenario = scenario.with_changes({"engine": f"!{options.engine.capitalize()}"})
     if options.meshcat:
         check_can_be_watched(scenario)
     check_result_folder(options.out)
@@ -207,7 +207,7 @@ def _scenario_to_evolve(options: Options) -> Scenario | None:
     from tetra_drake.evolution.manifest import read_manifest
 
     asked = {
-        "simulation.engine": options.engine,
+        "engine": options.engine and f"!{options.engine.capitalize()}",
         "evolution.trials": options.trials,
         "evolution.evaluations": options.evaluations,
     }

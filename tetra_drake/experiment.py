@@ -77,7 +77,7 @@ def evolve(
     make = optimizer or optimizer_of(own.optimizer)
     method = Method.of(own, objective=objective, optimizer=optimizer)
     evaluate = GaitEvaluation(own, objective)
-    in_lanes = executor is None and own.simulation.engine == "compiled"
+    in_lanes = executor is None and own.engine_name == "compiled"
     where = thread_executor if in_lanes else executor or process_executor
     if resume:
         record = RunRecord.resume(out, scenario=scenario, seed=seed, method=method)
@@ -105,7 +105,7 @@ def evolve(
                 executor=where,
                 show=progress.show,
             )
-        if reevaluate and own.simulation.engine != "drake":
+        if reevaluate and own.engine_name != "drake":
             try:
                 evaluate_again(
                     out,
@@ -137,7 +137,7 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
     text = (
         f"{directory}: scenario {scenario.name}, seed {manifest.seed}, optimiser "
         f"{method.optimizer}, trials {scenario.evolution.trials}, each of at most "
-        f"{scenario.evolution.evaluations} evaluations, engine {scenario.simulation.engine}, "
+        f"{scenario.evolution.evaluations} evaluations, engine {scenario.engine_name}, "
         f"workers {workers}{draws}{own}"
     )
     if report:
@@ -149,7 +149,7 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
 
 
 def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
-    then, now = manifest.versions, versions(manifest.scenario.simulation.engine)
+    then, now = manifest.versions, versions(manifest.scenario.engine_name)
     changed = [f"{name} {then.get(name)}" for name in now if then.get(name) != now[name]]
     if changed:
         progress.warn(

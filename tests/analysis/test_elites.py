@@ -103,7 +103,7 @@ def test_the_fittest_and_those_next_to_the_corners_are_chosen_without_lucky_ones
 
 
 def test_elites_are_simulated_on_disturbed_robots_once(run_of):
-    changes = {"cpg.start_up": 0.0, "simulation.engine": "compiled"}
+    changes = {"cpg.start_up": 0.0, "engine": "!Compiled"}
     run = run_of({2.0: (0.01, 0.3), 3.0: (0.05, 0.3)}, **changes)
     path = run.directory / "elites.jsonl"
     keep(run, {(0, 1): 0.25})

@@ -9,6 +9,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.model import make_model
 from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.engine_kinds import Compiled, Drake
 
 G = 9.80665
 FALLING = {
@@ -20,16 +21,19 @@ FALLING = {
     "cpg.gain": 0.0,
     "simulation.duration": "0.2 s",
     "simulation.steady_from": "0.1 s",
-    "simulation.scheme": "runge_kutta3",
-    "simulation.accuracy": 1e-9,
-    "simulation.max_step": "1e-3 s",
-    "compiled.tolerance": "1e-7 m/s",
 }
 
 
-@pytest.mark.parametrize("engine", ["drake", "compiled"])
+@pytest.mark.parametrize(
+    "engine",
+    [
+        Drake(scheme="runge_kutta3", accuracy=1e-9, max_step=1e-3),
+        Compiled(tolerance=1e-7),
+    ],
+    ids=["drake", "compiled"],
+)
 def test_a_falling_robot_keeps_momentum_and_energy(scenario, engine):
-    falling = scenario.with_changes({**FALLING, "simulation.engine": engine})
+    falling = scenario.with_changes({**FALLING, "engine": engine})
     structure = MakeStructure(falling)
     body = make_model(falling, structure).body
     mass, moment = body.mass[0], body.moment[0]

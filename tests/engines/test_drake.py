@@ -13,6 +13,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import StepBudgetExceeded
 from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
 from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, node_positions
+from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -24,9 +25,9 @@ def gait(scenario: Scenario, data: Path) -> Gait:
 
 
 def test_settles_where_the_independent_simulation_does(scenario, structure, gait, data):
-    still = scenario.with_changes({"cpg.start_up": "100.0 s", "simulation.max_step": "1e-3 s"})
+    still = scenario.with_changes({"cpg.start_up": "100.0 s", "engine.max_step": "1e-3 s"})
     diagram = MakeTensegrityDiagram(still, gait)
-    simulator = MakeSimulator(diagram, still.simulation)
+    simulator = MakeSimulator(diagram, still.engine)
     simulator.AdvanceTo(8.0)
     context = simulator.get_context()
     p_WN = node_positions(structure, diagram.GetOutputPort("state").Eval(context))
@@ -41,10 +42,13 @@ def test_settles_where_the_independent_simulation_does(scenario, structure, gait
 
 def test_a_live_network_walks_as_the_listing_with_short_steps_does(scenario, gait):
     # A second of actuation: Euler's error in steps of 0.01 ms is some 1e-5.
-    tight = {"scheme": "runge_kutta3", "accuracy": 1e-5, "max_step": "0.1 ms"}
-    tight |= {"duration": "1.1 s", "steady_from": "0.5 s"}
-    changes = {"cpg.start_up": "0.1 s"} | {f"simulation.{key}": tight[key] for key in tight}
-    changes["cpg.listing_step"] = "0.01 ms"
+    changes = {
+        "cpg.start_up": "0.1 s",
+        "cpg.listing_step": "0.01 ms",
+        "engine": Drake(scheme="runge_kutta3", accuracy=1e-5, max_step=1e-4),
+        "simulation.duration": "1.1 s",
+        "simulation.steady_from": "0.5 s",
+    }
     live, beforehand = (
         simulate(scenario=scenario.with_changes({**changes, "cpg.signals": signals}), gait=gait)
         for signals in ("live", "listing")
@@ -55,7 +59,7 @@ def test_a_live_network_walks_as_the_listing_with_short_steps_does(scenario, gai
 
 def test_a_step_ends_at_the_start_up_jump(scenario, gait):
     diagram = MakeTensegrityDiagram(scenario, gait)
-    simulator = MakeSimulator(diagram, scenario.simulation)
+    simulator = MakeSimulator(diagram, scenario.engine)
     ends: list[float] = []
     simulator.set_monitor(lambda context: ends.append(context.get_time()))
     simulator.AdvanceTo(1.5)
@@ -96,7 +100,7 @@ def test_the_budget_of_evaluations_is_for_the_whole_simulation(scenario, gait):
 
 def test_a_mode_change_is_due_until_it_is_made(scenario, gait):
     diagram = MakeTensegrityDiagram(scenario, gait)
-    simulator = MakeSimulator(diagram, scenario.simulation)
+    simulator = MakeSimulator(diagram, scenario.engine)
     ground = diagram.GetSubsystemByName("ground")
     context = ground.GetMyContextFromRoot(simulator.get_context())
 
@@ -111,17 +115,12 @@ def test_a_mode_change_is_due_until_it_is_made(scenario, gait):
 
 @pytest.mark.slow
 def test_random_gaits_walk_as_far_as_converged_ones(scenario):
-    engine = {"simulation.engine": "compiled"}
-    fine = {
-        "compiled.tolerance": "1e-6 m/s",
-        "compiled.max_step": "5e-4 s",
-        "compiled.look_ahead": "1e-6 s",
-    }
+    fine = {"engine": Compiled(tolerance=1e-6, max_step=5e-4, look_ahead=1e-6)}
     errors = []
     for seed in (7, 10, 14, 22, 24, 26, 30, 31):  # where a late mode change costs 0.1 in or more
         walked, exact = (
             simulate(scenario=changed, gait=seeded_gait(changed, seed)).metrics.distance_in
-            for changed in (scenario, scenario.with_changes(engine | fine))
+            for changed in (scenario, scenario.with_changes(fine))
         )
         errors.append(abs(walked - exact))
     assert np.median(errors) < 0.05

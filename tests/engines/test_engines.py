@@ -16,20 +16,26 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
-MUJOCO = pytest.param("mujoco", marks=pytest.mark.skipif(not installed(), reason=INSTALL))
+NEEDS_MUJOCO = pytest.mark.skipif(not installed(), reason=INSTALL)
+MUJOCO = pytest.param("mujoco", marks=NEEDS_MUJOCO)
+MUJOCO_DEFAULT = pytest.param("mujoco", {}, marks=NEEDS_MUJOCO)
 
 
 def shortly(scenario: Scenario, engine: str, **settings: Any) -> Scenario:
     """The scenario cut to 1 s on an engine, driven from 0.2 s on."""
-    settings = {"engine": engine, "duration": "1 s", "steady_from": "0.5 s", **settings}
+    settings = {"duration": "1 s", "steady_from": "0.5 s", **settings}
     changes = {f"simulation.{key}": value for key, value in settings.items()}
-    return scenario.with_changes({"cpg.start_up": "0.2 s", **changes})
+    kind = f"!{engine.capitalize()}"
+    return scenario.with_changes({"cpg.start_up": "0.2 s", "engine": kind, **changes})
 
 
-@pytest.mark.parametrize("engine", ["drake", "compiled", MUJOCO])
-@pytest.mark.parametrize("mode_changes", ["step_end", "witness"])
-def test_recording_changes_nothing(scenario, engine, mode_changes):
-    short = shortly(scenario, engine, mode_changes=mode_changes)
+@pytest.mark.parametrize(
+    ("engine", "settings"),
+    [("drake", {}), ("drake", {"mode_changes": "witness"}), ("compiled", {}), MUJOCO_DEFAULT],
+)
+def test_recording_changes_nothing(scenario, engine, settings):
+    changes = {f"engine.{key}": value for key, value in settings.items()}
+    short = shortly(scenario, engine).with_changes(changes)
     gait = seeded_gait(short)
     plain = simulate(scenario=short, gait=gait)
     recorded = simulate(scenario=short, gait=gait, record=True)
@@ -105,4 +111,4 @@ def test_an_engine_is_prepared_by_a_moment_of_simulation(scenario, monkeypatch, 
     prepare(scenario.with_changes({"robot.tetrahedra": 2} | changes))
     (call,) = simulated.call_args_list
     assert call.kwargs["scenario"].simulation.duration < 0.1
-    assert call.kwargs["scenario"].simulation.engine == scenario.simulation.engine == "drake"
+    assert call.kwargs["scenario"].engine_name == scenario.engine_name == "drake"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray
-from helpers.converged import FINE, shortly
+from helpers.converged import CONVERGED, shortly
 from helpers.quantities import with_unit
 from helpers.states import body_velocities
 from pydrake.systems.analysis import Simulator
@@ -15,6 +15,7 @@ from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.ground import ground_frames, make_ground
 from tetra_drake.robot.model import make_model
 from tetra_drake.robot.structure import MakeStructure, node_positions
+from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import (
@@ -43,13 +44,8 @@ TERRAINS: dict[str, Terrain] = {
 }
 
 
-def converged(scenario: Scenario, duration: float, **changes: object) -> Scenario:
-    """A short converged simulation, driven from the start."""
-    return shortly(scenario, duration, **{**FINE, **changes})
-
-
-def trajectory(scenario: Scenario, engine: str) -> xarray.Dataset:
-    on_engine = scenario.with_changes({"simulation.engine": engine})
+def trajectory(scenario: Scenario, engine: Drake | Compiled) -> xarray.Dataset:
+    on_engine = scenario.with_changes({"engine": engine})
     result = simulate(scenario=on_engine, gait=seeded_gait(scenario, 2), record=True)
     assert result.trajectory is not None
     return result.trajectory
@@ -69,8 +65,10 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, heigh
     friction = scenario.friction if friction == "reset" else friction
     surface = TERRAINS.get(terrain, height_field)
     changes = {"terrain": surface, "friction": friction, "robot__contacts": "all"}
-    short = converged(scenario, 0.1, robot__tetrahedra=3, **changes)
-    ours, drakes = (trajectory(short, engine)["p_WN"].values for engine in ("compiled", "drake"))
+    short = shortly(scenario, 0.1, robot__tetrahedra=3, **changes)
+    ours, drakes = (
+        trajectory(short, CONVERGED[engine])["p_WN"].values for engine in ("compiled", "drake")
+    )
     # As in test_compiled_simulation: with the reset integrator 1.75e-6 m/s per mode change, for
     # 0.1 s, and some forty of them. Coulomb friction hardly jumps.
     tolerance = 1e-5 if friction is scenario.friction else 1e-6
@@ -82,15 +80,15 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, heigh
 @pytest.mark.parametrize("engine", ["compiled", "drake"])
 def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction, engine):
     slope, friction = np.radians(8.0), scenario.friction if friction == "reset" else friction
-    short = converged(scenario, 0.3, friction=friction)
+    short = shortly(scenario, 0.3, friction=friction)
     inclined = short.with_changes({"terrain": Incline(slope=slope)})
-    up_the_slope = trajectory(inclined, engine)["p_WN"].values[-1].reshape(-1, 3)
+    up_the_slope = trajectory(inclined, CONVERGED[engine])["p_WN"].values[-1].reshape(-1, 3)
 
     diagram = MakeTensegrityDiagram(short, seeded_gait(short, 2))
     g, s, c = short.robot.gravity, np.sin(slope), np.cos(slope)
     gravity = diagram.GetSubsystemByName("plant").mutable_gravity_field()
     gravity.set_gravity_vector([-g * s, 0.0, -g * c])
-    simulator: Simulator = MakeSimulator(diagram, short.simulation)
+    simulator: Simulator = MakeSimulator(diagram, short.engine)
     simulator.AdvanceTo(0.3)
     state = diagram.GetOutputPort("state").Eval(simulator.get_context())
     level = node_positions(MakeStructure(short), state)
@@ -105,10 +103,12 @@ def test_contact_never_gives_energy(scenario, friction):
     friction = scenario.friction if friction == "reset" else friction
     fall = {"robot__offsets": [[0.0, 0.0, "5 mm"]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
     rough = Rough(amplitude=0.25 * INCH, wavelength=4.0 * INCH, seed=5)
-    falling = converged(scenario, 0.6, terrain=rough, friction=friction, **fall)
+    falling = shortly(scenario, 0.6, terrain=rough, friction=friction, **fall)
     structure, gravity = MakeStructure(falling), falling.robot.gravity
     body = make_model(falling, structure).body
-    walk = trajectory(falling.with_changes({"simulation.sample_period": "2e-3 s"}), "compiled")
+    walk = trajectory(
+        falling.with_changes({"simulation.sample_period": "2e-3 s"}), CONVERGED["compiled"]
+    )
     v_WB, w_WB = body_velocities(walk, structure)
     energy = 0.5 * (body.mass[0] * v_WB**2 + body.moment[0] * w_WB**2).sum(axis=(1, 2))
     energy += body.mass[0] * gravity * walk.p_WB.values[:, :, 2].sum(axis=1)
@@ -126,7 +126,7 @@ def test_on_a_rough_grid_without_relief_the_robot_walks_as_on_flat_ground(scenar
     # The same forces, by frames whose axes are World's.
     changes = {
         "simulation.duration": "2.0 s",
-        "simulation.engine": "compiled",
+        "engine": "!Compiled",
         "cpg.start_up": "0.1 s",
     }
     flat = scenario.with_changes({**changes, "simulation.steady_from": "1.0 s"})
@@ -152,7 +152,7 @@ def test_the_robot_stands_on_what_is_under_it(scenario):
         "robot.contacts": "all",
     }
     resting = scenario.with_changes({**times, **rough})
-    end = trajectory(resting, "compiled").isel(time=-1)
+    end = trajectory(resting, Compiled()).isel(time=-1)
     structure, ground = MakeStructure(resting), make_ground(resting, MakeStructure(resting))
     p_WN = end.p_WN.values.reshape(-1, 3)[structure.contacts]
     gaps = ground_frames(p_WN, ground)[:, 0]
@@ -166,20 +166,10 @@ def test_the_robot_stands_on_what_is_under_it(scenario):
 SLOWLY = {
     # At which errors are below 0.001 in (Coulomb), 0.005 in (reset integrator). With longer steps a
     # witness misses nodes that leave uneven ground and land again within a step.
-    "coulomb": {"simulation.accuracy": 1e-4, "simulation.max_step": "2e-3 s"},
-    "reset": {
-        "simulation.scheme": "runge_kutta3",
-        "simulation.accuracy": 1e-4,
-        "simulation.max_step": "3e-4 s",
-        "simulation.mode_changes": "witness",
-        "simulation.max_evaluations": 10**8,
-    },
+    "coulomb": Drake(accuracy=1e-4, max_step=2e-3),
+    "reset": Drake(scheme="runge_kutta3", accuracy=1e-4, max_step=3e-4, mode_changes="witness"),
 }
-CONVERGED = {
-    "compiled.tolerance": "1e-6 m/s",
-    "compiled.max_step": "5e-4 s",
-    "compiled.look_ahead": "1e-6 s",
-}
+FINE = Compiled(tolerance=1e-6, max_step=5e-4, look_ahead=1e-6)
 
 
 def distances(scenario: Scenario, gaits: list[Gait]) -> np.ndarray:
@@ -196,12 +186,12 @@ def test_random_gaits_end_where_the_diagrams_do(scenario, terrain, law, height_f
     friction = scenario.friction if law == "reset" else COULOMB
     changes = {"terrain": TERRAINS.get(terrain, height_field), "friction": friction}
     changes |= {"robot.contacts": "all"} if terrain != "flat" else {}
-    walking = scenario.with_changes(changes | SLOWLY[law] | CONVERGED)
-    assert walking.simulation.engine == "drake"
-    ours = walking.with_changes({"simulation.engine": "compiled"})
+    changes |= {"simulation.max_evaluations": 10**8}
+    walking = scenario.with_changes(changes | {"engine": SLOWLY[law]})
+    ours = walking.with_changes({"engine": FINE})
     gaits = [seeded_gait(walking, seed) for seed in range(80)]
     # Under the reset integrator, distances hang on nanometres where a foot just slips or does not.
-    finer = {"compiled.tolerance": "5e-7 m/s", "compiled.look_ahead": "5e-7 s"}
+    finer = {"engine.tolerance": "5e-7 m/s", "engine.look_ahead": "5e-7 s"}
     nudge = {"robot.offsets": with_unit([[i * 1e-8, -(i**2) * 1e-8, 0.0] for i in range(5)], "m")}
     nudged = ours.with_changes(finer | nudge)
     spread = np.abs(distances(ours, gaits) - distances(nudged, gaits))

@@ -10,6 +10,7 @@ from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.results.measures import lifted, travelling_index
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure, moved_nodes
+from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metric_units import METRICS
 
@@ -23,7 +24,7 @@ def short():
         "simulation.steady_from": "0.5 s",
     }
     changes |= {"cpg.start_up": "0.2 s", "simulation.sample_period": "1e-3 s", "cpg.gain": "3 lbf"}
-    return load_scenario("coulomb").with_changes(changes | {"simulation.engine": "compiled"})
+    return load_scenario("coulomb").with_changes(changes | {"engine": "!Compiled"})
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +72,7 @@ def test_tallied_metrics_are_those_of_the_trajectory(short, walk):
 def test_engines_agree_in_all_metrics(short, walk, engine):
     if engine == "mujoco" and not installed():
         pytest.skip("mujoco is not installed")
-    other = short.with_changes({"simulation.engine": engine, "simulation.accuracy": 1e-3})
+    other = short.with_changes({"engine": Drake(accuracy=1e-3) if engine == "drake" else "!Mujoco"})
     found = simulate(scenario=other, gait=seeded_gait(short, 3)).metrics
     for name, unit in METRICS.items():
         if engine == "mujoco" and name in ("lifted", "path_curvature"):

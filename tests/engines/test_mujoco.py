@@ -15,9 +15,9 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.engine_kinds import MUJOCO_FRICTION, Compiled, Mujoco
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.settings import MUJOCO_FRICTION
 from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -32,7 +32,7 @@ def short(scenario: Scenario) -> Scenario:
         "simulation.steady_from": "0.2 s",
         "cpg.start_up": "0.105 s",
     }
-    return scenario.with_changes({"simulation.engine": "mujoco", **times})
+    return scenario.with_changes({"engine": "!Mujoco", **times})
 
 
 def trajectory_of(scenario: Scenario) -> xarray.Dataset:
@@ -55,15 +55,10 @@ def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(short, tetra
     # order in the step, so that two steps give the limit.
     floating = {"robot.tetrahedra": tetrahedra, "robot.gravity": 0.0}
     floating |= {"robot.offsets": [[0.0, 0.0, "1 m"]] * tetrahedra}
-    fine = {
-        "compiled.tolerance": "1e-6 m/s",
-        "compiled.max_step": "0.5e-3 s",
-        "compiled.look_ahead": "1e-6 s",
-    }
-    fine |= {"simulation.engine": "compiled"}
+    fine = {"engine": Compiled(tolerance=1e-6, max_step=5e-4, look_ahead=1e-6)}
     ours, coarse, halved = (
         trajectory_of(short.with_changes(floating | changes))
-        for changes in (fine, {"mujoco.step": "4e-5 s"}, {"mujoco.step": "2e-5 s"})
+        for changes in (fine, {"engine.step": "4e-5 s"}, {"engine.step": "2e-5 s"})
     )
     limit = 2.0 * halved - coarse
     assert np.ptp(ours["q_WB"].sel(quaternion="y").values) > 0.01
@@ -76,7 +71,7 @@ def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(short, tetra
 @needs_mujoco
 def test_rests_with_its_weight_on_the_ground_as_on_other_engines(scenario, structure, data):
     times = {"simulation.duration": "1.2 s", "simulation.steady_from": "1.0 s"}
-    resting = scenario.with_changes({"simulation.engine": "mujoco", **times})
+    resting = scenario.with_changes({"engine": "!Mujoco", **times})
     end = trajectory_of(resting).isel(time=-1)
     settled = json.loads((data / "expected.json").read_text())["settled"]
     borne = float(end["normal_force"].sum()) / POUND_FORCE
@@ -121,7 +116,7 @@ def test_too_long_a_step_diverges_without_a_log_file(short, integrator, tmp_path
     # With implicitfast the robot jumps for ever, but nothing overflows; Euler's state does.
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(engine, "INTEGRATOR", integrator)
-    steps = {"mujoco.step": "4e-3 s"}
+    steps = {"engine.step": "4e-3 s"}
     unstable = short.with_changes({"simulation.duration": "3.0 s", **steps})
     with pytest.raises(Diverged) as caught:
         simulate(scenario=unstable, gait=seeded_gait(unstable, 0))
@@ -132,14 +127,13 @@ def test_too_long_a_step_diverges_without_a_log_file(short, integrator, tmp_path
 @needs_mujoco
 def test_where_mujoco_starts_again_the_simulation_has_failed_when_it_did(short):
     thrown = short.with_changes({"cpg.gain": "4e9 N"})
+    step = short.settings_of(Mujoco).step
     with pytest.raises(Diverged, match="warns of instability") as caught:
         simulate(scenario=thrown, gait=seeded_gait(thrown))
-    assert caught.value.time == pytest.approx(short.cpg.start_up, abs=2.5 * short.mujoco.step)
+    assert caught.value.time == pytest.approx(short.cpg.start_up, abs=2.5 * step)
 
 
-@pytest.mark.parametrize(
-    ("installed", "key"), [(True, "cables.slack"), (False, "simulation.engine")]
-)
+@pytest.mark.parametrize(("installed", "key"), [(True, "cables.slack"), (False, "engine")])
 def test_what_mujoco_cannot_simulate_is_refused(short, installed, key, monkeypatch):
     monkeypatch.setattr(engine, "installed", lambda: installed)
     with pytest.raises(InputError) as caught:
@@ -217,7 +211,7 @@ def test_walks_on_an_incline_as_the_compiled_engine_does(short):
     # The damping of the normal force differs, so that the robot lands a little differently.
     slope = {"terrain": Incline(slope=math.radians(5.0)), "friction": Coulomb()}
     walk = short.with_changes(slope | {"simulation.duration": "1.0 s"})
-    ours = trajectory_of(walk.with_changes({"simulation.engine": "compiled"}))
+    ours = trajectory_of(walk.with_changes({"engine": "!Compiled"}))
     theirs = trajectory_of(walk)
     assert np.ptp(ours["p_WB"].sel(axis="x").values, axis=0).max() > 3e-3
     assert float(abs(theirs["p_WN"] - ours["p_WN"]).max()) < 2e-4  # 0.2 mm
@@ -245,7 +239,7 @@ def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure
 @needs_mujoco
 def test_a_step_far_too_long_ends_the_simulation(short):
     with pytest.raises(Diverged):
-        simulate(scenario=short.with_changes({"mujoco.step": "0.1 s"}), gait=seeded_gait(short))
+        simulate(scenario=short.with_changes({"engine.step": "0.1 s"}), gait=seeded_gait(short))
 
 
 @needs_mujoco

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray
-from helpers.converged import FINE, shortly
+from helpers.converged import CONVERGED, shortly
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -14,6 +14,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
 from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -24,19 +25,18 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 BOTH = pytest.mark.parametrize("engine", ["drake", "compiled"])
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 LIVE = {"cpg.signals": "live", "cpg.start_up": 0.0}
-WITNESSED = {
-    "simulation.scheme": "runge_kutta3",
-    "simulation.accuracy": 1e-3,
-    "simulation.max_step": "2 ms",
-    "simulation.mode_changes": "witness",
-}
+WITNESSED = Drake(scheme="runge_kutta3", accuracy=1e-3, max_step=2e-3, mode_changes="witness")
 """Settings of the diagram within 0.03 in of converged distances."""
 
 
 def walk(
-    scenario: Scenario, gait: Gait, engine: str, steering: SteeringSignal | None = None
+    scenario: Scenario,
+    gait: Gait,
+    engine: str | Drake | Compiled,
+    steering: SteeringSignal | None = None,
 ) -> xarray.Dataset:
-    on_engine = scenario.with_changes({"simulation.engine": engine})
+    kind = f"!{engine.capitalize()}" if isinstance(engine, str) else engine
+    on_engine = scenario.with_changes({"engine": kind})
     result = simulate(scenario=on_engine, gait=gait, record=True, steering=steering)
     assert result.trajectory is not None
     return result.trajectory
@@ -107,27 +107,29 @@ def test_zero_gains_give_the_walk_without_feedback(scenario, engine):
 @pytest.mark.parametrize("pathway", PATHWAYS)
 def test_engines_agree_with_each_feedback_and_it_matters(scenario, pathway):
     # On Coulomb friction: the reset integrator's modes change 1e5 times while the robot lands.
-    changes = {**FINE, **LIVE, "cpg.feedback": [pathway], "friction": Coulomb()}
+    changes = {**LIVE, "cpg.feedback": [pathway], "friction": Coulomb()}
     short = shortly(scenario, 0.3, **changes)
     gait = dataclasses.replace(seeded_gait(short), gains=Gains(**{pathway: 1.0}))
-    ours, theirs = (walk(short, gait, engine) for engine in ("compiled", "drake"))
+    ours, theirs = (walk(short, gait, CONVERGED[engine]) for engine in ("compiled", "drake"))
     np.testing.assert_allclose(ours.signal.values, theirs.signal.values, atol=2e-5)
     np.testing.assert_allclose(ours.p_WN.values, theirs.p_WN.values, atol=1e-6)
-    none = walk(short, dataclasses.replace(gait, gains=Gains()), "compiled")
+    none = walk(short, dataclasses.replace(gait, gains=Gains()), CONVERGED["compiled"])
     assert np.abs(none.signal - ours.signal).max() > 1e-3, "ten times what engines may differ by"
 
 
 @pytest.mark.parametrize("signals", ["listing", "live"])
 def test_engines_agree_on_a_steering_signal(signals):
     scenario = load_scenario("turning").with_changes({"gait_bounds.turn": 0.0})
-    changes = FINE | {"cpg.signals": signals, "cpg.listing_step": "1e-4 s"}
+    changes = {"cpg.signals": signals, "cpg.listing_step": "1e-4 s"}
     short = shortly(scenario, 0.4, **changes)
     gait = seeded_gait(short)
 
     def steering(time: float) -> float:
         return 0.0 if time < 0.2 else 5.0 * (time - 0.2)
 
-    ours, theirs = (walk(short, gait, engine, steering) for engine in ("compiled", "drake"))
+    ours, theirs = (
+        walk(short, gait, CONVERGED[engine], steering) for engine in ("compiled", "drake")
+    )
     # From the second sample on: the listing's first signal is not zero, which is kept as zero.
     np.testing.assert_allclose(ours.signal.values[1:], theirs.signal.values[1:], atol=2e-4)
     left, right = ours.signal.values[:, 0], ours.signal.values[:, 1]
@@ -151,7 +153,7 @@ def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
     states = []
     for steering in (None, lambda time: -0.5):
         diagram = MakeTensegrityDiagram(short, gait, steering=steering)
-        simulator = MakeSimulator(diagram, short.simulation)
+        simulator = MakeSimulator(diagram, short.engine)
         if steering is None:
             diagram.GetInputPort("turn").FixValue(simulator.get_mutable_context(), [-0.5])
         simulator.AdvanceTo(0.2)
@@ -160,7 +162,7 @@ def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
 
 
 def test_a_constant_number_steers_as_the_gaits_turn_does(refused):
-    changes = {"simulation.engine": "compiled", "simulation.duration": "0.4 s"}
+    changes = {"engine": "!Compiled", "simulation.duration": "0.4 s"}
     short = load_scenario("turning").with_changes(changes | {"simulation.steady_from": "0.2 s"})
     gait = dataclasses.replace(seeded_gait(short), turn=0.0)
     turned = simulate(scenario=short, gait=dataclasses.replace(gait, turn=0.5))
@@ -175,7 +177,7 @@ def test_a_constant_number_steers_as_the_gaits_turn_does(refused):
 
 def test_a_scenario_is_simulated_by_its_name_and_by_its_file(tmp_path):
     file = tmp_path / "short.yaml"
-    times = "{engine: compiled, duration: 0.2 s, steady_from: 0.1 s}"
+    times = "{duration: 0.2 s, steady_from: 0.1 s}"
     file.write_text(f"base: turning\nname: short\nsimulation: {times}\n")
     short = load_scenario(file)
     gait = seeded_gait(short)
@@ -188,7 +190,7 @@ def test_a_scenario_is_simulated_by_its_name_and_by_its_file(tmp_path):
 
 
 def test_one_gait_walks_straight_on_and_turns_either_way(data):
-    scenario = load_scenario("turning").with_changes({"simulation.engine": "compiled"})
+    scenario = load_scenario("turning").with_changes({"engine": "!Compiled"})
     gait = load_gait(data / "gait_turning.json", scenario)
     left, straight, right = (
         simulate(scenario=scenario, gait=dataclasses.replace(gait, turn=turn)).metrics
@@ -203,7 +205,7 @@ def test_one_gait_walks_straight_on_and_turns_either_way(data):
 
 def test_lanes_with_other_gains_and_turns_keep_their_numbers(scenario):
     changes = {**LIVE, **SIDES, "cpg.feedback": list(PATHWAYS)}
-    changes |= {"simulation.engine": "compiled"}
+    changes |= {"engine": "!Compiled"}
     short = shortly(scenario, 1.0, **changes)
     gaits = [
         dataclasses.replace(seeded_gait(short, seed), turn=0.2 * seed - 0.5) for seed in range(6)
@@ -218,7 +220,7 @@ def test_feedback_is_refused_where_signals_are_computed_beforehand(scenario, ref
     with refused("scenario thesis", "cpg.signals", "live"):
         scenario.with_changes({"cpg.signals": "listing", "cpg.feedback": ["load"]})
     live = {"cpg.signals": "live", "cpg.feedback": ["load"]}
-    on_mujoco = scenario.with_changes({**live, "simulation.engine": "mujoco"})
+    on_mujoco = scenario.with_changes({**live, "engine": "!Mujoco"})
     pytest.importorskip("mujoco")
     with refused("thesis", "cpg.feedback", "load"):
         simulate(scenario=on_mujoco, gait=seeded_gait(on_mujoco))
@@ -228,10 +230,9 @@ def test_feedback_is_refused_where_signals_are_computed_beforehand(scenario, ref
 def test_random_gaits_with_feedback_end_where_the_diagrams_do(scenario):
     live = scenario.with_changes({"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)})
     gaits = [seeded_gait(live, seed) for seed in range(20)]
-    fine = {"simulation.engine": "compiled", "compiled.tolerance": "0.001 mm/s"}
-    fine |= {"compiled.max_step": "0.3 ms", "compiled.look_ahead": "0.001 ms"}
+    fine = {"engine": Compiled(tolerance=1e-6, max_step=3e-4, look_ahead=1e-6)}
     ours = simulate_many(scenario=live.with_changes(fine), gaits=gaits)
-    diagram = live.with_changes(WITNESSED)
+    diagram = live.with_changes({"engine": WITNESSED})
     errors = [
         abs(one.metrics.distance_in - simulate(scenario=diagram, gait=gait).metrics.distance_in)
         for one, gait in zip(ours, gaits, strict=True)

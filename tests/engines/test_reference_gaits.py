@@ -32,7 +32,7 @@ SOME = ["gait_a", "gait_b", "gait_f"]
 )
 def results(request, data: Path) -> dict[str, SimulationResult]:
     engine, names = request.param
-    scenario = load_scenario("thesis").with_changes({"simulation.engine": engine})
+    scenario = load_scenario("thesis").with_changes({"engine": f"!{engine.capitalize()}"})
     return {
         name: simulate(scenario=scenario, gait=load_gait(data / f"{name}.json", scenario))
         for name in names
@@ -97,8 +97,8 @@ def test_the_robot_walks_straight_by_its_symmetry(results):
 )
 @pytest.mark.parametrize("name", WELL_CONDITIONED)
 def test_other_settings_agree_with_the_independent_simulation(data, name, settings):
-    changes = {f"simulation.{key}": value for key, value in settings.items()}
-    scenario = load_scenario("thesis").with_changes({"simulation.accuracy": 1e-3} | changes)
+    changes = {f"engine.{key}": value for key, value in settings.items()}
+    scenario = load_scenario("thesis").with_changes({"engine.accuracy": 1e-3} | changes)
     expected = json.loads((data / "expected.json").read_text())["gaits"][name]["distance_in"]
     result = simulate(scenario=scenario, gait=load_gait(data / f"{name}.json", scenario))
     assert abs(result.metrics.distance_in - expected) < 0.1

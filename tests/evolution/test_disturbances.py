@@ -42,7 +42,7 @@ def tiny():
     """0.3 s of three tetrahedra, actuated at once, on the compiled engine, among three draws."""
     return small_scenario(oscillators=2, population=4, iterations=2, trials=2).with_changes(
         {
-            "simulation.engine": "compiled",
+            "engine": "!Compiled",
             "simulation.duration": "0.3 s",
             "simulation.steady_from": "0.1 s",
             "cpg.start_up": 0.0,

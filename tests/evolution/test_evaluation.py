@@ -70,7 +70,7 @@ def test_failures_say_why_and_have_the_worst_fitness(tiny, vectors, changes, obj
 
 
 def test_evaluations_in_lanes_are_those_of_single_gaits_and_keep_their_budgets(tiny, vectors):
-    compiled = tiny.with_changes({"simulation.engine": "compiled"})
+    compiled = tiny.with_changes({"engine": "!Compiled"})
     endless = {"simulation.duration": "1 h", "evolution.time_budget": "0.05 s"}
     with LanePool(1) as lanes:
         for vector in vectors:
@@ -103,7 +103,7 @@ def test_the_reason_of_a_failed_simulation_is_kept(tiny, vectors, monkeypatch):
 def test_time_budgets_hold_in_any_thread_and_end_with_their_evaluation(tiny, vectors, engine):
     if engine == "mujoco":
         pytest.importorskip("mujoco")
-    changes = {"simulation.engine": engine, "simulation.duration": "60.0 s"}
+    changes = {"engine": f"!{engine.capitalize()}", "simulation.duration": "60.0 s"}
     late = GaitEvaluation(tiny.with_changes(changes | {"evolution.time_budget": "0.01 s"}))
     with ThreadPoolExecutor(1) as thread:
         failed = thread.submit(late, vectors[0]).result()
@@ -112,7 +112,7 @@ def test_time_budgets_hold_in_any_thread_and_end_with_their_evaluation(tiny, vec
 
 
 def test_many_gaits_in_lanes_are_those_gaits_one_by_one(tiny, vectors):
-    compiled = tiny.with_changes({"simulation.engine": "compiled"})
+    compiled = tiny.with_changes({"engine": "!Compiled"})
     draws = Disturbances(draws=2, start=0.1)
     among = compiled.with_changes({"disturbances": draws})
     for scenario, tasks in (

@@ -1,19 +1,13 @@
 """Short walks, and settings at which the diagram and the compiled engine agree to micrometres."""
 
+from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.schema import Scenario
 
-FINE = {
-    "cpg.start_up": 0.0,
-    "simulation.scheme": "runge_kutta3",
-    "simulation.accuracy": 1e-6,
-    "simulation.max_step": "1e-4 s",
-    "simulation.mode_changes": "witness",
-    "compiled.tolerance": "1e-8 m/s",
-    "compiled.max_step": "3e-5 s",
-    "compiled.look_ahead": "1e-8 s",
+CONVERGED: dict[str, Drake | Compiled] = {
+    "drake": Drake(scheme="runge_kutta3", accuracy=1e-6, max_step=1e-4, mode_changes="witness"),
+    "compiled": Compiled(tolerance=1e-8, max_step=3e-5, look_ahead=1e-8),
 }
-"""Settings at which both engines have converged, mode changes placed to 2e-8 s, for short walks
-that are driven from the start."""
+"""Engines that have converged, with mode changes placed to 2e-8 s, for short walks."""
 
 
 def shortly(scenario: Scenario, duration: float, **changes: object) -> Scenario:

@@ -17,7 +17,9 @@ from tetra_drake.scenario.load import load_scenario
 @pytest.fixture(scope="module", params=["drake", "compiled"])
 def trajectory(request: pytest.FixtureRequest, data: Path) -> xarray.Dataset:
     times = {"simulation.duration": "2.0 s", "simulation.steady_from": "1.5 s"}
-    scenario = load_scenario("thesis").with_changes({"simulation.engine": request.param, **times})
+    scenario = load_scenario("thesis").with_changes(
+        {"engine": f"!{request.param.capitalize()}", **times}
+    )
     gait = load_gait(data / "gait_g.json", scenario)
     result = simulate(scenario=scenario, gait=gait, record=True)
     assert result.trajectory is not None

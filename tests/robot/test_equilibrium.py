@@ -62,7 +62,7 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     still = {
         "cpg.start_up": "100.0 s",
         "simulation.duration": "20.0 s",
-        "simulation.engine": "compiled",
+        "engine": "!Compiled",
     }
     scenario = scenario.with_changes(still | changes)
     walk = simulate(scenario=scenario, gait=seeded_gait(scenario, 0), record=True).trajectory

@@ -24,7 +24,7 @@ METRICS = {"cost_of_transport": 4.0, "tension": 1.0, "clearance": 0.02}
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """An analysed run of a robot of three tetrahedra."""
-    scenario = tiny_scenario().with_changes({"simulation.engine": "compiled"})
+    scenario = tiny_scenario().with_changes({"engine": "!Compiled"})
     metrics = {5.0: METRICS, 3.0: METRICS}
     path = tmp_path_factory.mktemp("runs") / "thesis"
     run = write_run(path, TRIALS, scenario=scenario, metrics=metrics)
@@ -53,7 +53,7 @@ def test_they_are_simulated_on_other_engines_and_under_other_laws(folder):
     scenario = run.manifest.scenario
     settings = analyse.settings_of(scenario)
     assert list(again["setting"]) == [name for name in settings for _ in range(2)]
-    engines = {name: each.simulation.engine for name, each in settings.items()}
+    engines = {name: each.engine_name for name, each in settings.items()}
     assert engines == {
         **{analyse.TIGHT: "drake", analyse.MUJOCO: "mujoco"},
         **{"reset integrator": "compiled", "Coulomb": "compiled"},
@@ -66,7 +66,7 @@ def test_they_are_simulated_on_other_engines_and_under_other_laws(folder):
 
 
 def test_only_what_an_engine_can_simulate_is_asked_of_it():
-    rough = load_scenario("feedback").with_changes({"simulation.engine": "compiled"})
+    rough = load_scenario("feedback").with_changes({"engine": "!Compiled"})
     assert set(analyse.settings_of(rough)) == {analyse.TIGHT}
     assert set(analyse.settings_of(load_scenario("incline"))) == {analyse.TIGHT, analyse.MUJOCO}
 

@@ -14,7 +14,7 @@ TINY = record.Experiment(
     "two tetrahedra",
     "thesis",
     {
-        **{"simulation.engine": "compiled", "simulation.duration": "0.4 s"},
+        **{"engine": "!Compiled", "simulation.duration": "0.4 s"},
         **{"simulation.steady_from": "0.1 s", "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)},
         **{"evolution.trials": 2, "evolution.evaluations": 8},
     },
@@ -72,4 +72,4 @@ def test_every_experiment_is_a_scenario():
     for name, experiment in record.EXPERIMENTS.items():
         scenario = experiment.scenario(name)
         assert scenario.name == name
-        assert (scenario.simulation.engine == "drake") == (name == "thesis-drake")
+        assert (scenario.engine_name == "drake") == (name == "thesis-drake")

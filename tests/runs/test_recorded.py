@@ -49,7 +49,7 @@ def test_the_best_gaits_walk_as_recorded(name):
     """On the compiled engine, undisturbed, which is what analyse.py recorded, too."""
     folder = tables.HERE / name
     analysis, scenario = load_analysis(folder), load_scenario(folder / "scenario.yaml")
-    scenario = scenario.with_changes({"simulation.engine": "compiled"})
+    scenario = scenario.with_changes({"engine": "!Compiled"})
     tolerance = 0.0 if analysis.versions == versions() else TOLERANCE
     recorded = analysis.gaits["undisturbed"] / INCH
     assert len(recorded) == scenario.evolution.trials

@@ -57,7 +57,7 @@ def runs(tmp_path_factory):
     """A run, and the same thinned."""
     folder = tmp_path_factory.mktemp("runs")
     kind = QualityDiversity(cells=[3, 3])
-    changes = {"optimizer": kind, "simulation.engine": "compiled"}
+    changes = {"optimizer": kind, "engine": "!Compiled"}
     metrics = {
         fitness: metrics_of(number, i, fitness)
         for number, trial in enumerate(FITNESS)

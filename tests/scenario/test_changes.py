@@ -37,7 +37,8 @@ def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
         ({"robot.spacing.x": "1 m"}, "robot.spacing", "a mapping"),
         ({"cables.outer_stiffness": 40}, "cables.outer_stiffness", "40 without a unit"),
         ({"robot.offsets": np.ones((5, 3))}, "robot.offsets[0][0]", "1.0 without a unit"),
-        ({"engine": "compiled"}, "engine", "'simulation.engine'"),
+        ({"accuracy": 0.1}, "accuracy", "'engine.accuracy'"),
+        ({"engine": "compiled"}, "engine", "!Compiled"),
         ({"damping": "1 N*s/m"}, "damping", "'cables.damping'"),
         ({"static": 0.5}, "static", "'friction.static'"),
         ({"robot": {"tetrahedra": 7}, "robot.tetrahedra": 7}, "robot.tetrahedra", "twice"),
@@ -105,9 +106,9 @@ def test_what_python_changes_decides_on_the_spacing_as_in_a_file(tmp_path, scena
 
 
 def test_a_mapping_changes_what_it_names_as_in_a_file(tmp_path, scenario):
-    changed = scenario.with_changes({"simulation": {"engine": "compiled"}, "name": "mine"})
-    assert changed == derived(tmp_path, "name: mine\nsimulation: {engine: compiled}")
-    assert changed.simulation == scenario.simulation.model_copy(update={"engine": "compiled"})
+    changed = scenario.with_changes({"simulation": {"duration": "9 s"}, "name": "mine"})
+    assert changed == derived(tmp_path, "name: mine\nsimulation: {duration: 9 s}")
+    assert changed.simulation == scenario.simulation.model_copy(update={"duration": 9.0})
     coulomb = scenario.with_changes({"friction": Coulomb(static=0.7)})
     assert coulomb.with_changes({"friction": {"kinetic": 0.3}}).friction == Coulomb(
         static=0.7, kinetic=0.3
@@ -129,7 +130,7 @@ def test_a_metric_joins_the_objective_where_a_mapping_replaces_it(scenario):
 
 def test_a_balanced_robot_stays_where_it_stands_until_it_is_actuated(scenario):
     # At 2.94 in, seven tetrahedra with outer cables twice as stiff shrink: T1 moves 1.96 in.
-    changes = {"robot.tetrahedra": 7, "robot.spacing": "balanced", "simulation.engine": "compiled"}
+    changes = {"robot.tetrahedra": 7, "robot.spacing": "balanced", "engine": "!Compiled"}
     changes |= {"cables.outer_stiffness": "0.4 lbf/in", "simulation.steady_from": 0.0}
     robot = scenario.with_changes(changes | {"simulation.duration": f"{scenario.cpg.start_up} s"})
     distance = simulate(scenario=robot, gait=seeded_gait(robot, 0)).metrics.distance
@@ -137,6 +138,6 @@ def test_a_balanced_robot_stays_where_it_stands_until_it_is_actuated(scenario):
 
 
 def test_a_difference_to_a_base_with_other_than_default_values_is_seen(scenario):
-    base = scenario.with_changes({"mujoco.step": "1 ms"})
-    assert differences(scenario, base) == [("mujoco.step", "0.000125 s")]
-    assert differences(base, scenario) == [("mujoco.step", "0.001 s")]
+    base = scenario.with_changes({"engine.accuracy": 0.1})
+    assert differences(scenario, base) == [("engine.accuracy", "0.005")]
+    assert differences(base, scenario) == [("engine.accuracy", "0.1")]

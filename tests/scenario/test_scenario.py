@@ -107,7 +107,7 @@ TOO_LARGE = [
     ({"robot.tetrahedra": 100_000}, "robot.tetrahedra", "100000"),
     ({"cpg.listing_step": "1e-6 s", "simulation.duration": "100 s"}, "cpg.listing_step", "1e-06 s"),
     ({"simulation.sample_period": "1e-9 s"}, "simulation.sample_period", "1e-09 s"),
-    ({"mujoco.step": "1e-7 s", "simulation.engine": "mujoco"}, "mujoco.step", "1e-07 s"),
+    ({"engine.step": "1e-7 s", "engine": "!Mujoco"}, "engine.step", "1e-07 s"),
     ({"evolution.population": 10**9}, "evolution.population", "1000000000"),
     ({"disturbances": {"draws": 10**9}}, "disturbances.draws", "1000000000"),
     ({"optimizer": {TAG: "CmaEs", "population": 10**9}}, "optimizer.population", "1000000000"),

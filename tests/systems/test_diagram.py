@@ -58,7 +58,7 @@ def resident_megabytes() -> float:
 def test_three_hundred_diagrams_do_not_fill_the_memory(scenario, gait):
     def build_and_run(count: int) -> float:
         for _ in range(count):
-            simulator = MakeSimulator(MakeTensegrityDiagram(scenario, gait), scenario.simulation)
+            simulator = MakeSimulator(MakeTensegrityDiagram(scenario, gait), scenario.engine)
             simulator.AdvanceTo(0.02)
             del simulator
         gc.collect()

@@ -40,7 +40,7 @@ WINDOW = 600, 400  # small, as it is drawn again and again in software
 @pytest.fixture(scope="module")
 def trajectory(data):
     """5 s, long enough to get somewhere."""
-    changes = {"simulation.duration": "5.0 s", "simulation.engine": "compiled"}
+    changes = {"simulation.duration": "5.0 s", "engine": "!Compiled"}
     scenario = load_scenario("thesis").with_changes(changes)
     gait = load_gait(data / "gait_g.json", scenario)
     return simulate(scenario=scenario, gait=gait, record=True).trajectory

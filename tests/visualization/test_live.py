@@ -93,9 +93,9 @@ def test_shows_where_the_robot_is(short, meshcat, visitor):
 
 
 def test_other_engines_cannot_be_watched(short, meshcat, refused):
-    compiled = short.with_changes({"simulation.engine": "compiled"})
+    compiled = short.with_changes({"engine": "!Compiled"})
     view = LiveView(meshcat, short)
-    with refused("scenario thesis", "simulation.engine", "'compiled'"):
+    with refused("scenario thesis", "engine", "'compiled'"):
         simulate(scenario=compiled, gait=seeded_gait(compiled), viewer=view)
 
 

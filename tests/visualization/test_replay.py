@@ -210,7 +210,7 @@ def test_the_legend_names_kinds_of_cables_that_the_robot_has(scenario, page, tmp
     kinds = {name: LEGEND[name] for name in CABLE_KINDS}
     assert all(meaning in page for meaning in kinds.values())
     groups = [[cable] for cable in CABLES]
-    driven = scenario.with_changes({"robot.actuation": groups, "simulation.engine": "compiled"})
+    driven = scenario.with_changes({"robot.actuation": groups, "engine": "!Compiled"})
     save_replay(tmp_path / "all.html", scenario=driven, trajectory=recorded(driven), title="all")
     shown = read_page(tmp_path / "all.html")
     assert [name for name, meaning in kinds.items() if meaning in shown] == ["actuated"]

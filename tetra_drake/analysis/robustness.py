@@ -110,7 +110,7 @@ def judge(
 
     Raises InputError where a gait is for another robot, or percent too large for the scenario.
     """
-    changes: dict[str, Any] = {"simulation.engine": "compiled"}
+    changes: dict[str, Any] = {"engine": "!Compiled"}
     if scenario.disturbances is None or percent is not None:
         changes["disturbances"] = default_disturbances(scenario, percent or PERCENT)
     scenario = scenario.with_changes(changes)

@@ -19,6 +19,7 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.model import make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import SimulationSection
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -40,15 +41,15 @@ def simulate_drake(
     steering: SteeringSignal | None = None,
 ) -> SimulationResult:
     """Simulates a gait as simulate() does, on the Drake diagram."""
-    settings = scenario.simulation
+    settings, engine = scenario.simulation, scenario.settings_of(Drake)
     diagram = MakeTensegrityDiagram(scenario, gait, steering=steering)
     structure = MakeStructure(scenario)
     model = make_model(scenario, structure)
-    simulator = MakeSimulator(diagram, settings)
+    simulator = MakeSimulator(diagram, engine)
     integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
     signals, observer = diagram.GetOutputPort("signals"), Observer(scenario, structure, model)
     work = _Work(integrator)
-    aimer = _StepAimer(diagram, simulator, settings, work)
+    aimer = _StepAimer(diagram, simulator, engine, work)
     samples = sample_times(settings.duration, settings.sample_period) if record else np.empty(0)
     needed = result_times(settings)
     times = np.union1d(needed, samples)
@@ -92,8 +93,8 @@ def simulate_drake(
         mass=float(model.body.mass[0]),
         wall_time=wall_time,
         integrator=IntegratorWork(
-            scheme=settings.scheme,
-            accuracy=settings.accuracy,
+            scheme=engine.scheme,
+            accuracy=engine.accuracy,
             steps=steps,
             derivative_evaluations=derivative_evaluations,
             jacobian_evaluations=jacobian_evaluations,
@@ -102,7 +103,7 @@ def simulate_drake(
     )
 
 
-def MakeSimulator(diagram: Diagram, settings: SimulationSection) -> Simulator:
+def MakeSimulator(diagram: Diagram, settings: Drake) -> Simulator:
     """A simulator of the diagram with the scenario's integrator settings."""
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, settings.scheme, settings.max_step)
@@ -166,7 +167,7 @@ class _StepAimer:
     """
 
     def __init__(
-        self, diagram: Diagram, simulator: Simulator, settings: SimulationSection, work: _Work
+        self, diagram: Diagram, simulator: Simulator, settings: Drake, work: _Work
     ) -> None:
         self._integrator, self._settings = simulator.get_mutable_integrator(), settings
         self._work = work

@@ -35,9 +35,9 @@ from tetra_drake.robot.model import Model, make_model
 from tetra_drake.robot.network import SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.engine_kinds import MUJOCO_FRICTION, Mujoco
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.settings import MUJOCO_FRICTION
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ at times far forward; a walking robot stays below 0.2 m/s."""
 def simulate_mujoco(
     *, scenario: Scenario, gait: Gait, record: bool, steering: SteeringSignal | None = None
 ) -> SimulationResult:
-    """Simulates a gait as simulate() does, in MuJoCo, in steps of `scenario.mujoco.step`.
+    """Simulates a gait as simulate() does, in MuJoCo, in steps of `engine.step`.
 
     Instants asked for, as of samples, are those of the nearest steps. Other threads run meanwhile.
     Raises InputError, too, if MuJoCo is missing or cannot do it.
@@ -96,7 +96,7 @@ def simulate_in_rollouts(
     """Simulates gaits as simulate_mujoco() does, on so many threads of MuJoCo's `Rollout`: the
     same numbers, bit for bit; for a gait that fails its Diverged or StepBudgetExceeded."""
     check_mujoco(scenario)
-    simulation, step = scenario.simulation, scenario.mujoco.step
+    simulation, step = scenario.simulation, scenario.settings_of(Mujoco).step
     steps = max(1, round(simulation.duration / step))
     if steps > simulation.max_evaluations:
         reason = f"{steps} steps exceed the budget of {simulation.max_evaluations}"
@@ -152,8 +152,8 @@ def installed() -> bool:
 
 def make_mjcf(scenario: Scenario, structure: Structure, robot: Model) -> str:
     """The robot and its ground in MuJoCo's format, with one motor per driven cable."""
-    model, settings = Element("mujoco", model=scenario.name), scenario.mujoco
-    steps = {"integrator": INTEGRATOR, "timestep": settings.step}
+    model = Element("mujoco", model=scenario.name)
+    steps = {"integrator": INTEGRATOR, "timestep": scenario.settings_of(Mujoco).step}
     _add(model, "compiler", inertiafromgeom="false")
     _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], cone="elliptic", **steps)
     world = _add(model, "worldbody")
@@ -174,7 +174,7 @@ class _Robot:
             # working folder. Not set back: other threads may be simulating.
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
-        self._scenario = scenario
+        self._scenario, self._step = scenario, scenario.settings_of(Mujoco).step
         self.structure = MakeStructure(scenario)
         self._robot = robot = make_model(scenario, self.structure)
         self.mass = float(robot.body.mass[0])
@@ -235,13 +235,13 @@ class _Robot:
         if not chosen.size:
             return
         steps = np.minimum(first + chosen + 1, len(signals) - 1)
-        step = self._scenario.mujoco.step
+        step = self._step
         for k, (at, state) in enumerate(zip(steps, self.states(states[chosen]), strict=True)):
             observer.add(step * (first + chosen[k] + 1), state, signals[at])
 
     def _failure(self, states: Array, first: int) -> Diverged | None:
         """How the states after step `first` and the next ones tell that a simulation failed."""
-        step = self._scenario.mujoco.step
+        step = self._step
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
         fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= MAX_SPEED)
         if fast.any():
@@ -310,7 +310,7 @@ class _Robot:
 def check_mujoco(scenario: Scenario) -> None:
     """Raises InputError if MuJoCo cannot simulate the scenario."""
     if not installed():
-        raise InputError(scenario.name, "simulation.engine", f"mujoco is not installed: {INSTALL}")
+        raise InputError(scenario.name, "engine", f"mujoco is not installed: {INSTALL}")
     if scenario.cpg.feedback:
         problem = f"found {scenario.cpg.feedback}; mujoco computes signals beforehand"
         raise InputError(scenario.name, "cpg.feedback", problem)

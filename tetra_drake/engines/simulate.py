@@ -46,7 +46,7 @@ def simulate(
         scenario = load_scenario(scenario)
     if steering is not None and not callable(steering):
         steering = constant_steering(steering)
-    if scenario.simulation.engine == "drake":
+    if scenario.engine_name == "drake":
         from tetra_drake.engines.drake import simulate_drake
 
         return simulate_drake(
@@ -54,7 +54,7 @@ def simulate(
         )
     if viewer is not None:
         check_can_be_watched(scenario)
-    if scenario.simulation.engine == "compiled":
+    if scenario.engine_name == "compiled":
         from tetra_drake.engines.compiled.engine import simulate_compiled as run
     else:
         from tetra_drake.engines.mujoco import simulate_mujoco as run
@@ -90,12 +90,12 @@ def simulate_many(
     threads = available_cores() if workers is None else workers
     if threads < 1:
         raise InputError("simulate_many", "workers", f"found {workers}, expected at least 1")
-    if all(each.simulation.engine == "compiled" for each in scenarios):
+    if all(each.engine_name == "compiled" for each in scenarios):
         from tetra_drake.engines.compiled.lane_pool import simulate_in_lanes
 
         pairs = list(zip(scenarios, gaits, strict=True))
         return simulate_in_lanes(pairs, record=record, threads=threads)
-    if isinstance(scenario, Scenario) and scenario.simulation.engine == "mujoco":
+    if isinstance(scenario, Scenario) and scenario.engine_name == "mujoco":
         from tetra_drake.engines.mujoco import simulate_in_rollouts
 
         return simulate_in_rollouts(scenario=scenario, gaits=gaits, record=record, threads=threads)
@@ -112,7 +112,7 @@ def check_scenario(scenario: Scenario) -> None:
     """Raises InputError if the scenario's engine cannot simulate it, say, as the robot would start
     in the ground."""
     make_model(scenario, MakeStructure(scenario))
-    if scenario.simulation.engine == "mujoco":
+    if scenario.engine_name == "mujoco":
         from tetra_drake.engines.mujoco import check_mujoco
 
         check_mujoco(scenario)
@@ -121,7 +121,7 @@ def check_scenario(scenario: Scenario) -> None:
 def prepare(scenario: Scenario, *, many: bool = False) -> None:
     """Compiles the scenario's engine, so that no simulation, nor one of many gaits, has to wait for
     that. The kernels of `drake` and `mujoco` are compiled as a moment is simulated."""
-    if scenario.simulation.engine == "compiled":
+    if scenario.engine_name == "compiled":
         from tetra_drake.engines.compiled.lane_engine import LaneEngine, PreparedGait, lanes_for
 
         prepared = PreparedGait.of(scenario, seeded_gait(scenario), record=False)

@@ -24,7 +24,7 @@ class Viewer(Protocol):
 def check_can_be_watched(scenario: Scenario) -> None:
     """Raises InputError unless the scenario's engine is the diagram: others show nothing until they
     have ended."""
-    engine = scenario.simulation.engine
+    engine = scenario.engine_name
     if engine != "drake":
         problem = f"found '{engine}', expected 'drake', which alone can be watched as it simulates"
-        raise InputError(f"scenario {scenario.name}", "simulation.engine", problem)
+        raise InputError(f"scenario {scenario.name}", "engine", problem)

@@ -65,7 +65,7 @@ class GaitEvaluation:
     @property
     def side_by_side(self) -> int:
         """The number of vectors, or a multiple, for which many() takes least time each."""
-        if self.lanes is not None or self.scenario.simulation.engine != "compiled":
+        if self.lanes is not None or self.scenario.engine_name != "compiled":
             return 1
         from tetra_drake.engines.compiled.lane_engine import lanes_for
 
@@ -119,7 +119,7 @@ class GaitEvaluation:
             evaluation = draws[0]
         else:
             evaluation = combine(draws, settings.tail)
-        return dataclasses.replace(evaluation, engine=self.scenario.simulation.engine)
+        return dataclasses.replace(evaluation, engine=self.scenario.engine_name)
 
     def _simulate(self, scenario: Scenario, gait: Gait) -> SimulationResult:
         with time_limit(self.scenario.evolution.time_budget):

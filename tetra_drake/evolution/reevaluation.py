@@ -26,7 +26,7 @@ _TITLE = "best gaits on the Drake diagram"
 
 def on_diagram(scenario: Scenario) -> Scenario:
     """The scenario with the Drake diagram as its engine."""
-    return scenario.with_changes({"simulation.engine": "drake"})
+    return scenario.with_changes({"engine": "!Drake"})
 
 
 def evaluate_again(

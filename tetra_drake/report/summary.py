@@ -18,11 +18,11 @@ from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.engine_kinds import MUJOCO_FRICTION
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import tree_of
-from tetra_drake.scenario.settings import MUJOCO_FRICTION
 from tetra_drake.scenario.terrain_kinds import Flat
 from tetra_drake.scenario.units import customary, shown
 
@@ -88,7 +88,7 @@ def ground_text(scenario: Scenario) -> str:
     if isinstance(law, Coulomb):
         numbers = {"static": law.static, "kinetic": law.kinetic}
         friction = f"Coulomb friction ({_listed(numbers | tree_of(law, show=shown))})"
-    elif scenario.simulation.engine == "mujoco":
+    elif scenario.engine_name == "mujoco":
         friction = f"MuJoCo's friction (coefficient {MUJOCO_FRICTION:g})"
     elif isinstance(terrain, Flat):
         return ""

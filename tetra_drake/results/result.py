@@ -120,7 +120,7 @@ def make_result(
         duration=simulation.duration,
         wall_time=wall_time,
         integrator=integrator,
-        engine=simulation.engine,
+        engine=scenario.engine_name,
         path=path,
         trajectory=trajectory,
     )

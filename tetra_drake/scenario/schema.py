@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from pydantic import PrivateAttr
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.cable_names import SIDES, mirrored
+from tetra_drake.scenario.engine_kinds import ENGINES, Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
@@ -26,19 +27,19 @@ from tetra_drake.scenario.sections import (
 )
 from tetra_drake.scenario.settings import (
     CableSection,
-    CompiledSection,
     CpgSection,
     Disturbances,
     EvolutionSection,
     GaitBounds,
     GroundSection,
-    MujocoSection,
     RobotSection,
     SimulationSection,
     separate,
 )
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.yaml_text import dump_yaml
+
+EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
 
 MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
 """Upper limits of the values of all signals in one simulation: some 3 GB."""
@@ -59,8 +60,7 @@ class Scenario(Section):
     cpg: CpgSection
     gait_bounds: GaitBounds
     simulation: SimulationSection
-    compiled: CompiledSection
-    mujoco: MujocoSection = MujocoSection()
+    engine: Engine = Drake()
     objective: dict[str, float] = named_quantities({k: inverse(u) for k, u in METRICS.items()})
     """What evolution maximises: the sum of metrics times these weights, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
@@ -89,6 +89,17 @@ class Scenario(Section):
     def oscillators(self) -> int:
         """One neural oscillator for each group of cables of each junction between tetrahedra."""
         return len(self.robot.actuation) * (self.robot.tetrahedra - 1)
+
+    @property
+    def engine_name(self) -> str:
+        """Name of the engine, one of ENGINES."""
+        return next(name for name, kind in ENGINES.items() if isinstance(self.engine, kind))
+
+    def settings_of(self, engine: type[EngineKind]) -> EngineKind:
+        """The settings of the scenario's engine, which must be of this kind."""
+        if not isinstance(self.engine, engine):
+            raise TypeError(f"the engine is !{type(self.engine).__name__}")
+        return self.engine
 
     @property
     def draws(self) -> int:
@@ -168,7 +179,7 @@ def _as_a_whole(given: Tree, keys: Iterable[str]) -> Tree:
 
 def _with_tags(tree: Tree, scenario: Scenario) -> Tree:
     """The tree with the tags of all kinds, so that another kind does not merge with them."""
-    kinds = ("friction", "terrain", "optimizer")
+    kinds = ("friction", "terrain", "engine", "optimizer")
     tagged = {k: {TAG: type(getattr(scenario, k)).__name__} | tree[k] for k in kinds if k in tree}
     return tree | tagged
 
@@ -227,16 +238,16 @@ def check_relations(scenario: Scenario, source: object) -> None:
 
 def _check_size(scenario: Scenario, source: object) -> None:
     """Raises InputError for what does not fit in memory."""
-    simulation = scenario.simulation
-    most_signals = MOST_SIGNALS_OF_DRAKE if simulation.engine == "drake" else MOST_SIGNALS
+    simulation, engine = scenario.simulation, scenario.engine
+    most_signals = MOST_SIGNALS_OF_DRAKE if isinstance(engine, Drake) else MOST_SIGNALS
     per_signal = simulation.duration * scenario.oscillators / most_signals
     per_sample = simulation.duration * scenario.robot.tetrahedra / MOST_SAMPLES
     periods = {
         "cpg.listing_step": (scenario.cpg.listing_step, per_signal),
         "simulation.sample_period": (simulation.sample_period, per_sample),
     }
-    if simulation.engine == "mujoco":
-        periods["mujoco.step"] = (scenario.mujoco.step, per_signal)
+    if isinstance(engine, Mujoco):
+        periods["engine.step"] = (engine.step, per_signal)
     for key, (period, least) in periods.items():
         if period < least:
             problem = (

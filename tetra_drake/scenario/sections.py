@@ -305,7 +305,8 @@ def merge(base: Any, changes: Any) -> Any:
 def tree_of(section: Section, *, show: Show = "{!r} {}".format, sparse: bool = True) -> Tree:
     """The tree of a section; `show` gives the text of a quantity from number and unit.
 
-    If `sparse`, values that are their fields' defaults, and tags of first kinds, are left out.
+    If `sparse`, values that are their fields' defaults are left out. Kinds are given in full, so
+    that another default does not change what a record means.
     """
     tree: Tree = {}
     for name, field in type(section).model_fields.items():
@@ -321,9 +322,9 @@ def _tree(value: Any, kind: Any, extra: Mapping[str, Any], show: Show, sparse: b
     kinds = members(kind)
     items = typing.get_args(kinds[0])
     if isinstance(value, Section):
-        tag = {TAG: type(value).__name__} if len(kinds) > 1 else {}
-        first = sparse and type(value) is kinds[0]
-        return ({} if first else tag) | tree_of(value, show=show, sparse=sparse)
+        if len(kinds) == 1:
+            return tree_of(value, show=show, sparse=sparse)
+        return {TAG: type(value).__name__} | tree_of(value, show=show, sparse=False)
     if isinstance(value, list):
         return [_tree(item, items[-1], extra, show, sparse) for item in value]
     if isinstance(value, dict):

@@ -12,9 +12,6 @@ from pydantic import Field, model_validator
 from tetra_drake.scenario.cable_names import Cable
 from tetra_drake.scenario.sections import Section, quantity, refuse
 
-EngineName = Literal["drake", "compiled", "mujoco"]
-ENGINES: tuple[str, ...] = get_args(EngineName)
-
 Pathway = Literal["length", "load", "pitch"]
 """A signal that can be fed back to the oscillators; see physics.feedback."""
 
@@ -133,23 +130,11 @@ class GaitBounds(Section):
 
 
 class SimulationSection(Section):
-    """How long to simulate, on which engine, how finely, and when to give up.
+    """How long to simulate and when to give up."""
 
-    From `scheme` to `look_ahead`, the settings are those of the engine `drake`. Contact and
-    stiction (modes) change at the end of steps, or are localised by a witness function.
-    """
-
-    engine: EngineName
     duration: float = quantity("s", gt=0, le=1e5)
     steady_from: float = quantity("s", ge=0)
     """Time from which the fitness counts (section 2.3)."""
-    scheme: Literal["radau3", "runge_kutta3"]
-    accuracy: float = Field(gt=0)
-    """Target accuracy per step."""
-    max_step: float = quantity("s", gt=0)
-    mode_changes: Literal["step_end", "witness"]
-    look_ahead: float = quantity("s", ge=0)
-    """With step_end and radau3: shortest step that ends at a predicted mode change; 0 for none."""
     max_evaluations: int = Field(ge=1)
     """Evaluations of the derivatives in one simulation."""
     sample_period: float = quantity("s", gt=0)
@@ -161,30 +146,6 @@ class SimulationSection(Section):
             problem = f"found {self.steady_from} s, expected less than the duration"
             refuse("steady_from", f"{problem}, {self.duration} s")
         return self
-
-
-SHORTEST_STEP = 1e-9
-"""Lower limit (s) of the steps of the engine `compiled`."""
-
-
-class CompiledSection(Section):
-    """How finely the engine `compiled` simulates."""
-
-    tolerance: float = quantity("m/s", gt=0)
-    """Error of a body's velocity, or of its strut tips' by rotation, allowed per step."""
-    max_step: float = quantity("s", gt=SHORTEST_STEP, le=1)
-    look_ahead: float = quantity("s", gt=SHORTEST_STEP, le=1)
-    """Time from a predicted mode change to the end of the step that aims at it."""
-
-
-MUJOCO_FRICTION = 0.5
-"""Coefficient of MuJoCo's friction, as of metal on a floor, in place of the thesis's law."""
-
-
-class MujocoSection(Section):
-    """How finely the engine `mujoco` simulates."""
-
-    step: float = quantity("s", default=0.125e-3, ge=1e-7, le=1)
 
 
 class EvolutionSection(Section):

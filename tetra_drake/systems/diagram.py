@@ -22,6 +22,7 @@ from tetra_drake.robot.network import (
 )
 from tetra_drake.robot.signals import signal_samples
 from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import (
     CableNetwork,
@@ -67,7 +68,7 @@ def MakeTensegrityDiagram(
     gate = StartUpGate(structure.signals, start_up=scenario.cpg.start_up)
     start_up = builder.AddNamedSystem("start_up", gate)
     cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
-    witness = scenario.simulation.mode_changes == "witness"
+    witness = isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness"
     contact = GroundContact(structure, scenario, witness=witness)
     ground = builder.AddNamedSystem("ground", contact)
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))

@@ -6,19 +6,20 @@ import sys
 import numpy as np
 import pytest
 import xarray
-from helpers.converged import FINE
+from helpers.converged import CONVERGED
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import WALKING_SEED, load_gait, seeded_gait
 from tetra_drake.robot.model import make_model
+from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.schema import Scenario
 
 
 @pytest.fixture
 def compiled(scenario: Scenario) -> Scenario:
     """The thesis scenario on the compiled engine."""
-    return scenario.with_changes({"simulation.engine": "compiled"})
+    return scenario.with_changes({"engine": "!Compiled"})
 
 
 SAME_PLACE = 5e-6
@@ -40,7 +41,7 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, tetrahedra, seed, durati
         "simulation.duration": f"{duration} s",
         "simulation.steady_from": f"{0.5 * duration} s",
     }
-    fine = scenario.with_changes({"robot.tetrahedra": tetrahedra, **times, **FINE})
+    fine = scenario.with_changes({"robot.tetrahedra": tetrahedra, "cpg.start_up": 0.0, **times})
     trajectories = trajectories_on_both(fine, seed)
     ours, drakes = (trajectory["p_WN"].values[-1] for trajectory in trajectories)
     assert ours.shape == (tetrahedra, 4, 3)
@@ -50,8 +51,8 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, tetrahedra, seed, durati
 
 def trajectories_on_both(scenario: Scenario, seed: int = WALKING_SEED) -> list[xarray.Dataset]:
     """Of a seeded gait on the compiled engine and on the diagram."""
-    gait, engines = seeded_gait(scenario, seed), ("compiled", "drake")
-    both = [scenario.with_changes({"simulation.engine": engine}) for engine in engines]
+    gait = seeded_gait(scenario, seed)
+    both = [scenario.with_changes({"engine": CONVERGED[name]}) for name in ("compiled", "drake")]
     return [simulate(scenario=each, gait=gait, record=True).trajectory for each in both]
 
 
@@ -63,14 +64,14 @@ from tetra_drake.robot.gait import seeded_gait
 
 times = {"simulation.duration": "0.2 s", "simulation.steady_from": "0.1 s"}
 times["cpg.start_up"] = "0.05 s"
-small = times | {"robot.tetrahedra": 2, "simulation.engine": "compiled"}
+small = times | {"robot.tetrahedra": 2, "engine": "!Compiled"}
 scenario = td.load_scenario("thesis").with_changes(small)
 for key, value in (
     *(("look_ahead", value) for value in ("0.2 s", "1 s", "2e-9 s")),
     *(("max_step", value) for value in ("1 s", "2e-9 s")),
     *(("tolerance", value) for value in ("1e-200 m/s", "1e200 m/s")),
 ):
-    changed = scenario.with_changes({"compiled." + key: value, "simulation.max_evaluations": 9000})
+    changed = scenario.with_changes({"engine." + key: value, "simulation.max_evaluations": 9000})
     try:
         with time_limit(30.0):
             td.simulate(scenario=changed, gait=seeded_gait(changed))
@@ -90,15 +91,10 @@ def test_extreme_settings_come_to_an_end():
 @pytest.mark.slow
 def test_nine_of_ten_well_conditioned_random_gaits_end_where_the_diagrams_do(compiled):
     # The diagram's default settings are themselves off by 0.2 in and more in every fourth gait.
-    fine = {"engine": "drake", "scheme": "runge_kutta3", "accuracy": 1e-5}
-    fine |= {"max_step": "5e-5 s", "look_ahead": 0.0}
-    diagram = compiled.with_changes({f"simulation.{key}": fine[key] for key in fine})
-    coarser = compiled.with_changes(
-        {"compiled.tolerance": "5e-6 m/s", "compiled.look_ahead": "2e-6 s"}
-    )
-    finer = compiled.with_changes(
-        {"compiled.tolerance": "2e-6 m/s", "compiled.look_ahead": "1e-6 s"}
-    )
+    fine = Drake(scheme="runge_kutta3", accuracy=1e-5, max_step=5e-5, look_ahead=0.0)
+    diagram = compiled.with_changes({"engine": fine})
+    coarser = compiled.with_changes({"engine.tolerance": "5e-6 m/s", "engine.look_ahead": "2e-6 s"})
+    finer = compiled.with_changes({"engine.tolerance": "2e-6 m/s", "engine.look_ahead": "1e-6 s"})
     well_conditioned = [
         seed
         for seed in range(200, 230)

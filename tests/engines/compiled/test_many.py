@@ -46,7 +46,7 @@ def short(scenario: Scenario) -> Scenario:
         "simulation.steady_from": "0.5 s",
         "cpg.start_up": "0.2 s",
     }
-    return scenario.with_changes({"simulation.engine": "compiled", **times})
+    return scenario.with_changes({"engine": "!Compiled", **times})
 
 
 def courses(walks: list[PreparedGait], width: int) -> list[Course]:
@@ -120,7 +120,7 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
         short,
         short.with_changes({"cables.outer_stiffness": "0.21 lbf/in"}),
         short.with_changes({"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}),
-        short.with_changes({"simulation.duration": "0.8 s", "compiled.tolerance": "5e-5 m/s"}),
+        short.with_changes({"simulation.duration": "0.8 s", "engine.tolerance": "5e-5 m/s"}),
         short.with_changes({"robot.tetrahedra": 3}),
         short.with_changes({"cpg.signals": "live", "cpg.gain": "1 lbf"}),
         short.with_changes({"cables.slack": True, "cpg.listing_step": "0.1 ms"}),
@@ -136,7 +136,7 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
 def test_failures_stand_in_the_place_of_results(short):
     failing = {
         "a body's velocity": FALLING,
-        "no step": {"compiled.tolerance": "1e-300 m/s"},
+        "no step": {"engine.tolerance": "1e-300 m/s"},
         "force evaluations": {"simulation.max_evaluations": 100},
         "": {},
     }

@@ -24,6 +24,7 @@ from tetra_drake.results.result import IntegratorWork, SimulationResult, make_re
 from tetra_drake.results.trajectory import assemble_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def make_outcome(prepared: PreparedGait, course: Course) -> SimulationResult:
         times = sample_times(simulation.duration, simulation.sample_period)
         trajectory = _dataset(prepared, course, times)
     steps, evaluations = course.steps, course.evaluations
+    tolerance = scenario.settings_of(Compiled).tolerance
     return make_result(
         scenario,
         structure,
@@ -66,7 +68,7 @@ def make_outcome(prepared: PreparedGait, course: Course) -> SimulationResult:
         totals=course.totals,
         mass=float(prepared.model.body.mass[0]),
         wall_time=course.wall_time,
-        integrator=IntegratorWork("ros2", scenario.compiled.tolerance, steps, evaluations),
+        integrator=IntegratorWork("ros2", tolerance, steps, evaluations),
         trajectory=trajectory,
     )
 

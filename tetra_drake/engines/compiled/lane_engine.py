@@ -56,6 +56,7 @@ from tetra_drake.robot.network import (
 )
 from tetra_drake.robot.signals import sample_count
 from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
@@ -133,7 +134,7 @@ class PreparedGait:
     def recent_signals(self) -> int:
         """How many samples of the signals an engine has to hold: those within a step, and as many
         for lanes that run ahead; a power of two."""
-        within = self.scenario.compiled.max_step / self.scenario.cpg.listing_step
+        within = self.scenario.settings_of(Compiled).max_step / self.scenario.cpg.listing_step
         return 1 << math.ceil(math.log2(2.0 * within + 32.0))
 
     @property
@@ -217,10 +218,11 @@ class LaneEngine:
         scenario, model, structure = prepared.scenario, prepared.model, prepared.structure
         gait, start = prepared.gait, structure.initial_state
         modes = starting_modes(structure, model.ground)
-        cpg, simulation, compiled = scenario.cpg, scenario.simulation, scenario.compiled
+        cpg, simulation = scenario.cpg, scenario.simulation
         network = make_network(scenario, structure, gait)
         senses, turns = prepared.senses, sample_turns(scenario, structure, gait, prepared.steering)
-        numbers: dict[str, Any] = dict(compiled)
+        engine = scenario.settings_of(Compiled)
+        numbers: dict[str, Any] = dict(engine)
         numbers |= {"max_speed": MAX_SPEED, "max_evaluations": simulation.max_evaluations}
         numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
         numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
@@ -253,7 +255,7 @@ class LaneEngine:
         log.states[lane, 0], log.modes[lane, 0], log.signals[lane, 0] = start, modes, 0.0
         log.kept[lane], log.passed[lane] = 1, 0
         clock[:, lane] = 0.0
-        first_step = min(compiled.look_ahead, compiled.max_step)
+        first_step = min(engine.look_ahead, engine.max_step)
         clock[STATUS, lane], clock[STEP, lane] = WALKING, first_step
         clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
         self._in_lane[lane], self._wall_times[lane] = prepared, 0.0

@@ -1,0 +1,56 @@
+"""Kinds of engines: how finely they simulate."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from tetra_drake.scenario.sections import Kinds, Section, quantity
+
+SHORTEST_STEP = 1e-9
+"""Lower limit (s) of the steps of !Compiled."""
+
+
+class Drake(Section):
+    """The Drake diagram with an error-controlled integrator.
+
+    Contact and stiction (modes) change at the end of steps, or are localised by a witness function.
+    """
+
+    scheme: Literal["radau3", "runge_kutta3"] = "radau3"
+    accuracy: float = Field(default=0.005, gt=0)
+    """Target accuracy per step."""
+    max_step: float = quantity("s", default=0.008, gt=0)
+    mode_changes: Literal["step_end", "witness"] = "step_end"
+    """`witness` needs short steps, as of runge_kutta3."""
+    look_ahead: float = quantity("s", default=2e-5, ge=0)
+    """With step_end and radau3: shortest step that ends at a predicted mode change; 0 for none."""
+
+
+class Compiled(Section):
+    """The compiled engine: a Rosenbrock method in machine code, many gaits side by side."""
+
+    tolerance: float = quantity("m/s", default=1e-4, gt=0)
+    """Error of a body's velocity, or of its strut tips' by rotation, allowed per step."""
+    max_step: float = quantity("s", default=0.003, gt=SHORTEST_STEP, le=1)
+    look_ahead: float = quantity("s", default=2e-5, gt=SHORTEST_STEP, le=1)
+    """Time from a predicted mode change to the end of the step that aims at it."""
+
+
+class Mujoco(Section):
+    """MuJoCo with its own contact, on planes."""
+
+    step: float = quantity("s", default=0.125e-3, ge=1e-7, le=1)
+
+
+MUJOCO_FRICTION = 0.5
+"""Coefficient of MuJoCo's friction, as of metal on a floor, in place of the thesis's law."""
+
+ENGINES: dict[str, type[Drake] | type[Compiled] | type[Mujoco]] = {
+    "drake": Drake,
+    "compiled": Compiled,
+    "mujoco": Mujoco,
+}
+"""The kinds of engines by their names on the command line and in records."""
+
+Engine = Annotated[Drake | Compiled | Mujoco, Kinds()]
+"""The tagged kinds of engines; without a tag it is the first."""
