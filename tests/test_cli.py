@@ -69,7 +69,7 @@ def unchanged(work):
     [
         ("simulate --scenario key.yaml", "key.yaml", "robot.tetrahedron tetrahedra"),
         ("simulate --scenario missing.yaml", "missing.yaml", ""),
-        ("simulate --engine compiled --meshcat", "scenario thesis", "simulation.engine compiled"),
+        ("simulate --engine compiled --meshcat", "scenario thesis", "engine compiled"),
         ("simulate --gait 23.json", "23.json", "weights 23 24"),
         # 2 n (n - 1) = 40 weights for the 5 oscillators of 6 tetrahedra.
         ("simulate --scenario six.yaml --gait good.json", "good.json", "weights 24 40"),

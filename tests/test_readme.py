@@ -22,7 +22,8 @@ QUICK = """\
 base: thesis
 name: quick
 simulation: {duration: 0.4 s, steady_from: 0.1 s}
-evolution: {population: 4, tournament: 2, trials: 1, evaluations: 6}
+evolution: {trials: 1, evaluations: 6}
+optimizer: {population: 4, tournament: 2}
 """
 """Takes the place of the shipped scenario of this name."""
 

@@ -88,7 +88,7 @@ def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction, e
     g, s, c = short.robot.gravity, np.sin(slope), np.cos(slope)
     gravity = diagram.GetSubsystemByName("plant").mutable_gravity_field()
     gravity.set_gravity_vector([-g * s, 0.0, -g * c])
-    simulator: Simulator = MakeSimulator(diagram, short.engine)
+    simulator: Simulator = MakeSimulator(diagram, CONVERGED["drake"])
     simulator.AdvanceTo(0.3)
     state = diagram.GetOutputPort("state").Eval(simulator.get_context())
     level = node_positions(MakeStructure(short), state)

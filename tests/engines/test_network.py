@@ -153,7 +153,7 @@ def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
     states = []
     for steering in (None, lambda time: -0.5):
         diagram = MakeTensegrityDiagram(short, gait, steering=steering)
-        simulator = MakeSimulator(diagram, short.engine)
+        simulator = MakeSimulator(diagram, Drake())
         if steering is None:
             diagram.GetInputPort("turn").FixValue(simulator.get_mutable_context(), [-0.5])
         simulator.AdvanceTo(0.2)

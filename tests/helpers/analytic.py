@@ -96,7 +96,7 @@ def small_scenario(
     return load_scenario("thesis").with_changes(
         {
             "robot.tetrahedra": oscillators + 1,
-            "evolution.population": population,
+            "optimizer.population": population,
             "evolution.evaluations": population + CHILDREN * iterations,
             "evolution.trials": trials,
         }

@@ -119,7 +119,7 @@ def test_parameters_with_equal_bounds_stay_and_tau_b_may_go_its_own_way(kind):
     vectors = np.concatenate(run(make(kind, **fixed))[0])
     assert (vectors[:, -2:] == [0.3, 0.6]).all()
     if kind in LEARNING:
-        vectors = np.concatenate(run(make(kind, **{"evolution.tau_mutation": "independent"}))[0])
+        vectors = np.concatenate(run(make(kind, **{"gait_bounds.independent_tau_b": True}))[0])
         assert (vectors[:, TAU_B] != 2.0 * vectors[:, TAU_A]).mean() > 0.5
         assert (vectors[:, TAU_B] >= 0.4).all()
 

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 from helpers.analytic import small_scenario
 
+from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.optimizers.steady_state import (
-    SteadyState,
     cross_over,
     draw_mutation,
     find_place,
     has_levelled_off,
     mean_fitness,
     mutate,
+    mutation_steps,
     select_parent,
     select_victim,
 )
@@ -82,7 +83,7 @@ def test_each_parameter_is_swapped_with_the_probability(generator, probability):
 
 
 def test_seven_tenths_of_the_parameters_move_by_up_to_their_step(scenario, generator):
-    steps = ParameterSpace.of(scenario).steps
+    steps = mutation_steps(ParameterSpace.of(scenario), scenario.optimizer)
     rows = np.array(
         [draw_mutation(steps, probability=0.7, generator=generator) for _ in range(DRAWS)]
     )
@@ -162,6 +163,19 @@ def test_one_iteration_as_the_listing_goes_through_it(scenario):
     assert script.numbers == []
 
 
+def test_steps_are_the_thesis_s(scenario):
+    def steps(changes):
+        changed = scenario.with_changes(changes)
+        return mutation_steps(ParameterSpace.of(changed), changed.optimizer)
+
+    assert steps({})[0] == 0.2
+    np.testing.assert_allclose(steps({})[[TAU_A, TAU_B]], [0.05, 0.1])
+    listing = {"optimizer.tau_mutation": "listing"}
+    np.testing.assert_allclose(steps(listing)[[TAU_A, TAU_B]], [0.0, 0.1])
+    fixed = {"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}
+    np.testing.assert_array_equal(steps(fixed)[[TAU_A, TAU_B]], 0.0)
+
+
 # The optimiser
 
 
@@ -171,7 +185,9 @@ def evaluate(vector):
 
 def make(scenario, seed=3):
     generator = np.random.default_rng(seed)
-    return SteadyState(ParameterSpace.of(scenario), scenario.evolution, generator)
+    return optimizer_of(scenario.optimizer)(
+        ParameterSpace.of(scenario), scenario.evolution, generator
+    )
 
 
 def run(optimizer):
@@ -233,12 +249,12 @@ def test_tau_b_is_twice_tau_a_unless_it_is_independent():
         np.testing.assert_array_equal(vectors[:, TAU_B], 2.0 * vectors[:, TAU_A])
         assert (vectors[:, :-2] > 0.0).all()
         assert (vectors[:, TAU_A] >= 0.2).all()
-    _, children = vectors_of({"evolution.tau_mutation": "independent"})
+    _, children = vectors_of({"gait_bounds.independent_tau_b": True})
     assert (children[:, TAU_B] != 2.0 * children[:, TAU_A]).mean() > 0.5
 
 
 def test_with_the_listings_slip_tau_a_is_only_ever_passed_on():
-    initial, children = vectors_of({"evolution.tau_mutation": "listing"})
+    initial, children = vectors_of({"optimizer.tau_mutation": "listing"})
     assert set(children[:, TAU_A]) <= set(initial[:, TAU_A])
     np.testing.assert_array_equal(children[:, TAU_B], 2.0 * children[:, TAU_A])
 
@@ -250,7 +266,7 @@ def test_a_fixed_tau_stays():
 
 
 def test_a_trial_ends_when_the_mean_fitness_levels_off_and_not_for_want_of_one():
-    changes = {"evolution.stop_after": 20, "evolution.stop_window": 10}
+    changes = {"optimizer.stop_after": 20, "optimizer.stop_window": 10}
     level, failing = (make(small_scenario(iterations=100).with_changes(changes)) for _ in range(2))
     for iteration in range(22):
         told = level.tell([Evaluation(1.0)] * len(level.ask()))

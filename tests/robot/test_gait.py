@@ -127,7 +127,7 @@ SPACES = {
     "undulation": {},
     "all-cables": {},
     "turning": {},
-    "feedback": {"evolution.tau_mutation": "independent"},
+    "feedback": {"gait_bounds.independent_tau_b": True},
 }
 """Shipped scenarios, with changes."""
 
@@ -176,7 +176,7 @@ def test_missing_and_unknown_names_are_refused(tmp_path, scenario, refused, chan
 def test_a_vector_is_a_gait_in_every_scenario_and_back(shipped):
     space = ParameterSpace.of(shipped)
     assert len(space.names) == len(set(space.names))
-    for limits in (space.low, space.high, space.steps, space.floors):
+    for limits in (space.low, space.high, space.floors):
         assert limits.shape == (len(space.names),)
     for seed in range(3):
         vector = space.random(np.random.default_rng(seed))
@@ -207,13 +207,13 @@ def test_mirrored_weights_are_one_parameter_for_left_and_right():
     assert sorted(weights) == sorted([*vector[:32], *vector[:32]])
 
 
-def test_gains_have_bounds_steps_and_floors():
+def test_gains_have_bounds_and_no_floor():
     space = ParameterSpace.of(load_scenario("feedback"))
-    columns = zip(space.low, space.high, space.steps, space.floors, strict=True)
+    columns = zip(space.low, space.high, space.floors, strict=True)
     rows = dict(zip(space.names, columns, strict=True))
     assert space.names[24:] == ("gain length", "gain load", "gain pitch", "tau_A", "tau_B")
     # A gain may become negative by mutation.
-    assert rows["gain load"] == (-1.0, 1.0, 0.2, -math.inf)
+    assert rows["gain load"] == (-1.0, 1.0, -math.inf)
     gait = space.gait(np.arange(29.0), name="any")
     assert gait.gains == Gains(length=24.0, load=25.0, pitch=26.0)
     assert (gait.tau_a, gait.tau_b) == (27.0, 28.0)
@@ -244,17 +244,10 @@ def test_names_follow_the_listing(scenario):
     assert names[-2:] == ("tau_A", "tau_B")
 
 
-def test_steps_and_floors_are_the_thesis_s(scenario):
+def test_floors_are_the_thesis_s(scenario):
     space = ParameterSpace.of(scenario)
-    assert (space.steps[0], space.floors[0]) == (0.2, 0.0)
-    np.testing.assert_allclose(space.steps[[TAU_A, TAU_B]], [0.05, 0.1])
+    assert space.floors[0] == 0.0
     np.testing.assert_allclose(space.floors[[TAU_A, TAU_B]], [0.2, 0.4])
-    scenario = scenario.with_changes({"evolution.tau_mutation": "listing"})
-    np.testing.assert_allclose(ParameterSpace.of(scenario).steps[[TAU_A, TAU_B]], [0.0, 0.1])
-    scenario = scenario.with_changes(
-        {"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}
-    )
-    np.testing.assert_array_equal(ParameterSpace.of(scenario).steps[[TAU_A, TAU_B]], 0.0)
 
 
 def test_repair_couples_tau_b_unless_it_is_independent(scenario):
@@ -264,7 +257,7 @@ def test_repair_couples_tau_b_unless_it_is_independent(scenario):
     assert repaired[TAU_B] == 2.0 * vector[TAU_A]
     np.testing.assert_array_equal(repaired[:TAU_B], vector[:TAU_B])
     assert vector[TAU_B] == 2.0
-    scenario = scenario.with_changes({"evolution.tau_mutation": "independent"})
+    scenario = scenario.with_changes({"gait_bounds.independent_tau_b": True})
     np.testing.assert_array_equal(ParameterSpace.of(scenario).repair(vector), vector)
 
 

@@ -115,8 +115,8 @@ BAD = [
         *("disturbances.spreads.cables.damping", "0.7"),
     ),
     (
-        "disturbances: {draws: 2, spreads: {evolution.mutation_probability: 0.5}}",
-        *("disturbances.spreads.evolution.mutation_probability", "at most 1"),
+        "disturbances: {draws: 2, spreads: {optimizer.mutation_probability: 0.5}}",
+        *("disturbances.spreads.optimizer.mutation_probability", "at most 1"),
     ),
     (
         "friction: !Coulomb\ndisturbances: {draws: 2, spreads: {friction.kinetic: 0.1}}",

@@ -108,7 +108,7 @@ TOO_LARGE = [
     ({"cpg.listing_step": "1e-6 s", "simulation.duration": "100 s"}, "cpg.listing_step", "1e-06 s"),
     ({"simulation.sample_period": "1e-9 s"}, "simulation.sample_period", "1e-09 s"),
     ({"engine.step": "1e-7 s", "engine": "!Mujoco"}, "engine.step", "1e-07 s"),
-    ({"evolution.population": 10**9}, "evolution.population", "1000000000"),
+    ({"optimizer.population": 10**9}, "optimizer.population", "1000000000"),
     ({"disturbances": {"draws": 10**9}}, "disturbances.draws", "1000000000"),
     ({"optimizer": {TAG: "CmaEs", "population": 10**9}}, "optimizer.population", "1000000000"),
     (
@@ -213,7 +213,7 @@ def test_a_dumped_scenario_keeps_every_bit_and_needs_no_base(tmp_path, scenario)
 
 
 def test_differences_are_keys_and_readable_values(scenario):
-    changes = {"cables.slack": True, "cpg.signals": "live", "evolution.stop_rise": 0.1 + 0.2}
+    changes = {"cables.slack": True, "cpg.signals": "live", "optimizer.stop_rise": 0.1 + 0.2}
     changes |= {"name": "other", "friction.stiction_damping": "0.3 lbf*s/in"}
     changed = scenario.with_changes(changes | {"robot.offsets": [["1 mm", 0, 0]] * 5})
     assert differences(changed, scenario) == [
@@ -221,7 +221,7 @@ def test_differences_are_keys_and_readable_values(scenario):
         ("friction.stiction_damping", "52.5381 N*s/m"),
         ("cables.slack", "true"),
         ("cpg.signals", "live"),
-        ("evolution.stop_rise", "0.3"),
+        ("optimizer.stop_rise", "0.3"),
     ]
 
 

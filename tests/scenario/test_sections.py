@@ -102,11 +102,12 @@ def test_values_cannot_be_changed_in_place():
         load("").count = 3
 
 
-def test_the_first_kind_is_dumped_without_a_tag():
+def test_kinds_are_dumped_with_their_tags_and_all_their_values():
     settings = load("ramps: [!Flat , !Incline {slope: 1 rad}], terrain: !Incline {slope: 1 rad}")
     assert [line for line in shown(settings).splitlines() if "!" in line] == [
         "terrain: !Incline",
         "- !Flat {}",
+        "- !Incline",
     ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+from typing import Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.optimizers.base import MakeOptimizer
@@ -15,11 +16,16 @@ from tetra_drake.scenario import optimizer_kinds as kinds
 
 
 def optimizer_of(kind: kinds.OptimizerKind) -> MakeOptimizer:
-    """What makes the optimiser that a scenario asks for. Raises InputError if pyribs is missing."""
-    if isinstance(kind, kinds.CmaEs):
-        return functools.partial(CmaEs, own=kind)
-    if isinstance(kind, kinds.QualityDiversity):
-        if importlib.util.find_spec("ribs") is None:
-            raise InputError("optimizer", "", f"needs pyribs: {INSTALL}")
-        return functools.partial(QualityDiversity, own=kind)
-    return RandomSearch if isinstance(kind, kinds.RandomSearch) else SteadyState
+    """The maker of the optimiser that a scenario asks for.
+
+    Raises InputError if pyribs is missing.
+    """
+    if isinstance(kind, kinds.QualityDiversity) and importlib.util.find_spec("ribs") is None:
+        raise InputError("optimizer", "", f"needs pyribs: {INSTALL}")
+    optimizers: dict[type, Any] = {
+        kinds.SteadyState: SteadyState,
+        kinds.CmaEs: CmaEs,
+        kinds.RandomSearch: RandomSearch,
+        kinds.QualityDiversity: QualityDiversity,
+    }
+    return functools.partial(optimizers[type(kind)], settings=kind)

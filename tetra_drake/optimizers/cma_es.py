@@ -49,27 +49,27 @@ class CmaEs(Generational):
     def __init__(
         self,
         space: ParameterSpace,
-        settings: EvolutionSection,
+        evolution: EvolutionSection,
         generator: np.random.Generator,
-        own: kinds.CmaEs | None = None,
+        settings: kinds.CmaEs | None = None,
     ) -> None:
-        super().__init__(space, settings, generator)
-        self._own = own = own or kinds.CmaEs()
-        self._starts = min(own.starts, max(1, settings.evaluations // (2 * TRYOUT)))
+        super().__init__(space, evolution, generator)
+        self._settings = settings = settings or kinds.CmaEs()
+        self._starts = min(settings.starts, max(1, evolution.evaluations // (2 * TRYOUT)))
         self._searches: list[_Search] = []
         """Empty during the sample."""
-        if not own.sample:
+        if not settings.sample:
             middle = np.full(self._ranges.size, MIDDLE)
             self._begin(np.vstack([middle, *self._random(self._starts - 1)]))
 
     def _begin(self, starts: Matrix) -> None:
         chosen = starts[: self._starts]
         self._searches = [
-            _Search(self._own.population, self._ranges, self._generator, x) for x in chosen
+            _Search(self._settings.population, self._ranges, self._generator, x) for x in chosen
         ]
 
     def _draw(self) -> Matrix:
-        return self._current.draw() if self._searches else self._random(self._own.sample)
+        return self._current.draw() if self._searches else self._random(self._settings.sample)
 
     def _learn(self, fitnesses: Vector) -> None:
         if self._searches:

@@ -63,20 +63,20 @@ class Generational:
     """
 
     def __init__(
-        self, space: ParameterSpace, settings: EvolutionSection, generator: np.random.Generator
+        self, space: ParameterSpace, evolution: EvolutionSection, generator: np.random.Generator
     ) -> None:
         self._space = space
-        self._settings = settings
+        self._evaluations = evolution.evaluations
         self._generator = generator
         self._ranges = Ranges(space)
-        self._left = settings.evaluations
+        self._left = evolution.evaluations
         self._points: Matrix = np.empty((0, self._ranges.size))
         """Those drawn last."""
 
     @property
     def evaluations_at_most(self) -> int:
         """Number of evaluations of a trial."""
-        return self._settings.evaluations
+        return self._evaluations
 
     def ask(self) -> list[Vector]:
         """The next batch."""

@@ -42,23 +42,23 @@ class QualityDiversity(Generational):
     def __init__(
         self,
         space: ParameterSpace,
-        settings: EvolutionSection,
+        evolution: EvolutionSection,
         generator: np.random.Generator,
-        own: kinds.QualityDiversity | None = None,
+        settings: kinds.QualityDiversity | None = None,
     ) -> None:
         from ribs.archives import GridArchive
         from ribs.emitters import EvolutionStrategyEmitter
 
-        super().__init__(space, settings, generator)
-        self._own = own = own or kinds.QualityDiversity()
+        super().__init__(space, evolution, generator)
+        self._settings = settings = settings or kinds.QualityDiversity()
         self._roots: Matrix = np.empty((0, self._ranges.size))
         """Those drawn last; see Ranges.from_roots()."""
         self._told: dict[str, Any] = {}
         self._added: dict[str, Any] = {}
         self._archive = GridArchive(
             solution_dim=self._ranges.size,
-            dims=own.cells,
-            ranges=[(low, high) for low, high in own.measures.values()],
+            dims=settings.cells,
+            ranges=[(low, high) for low, high in settings.measures.values()],
             threshold_min=FLOOR,
             learning_rate=LEARNING_RATE,
             seed=self._seed(),
@@ -86,7 +86,7 @@ class QualityDiversity(Generational):
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes a batch."""
-        names = self._own.measures
+        names = self._settings.measures
         wanted = np.array(
             [[each.fitness, *map(each.metrics.get, names)] for each in evaluations], dtype=float
         )

@@ -13,10 +13,15 @@ import numpy.typing as npt
 
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.base import Evaluation, Iteration
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.robot.gait import TAU_A, TAU_B, TAU_B_PER_TAU_A, ParameterSpace, Vector
+from tetra_drake.scenario import optimizer_kinds as kinds
 from tetra_drake.scenario.settings import EvolutionSection
 
 CHILDREN = 2
+
+GAIN_MUTATION = 0.2
+"""Largest change of a feedback gain in one mutation."""
+
 Fitnesses = npt.NDArray[np.float64]
 
 
@@ -28,10 +33,16 @@ class SteadyState:
     """
 
     def __init__(
-        self, space: ParameterSpace, settings: EvolutionSection, generator: np.random.Generator
+        self,
+        space: ParameterSpace,
+        evolution: EvolutionSection,
+        generator: np.random.Generator,
+        settings: kinds.SteadyState | None = None,
     ) -> None:
         self._space = space
-        self._settings = settings
+        self._evaluations = evolution.evaluations
+        self._settings = settings or kinds.SteadyState()
+        self._steps = mutation_steps(space, self._settings)
         self._generator = generator
         self._asked: list[Vector] = []
         self._population: list[Vector] = []
@@ -41,7 +52,7 @@ class SteadyState:
     @property
     def evaluations_at_most(self) -> int:
         """Number of evaluations of a trial that is not stopped early."""
-        return self._settings.evaluations
+        return self._evaluations
 
     def ask(self) -> list[Vector]:
         """The initial population, then two children at a time."""
@@ -74,7 +85,7 @@ class SteadyState:
         parents, probability = [self._population[i] for i in chosen], settings.crossover_probability
         crossed = cross_over(*parents, probability=probability, generator=generator)
         mutation = draw_mutation(
-            space.steps, probability=settings.mutation_probability, generator=generator
+            self._steps, probability=settings.mutation_probability, generator=generator
         )
         return [space.repair(mutate(c, mutation=mutation, floors=space.floors)) for c in crossed]
 
@@ -90,7 +101,7 @@ class SteadyState:
         settings = self._settings
         iteration = len(self._means) - 1
         evaluations = settings.population + CHILDREN * iteration
-        if evaluations + CHILDREN > settings.evaluations:
+        if evaluations + CHILDREN > self._evaluations:
             return "all evaluations done"
         rise, window, after = settings.stop_rise, settings.stop_window, settings.stop_after
         levelled_off = has_levelled_off(self._means, rise=rise, window=window, after=after)
@@ -115,6 +126,20 @@ def cross_over(
     """Two children: the parents with each parameter swapped at this probability."""
     swapped = generator.random(len(first)) >= 1.0 - probability
     return np.where(swapped, second, first), np.where(swapped, first, second)
+
+
+def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector:
+    """Largest change of each parameter in one mutation (Table 6); 0 where it does not mutate.
+
+    With `tau_mutation: listing` tau_A does not: the listing's index 26 is that of tau_B.
+    """
+    is_gain = np.array([name.startswith("gain ") for name in space.names])
+    steps = np.where(is_gain, GAIN_MUTATION, settings.weight_mutation)
+    is_fixed = space.low[TAU_A] == space.high[TAU_A]
+    step = 0.0 if is_fixed else settings.tau_mutation_range
+    steps[TAU_A] = 0.0 if settings.tau_mutation == "listing" else step
+    steps[TAU_B] = TAU_B_PER_TAU_A * step
+    return steps
 
 
 def draw_mutation(steps: Vector, *, probability: float, generator: np.random.Generator) -> Vector:

@@ -20,9 +20,8 @@ from tetra_drake.scenario.sections import Section
 
 SCHEMA = 2
 
-LARGEST_GAIN, GAIN_MUTATION = 1.0, 0.2
-"""Of a feedback gain: the greatest absolute value of random gaits, and the largest change in one
-mutation."""
+LARGEST_GAIN = 1.0
+"""Greatest absolute value of a feedback gain of random gaits."""
 
 Vector = npt.NDArray[np.float64]
 """The parameters of one gait in the order of ParameterSpace.names."""
@@ -110,8 +109,6 @@ class ParameterSpace:
     low: Vector
     high: Vector
     """Bounds of random gaits (Table 5)."""
-    steps: Vector
-    """Largest change of each parameter in one mutation (Table 6); 0 where it does not mutate."""
     floors: Vector
     """A parameter reduced by mutation must stay above this (listing A.3.3, A.3.4)."""
     couples_tau_b: bool
@@ -129,8 +126,7 @@ class ParameterSpace:
     def of(cls, scenario: Scenario) -> Self:
         """The space of a scenario.
 
-        With equal bounds a parameter is fixed. With `tau_mutation: listing` tau_A does not mutate:
-        the listing's index 26 is that of tau_B. An independent tau_B has twice tau_A's numbers.
+        With equal bounds a parameter is fixed. An independent tau_B has twice tau_A's numbers.
         """
         actuation = Actuation.of(scenario)
         images = np.arange(len(actuation.images))
@@ -139,14 +135,13 @@ class ParameterSpace:
         chosen, places = np.unique(images, return_inverse=True)
         weight_names = actuation.weight_names
         weights = [weight_names[i] for i in chosen]
-        names, low, high, steps, floors = zip(*_parameters(scenario, weights), strict=True)
+        names, low, high, floors = zip(*_parameters(scenario, weights), strict=True)
         return cls(
             names=names,
             low=np.array(low),
             high=np.array(high),
-            steps=np.array(steps),
             floors=np.array(floors),
-            couples_tau_b=scenario.evolution.tau_mutation != "independent",
+            couples_tau_b=not scenario.gait_bounds.independent_tau_b,
             weights=places,
             weight_names=weight_names,
             pathways=tuple(scenario.cpg.feedback),
@@ -187,14 +182,12 @@ class ParameterSpace:
 
 
 def _parameters(scenario: Scenario, weights: list[str]) -> list[tuple[str, *tuple[float, ...]]]:
-    """Name, lower and upper bound, step and floor of each parameter."""
-    bounds, settings = scenario.gait_bounds, scenario.evolution
-    weight = bounds.weight_min, bounds.weight_max, settings.weight_mutation, 0.0
-    gain = -LARGEST_GAIN, LARGEST_GAIN, GAIN_MUTATION, -math.inf
-    low, high, floor = bounds.tau_a_min, bounds.tau_a_max, bounds.tau_a_min
-    step = 0.0 if low == high else settings.tau_mutation_range
-    tau_a = low, high, 0.0 if settings.tau_mutation == "listing" else step, floor
-    tau_b = (TAU_B_PER_TAU_A * number for number in (low, high, step, floor))
+    """Name, lower and upper bound and floor of each parameter."""
+    bounds = scenario.gait_bounds
+    weight = bounds.weight_min, bounds.weight_max, 0.0
+    gain = -LARGEST_GAIN, LARGEST_GAIN, -math.inf
+    tau_a = bounds.tau_a_min, bounds.tau_a_max, bounds.tau_a_min
+    tau_b = (TAU_B_PER_TAU_A * number for number in tau_a)
     return [
         *((f"weight {name}", *weight) for name in weights),
         *((f"gain {name}", *gain) for name in scenario.cpg.feedback),

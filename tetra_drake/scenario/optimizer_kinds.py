@@ -1,15 +1,36 @@
 """Kinds of optimisers and their settings."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.sections import Kinds, Section, named_quantities, refuse
+from tetra_drake.scenario.sections import Kinds, Section, named_quantities, quantity, refuse
+
+MOST_GAITS = 100_000
+"""Upper limit of a population."""
 
 
 class SteadyState(Section):
-    """The thesis's evolutionary algorithm. Its settings are those of the section `evolution`."""
+    """The thesis's evolutionary algorithm (Table 6, section 2.3, appendix A).
+
+    A trial ends early when the mean fitness rose by less than `stop_rise` over `stop_window`
+    iterations, not before iteration `stop_after`.
+    """
+
+    population: int = Field(default=50, ge=2, le=MOST_GAITS)
+    tournament: int = Field(default=5, ge=1, le=MOST_GAITS)
+    crossover_probability: float = Field(default=0.2, ge=0, le=1)
+    mutation_probability: float = Field(default=0.7, ge=0, le=1)
+    weight_mutation: float = Field(default=0.2, ge=0)
+    """Largest change of a weight in one mutation."""
+    tau_mutation: Literal["intended", "listing"] = "intended"
+    """`listing`: as in the thesis's listing A.3.4, mutation never changes tau_A."""
+    tau_mutation_range: float = quantity("s", default=0.05, ge=0)
+    """Largest change of tau_A in one mutation."""
+    stop_rise: float = Field(default=0.03, ge=0)
+    stop_window: int = Field(default=100, ge=1)
+    stop_after: int = Field(default=200, ge=0)
 
 
 class CmaEs(Section):
@@ -19,9 +40,9 @@ class CmaEs(Section):
     begins anew around the best gait, larger.
     """
 
-    population: int | None = Field(default=None, ge=4, le=100_000)
+    population: int | None = Field(default=None, ge=4, le=MOST_GAITS)
     """Vectors in an iteration; 4 + 3 ln n, rounded down, of n parameters if not given."""
-    sample: int = Field(default=40, ge=0, le=100_000)
+    sample: int = Field(default=40, ge=0, le=MOST_GAITS)
     """Random gaits evaluated first."""
     starts: int = Field(default=5, ge=1, le=1000)
     """Searches, of which the one with the best gait goes on: the first from the mean of the best
@@ -31,7 +52,10 @@ class CmaEs(Section):
 
 
 class RandomSearch(Section):
-    """Random gaits, as many in an iteration as `evolution.population`: a baseline."""
+    """Random gaits: a baseline."""
+
+    population: int = Field(default=50, ge=1, le=MOST_GAITS)
+    """Gaits per iteration."""
 
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]

@@ -224,9 +224,9 @@ def check_relations(scenario: Scenario, source: object) -> None:
     if step > duration:
         problem = f"found {step} s, expected at most the duration, {duration} s"
         raise InputError(source, "cpg.listing_step", problem)
-    evaluations, population = scenario.evolution.evaluations, scenario.evolution.population
-    if isinstance(scenario.optimizer, SteadyState) and evaluations < population:
-        problem = f"found {evaluations}, expected at least the population, {population}"
+    evaluations, optimizer = scenario.evolution.evaluations, scenario.optimizer
+    if isinstance(optimizer, SteadyState) and evaluations < optimizer.population:
+        problem = f"found {evaluations}, expected at least the population, {optimizer.population}"
         raise InputError(source, "evolution.evaluations", problem)
     if "load" in scenario.cpg.feedback and scenario.robot.gravity == 0.0:
         problem = "found 0 m/s^2, expected a weight, for feedback of the load"

@@ -117,6 +117,8 @@ class GaitBounds(Section):
     """The turn of all gaits that are drawn or evolved."""
     mirrored: bool = False
     """Whether weights are drawn and evolved in pairs, left and right alike."""
+    independent_tau_b: bool = False
+    """Whether tau_B evolves by itself instead of staying at 2 tau_A."""
 
     @model_validator(mode="after")
     def _check(self) -> GaitBounds:
@@ -149,30 +151,12 @@ class SimulationSection(Section):
 
 
 class EvolutionSection(Section):
-    """The evolutionary algorithm (Table 6, section 2.3, appendix A).
+    """How much is evolved, by any optimiser."""
 
-    It stops when the mean fitness rose by less than `stop_rise` over `stop_window` iterations, not
-    before iteration `stop_after`.
-    """
-
-    population: int = Field(ge=2, le=100_000)
-    tournament: int = Field(ge=1, le=100_000)
     trials: int = Field(ge=1, le=1000)
     evaluations: int = Field(ge=1)
-    """Of a trial that does not end early, by any optimiser. !SteadyState makes one for each member
-    of the population, then two in each iteration."""
-    crossover_probability: float = Field(ge=0, le=1)
-    mutation_probability: float = Field(ge=0, le=1)
-    weight_mutation: float = Field(ge=0)
-    """Largest change of a weight in one mutation."""
-    tau_mutation_range: float = quantity("s", ge=0)
-    """Largest change of tau_A in one mutation."""
-    tau_mutation: Literal["intended", "listing", "independent"]
-    """`intended`: tau_A mutates, and tau_B stays 2 tau_A. `listing`: as in the thesis's listing,
-    neither does. `independent`: both do, and every optimiser varies tau_B by itself."""
-    stop_rise: float = Field(ge=0)
-    stop_window: int = Field(ge=1)
-    stop_after: int = Field(ge=0)
+    """Gaits of a trial that does not end early. !SteadyState evaluates its population, then two in
+    each iteration."""
     time_budget: float = quantity("s", gt=0)
     """Wall time of a simulation; a longer one counts as failed."""
 
