@@ -123,7 +123,7 @@ def test_another_seed_scenario_or_method_is_refused(run_small, refused):
     run = run_small(seed=5)
     for key, problem, changed in (
         ("seed", "5, not 6", {"seed": 6}),
-        ("optimizer.population", "12", {"scenario": small_scenario(population=13)}),
+        ("evolution.trials", "2", {"scenario": small_scenario(trials=3)}),
         ("objective", "Bowl", {"method": Method.of(small_scenario(), objective=Bowl())}),
     ):
         with refused(run, key, problem):

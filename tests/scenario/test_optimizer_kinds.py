@@ -49,7 +49,7 @@ def test_the_thesiss_algorithm_is_the_default_and_is_not_written(scenario):
         ("!CmaEs {starts: 0}", "optimizer.starts"),
         ("!CmaEs {populaton: 9}", "optimizer.populaton"),
         ("!CmaEs {population: 3}", "optimizer.population"),
-        ("!SteadyState {population: 9}", "optimizer.population"),
+        ("!SteadyState {sample: 9}", "optimizer.sample"),
         ("!CMAES {}", "optimizer"),
         ("!QualityDiversity {measures: {lifted: [0, 1]}}", "optimizer.measures"),
         ("!QualityDiversity {measures: {lited: [0, 1]}}", "optimizer.measures.lited"),

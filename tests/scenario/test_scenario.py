@@ -40,10 +40,11 @@ THESIS: list[tuple[str, str, tuple[float, ...]]] = [
     # Tables 5 and 6, section 2.3, appendix A
     ("gait_bounds", "weight_min weight_max tau_a_min tau_a_max", (1, 3.4, 0.2, 0.5)),
     ("simulation", "duration steady_from", (15, 3)),
-    ("evolution", "population tournament trials evaluations", (50, 5, 10, 50 + 2 * 2000)),
-    ("evolution", "crossover_probability mutation_probability", (0.2, 0.7)),
-    ("evolution", "weight_mutation tau_mutation_range", (0.2, 0.05)),
-    ("evolution", "stop_rise stop_window stop_after", (0.03, 100, 200)),
+    ("evolution", "trials evaluations", (10, 50 + 2 * 2000)),
+    ("optimizer", "population tournament", (50, 5)),
+    ("optimizer", "crossover_probability mutation_probability", (0.2, 0.7)),
+    ("optimizer", "weight_mutation tau_mutation_range", (0.2, 0.05)),
+    ("optimizer", "stop_rise stop_window stop_after", (0.03, 100, 200)),
 ]
 
 
