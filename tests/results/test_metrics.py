@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from tetra_drake.results.metrics import (
 )
 from tetra_drake.results.path import CentrePath
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
+from tetra_drake.scenario import schema
+from tetra_drake.scenario.metric_units import DEFINITIONS, LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
 
 INCH = 0.0254
@@ -79,8 +81,8 @@ def walked(structure: Structure, way: float, **given: Any) -> Metrics:
     start = node_positions(structure, structure.initial_state)
     end = start + np.array([way, 0.0, 0.0])
     path = CentrePath(np.linspace(0.0, 15.0, 61), np.zeros((61, 3)), np.zeros(61))
-    known = {"path": path, "steady_from": 3.0} | STEADY | given
-    return compute_metrics(structure, start=start, steady=start, end=end, **known)
+    kwargs = {"path": path, "steady_from": 3.0} | STEADY | given
+    return compute_metrics(structure, start=start, steady=start, end=end, **kwargs)
 
 
 def test_totals_become_metrics(structure: Structure) -> None:
@@ -109,14 +111,19 @@ def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(structure: Stru
     assert weightless.to_json()["actuator_work"] == 0.3
 
 
-def test_every_metric_has_a_unit_and_only_lengths_are_given_in_inches(
-    structure: Structure,
-) -> None:
-    assert (METRICS["heading_change"], METRICS["path_curvature"]) == ("rad", "1/m")
+def test_only_lengths_are_given_in_inches(structure: Structure) -> None:
     lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift", "clearance"}
-    assert {name for name, unit in METRICS.items() if unit == "m"} == lengths
     inches = metrics_of(structure, CIRCLE, 0.0).in_inches()
     assert inches.keys() == {f"{name}_in" for name in lengths}
+
+
+def test_the_readme_lists_each_metric_with_its_unit_and_definition() -> None:
+    readme = Path(schema.__file__).with_name("README.md").read_text(encoding="utf-8")
+    table = readme.split("| metric | unit | what it is |\n| --- | --- | --- |\n")[1]
+    rows = [row.split("|")[1:4] for row in table.split("\n\n")[0].splitlines()]
+    assert [[cell.strip() for cell in row] for row in rows] == [
+        [f"`{name}`", METRICS[name], DEFINITIONS[name]] for name in METRICS
+    ]
 
 
 def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario) -> None:

@@ -11,10 +11,8 @@ import numpy as np
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.metric_units import LEAST
 from tetra_drake.scenario.schema import Scenario
-
-LEAST = ("clearance", "tension")
-"""Metrics of which the least of all draws is recorded, in place of their mean."""
 
 Seed = tuple[int, int, int]
 """Of a run, number of a trial and of an iteration, whose vectors all have the same draws."""
