@@ -20,11 +20,12 @@ from tetra_drake.errors import (
     StepBudgetExceeded,
     TimeBudgetExceeded,
 )
-from tetra_drake.evolution.draws import Seed, SeededVector, combine, draws_of
+from tetra_drake.evolution.draws import SeededVector, combine
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
+from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -88,9 +89,11 @@ class GaitEvaluation:
         return ParameterSpace.of(self.scenario)
 
     @functools.cached_property
-    def _draws(self) -> Callable[[Seed], list[Scenario]]:
+    def _draws(self) -> Callable[[IterationSeed], list[Scenario]]:
         """The scenario's draws of a seed: the same objects for all vectors of an iteration."""
-        return functools.lru_cache(_SEEDS_KEPT)(functools.partial(draws_of, self.scenario))
+        return functools.lru_cache(_SEEDS_KEPT)(
+            functools.partial(draws_of_iteration, self.scenario)
+        )
 
     def _evaluate_in(
         self, lanes: LanePool, tasks: Sequence[Vector | SeededVector]
