@@ -90,7 +90,7 @@ def evolve(
         trials = open_trials(record, optimizer=make)
         unfinished = any(trial.unevaluated for trial in trials)
         if resume and (unfinished or objective is not None):
-            check_fitness(out, record.manifest, evaluate=evaluate, executor=where)
+            check_fitness(trials, out, evaluate=evaluate, executor=where)
         with contextlib.ExitStack() as stack:
             at_a_time = workers
             if in_lanes:

@@ -12,7 +12,6 @@ from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario.disturbances import IterationSeed
 from tetra_drake.scenario.metric_units import LEAST
-from tetra_drake.scenario.schema import Scenario
 
 
 class SeededVector(NamedTuple):
@@ -20,11 +19,6 @@ class SeededVector(NamedTuple):
 
     vector: Vector
     seed: IterationSeed
-
-
-def task_of(scenario: Scenario, vector: Vector, seed: IterationSeed) -> Vector | SeededVector:
-    """What a vector's evaluation is given: the seed, too, if there are disturbances to draw."""
-    return vector if scenario.disturbances is None else SeededVector(vector, seed)
 
 
 def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
