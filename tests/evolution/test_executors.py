@@ -120,17 +120,9 @@ def test_mpi_is_an_executor(tmp_path):
         pytest.skip("mpiexec is not installed")
     (tmp_path / "mpi.py").write_text(PROGRAM + MPI)
     as_root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    program = [sys.executable, "-m", "mpi4py.futures", tmp_path / "mpi.py"]
     ended = subprocess.run(
-        [
-            mpiexec,
-            "--oversubscribe",
-            "-n",
-            "3",
-            sys.executable,
-            "-m",
-            "mpi4py.futures",
-            tmp_path / "mpi.py",
-        ],
+        [mpiexec, "--oversubscribe", "-n", "3", *program],
         text=True,
         capture_output=True,
         env=os.environ | as_root | {"PYTHONPATH": os.pathsep.join(sys.path)},

@@ -140,25 +140,15 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
 @pytest.mark.parametrize(
     ("objective", "text"),
     [
-        ({"steady_distance": 1.0, "twist": -1000.0}, "2.00 inches in 15 s"),
         ({"speed": 1.0, "heading_change": 9.0}, "2.00 inches in 15 s"),
         ({"heading_change": 1.0}, "heading change 180 deg after 15 s"),
         ({"cost_of_transport": -1.0, "twist": -1.0}, "cost of transport 4 after 15 s"),
-        ({"cost_of_transport": -1.0, "twist": -1000.0}, "twist 0.5 in after 15 s"),
     ],
 )
 def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text):
     metrics = dict.fromkeys(METRICS, 0.0) | {"distance": 2.0 * INCH, "twist": 0.5 * INCH}
     metrics |= {"heading_change": math.pi, "cost_of_transport": 4.0, "speed": 0.1}
     assert headline(scenario.with_sections(objective=objective), metrics) == text
-
-
-def test_the_constants_of_equation_10_are_those_of_the_thesis_to_the_last_digit(
-    scenario: Scenario,
-) -> None:
-    for name, phi in (("steady_distance", 1.0), ("twist", -10.0), ("lateral_drift", -1.0)):
-        metrics = Metrics(**dict.fromkeys(METRICS, 0.0) | {name: 0.1234567})
-        assert compute_fitness(metrics, scenario.objective) == phi * (0.1234567 / INCH)
 
 
 @pytest.mark.parametrize(
