@@ -68,36 +68,36 @@ def evolve(
     check_guard()
     out, progress = Path(out), progress or Progress()
     workers = getattr(executor, "workers", None) or workers or available_cores()
-    if isinstance(scenario, (str, Path)):
-        scenario = load_scenario(scenario)
-    own = read_manifest(out).scenario if resume else scenario
-    if own is None:
+    given = load_scenario(scenario) if isinstance(scenario, (str, Path)) else scenario
+    scenario = read_manifest(out).scenario if resume else given
+    if scenario is None:
         raise InputError("scenario", "", "is needed to begin a run")
-    check_scenario(own)  # before there is a directory
-    make = optimizer or optimizer_of(own.optimizer)
-    method = Method.of(own, objective=objective, optimizer=optimizer)
-    evaluate = GaitEvaluation(own, objective)
-    in_lanes = executor is None and own.engine_name == "compiled"
+    check_scenario(scenario)  # before there is a directory
+    make = optimizer or optimizer_of(scenario.optimizer)
+    method = Method.of(scenario, objective=objective, optimizer=optimizer)
+    evaluate = GaitEvaluation(scenario, objective)
+    in_lanes = executor is None and scenario.engine_name == "compiled"
     where = thread_executor if in_lanes else executor or process_executor
     if resume:
-        record = RunRecord.resume(out, scenario=scenario, seed=seed, method=method)
+        record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
         check_sendable(evaluate, where)
-        record = RunRecord.create(out, scenario=own, seed=seed or 0, method=method)
+        record = RunRecord.create(out, scenario=scenario, seed=seed or 0, method=method)
     with record, progress:
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
         trials = open_trials(record, optimizer=make)
         unfinished = any(trial.unevaluated for trial in trials)
         if resume and (unfinished or objective is not None):
-            check_fitness(out, record.manifest, evaluate=evaluate, executor=where)
+            check_fitness(trials, out, evaluate=evaluate, executor=where)
         with contextlib.ExitStack() as stack:
             at_a_time = workers
             if in_lanes:
                 lanes = stack.enter_context(LanePool(workers))
-                evaluate, at_a_time = GaitEvaluation(own, objective, lanes), lanes.capacity
+                evaluate = GaitEvaluation(scenario, objective, lanes)
+                at_a_time = lanes.capacity
             elif unfinished:
-                prepare(own, many=True)
+                prepare(scenario, many=True)
             run_trials(
                 trials,
                 evaluate=evaluate,
@@ -105,11 +105,11 @@ def evolve(
                 executor=where,
                 show=progress.show,
             )
-        if reevaluate and own.engine_name != "drake":
+        if reevaluate and scenario.engine_name != "drake":
             try:
                 evaluate_again(
                     out,
-                    GaitEvaluation(on_diagram(own), objective),
+                    GaitEvaluation(on_diagram(scenario), objective),
                     workers=workers,
                     executor=executor or process_executor,
                     progress=progress,
@@ -133,12 +133,12 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
     scenario, method = manifest.scenario, manifest.method
     among = scenario.disturbances
     draws = f", each gait among {among.draws} draws of disturbances" if among else ""
-    own = "" if method.objective == FITNESS else f", objective {method.objective}"
+    objective = "" if method.objective == FITNESS else f", objective {method.objective}"
     text = (
         f"{directory}: scenario {scenario.name}, seed {manifest.seed}, optimiser "
         f"{method.optimizer}, trials {scenario.evolution.trials}, each of at most "
         f"{scenario.evolution.evaluations} evaluations, engine {scenario.engine_name}, "
-        f"workers {workers}{draws}{own}"
+        f"workers {workers}{draws}{objective}"
     )
     if report:
         text += (
@@ -166,8 +166,8 @@ def _report(directory: Path, progress: Progress) -> None:
     try:
         write_report(directory)
     except Exception as error:
-        known = isinstance(error, (InputError, SimulationFailure))
+        cause = str(error) if isinstance(error, (InputError, SimulationFailure)) else repr(error)
         progress.warn(
-            "the run is complete, but its report could not be written: "
-            f"{error if known else repr(error)}; try again with: tetra-drake figures {directory}"
+            f"the run is complete, but its report could not be written: {cause}; try again with: "
+            f"tetra-drake figures {directory}"
         )

@@ -6,7 +6,7 @@ import numpy as np
 import pandas
 import pytest
 from helpers.quantities import with_unit
-from helpers.synthetic_run import tiny_scenario, write_run
+from helpers.synthetic_run import tiny_scenario
 
 from tetra_drake.analysis.robustness import (
     ALONE,
@@ -17,7 +17,6 @@ from tetra_drake.analysis.robustness import (
     by_change,
     by_gait,
     default_disturbances,
-    fresh_seed,
     judge,
     rank_correlations,
 )
@@ -26,7 +25,7 @@ from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.report.analysis_text import robustness_text
 from tetra_drake.robot.gait import save_gait, seeded_gait
-from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.disturbances import disturbed, fresh_draws, fresh_seed
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.settings import Disturbances
 from tetra_drake.scenario.terrain_kinds import Steps
@@ -39,8 +38,9 @@ DRAWS = 3
 def scenario():
     """A short walk on rough ground, in which the oscillators start at once."""
     tiny = tiny_scenario(name="rough")
-    own = {"terrain": load_scenario("rough").terrain, "friction": load_scenario("rough").friction}
-    return tiny.with_changes({"cpg.start_up": 0.0, "robot.contacts": "all", **own})
+    rough = load_scenario("rough")
+    ground = {"terrain": rough.terrain, "friction": rough.friction}
+    return tiny.with_changes({"cpg.start_up": 0.0, "robot.contacts": "all", **ground})
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +54,8 @@ def judgement(scenario, gaits):
 
 
 def test_the_default_disturbances_are_of_what_the_scenario_has(scenario):
-    thesis, ours = (
-        default_disturbances(load_scenario("thesis"), 2.0),
-        default_disturbances(scenario),
-    )
+    thesis = default_disturbances(load_scenario("thesis"), 2.0)
+    ours = default_disturbances(scenario)
     laws = {"friction.static, friction.kinetic", "friction.damping"}
     assert set(SPREAD) - set(thesis.spreads) == laws
     assert {key for key in ours.spreads if key.startswith("friction")} == laws
@@ -69,8 +67,9 @@ def test_every_gait_walks_under_the_same_draws_as_evolution_would_simulate_them(
     draws = judgement.draws.set_index(["gait", "draw"])
     assert draws.index.tolist() == [(gait, i) for i in range(DRAWS) for gait in gaits]
     changed = judgement.scenario
+    fresh = fresh_draws(changed, 5, DRAWS)
     for (gait, i), row in draws.iterrows():
-        draw = draw_disturbances(changed, fresh_seed(5, i))
+        draw = fresh[i]
         assert row[list(draw.factors)].to_dict() == draw.factors
         result = simulate(scenario=disturbed(changed, draw), gait=gaits[gait])
         assert (row["distance"], row["fitness"]) == (result.metrics.distance, result.fitness)
@@ -82,19 +81,16 @@ def test_every_gait_walks_under_the_same_draws_as_evolution_would_simulate_them(
 
 def test_every_change_is_also_made_alone(judgement, gaits):
     alone = judgement.alone[judgement.alone["gait"] == "b"]
-    keys, few = list(judgement.scenario.disturbances.spreads), min(ALONE, DRAWS)
-    expected = {key: [-0.05, 0.05] for key in keys}
-    found = alone.dropna(subset="spread").groupby("what", sort=False)["spread"].apply(list)
-    assert found.to_dict() == expected
-    assert {what: sum(alone["what"] == what) for what in (START, TERRAIN)} == {
-        START: few,
-        TERRAIN: few,
-    }
+    spreads = alone.dropna(subset="spread").groupby("what", sort=False)["spread"].apply(list)
+    keys = judgement.scenario.disturbances.spreads
+    assert spreads.to_dict() == {key: [-0.05, 0.05] for key in keys}
+    for what in (START, TERRAIN):
+        assert sum(alone["what"] == what) == DRAWS <= ALONE
     (softer,) = alone.query("what == 'ground.stiffness' and spread < 0")["distance"]
     stiffness = with_unit(0.95 * judgement.scenario.ground.stiffness, "N/m")
     changed = judgement.scenario.with_changes({"ground.stiffness": stiffness, "disturbances": None})
     assert softer == simulate(scenario=changed, gait=gaits["b"]).metrics.distance
-    draw = draw_disturbances(judgement.scenario, fresh_seed(5, 1))
+    draw = fresh_draws(judgement.scenario, 5, DRAWS)[1]
     terrain = changed.terrain.model_copy(update={"seed": draw.terrain_seed})
     changed = judgement.scenario.with_changes({"terrain": terrain, "disturbances": None})
     (other,) = alone[(alone["what"] == TERRAIN) & (alone["draw"] == 1)]["distance"]
@@ -105,21 +101,18 @@ def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits,
     again = judge(scenario, {"b": gaits["b"]}, draws=DRAWS, seed=5, workers=1)
     for name in ("undisturbed", "draws", "alone"):
         table = getattr(judgement, name)
-        own = table[table["gait"] == "b"].reset_index(drop=True)
-        pandas.testing.assert_frame_equal(getattr(again, name), own, check_exact=True)
-    assert again.draws["distance"].tolist() != judge(
-        scenario, {"b": gaits["b"]}, draws=DRAWS, seed=6
-    ).draws["distance"].tolist()  # fmt: skip
+        of_b = table[table["gait"] == "b"].reset_index(drop=True)
+        pandas.testing.assert_frame_equal(getattr(again, name), of_b, check_exact=True)
 
 
 def test_the_scenarios_own_disturbances_are_used_unless_a_percentage_is_given(scenario, gaits):
-    own = Disturbances(draws=4, spreads={"cables.damping": 0.2})
-    disturbing = scenario.with_changes({"disturbances": own, "require": {"distance": "1 m"}})
-    found = judge(disturbing, gaits, draws=2)
-    assert set(found.alone["what"]) == {"cables.damping", TERRAIN}
-    assert found.draws["cables.damping"].between(0.8, 1.2).all()
-    assert by_gait(found)["missed"].tolist() == [2, 2]  # no gait walks a metre
-    given = judge(disturbing, {"a": gaits["a"]}, percent=3.0, draws=1)
+    damping = Disturbances(draws=4, spreads={"cables.damping": 0.2})
+    disturbing = scenario.with_changes({"disturbances": damping, "require": {"distance": "1 m"}})
+    judged = judge(disturbing, gaits, draws=2)
+    assert set(judged.alone["what"]) == {"cables.damping", TERRAIN}
+    assert judged.draws["cables.damping"].between(0.8, 1.2).all()
+    assert by_gait(judged)["missed"].tolist() == [2, 2]  # no gait walks a metre
+    given = judge(disturbing, {"a": gaits["a"]}, percent=3.0, draws=1, alone=False)
     assert given.scenario.disturbances == default_disturbances(scenario, 3.0)
 
 
@@ -239,18 +232,6 @@ def test_the_command_writes_tables_summary_and_figure(scenario, gaits, judgement
     assert {row["what"] for row in summary["changes"]} == set(judgement.alone["what"])
 
 
-def test_the_command_takes_the_best_gait_of_each_trial_of_a_run(tmp_path, capsys):
-    trials = [[[(1.0, 0), (2.0, 1)]], [[(3.0, 0)]]]
-    run = write_run(tmp_path / "run", trials)
-    assert main(["robustness", str(run), "--draws=2"]) == 0
-    printed = capsys.readouterr().out
-    rows = [line.split("  ")[0] for line in printed.splitlines()]
-    assert {"trial 0", "trial 1", START, *default_disturbances(tiny_scenario()).spreads} <= set(
-        rows
-    )
-    assert max(map(len, printed.splitlines())) <= 100
-
-
 def test_nothing_is_written_for_a_gait_of_another_robot(scenario, tmp_path, refused, capsys):
     with refused("gait random gait 1", "weights", "expected 4"):
         judge(scenario, {"a": seeded_gait(load_scenario("thesis"), 1)}, draws=1)
@@ -265,16 +246,14 @@ def test_a_draw_in_which_the_robot_cannot_start_is_a_failure(scenario, gaits):
     # ascent, and are moved by up to 0.4 spacings, 1.18 in.
     edge = 2.0 * scenario.robot.spacing + INCH
     steps = Steps(height=1.0 * INCH, depth=1.0, count=1, start=edge)
-    own = {"terrain": steps, "disturbances": Disturbances(draws=1, start=0.4)}
-    found = judge(scenario.with_changes(own), gaits, draws=8)
+    changes = {"terrain": steps, "disturbances": Disturbances(draws=1, start=0.4)}
+    found = judge(scenario.with_changes(changes), gaits, draws=8)
     assert by_change(found).loc[START, "failed"] > 0
     failed = found.draws[found.draws["failure"].notna()]
     assert 2 <= len(failed) < 16 and failed["failure"].str.contains("below the ground").all()
     assert failed["gait"].tolist() == ["a", "b"] * (len(failed) // 2)
     walked = found.draws.drop(failed.index)
-    scenarios = (
-        disturbed(found.scenario, draw_disturbances(found.scenario, fresh_seed(0, i)))
-        for i in walked["draw"]
-    )
-    for changed, gait, distance in zip(scenarios, walked["gait"], walked["distance"], strict=True):
-        assert simulate(scenario=changed, gait=gaits[gait]).metrics.distance == distance
+    draws = fresh_draws(found.scenario, 0, 8)
+    i, gait, distance = walked[["draw", "gait", "distance"]].iloc[-1]
+    changed = disturbed(found.scenario, draws[i])
+    assert simulate(scenario=changed, gait=gaits[gait]).metrics.distance == distance

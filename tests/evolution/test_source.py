@@ -1,6 +1,5 @@
 """Gaits for commands: from a file or a run, with the scenario that they are simulated on."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -10,8 +9,8 @@ from helpers.synthetic_run import tiny_scenario, write_run
 from tetra_drake.cli import main
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.source import load_source
-from tetra_drake.robot.gait import load_gait, save_gait, seeded_gait
-from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.robot.gait import save_gait
+from tetra_drake.scenario.load import dump_scenario
 
 
 @pytest.fixture
@@ -46,23 +45,6 @@ def test_another_scenario_than_the_gaits_is_said_once_with_both_names(run, tmp_p
         assert load_source(source, scenario=str(other), warn=told.append).scenario.name == "other"
     assert len(told) == 3
     assert all("tiny" in text and "other" in text for text in told)
-
-
-def test_a_gait_file_keeps_the_scenario_that_it_was_made_for(tmp_path):
-    thesis, coulomb = load_scenario("thesis"), load_scenario("coulomb")
-    save_gait(seeded_gait(coulomb), tmp_path / "gait.json", coulomb)
-    gait = load_gait(tmp_path / "gait.json", thesis)
-    assert gait.scenario == "coulomb"
-    save_gait(gait, tmp_path / "again.json", thesis)
-    assert json.loads((tmp_path / "again.json").read_text())["scenario"] == "coulomb"
-
-
-def test_nothing_is_said_of_a_file_without_a_scenario(tmp_path):
-    content = {"schema": 1, "weights": [1.5] * 24, "tau_a_s": 0.3}
-    (tmp_path / "gait.json").write_text(json.dumps(content))
-    told = []
-    source = load_source(tmp_path / "gait.json", scenario="coulomb", warn=told.append)
-    assert (source.scenario.name, source.best.scenario, told) == ("coulomb", "", [])
 
 
 def test_commands_take_a_run_for_its_best_gait_and_warn_in_one_line(run, tmp_path, capsys):

@@ -1,6 +1,6 @@
-"""A small run to be killed, on a cheap fitness: killed_run.py DIRECTORY EXECUTOR DELAY OPTIMIZER.
+"""A small run to be killed, on a cheap fitness: killed_run.py DIRECTORY EXECUTOR DELAY.
 
-The executor is processes or threads, the optimiser the name of a kind.
+The executor is processes or threads.
 """
 
 import signal
@@ -20,8 +20,7 @@ if __name__ == "__main__":
     if (directory / MANIFEST).exists():
         opened = RunRecord.resume(directory)
     else:
-        scenario = drawn_scenario(iterations=150).with_changes({"optimizer": f"!{sys.argv[4]}"})
-        opened = RunRecord.create(directory, scenario=scenario, seed=9)
+        opened = RunRecord.create(directory, scenario=drawn_scenario(iterations=150), seed=9)
     with opened as record:
         print("begun", flush=True)
         run_trials(

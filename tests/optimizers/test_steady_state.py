@@ -210,32 +210,11 @@ def test_first_the_population_then_two_children_per_iteration(spare):
     assert iterations[-1].stop == "all evaluations done"
 
 
-@pytest.mark.parametrize("oscillators", [2, 4, 8])
-def test_the_mean_fitness_never_falls_and_rises_much(oscillators):
-    scenario = small_scenario(oscillators=oscillators, population=20, iterations=200)
-    _, iterations = run(make(scenario))
+def test_the_mean_fitness_never_falls_and_rises_much():
+    _, iterations = run(make(small_scenario(population=20, iterations=200)))
     means = np.array([iteration.report["mean_fitness"] for iteration in iterations])
     assert (np.diff(means) >= -1e-12).all()
     assert means[-1] > 0.6 * means[0]
-
-
-def test_the_generator_alone_decides_a_trial():
-    ours, theirs, others = (
-        np.concatenate(run(make(small_scenario(), seed))[0]) for seed in (3, 3, 4)
-    )
-    np.testing.assert_array_equal(ours, theirs)
-    assert not np.array_equal(ours, others)
-
-
-def test_what_is_asked_for_can_be_changed_without_harm():
-    first, second = make(small_scenario()), make(small_scenario())
-    asked = first.ask()
-    second.tell([evaluate(vector) for vector in second.ask()])
-    told = [evaluate(vector) for vector in asked]
-    for vector in asked:
-        vector[:] = 0.0
-    first.tell(told)
-    np.testing.assert_array_equal(first.ask(), second.ask())
 
 
 def vectors_of(changes):
@@ -257,12 +236,6 @@ def test_with_the_listings_slip_tau_a_is_only_ever_passed_on():
     initial, children = vectors_of({"optimizer.tau_mutation": "listing"})
     assert set(children[:, TAU_A]) <= set(initial[:, TAU_A])
     np.testing.assert_array_equal(children[:, TAU_B], 2.0 * children[:, TAU_A])
-
-
-def test_a_fixed_tau_stays():
-    for vectors in vectors_of({"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}):
-        np.testing.assert_array_equal(vectors[:, TAU_A], 0.3)
-        np.testing.assert_array_equal(vectors[:, TAU_B], 0.6)
 
 
 def test_a_trial_ends_when_the_mean_fitness_levels_off_and_not_for_want_of_one():

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from tetra_drake.results.metrics import (
 )
 from tetra_drake.results.path import CentrePath
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
+from tetra_drake.scenario import schema
+from tetra_drake.scenario.metric_units import DEFINITIONS, LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
 
 INCH = 0.0254
@@ -79,8 +81,8 @@ def walked(structure: Structure, way: float, **given: Any) -> Metrics:
     start = node_positions(structure, structure.initial_state)
     end = start + np.array([way, 0.0, 0.0])
     path = CentrePath(np.linspace(0.0, 15.0, 61), np.zeros((61, 3)), np.zeros(61))
-    known = {"path": path, "steady_from": 3.0} | STEADY | given
-    return compute_metrics(structure, start=start, steady=start, end=end, **known)
+    kwargs = {"path": path, "steady_from": 3.0} | STEADY | given
+    return compute_metrics(structure, start=start, steady=start, end=end, **kwargs)
 
 
 def test_totals_become_metrics(structure: Structure) -> None:
@@ -109,14 +111,19 @@ def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(structure: Stru
     assert weightless.to_json()["actuator_work"] == 0.3
 
 
-def test_every_metric_has_a_unit_and_only_lengths_are_given_in_inches(
-    structure: Structure,
-) -> None:
-    assert (METRICS["heading_change"], METRICS["path_curvature"]) == ("rad", "1/m")
+def test_only_lengths_are_given_in_inches(structure: Structure) -> None:
     lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift", "clearance"}
-    assert {name for name, unit in METRICS.items() if unit == "m"} == lengths
     inches = metrics_of(structure, CIRCLE, 0.0).in_inches()
     assert inches.keys() == {f"{name}_in" for name in lengths}
+
+
+def test_the_readme_lists_each_metric_with_its_unit_and_definition() -> None:
+    readme = Path(schema.__file__).with_name("README.md").read_text(encoding="utf-8")
+    table = readme.split("| metric | unit | what it is |\n| --- | --- | --- |\n")[1]
+    rows = [row.split("|")[1:4] for row in table.split("\n\n")[0].splitlines()]
+    assert [[cell.strip() for cell in row] for row in rows] == [
+        [f"`{name}`", METRICS[name], DEFINITIONS[name]] for name in METRICS
+    ]
 
 
 def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario) -> None:
@@ -133,25 +140,15 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
 @pytest.mark.parametrize(
     ("objective", "text"),
     [
-        ({"steady_distance": 1.0, "twist": -1000.0}, "2.00 inches in 15 s"),
         ({"speed": 1.0, "heading_change": 9.0}, "2.00 inches in 15 s"),
         ({"heading_change": 1.0}, "heading change 180 deg after 15 s"),
         ({"cost_of_transport": -1.0, "twist": -1.0}, "cost of transport 4 after 15 s"),
-        ({"cost_of_transport": -1.0, "twist": -1000.0}, "twist 0.5 in after 15 s"),
     ],
 )
 def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text):
     metrics = dict.fromkeys(METRICS, 0.0) | {"distance": 2.0 * INCH, "twist": 0.5 * INCH}
     metrics |= {"heading_change": math.pi, "cost_of_transport": 4.0, "speed": 0.1}
     assert headline(scenario.with_sections(objective=objective), metrics) == text
-
-
-def test_the_constants_of_equation_10_are_those_of_the_thesis_to_the_last_digit(
-    scenario: Scenario,
-) -> None:
-    for name, phi in (("steady_distance", 1.0), ("twist", -10.0), ("lateral_drift", -1.0)):
-        metrics = Metrics(**dict.fromkeys(METRICS, 0.0) | {name: 0.1234567})
-        assert compute_fitness(metrics, scenario.objective) == phi * (0.1234567 / INCH)
 
 
 @pytest.mark.parametrize(

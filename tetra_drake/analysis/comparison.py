@@ -129,7 +129,7 @@ class _Trial:
 def _trials(run: Run, cost: int) -> dict[int, _Trial]:
     """The trials that have begun, by their numbers; `cost`: of an evaluation."""
     run.fittest()  # raises InputError if there is none
-    found = {}
+    trials = {}
     for number, rows in run.evaluations.groupby("trial"):
         fitness = rows["fitness"].fillna(-math.inf).to_numpy()
         best = np.maximum.accumulate(fitness)
@@ -137,8 +137,8 @@ def _trials(run: Run, cost: int) -> dict[int, _Trial]:
         distance = np.where(np.isfinite(best), rows["distance"].to_numpy()[fittest], math.nan)
         costs = cost * np.arange(1, len(best) + 1)
         ended = run.statuses[int(number)].stop is not None
-        found[int(number)] = _Trial(costs, best, distance, ended)
-    return found
+        trials[int(number)] = _Trial(costs, best, distance, ended)
+    return trials
 
 
 def _rises(best: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
@@ -174,17 +174,17 @@ def _quartiles(values: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float64]]
 
 def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     """A run's columns of Compared.runs, from its trials."""
-    found: dict[str, Any] = {"trials": len(trials), "going_on": int((~trials["ended"]).sum())}
-    found["cost"] = trials["cost"].median()
+    row: dict[str, Any] = {"trials": len(trials), "going_on": int((~trials["ended"]).sum())}
+    row["cost"] = trials["cost"].median()
     for name in ("at_common", "fitness", "distance"):
         values = trials[name].replace(-math.inf, math.nan).dropna()
         low, high = interval(values, interquartile_mean)
         mean = float(interquartile_mean(values)) if len(values) else math.nan
-        found |= {name: values.median(), f"{name}_mean": mean}
-        found |= {f"{name}_low": low, f"{name}_high": high}
+        row |= {name: values.median(), f"{name}_mean": mean}
+        row |= {f"{name}_low": low, f"{name}_high": high}
     quartiles = _quartiles(trials["reached"].to_numpy())
-    found |= dict(zip(("reached_low", "reached", "reached_high"), quartiles, strict=True))
-    return found | {"share": float(np.isfinite(trials["reached"]).mean())}
+    row |= dict(zip(("reached_low", "reached", "reached_high"), quartiles, strict=True))
+    return row | {"share": float(np.isfinite(trials["reached"]).mean())}
 
 
 def _labelled(runs: Sequence[Run]) -> dict[str, Run]:

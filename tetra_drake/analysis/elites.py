@@ -78,8 +78,8 @@ def judge_elites(
         return
     repair_torn_line(directory / ELITES)
     run = load_run(directory)
-    scenario, found = run.manifest.scenario, elites(run)
-    missing = found[found["kept"].isna()]
+    scenario, gaits_of_map = run.manifest.scenario, elites(run)
+    missing = gaits_of_map[gaits_of_map["kept"].isna()]
     if missing.empty:
         return
     say(f"simulating {len(missing)} gaits of the map in {kind.draws} draws of disturbances")
@@ -95,17 +95,17 @@ def judge_elites(
     append_lines(directory / ELITES, lines)
 
 
-def robust(found: pandas.DataFrame) -> pandas.DataFrame:
-    """The elites without the lucky ones, the fittest first."""
-    return found[~(found["kept"] < LUCKY)]
+def robust(gaits: pandas.DataFrame) -> pandas.DataFrame:
+    """Elites without the lucky ones, the fittest first."""
+    return gaits[~(gaits["kept"] < LUCKY)]
 
 
 def chosen(run: Run) -> dict[str, pandas.Series]:
     """By name, the fittest of the robust elites and those nearest to the corners of the map."""
-    found, kind = robust(elites(run)), run.manifest.scenario.optimizer
-    if not isinstance(kind, QualityDiversity) or found.empty:
+    gaits, kind = robust(elites(run)), run.manifest.scenario.optimizer
+    if not isinstance(kind, QualityDiversity) or gaits.empty:
         return {}
-    return {"fittest of the map": found.iloc[0]} | _corners(found, kind)
+    return {"fittest of the map": gaits.iloc[0]} | _corners(gaits, kind)
 
 
 def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, pandas.Series]:
@@ -125,4 +125,4 @@ def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], 
     names: dict[Any, list[str]] = {}
     for name, gait in named.items():
         names.setdefault((gait["trial"], gait["index"]), []).append(name)
-    return [(each, named[each[0]]) for each in names.values()]
+    return [(alike, named[alike[0]]) for alike in names.values()]

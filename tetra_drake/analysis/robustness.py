@@ -16,7 +16,7 @@ from tetra_drake.machine import versions
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
-from tetra_drake.scenario.disturbances import Draw, disturbed, draw_disturbances
+from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import tree_of
@@ -116,31 +116,22 @@ def judge(
     scenario = scenario.with_changes(changes)
     settings = scenario.disturbances
     assert settings is not None
-    fresh = [draw_disturbances(scenario, fresh_seed(seed, i)) for i in range(draws)]
+    fresh = fresh_draws(scenario, seed, draws)
     plan: list[tuple[dict[str, Any], Draw]] = [({"what": NOTHING}, Draw({}))]
-    plan += [({"what": ALL, "draw": i, **each.factors}, each) for i, each in enumerate(fresh)]
+    plan += [({"what": ALL, "draw": i, **draw.factors}, draw) for i, draw in enumerate(fresh)]
     plan += _alone(settings, fresh) if alone else []
     outcomes = _outcomes(scenario, [draw for _, draw in plan], gaits, workers=workers)
     labels = [{"gait": key} | label for label, _ in plan for key in gaits]
     rows = [a | b for a, b in zip(labels, outcomes, strict=True)]
-    chosen = {what: [row for row in rows if row["what"] == what] for what in (NOTHING, ALL)}
-    changed = [row for row in rows if row["what"] not in chosen]
     return Judgement(
         scenario=scenario,
         seed=seed,
-        undisturbed=_table(chosen[NOTHING]),
-        draws=_table(chosen[ALL], "draw", *settings.spreads),
-        alone=_table(changed, "what", "spread", "draw"),
+        undisturbed=_table([row for row in rows if row["what"] == NOTHING]),
+        draws=_table([row for row in rows if row["what"] == ALL], "draw", *settings.spreads),
+        alone=_table(
+            [row for row in rows if row["what"] not in (NOTHING, ALL)], "what", "spread", "draw"
+        ),
     )
-
-
-def fresh_seed(seed: int, draw: int) -> tuple[int, ...]:
-    """The seed of a fresh draw.
-
-    Those of evolution have four numbers, of which the first may count as two: numpy takes a seed
-    above 2³² for two numbers, and appends zeros where there are few. So it gets six, no zero last.
-    """
-    return seed, draw, 0, 0, 0, 1
 
 
 def _alone(settings: Disturbances, fresh: Sequence[Draw]) -> Iterator[tuple[dict[str, Any], Draw]]:
@@ -162,13 +153,14 @@ def _outcomes(
     check_scenario(scenario)
     # One scenario for all gaits: the engine prepares it once.
     changed = [disturbed(scenario, draw) for draw in draws]
-    refused = [_refusal(each) for each in changed]
-    able = [each for each, error in zip(changed, refused, strict=True) if error is None]
-    scenarios, walking = [each for each in able for _ in gaits], [*gaits.values()] * len(able)
-    found = iter(simulate_many(scenario=scenarios, gaits=walking, **options))
-    for error in refused:
+    refusals = [_refusal(scenario) for scenario in changed]
+    able = [scenario for scenario, refusal in zip(changed, refusals, strict=True) if not refusal]
+    scenarios = [scenario for scenario in able for _ in gaits]
+    walking = [*gaits.values()] * len(able)
+    results = iter(simulate_many(scenario=scenarios, gaits=walking, **options))
+    for refusal in refusals:
         for _ in gaits:
-            yield _outcome(error or next(found), scenario.require)
+            yield _outcome(refusal or next(results), scenario.require)
 
 
 def _refusal(scenario: Scenario) -> InputError | None:
@@ -181,12 +173,12 @@ def _refusal(scenario: Scenario) -> InputError | None:
 
 
 def _outcome(
-    found: SimulationResult | SimulationFailure | InputError, require: Mapping[str, float]
+    result: SimulationResult | SimulationFailure | InputError, require: Mapping[str, float]
 ) -> dict[str, Any]:
-    if not isinstance(found, SimulationResult):
-        return {"failure": str(found), "missed": ""}
-    missed = ", ".join(unmet_requirements(found.metrics, require))
-    return {"missed": missed, "fitness": found.fitness} | found.metrics.to_json()
+    if not isinstance(result, SimulationResult):
+        return {"failure": str(result), "missed": ""}
+    missed = ", ".join(unmet_requirements(result.metrics, require))
+    return {"missed": missed, "fitness": result.fitness} | result.metrics.to_json()
 
 
 def _table(rows: list[dict[str, Any]], *labels: str) -> pandas.DataFrame:

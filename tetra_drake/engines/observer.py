@@ -10,7 +10,7 @@ from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.physics.terrain import FRAME_COLUMNS
-from tetra_drake.results.metrics import Totals, empty_tally
+from tetra_drake.results.metrics import empty_tally
 from tetra_drake.robot.model import Model
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
@@ -48,10 +48,10 @@ class Observer:
         if len(self._waiting) == _TOGETHER:
             self._flush()
 
-    def totals(self) -> Totals:
-        """The totals of all that has been added."""
+    def totals(self) -> Tally:
+        """The tally of all that has been added."""
         self._flush()
-        return Totals.of(self._tally)
+        return self._tally
 
     def _flush(self) -> None:
         if self._waiting:

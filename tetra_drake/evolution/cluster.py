@@ -73,9 +73,10 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
 
 def _check_version(client: Client, name: str) -> None:
     """Raises InputError if a worker that is up has another version of a package, or none."""
-    for worker, found in client.run(metadata.version, name, on_error="return").items():
-        if found != (ours := metadata.version(name)):
-            problem = f"{name} on worker {worker}: found {found!r}, expected '{ours}' as here"
+    ours = metadata.version(name)
+    for worker, theirs in client.run(metadata.version, name, on_error="return").items():
+        if theirs != ours:
+            problem = f"{name} on worker {worker}: found {theirs!r}, expected '{ours}' as here"
             raise InputError("executor", "", problem)
 
 

@@ -1,4 +1,4 @@
-"""Evaluating a gait among disturbances: the seeds of its draws, and one evaluation of many."""
+"""Evaluations of a gait among disturbances: its draws, and one evaluation made of theirs."""
 
 from __future__ import annotations
 
@@ -10,32 +10,15 @@ import numpy as np
 
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Vector
-from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
-from tetra_drake.scenario.schema import Scenario
-
-LEAST = ("clearance", "tension")
-"""Metrics of which the least of all draws is recorded, in place of their mean."""
-
-Seed = tuple[int, int, int]
-"""Of a run, number of a trial and of an iteration, whose vectors all have the same draws."""
+from tetra_drake.scenario.disturbances import IterationSeed
+from tetra_drake.scenario.metric_units import LEAST
 
 
 class SeededVector(NamedTuple):
-    """A vector and the seed of the draws among which to evaluate it; draw k adds k to the seed."""
+    """A vector and the seed of the draws in which to evaluate it."""
 
     vector: Vector
-    seed: Seed
-
-
-def task_of(scenario: Scenario, vector: Vector, seed: Seed) -> Vector | SeededVector:
-    """What a vector's evaluation is given: the seed, too, if there are disturbances to draw."""
-    return vector if scenario.disturbances is None else SeededVector(vector, seed)
-
-
-def draws_of(scenario: Scenario, seed: Sequence[int]) -> list[Scenario]:
-    """The scenario's draws of the seed of a SeededVector."""
-    seeds = [(*seed, k) for k in range(scenario.draws)]
-    return [disturbed(scenario, draw_disturbances(scenario, each)) for each in seeds]
+    seed: IterationSeed
 
 
 def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:

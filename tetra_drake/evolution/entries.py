@@ -11,9 +11,10 @@ elites.jsonl              of a map: its gaits on disturbed robots
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import REMEDY, read_lines
@@ -53,11 +54,11 @@ def evaluation_entry(
 def read_entries(path: Path, *, checksums: bool = False) -> list[dict[str, Any]]:
     """The lines of a file of a record; InputError, naming file and line, where one is damaged; with
     `checksums`, also where it lacks that."""
-    checks = _CHECKS.get(path.name, _EVALUATION)
+    kind = _KINDS.get(path.name, _Evaluation)
     counter = _COUNTERS.get(path.name)
     entries = read_lines(path, checksums=checksums)
     for row, entry in enumerate(entries):
-        problem = _problem(entry, checks)
+        problem = _problem(entry, kind)
         if counter and not problem and entry[counter] != row:
             problem = f"{counter} is {entry[counter]}, expected {row}"
         if problem:
@@ -65,102 +66,67 @@ def read_entries(path: Path, *, checksums: bool = False) -> list[dict[str, Any]]
     return entries
 
 
-Checks = dict[str, Callable[[Any], bool]]
-
-
-def _problem(entry: dict[str, Any], checks: Checks) -> str:
+def _problem(entry: dict[str, Any], kind: type[_Line]) -> str:
     """What is wrong with the values of an entry; "" if nothing is."""
-    for key, is_valid in checks.items():
-        if key not in entry or not is_valid(entry[key]):
-            return f"{key} is missing or invalid"
-    for key, is_valid in _OPTIONAL.items():
-        if key in entry and not is_valid(entry[key]):
-            return f"{key} is invalid"
+    try:
+        kind.model_validate(entry)
+    except ValidationError as error:
+        return f"{error.errors()[0]['loc'][0]} is missing or invalid"
     return ""
 
 
-def _is_count(value: Any) -> bool:
-    return type(value) is int and 0 <= value < 2**63
+Count = Annotated[int, Field(ge=0, lt=2**63)]
+Number = Annotated[float, Field(gt=-1e300, lt=1e300)]
+Numbers = Annotated[list[Number], Field(min_length=1)]
 
 
-def _is_number(value: Any) -> bool:
-    return type(value) in (int, float) and abs(value) < 1e300
+class _Line(BaseModel):
+    """Keys that a line must have, and kinds of values of those that it may have."""
+
+    model_config = ConfigDict(strict=True, extra="allow")
 
 
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
+class _Metrics(_Line):
+    __pydantic_extra__: dict[str, Number | None]
+    distance: Number = 0.0
+    lifted_shares: list[Number] = []
 
 
-def _is_count_or_none(value: Any) -> bool:
-    return value is None or _is_count(value)
+class _Draws(_Line):
+    fitness: Numbers
+    distance: Numbers
 
 
-def _is_number_or_none(value: Any) -> bool:
-    return value is None or _is_number(value)
+class _Evaluation(_Line):
+    index: Count
+    iteration: Count
+    genome: list[Number] | None
+    metrics: _Metrics
+    fitness: Number | None
+    failure: str | None
+    wall_time_s: Number
+    engine: str
+    draws: _Draws | None = None
+    placed: Count | None = None
 
 
-def _is_text_or_none(value: Any) -> bool:
-    return value is None or _is_text(value)
+class _Iteration(_Line):
+    iteration: Count
+    evaluations: Count
+    best_fitness: Number | None
+    best_evaluation: Count | None
+    stop: str | None
+    mean_fitness: Number | None = None
 
 
-def _are_numbers(value: Any) -> bool:
-    return isinstance(value, list) and all(_is_number(item) for item in value)
+class _Elite(_Line):
+    trial: Count
+    index: Count
+    kept: Number
+    mean_distance: Number | None
 
 
-def _is_genome(value: Any) -> bool:
-    return value is None or _are_numbers(value)
-
-
-def _are_metrics(value: Any) -> bool:
-    return isinstance(value, dict) and all(_is_metric(*item) for item in value.items())
-
-
-def _is_metric(name: str, value: Any) -> bool:
-    if name == "lifted_shares":
-        return _are_numbers(value)
-    if name == "distance":
-        return _is_number(value)
-    return _is_number_or_none(value)
-
-
-def _are_draws(value: Any) -> bool:
-    if not isinstance(value, dict):
-        return False
-    fitnesses, distances = value.get("fitness"), value.get("distance")
-    return bool(fitnesses and distances) and _are_numbers(fitnesses) and _are_numbers(distances)
-
-
-_EVALUATION: Checks = {
-    "index": _is_count,
-    "iteration": _is_count,
-    "genome": _is_genome,
-    "metrics": _are_metrics,
-    "fitness": _is_number_or_none,
-    "failure": _is_text_or_none,
-    "wall_time_s": _is_number,
-    "engine": _is_text,
-}
-_ITERATION: Checks = {
-    "iteration": _is_count,
-    "evaluations": _is_count,
-    "best_fitness": _is_number_or_none,
-    "best_evaluation": _is_count_or_none,
-    "stop": _is_text_or_none,
-}
-_ELITE: Checks = {
-    "trial": _is_count,
-    "index": _is_count,
-    "kept": _is_number,
-    "mean_distance": _is_number_or_none,
-}
-_OPTIONAL: Checks = {
-    "draws": _are_draws,
-    "placed": _is_count_or_none,
-    "mean_fitness": _is_number_or_none,
-}
-"""What a line may have besides: draws where there are disturbances, the others by optimiser."""
-
-_CHECKS = {ITERATIONS: _ITERATION, ELITES: _ELITE}
+_KINDS: dict[str, type[_Line]] = {ITERATIONS: _Iteration, ELITES: _Elite}
 """By file; the lines of the other files are evaluations."""
 _COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
 """The key that counts the lines of a file."""

@@ -20,11 +20,12 @@ from tetra_drake.errors import (
     StepBudgetExceeded,
     TimeBudgetExceeded,
 )
-from tetra_drake.evolution.draws import Seed, SeededVector, combine, draws_of
+from tetra_drake.evolution.draws import SeededVector, combine
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
+from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -53,7 +54,9 @@ class GaitEvaluation:
         among its draws, which end where one has failed."""
         if self.lanes is not None:
             return self._evaluate_in(self.lanes, [task])[0]
-        started, (gait, scenarios), draws = time.perf_counter(), self._walks(task), []
+        started = time.perf_counter()
+        gait, scenarios = self._walks(task)
+        draws = []
         for scenario in scenarios:
             simulation = functools.partial(self._simulate, scenario, gait)
             draws.append(self._evaluation(scenario, simulation))
@@ -88,9 +91,11 @@ class GaitEvaluation:
         return ParameterSpace.of(self.scenario)
 
     @functools.cached_property
-    def _draws(self) -> Callable[[Seed], list[Scenario]]:
+    def _draws(self) -> Callable[[IterationSeed], list[Scenario]]:
         """The scenario's draws of a seed: the same objects for all vectors of an iteration."""
-        return functools.lru_cache(_SEEDS_KEPT)(functools.partial(draws_of, self.scenario))
+        return functools.lru_cache(_SEEDS_KEPT)(
+            functools.partial(draws_of_iteration, self.scenario)
+        )
 
     def _evaluate_in(
         self, lanes: LanePool, tasks: Sequence[Vector | SeededVector]
@@ -99,12 +104,14 @@ class GaitEvaluation:
         plans = [self._walks(task) for task in tasks]
         walks = [(scenario, gait) for gait, scenarios in plans for scenario in scenarios]
         futures = iter(lanes.submit(walks, time_budget=self.scenario.evolution.time_budget))
-        found = []
+        evaluations = []
         for task, (_, scenarios) in zip(tasks, plans, strict=True):
-            waits = [functools.partial(lanes.result, next(futures)) for _ in scenarios]
-            draws = [self._evaluation(*each) for each in zip(scenarios, waits, strict=True)]
-            found.append(self._combined(task, draws))
-        return found
+            draws = []
+            for scenario in scenarios:
+                simulation = functools.partial(lanes.result, next(futures))
+                draws.append(self._evaluation(scenario, simulation))
+            evaluations.append(self._combined(task, draws))
+        return evaluations
 
     def _walks(self, task: Vector | SeededVector) -> tuple[Gait, list[Scenario]]:
         """The gait of a task and the scenarios to simulate it on."""
@@ -139,12 +146,14 @@ class GaitEvaluation:
                 raise
             return Evaluation.failed(f"no start: {error}")
         fitness = result.fitness if self.objective is None else float(self.objective(result))
-        found = Evaluation(fitness, result.metrics.to_json())
+        metrics, wall_time = result.metrics.to_json(), result.wall_time
         if not math.isfinite(fitness):
-            found = Evaluation.failed("diverged: the fitness is not finite")
-        elif unmet := unmet_requirements(result.metrics, self.scenario.require):
-            found = Evaluation(-math.inf, found.metrics, f"requirement: {'; '.join(unmet)}")
-        return dataclasses.replace(found, wall_time=result.wall_time)
+            reason = "diverged: the fitness is not finite"
+            return Evaluation(-math.inf, failure=reason, wall_time=wall_time)
+        if unmet := unmet_requirements(result.metrics, self.scenario.require):
+            reason = f"requirement: {'; '.join(unmet)}"
+            return Evaluation(-math.inf, metrics, reason, wall_time)
+        return Evaluation(fitness, metrics, wall_time=wall_time)
 
 
 _KINDS: dict[type[Exception], str] = {

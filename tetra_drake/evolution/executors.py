@@ -9,7 +9,6 @@ import os
 import pickle
 import signal
 import sys
-import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -162,14 +161,17 @@ class EvaluationPool(Generic[JobT]):
 
     def wait(self, timeout: float | None = None) -> list[tuple[JobT, Evaluation]]:
         """Whatever has been evaluated, as soon as there is something or time (s) is up."""
-        alone = self._suspects and not self._running
-        found = self._try_suspect() if alone else self._collect(timeout)
-        self._proven = self._proven or bool(found)
+        if self._suspects and not self._running:
+            evaluated = self._try_suspect()
+        else:
+            evaluated = self._collect(timeout)
+        self._proven = self._proven or bool(evaluated)
         if self._proven:
-            found, self._held = self._held + found, []
+            evaluated = self._held + evaluated
+            self._held = []
         elif self._held and (len(self._held) == _HOPELESS or not self.busy):
             raise EvaluationImpossible(_SOURCE, "", "every evaluation ends its worker process")
-        return found
+        return evaluated
 
     def _collect(self, timeout: float | None) -> list[tuple[JobT, Evaluation]]:
         """Keeps the workers busy, unless there are suspects; if an executor breaks, there is a
@@ -185,7 +187,7 @@ class EvaluationPool(Generic[JobT]):
             for _ in chunk:
                 self._queue.popleft()
         done, _ = wait(self._running, timeout=timeout, return_when=FIRST_COMPLETED)
-        found: list[tuple[JobT, Evaluation]] = []
+        evaluated: list[tuple[JobT, Evaluation]] = []
         broken = False
         for future in done:
             chunk = self._running.pop(future)
@@ -196,12 +198,13 @@ class EvaluationPool(Generic[JobT]):
                 broken |= isinstance(error, BrokenExecutor)
                 continue
             for (job, _), evaluation in zip(chunk, future.result(), strict=True):
-                found.append((job, evaluation))
+                evaluated.append((job, evaluation))
         if broken:
-            self._suspects.extend(each for chunk in self._running.values() for each in chunk)
+            for chunk in self._running.values():
+                self._suspects.extend(chunk)
             self._running.clear()
             self._renew()
-        return found
+        return evaluated
 
     def _chunk_size(self) -> int:
         """How many tasks the next idle worker gets: its share of those that wait, but not more than
@@ -309,22 +312,13 @@ def check_sendable(evaluate: object, executor: MakeExecutor) -> None:
 
 
 def _check_worker(evaluate: object) -> None:
-    """Raises EvaluationImpossible if a new worker ends before it can evaluate anything."""
+    """Raises EvaluationImpossible if a new worker, which says why, ends before it can evaluate."""
     worker = _Worker(target=_do_nothing, args=(evaluate,))
-    with tempfile.TemporaryFile("w+") as messages:
-        ours = os.dup(2)
-        os.dup2(messages.fileno(), 2)  # which the worker inherits
-        try:
-            worker.start()
-            worker.join()
-        finally:
-            os.dup2(ours, 2)
-            os.close(ours)
-        messages.seek(0)
-        *_, last = messages.read().strip().splitlines() or [f"exit status {worker.exitcode}"]
+    worker.start()
+    worker.join()
     if worker.exitcode:
-        cause = _UNGUARDED if _UNGUARDED in last else last
-        raise EvaluationImpossible(_SOURCE, "", f"do not start: {cause}")
+        problem = f"do not start, as they say above; it may be that {_UNGUARDED}"
+        raise EvaluationImpossible(_SOURCE, "", problem)
 
 
 def _terminate_workers() -> None:

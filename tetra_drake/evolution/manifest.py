@@ -21,7 +21,9 @@ from pathlib import Path
 from typing import Any
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.draws import SeededVector
 from tetra_drake.files import read_text, write_whole
+from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -81,6 +83,19 @@ class Manifest:
     method: Method
     thinned: bool = False
     """Whether most genomes were left out, as in the runs recorded beside the package."""
+
+    def gait(self, vector: Vector, *, trial: int, index: int) -> Gait:
+        """The gait of a recorded evaluation."""
+        name = f"{self.scenario.name}, seed {self.seed}, trial {trial}, evaluation {index}"
+        gait = ParameterSpace.of(self.scenario).gait(vector, name=name)
+        return dataclasses.replace(gait, scenario=self.scenario.name)
+
+    def task(self, vector: Vector, *, trial: int, iteration: int) -> Vector | SeededVector:
+        """What the evaluation of a vector is given: the seed of its draws, too, among
+        disturbances."""
+        if self.scenario.disturbances is None:
+            return vector
+        return SeededVector(vector, (self.seed, trial, iteration))
 
 
 def read_manifest(directory: Path) -> Manifest:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from tetra_drake.evolution.draws import task_of
 from tetra_drake.evolution.entries import REEVALUATIONS, evaluation_entry, trial_folder
 from tetra_drake.evolution.executors import MakeExecutor, evaluate_all, process_executor
 from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
@@ -54,7 +53,7 @@ def evaluate_again(
         return run
     vectors = [run.vector(trial, index) for trial, index, _ in missing]
     tasks = [
-        task_of(scenario, vector, (run.manifest.seed, trial, iteration))
+        run.manifest.task(vector, trial=trial, iteration=iteration)
         for vector, (trial, _, iteration) in zip(vectors, missing, strict=True)
     ]
     progress = progress or Progress()

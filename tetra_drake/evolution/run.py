@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -123,10 +123,7 @@ class Run:
 
     def gait(self, trial: int, index: int) -> Gait:
         """The gait of an evaluation."""
-        scenario = self.manifest.scenario
-        name = f"{scenario.name}, seed {self.manifest.seed}, trial {trial}, evaluation {index}"
-        gait = ParameterSpace.of(scenario).gait(self.vector(trial, index), name=name)
-        return replace(gait, scenario=scenario.name)
+        return self.manifest.gait(self.vector(trial, index), trial=trial, index=index)
 
     @property
     def _columns(self) -> list[str]:
@@ -165,7 +162,7 @@ def load_run(path: str | Path) -> Run:
     if not iterations.empty:
         distances = evaluations.set_index(["trial", "index"])["distance_in"].to_dict()
         best = zip(iterations["trial"], iterations["best_evaluation"], strict=True)
-        iterations["best_distance_in"] = [distances.get(each, math.nan) for each in best]
+        iterations["best_distance_in"] = [distances.get(key, math.nan) for key in best]
     return Run(directory, manifest, *tables)
 
 

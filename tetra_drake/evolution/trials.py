@@ -11,12 +11,9 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.draws import SeededVector, task_of
+from tetra_drake.evolution.draws import SeededVector
 from tetra_drake.evolution.entries import (
-    EVALUATIONS,
-    IN_PROGRESS,
     evaluation_entry,
-    read_entries,
     trial_folder,
 )
 from tetra_drake.evolution.executors import (
@@ -35,7 +32,6 @@ from tetra_drake.optimizers.base import (
     Optimizer,
 )
 from tetra_drake.robot.gait import ParameterSpace, Vector
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
 _SHOW_PERIOD = 1.0  # s
@@ -103,18 +99,18 @@ class Trial:
     holds already it goes through at once."""
 
     def __init__(
-        self, number: int, *, scenario: Scenario, seed: int, optimizer: Optimizer, folder: Path
+        self, number: int, *, manifest: Manifest, optimizer: Optimizer, folder: Path
     ) -> None:
-        """`seed` is the run's."""
         self.status = TrialStatus(number, optimizer.evaluations_at_most)
         self.unevaluated: dict[int, Vector] = {}
         """What has to be evaluated before the optimiser can go on, by number; empty at the end."""
-        self._scenario = scenario
-        self._seed = seed
+        self.recalled: tuple[int, Vector | SeededVector, Evaluation] | None = None
+        """Number, task and evaluation of the first recorded gait with a fitness."""
+        self._manifest = manifest
         self._optimizer = optimizer
         self._record = TrialRecord(folder)
         self._results: dict[int, Evaluation] = {}
-        """Those of this iteration."""
+        """Evaluations of this iteration."""
         self._best: tuple[int, Vector, Evaluation] | None = None
         self._saved_best: int | None = None
         self._course = self._iterate()
@@ -123,8 +119,11 @@ class Trial:
     @property
     def tasks(self) -> dict[int, Vector | SeededVector]:
         """What the evaluations of `unevaluated` are given."""
-        seed = self._seed, self.status.number, self.status.iteration + 1
-        return {i: task_of(self._scenario, v, seed) for i, v in self.unevaluated.items()}
+        return {index: self._task(vector) for index, vector in self.unevaluated.items()}
+
+    def _task(self, vector: Vector) -> Vector | SeededVector:
+        iteration = self.status.iteration + 1
+        return self._manifest.task(vector, trial=self.status.number, iteration=iteration)
 
     def take(self, index: int, evaluation: Evaluation) -> bool:
         """Takes an evaluation; True if that was the last of its iteration."""
@@ -148,6 +147,8 @@ class Trial:
                     self.unevaluated[index] = vector
                 else:
                     self._add(index, recorded)
+                    if self.recalled is None and recorded.failure is None:
+                        self.recalled = index, self._task(vector), recorded
             if self.unevaluated:
                 self._save_best()
                 yield
@@ -162,11 +163,10 @@ class Trial:
 
     def _save_best(self) -> None:
         if self._best is not None and self._best[0] != self._saved_best:
-            self._saved_best, vector, _ = self._best
-            trial = f"{self._scenario.name}, seed {self._seed}, trial {self.status.number}"
-            name = f"{trial}, evaluation {self._saved_best}"
-            gait = ParameterSpace.of(self._scenario).gait(vector, name=name)
-            self._record.save_best(gait, self._scenario)
+            index, vector, _ = self._best
+            gait = self._manifest.gait(vector, trial=self.status.number, index=index)
+            self._record.save_best(gait, self._manifest.scenario)
+            self._saved_best = index
 
     def _complete(self, batch: Mapping[int, Vector]) -> None:
         """Tells the optimiser the results of an iteration, and records it."""
@@ -205,8 +205,7 @@ def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) ->
         generator = np.random.default_rng(trial_seed)
         trial = Trial(
             number,
-            scenario=scenario,
-            seed=seed,
+            manifest=record.manifest,
             optimizer=make(space, scenario.evolution, generator),
             folder=trial_folder(record.directory, number),
         )
@@ -238,41 +237,29 @@ def run_trials(
                 for index, task in trial.tasks.items():
                     pool.submit((trial, index), task)
             done = pool.wait(_SHOW_PERIOD)
-            waiting = [trial for (trial, index), found in done if trial.take(index, found)]
+            waiting = [trial for (trial, index), result in done if trial.take(index, result)]
             show(statuses)
     return statuses
 
 
 def check_fitness(
-    directory: Path, manifest: Manifest, *, evaluate: Evaluate, executor: MakeExecutor
+    trials: Sequence[Trial], directory: Path, *, evaluate: Evaluate, executor: MakeExecutor
 ) -> None:
     """Evaluates the first recorded gait that has a fitness once more; InputError if its fitness is
     another now, so that no record ever holds two objectives."""
-    first = _first_with_fitness(directory, manifest.scenario.evolution.trials)
-    if first is None:
+    trial = next((trial for trial in trials if trial.recalled), None)
+    if trial is None or trial.recalled is None:
         return
-    trial, entry = first
-    seed = manifest.seed, trial, entry["iteration"]
-    task = task_of(manifest.scenario, np.array(entry["genome"]), seed)
+    index, task, recorded = trial.recalled
     ((_, again),) = evaluate_all(evaluate, [task], workers=1, executor=executor)
-    if again.fitness != entry["fitness"]:
-        found = again.failure or f"fitness {again.fitness!r}"
+    if again.fitness != recorded.fitness:
+        outcome = again.failure or f"fitness {again.fitness!r}"
         problem = (
-            f"trial {trial}, evaluation {entry['index']} has fitness {entry['fitness']!r}, and "
-            f"evaluated again {found}; resume the run with the objective, the versions of "
+            f"trial {trial.status.number}, evaluation {index} has fitness {recorded.fitness!r}, "
+            f"and evaluated again {outcome}; resume the run with the objective, the versions of "
             "the packages and the kind of processor it was begun with"
         )
         raise InputError(directory, "objective", problem)
-
-
-def _first_with_fitness(directory: Path, trials: int) -> tuple[int, dict[str, Any]] | None:
-    """Trial and entry of the first recorded evaluation that has a fitness; None without any."""
-    for trial in range(trials):
-        for name in (EVALUATIONS, IN_PROGRESS):
-            for entry in read_entries(trial_folder(directory, trial) / name):
-                if entry["fitness"] is not None and entry["genome"] is not None:
-                    return trial, entry
-    return None
 
 
 def _number(value: Any) -> float:

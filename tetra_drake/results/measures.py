@@ -48,8 +48,11 @@ def lifted(trajectory: xarray.Dataset) -> xarray.DataArray:
     import xarray
 
     off, bodies = off_ground(trajectory), trajectory.tetrahedron
-    nodes = [off.contact.str.startswith(f"{body} ") for body in bodies.values]
-    return xarray.concat([off[:, own.values].all("contact") for own in nodes], dim=bodies).T
+    of_bodies = []
+    for body in bodies.values:
+        nodes = off.contact.str.startswith(f"{body} ").values
+        of_bodies.append(off[:, nodes].all("contact"))
+    return xarray.concat(of_bodies, dim=bodies).T
 
 
 def intervals(times: np.ndarray, active: np.ndarray) -> list[tuple[float, float]]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -17,32 +15,6 @@ from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, Structur
 from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
-
-
-@dataclass(frozen=True)
-class Totals:
-    """What a tally holds at the end of a walk; SI units."""
-
-    time: float
-    """That of the steady stretch, to which the next three belong."""
-    work: float
-    roughness: float
-    lifted: np.ndarray
-    tension: float
-    clearance: float
-    """The distance, not its square."""
-
-    @classmethod
-    def of(cls, tally: Tally) -> Self:
-        """The totals of a tally of plain arrays."""
-        return cls(
-            time=max(0.0, tally.time[0] - tally.begins[0]),
-            work=float(tally.work[0]),
-            roughness=float(tally.roughness[0]),
-            lifted=tally.lifted.copy(),
-            tension=float(tally.tension[0]),
-            clearance=math.sqrt(tally.clearance[0]),
-        )
 
 
 def empty_tally(scenario: Scenario) -> Tally:
@@ -59,18 +31,21 @@ def compute_metrics(
     end: np.ndarray,
     path: CentrePath,
     steady_from: float,
-    totals: Totals,
+    totals: Tally,
     signals: np.ndarray,
     weight: float,
 ) -> Metrics:
     """The metrics from node positions p_WN (nodes, 3) in m at three instants, from the path of the
-    centre, the totals, and the signals (k, m) in N at evenly spaced times of the steady stretch,
-    which begins at `steady_from` (s); `weight` of the robot in N."""
+    centre, the tally of the whole walk as plain arrays, and the signals (k, m) in N at evenly
+    spaced times of the steady stretch, which begins at `steady_from` (s); `weight` in N."""
     tip = 4 * (len(structure.bodies) - 1) + TIP
-    steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
-    x_way, y_way, _ = (end.mean(axis=0) - steady.mean(axis=0)).tolist()  # of the centre
     x1, x2, x3 = end[BOTTOM_LEFT, 0], end[BOTTOM_RIGHT, 0], end[tip, 0]
-    carried, per_time = weight * max(math.hypot(x_way, y_way), LEAST_WAY), 1.0 / (totals.time or 1)
+    x_way, y_way, _ = (end.mean(axis=0) - steady.mean(axis=0)).tolist()  # of the centre
+    steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
+    work = float(totals.work[0])
+    carried = weight * max(math.hypot(x_way, y_way), LEAST_WAY)
+    steady_time = max(0.0, totals.time[0] - totals.begins[0])
+    per_time = 1.0 / (steady_time or 1)
     lifted = (per_time * totals.lifted).tolist()
     return Metrics(
         distance=float(x1 - start[BOTTOM_LEFT, 0]),
@@ -81,12 +56,12 @@ def compute_metrics(
         lateral_drift=float(abs(end[BOTTOM_LEFT, 1] - start[BOTTOM_LEFT, 1])),
         heading_change=float(path.heading[-1] - path.heading[0]),
         path_curvature=curvature(steady_path),
-        actuator_work=totals.work,
-        cost_of_transport=totals.work / carried if carried else math.inf,
-        signal_rate=math.sqrt(per_time * totals.roughness / structure.signals),
+        actuator_work=work,
+        cost_of_transport=work / carried if carried else math.inf,
+        signal_rate=math.sqrt(per_time * float(totals.roughness[0]) / structure.signals),
         lifted=sum(lifted) / len(lifted),
-        clearance=totals.clearance,
-        tension=totals.tension,
+        clearance=math.sqrt(totals.clearance[0]),
+        tension=float(totals.tension[0]),
         travelling_index=travelling_index(signals),
         lifted_shares=tuple(lifted),
     )
@@ -126,9 +101,9 @@ def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:
     """Of each metric that is less than its required SI value, or NaN: name, value and limit, as
     "clearance is 0.05 in, less than 0.125 in"."""
-    found = {name: (getattr(metrics, name), least) for name, least in require.items()}
-    return [
-        f"{name} is {shown(value, METRICS[name])}, less than {shown(least, METRICS[name])}"
-        for name, (value, least) in found.items()
-        if not value >= least
-    ]
+    texts = []
+    for name, least in require.items():
+        value, unit = getattr(metrics, name), METRICS[name]
+        if not value >= least:
+            texts.append(f"{name} is {shown(value, unit)}, less than {shown(least, unit)}")
+    return texts

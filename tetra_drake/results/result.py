@@ -12,8 +12,8 @@ import numpy as np
 
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.machine import versions
+from tetra_drake.physics.tally import Tally
 from tetra_drake.results.metrics import (
-    Totals,
     compute_fitness,
     compute_metrics,
 )
@@ -84,7 +84,7 @@ def make_result(
     times: np.ndarray,
     states: np.ndarray,
     signals: np.ndarray,
-    totals: Totals,
+    totals: Tally,
     mass: float,
     wall_time: float,
     integrator: IntegratorWork,

@@ -1,4 +1,8 @@
-"""Draws of a scenario's disturbances, and the scenario changed by one."""
+"""Draws of a scenario's disturbances: their seeds, their numbers, and the scenario changed by one.
+
+Draws of evolution have the seeds (run's seed, trial, iteration, k), so that all gaits of an
+iteration have the same. Those by which gaits are judged have seeds of their own, which no run has.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,9 @@ import numpy as np
 
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import separate
+
+IterationSeed = tuple[int, int, int]
+"""Seed of a run, number of a trial, number of an iteration."""
 
 
 @dataclass(frozen=True)
@@ -60,3 +67,21 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
     if draw.terrain_seed is not None:
         terrain = terrain.model_copy(update={"seed": draw.terrain_seed})
     return changed.with_sections(robot=robot, terrain=terrain, disturbances=None)
+
+
+def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:
+    """The scenario in each of its draws in an iteration of an evolution."""
+    draws = [draw_disturbances(scenario, (*seed, k)) for k in range(scenario.draws)]
+    return [disturbed(scenario, draw) for draw in draws]
+
+
+def fresh_draws(scenario: Scenario, seed: int, count: int) -> list[Draw]:
+    """Draws that no evolution has seen, whatever its seed."""
+    return [draw_disturbances(scenario, fresh_seed(seed, k)) for k in range(count)]
+
+
+def fresh_seed(seed: int, k: int) -> tuple[int, ...]:
+    """The seed of a fresh draw: six numbers, the last not 0, so that it never equals one of
+    evolution. Those have four, of which numpy splits the first in two above 2³², and pads with
+    zeros."""
+    return seed, k, 0, 0, 0, 1

@@ -18,58 +18,72 @@ LEAST_WAY = 1e-3
 """m: a robot that goes less far counts as gone so far in its cost of transport."""
 
 
-def _metric(unit: str) -> Any:
-    """A field of Metrics in the SI unit `unit`, "" for none."""
-    return field(metadata={"unit": unit})
+def _metric(unit: str, definition: str, *, least: bool = False) -> Any:
+    """A field of Metrics in the SI unit `unit`, "" for none; `least` for a least value, of which
+    the least of several simulations is recorded in place of their mean."""
+    return field(metadata={"unit": unit, "definition": definition, "least": least})
 
 
 @dataclass(frozen=True)
 class Metrics:
     """How a robot walked, each number in the SI unit of its field's metadata.
 
-    x1 and y1 are those of T1's bottom left node, x2 is that of its bottom right node, x3 that of
+    x₁ and y₁ are those of T1's bottom left node, x₂ is that of its bottom right node, x₃ that of
     the lead tetrahedron's tip. The steady stretch is from `simulation.steady_from`, or from
     `cpg.start_up` where that is later, to the end. The centre is the mean of the bodies' origins.
+    Values come from results.metrics; definitions are also the table of scenario/README.md.
     """
 
-    distance: float = _metric("m")
-    """x1 at the end less x1 at the start."""
-    steady_distance: float = _metric("m")
-    """dx1: x1 at the end less x1 at `simulation.steady_from`."""
-    speed: float = _metric("m/s")
-    """Mean speed of the centre along x from `simulation.steady_from` on."""
-    twist: float = _metric("m")
-    """abs(x1 - x2) at the end: how far the rear base triangle has turned about the vertical."""
-    lead: float = _metric("m")
-    """x3 - x1 at the end: how far the tip of the lead is ahead; negative if it points backward."""
-    lateral_drift: float = _metric("m")
-    """abs(y1): sideways displacement at the end."""
-    heading_change: float = _metric("rad")
-    """By how much the robot has turned to the left, from the start to the end; whole turns count.
-    See results.path."""
-    path_curvature: float = _metric("1/m")
-    """Curvature of the path of the centre from `simulation.steady_from` on, positive to the left of
-    the direction in which it moves, be that backward; 0 if it is straight. See results.path."""
-    actuator_work: float = _metric("J")
-    """The integral of max(0, -S dl/dt) over the steady stretch, summed over the driven cables, of
-    length l and signal S: the work of actuators that cannot take any back."""
-    cost_of_transport: float = _metric("")
-    """actuator_work / (weight of the robot * way of the centre over the ground in the steady
-    stretch); the way counts as LEAST_WAY at least. Infinite without gravity."""
-    signal_rate: float = _metric("N/s")
-    """Root mean square of dS/dt over the steady stretch and the oscillators' signals S: the less,
-    the smoother the drive."""
-    lifted: float = _metric("")
-    """Share of the steady stretch in which no contact node of a tetrahedron bears a normal force:
-    mean of the tetrahedra."""
-    clearance: float = _metric("m")
-    """Least distance between the axes of two struts of different tetrahedra, of all times. Struts
-    overlap where it is less than their diameter: nothing in the model keeps them apart."""
-    tension: float = _metric("N")
-    """Least tension of a cable, of all times: a cable that would have to push is below 0."""
-    travelling_index: float = _metric("")
-    """How far the signals travel along the robot in the steady stretch: 0 if they stand, 1 if they
-    travel. See results.measures."""
+    distance: float = _metric("m", "way along x of T1's bottom left node, x₁")
+    steady_distance: float = _metric(
+        "m", "the same from `simulation.steady_from` on: Δx₁ of Eq. 10"
+    )
+    speed: float = _metric("m/s", "mean speed of the robot's centre along x in the steady stretch")
+    """The stretch begins at `simulation.steady_from` here."""
+    twist: float = _metric("m", "abs(x₁ - x₂) at the end, x₂ of T1's bottom right node")
+    lead: float = _metric("m", "x₃ - x₁ at the end, x₃ of the lead's tip")
+    lateral_drift: float = _metric("m", "abs(y₁), sideways way of T1's bottom left node")
+    heading_change: float = _metric(
+        "rad", "angle by which the robot has turned to the left at the end; whole turns count"
+    )
+    """See results.path."""
+    path_curvature: float = _metric(
+        "1/m", "of the centre's path in the steady stretch, positive to the left; 0 if straight"
+    )
+    """Left of the direction in which the centre moves, be that backward. The stretch begins at
+    `simulation.steady_from` here. See results.path."""
+    actuator_work: float = _metric(
+        "J",
+        "integral of max(0, -S dl/dt) in the steady stretch, for driven cables with signal S and "
+        "length l",
+    )
+    """The work of actuators that cannot take any back."""
+    cost_of_transport: float = _metric("", "actuator work / (weight times way of the centre)")
+    """The way over the ground in the steady stretch, LEAST_WAY at least. Infinite without
+    gravity."""
+    signal_rate: float = _metric("N/s", "root mean square of dS/dt in the steady stretch")
+    """Over all oscillators' signals S: the less, the smoother the drive."""
+    lifted: float = _metric(
+        "",
+        "share of the steady stretch in which a tetrahedron is off the ground, mean of all (says "
+        "little in MuJoCo)",
+    )
+    """Off the ground is a tetrahedron none of whose contact nodes bears a normal force."""
+    clearance: float = _metric(
+        "m",
+        "least distance between the axes of struts of two tetrahedra; less than a strut's diameter "
+        "is overlap",
+        least=True,
+    )
+    """Of all times. Nothing in the model keeps struts apart."""
+    tension: float = _metric(
+        "N", "least tension of any cable; below 0 it would have to push", least=True
+    )
+    """Of all times."""
+    travelling_index: float = _metric(
+        "", "0 if the signals stand along the robot, 1 if they travel, in the steady stretch"
+    )
+    """See results.measures."""
     lifted_shares: tuple[float, ...] = ()
     """The share of `lifted` of each tetrahedron, from T1 on."""
 
@@ -94,10 +108,16 @@ class Metrics:
         return numbers | {"lifted_shares": list(self.lifted_shares)}
 
 
-METRICS: dict[str, str] = {
-    f.name: f.metadata["unit"] for f in dataclasses.fields(Metrics) if f.metadata
-}
+_FIELDS = [field for field in dataclasses.fields(Metrics) if field.metadata]
+
+METRICS: dict[str, str] = {field.name: field.metadata["unit"] for field in _FIELDS}
 """The SI unit of each metric that is a number, by name."""
+
+DEFINITIONS: dict[str, str] = {field.name: field.metadata["definition"] for field in _FIELDS}
+"""The definition of each metric, by name."""
+
+LEAST = tuple(field.name for field in _FIELDS if field.metadata["least"])
+"""Metrics of which the least of several simulations is recorded, in place of their mean."""
 
 
 def inverse(unit: str) -> str:

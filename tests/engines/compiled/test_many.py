@@ -65,7 +65,7 @@ def courses(walks: list[PreparedGait], width: int) -> list[Course]:
 
 def same(a: Course, b: Course) -> bool:
     """Whether two courses agree to the last bit, cost aside."""
-    ours, theirs = ([*each[:-2], *vars(each.totals).values()] for each in (a, b))
+    ours, theirs = ([*each[:-2], *each.totals] for each in (a, b))
     pairs = zip(ours, theirs, strict=True)
     return all(np.array_equal(x, y, equal_nan=True) for x, y in pairs)
 

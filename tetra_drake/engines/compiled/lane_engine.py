@@ -40,7 +40,7 @@ from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.oscillator import NEURON_COLUMNS, Network, make_neurons
 from tetra_drake.physics.tally import Tally
 from tetra_drake.physics.terrain import FRAME_COLUMNS
-from tetra_drake.results.metrics import Totals, empty_tally
+from tetra_drake.results.metrics import empty_tally
 from tetra_drake.results.result import result_times
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
@@ -157,7 +157,7 @@ class Course(NamedTuple):
     states: np.ndarray
     modes: np.ndarray
     signals: np.ndarray
-    totals: Totals
+    totals: Tally
     wall_time: float
     """What it cost, in s: shared with the other lanes of the same core."""
 
@@ -294,7 +294,7 @@ class LaneEngine:
             states=log.states[lane, kept].copy(),
             modes=log.modes[lane, kept].copy(),
             signals=log.signals[lane, kept].copy(),
-            totals=Totals.of(Tally(*(t.array[..., lane] for t in self._tables.tally))),
+            totals=Tally(*(t.array[..., lane].copy() for t in self._tables.tally)),
             wall_time=self._wall_times[lane],
         )
 
