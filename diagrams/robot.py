@@ -24,10 +24,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from block_diagram import save_block_diagram
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.engines.sampler import Sampler, make_dataset
-from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.results.measures import distance_walked
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import load_gait

@@ -15,10 +15,10 @@ import math
 from pathlib import Path
 
 import numpy as np
+from block_diagram import save_block_diagram
 from matplotlib.figure import Figure
 from one_tetrahedron import TRAILING, Motion, let_go, make_diagram
 
-from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.figures.style import common_style, make_figure, save_figure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario

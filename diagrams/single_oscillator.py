@@ -20,12 +20,12 @@ import math
 from pathlib import Path
 
 import numpy as np
+from block_diagram import save_block_diagram
 from matplotlib.figure import Figure
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
-from tetra_drake.figures.block_diagram import save_block_diagram
 from tetra_drake.figures.style import common_style, make_figure, save_figure
 from tetra_drake.physics.oscillator import Network
 from tetra_drake.results.measures import dominant_frequency

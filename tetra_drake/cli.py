@@ -170,10 +170,8 @@ def _evolve(options: Options) -> None:
     """
     from tetra_drake.evolution.progress import Display
     from tetra_drake.experiment import evolve
-    from tetra_drake.report.summary import run_text, whole_experiment
+    from tetra_drake.report.summary import run_text
 
-    if options.scenario is None and not options.resume:
-        print(whole_experiment(load_scenario("thesis"), seconds=0.2), flush=True)
     try:
         with _executor(options) as executor:
             run = evolve(
@@ -194,7 +192,7 @@ def _evolve(options: Options) -> None:
 
 
 def _executor(options: Options) -> contextlib.AbstractContextManager[Any]:
-    """What makes executors by --dask; None without it."""
+    """Maker of executors on a Dask cluster by --dask; None without it."""
     if options.dask is None:
         return contextlib.nullcontext()
     from tetra_drake.evolution.cluster import dask_cluster
@@ -392,8 +390,8 @@ def _integer(least: int) -> Callable[[str], int]:
     def parse(text: str) -> int:
         if text.isascii() and text.isdecimal() and int(text) >= least:
             return int(text)
-        wanted = f"an integer, {least} or more"
-        raise argparse.ArgumentTypeError(f"found '{text}', expected {wanted}")
+        problem = f"found '{text}', expected an integer, {least} or more"
+        raise argparse.ArgumentTypeError(problem)
 
     return parse
 

@@ -16,10 +16,10 @@ from typing import Any
 from tetra_drake.errors import InputError
 
 MOST_BYTES = 64 * 2**20
-"""Size of a file that is read whole, at most, where nothing less is said."""
+"""Largest size of a file that is read whole, where nothing less is said."""
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""Numbers of errors of a disk that takes nothing more."""
+"""Error numbers of a disk that is full or broken."""
 
 
 @contextlib.contextmanager
@@ -105,7 +105,7 @@ def json_number(value: Any) -> Any:
 
 
 def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:
-    """The text of a file; as read_bytes()."""
+    """Text of a file of at most so many bytes in UTF-8. Raises InputError as read_bytes()."""
     try:
         return read_bytes(path, what, most=most).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -113,14 +113,16 @@ def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:
 
 
 def read_bytes(path: str | Path, what: str, *, most: int = MOST_BYTES) -> bytes:
-    """What a file of at most so many bytes holds; `what` says in errors what was expected.
+    """Content of a file of at most so many bytes; `what` says in errors what was expected.
 
-    Raises InputError, also for what is no regular file, as a device or a pipe, which may never end.
+    Raises InputError, also for a device or a pipe, which may never end.
     """
+    content = b""
     try:
         mode = os.stat(path).st_mode
-        # Not opened otherwise: a pipe would wait for a writer.
-        content = _first_bytes(path, most + 1) if stat.S_ISREG(mode) else b""
+        if stat.S_ISREG(mode):  # others are not opened: a pipe would wait for a writer
+            with open(path, "rb") as file:
+                content = file.read(most + 1)
     except FileNotFoundError as error:
         raise InputError(path, "", f"no such {what}") from error
     except (OSError, ValueError) as error:
@@ -132,11 +134,6 @@ def read_bytes(path: str | Path, what: str, *, most: int = MOST_BYTES) -> bytes:
         limit = f"{most // 2**20} MB"
         raise InputError(path, "", f"is larger than {limit}, expected a {what} of at most {limit}")
     return content
-
-
-def _first_bytes(path: str | Path, count: int) -> bytes:
-    with Path(path).open("rb") as file:
-        return file.read(count)
 
 
 def write_whole(path: str | Path, content: str | bytes) -> None:

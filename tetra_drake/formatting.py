@@ -17,7 +17,7 @@ def fixed(value: float, digits: int = 2) -> str:
 
 
 def signed(value: float, digits: int = 2) -> str:
-    """As fixed(), with a plus sign before positive numbers."""
+    """A number with this many decimals and a plus sign if it is positive; see fixed()."""
     text = fixed(value, digits)
     return f"+{text}" if math.isfinite(value) and float(text) > 0.0 else text
 

@@ -37,7 +37,7 @@ def test_it_meets_the_ground_as_asked_for_and_rests_on_its_weight(scenario):
     assert np.abs(settling.v_WN[-1]).max() < 1e-3 * IMPACT_SPEED
 
 
-@pytest.mark.parametrize("inches_per_second", [0.03, 0.12, 0.3])
+@pytest.mark.parametrize("inches_per_second", [0.12, 0.3])
 def test_restitution_is_that_of_the_law(scenario, inches_per_second):
     # Eq. 1 without weight, m dv/dt = -k x (1 + d v) with d = lambda / k = 3/2 alpha and
     # v = dx/dt, separates: v dv / (1 + d v) = -k/m x dx. The right-hand side gives

@@ -13,8 +13,8 @@ from helpers.synthetic_run import tiny_scenario, write_run
 from tetra_drake.cli import make_parser
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.run import load_run
-from tetra_drake.figures.study import study_run
 from tetra_drake.report.run_page import render_report, write_report
+from tetra_drake.report.study import study_run
 from tetra_drake.report.summary import ground_text, results
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.terrain_kinds import Incline
@@ -143,7 +143,7 @@ def test_each_trial_and_each_setting_that_differs_from_the_thesis_has_a_row(page
 
 def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page):
     space = ParameterSpace.of(study.run.manifest.scenario)
-    for name, value in zip(space.names, space.vector(study.best.gait), strict=True):
+    for name, value in zip(space.names, space.vector(study.best.motion.gait), strict=True):
         assert page.row(name) == [f"{value:.4f}"]
     # As recorded; simulated again, this gait moves elsewhere, which a note says.
     assert "2.00 inches" in page.texts["h1"][0]

@@ -17,9 +17,6 @@ from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
-MIRRORED = [1, 0, 2, 4, 3, 5]
-"""The cables of a junction, left and right exchanged."""
-
 
 def normal_forces(scenario: Scenario) -> np.ndarray:
     """(contacts,) in N at rest: stiffness times depth."""
@@ -52,7 +49,6 @@ def test_rests_where_the_independent_simulation_does(scenario, structure, data):
             "robot.tetrahedra": 3,
             "robot.offsets": [[0, 0, 0], ["2 mm", "1 mm", "1 mm"], [0, 0, "3 mm"]],
         },
-        {"robot.tetrahedra": 4, "robot.contacts": "all"},
         # Base triangles so near that the robot tips forward, onto the lead's tip.
         {"robot.tetrahedra": 2, "robot.spacing": "0.055 m", "cables.inner_stiffness": "26.0 N/m"},
     ],
@@ -69,12 +65,11 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     np.testing.assert_allclose(walk.length[-1], settled_lengths(scenario), rtol=1e-6)
 
 
-@pytest.mark.parametrize("contacts", ["thesis", "all"])
-@pytest.mark.parametrize("tetrahedra", [2, 5])
+@pytest.mark.parametrize(("tetrahedra", "contacts"), [(2, "thesis"), (5, "all")])
 def test_the_ground_bears_the_weight_whatever_the_stiffnesses(scenario, tetrahedra, contacts):
     scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra, "robot.contacts": contacts})
     cables, ground = scenario.cables, scenario.ground
-    for outer, inner, hard in [(1.0, 1.0, 1.0), (1.0, 1.5, 0.5), (0.5, 1.0, 1.5)]:
+    for outer, inner, hard in [(1.0, 1.5, 0.5), (0.5, 1.0, 1.5)]:
         changes = {
             "cables.outer_stiffness": with_unit(outer * cables.outer_stiffness, "N/m"),
             "cables.inner_stiffness": with_unit(inner * cables.inner_stiffness, "N/m"),
@@ -87,7 +82,6 @@ def test_the_ground_bears_the_weight_whatever_the_stiffnesses(scenario, tetrahed
 @pytest.mark.parametrize(
     ("changes", "slack"),
     [
-        ({"robot.strut_length": "0.1 m"}, 0),
         ({"robot.strut_length": "0.25 m", "robot.gravity": "1.6 m/s^2"}, 0),
         # Cables of 0.12 m: the tetrahedra lean forward, and only those from tips to tops hold them.
         ({"robot.spacing": "0.08 m", "cables.free_length": "0.12 m", "robot.contacts": "all"}, 20),
@@ -120,13 +114,6 @@ def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario):
     spacings = [np.diff(settled_state(each)[4:35:7]).tolist() for each in (scenario, elsewhere)]
     assert spacings[0] != spacings[1]
     assert np.array_equal(settled_lengths(elsewhere), settled_lengths(scenario))
-
-
-def test_left_and_right_are_alike_to_the_last_digit(scenario, structure):
-    lengths = settled_lengths(scenario).reshape(-1, 6)
-    assert np.array_equal(lengths[:, MIRRORED], lengths)
-    p_WN = node_positions(structure, settled_state(scenario)).reshape(-1, 4, 3)
-    assert np.array_equal(p_WN[:, [1, 0, 2, 3]] * [1, -1, 1], p_WN)
 
 
 def test_neither_terrain_nor_offsets_nor_friction_matter(scenario):

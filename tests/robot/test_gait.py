@@ -35,10 +35,6 @@ def gait_file(**changes: object) -> dict[str, object]:
     return {"schema": 1, "name": "mine", "weights": WEIGHTS, "tau_a_s": 0.3} | changes
 
 
-def without(key: str) -> dict[str, object]:
-    return {k: v for k, v in gait_file().items() if k != key}
-
-
 # Files
 
 
@@ -46,7 +42,6 @@ def test_a_gait_file_gives_weights_and_time_constants(tmp_path, scenario):
     gait = load_gait(write(tmp_path, gait_file()), scenario)
     assert gait == Gait(name="mine", weights=tuple(WEIGHTS), tau_a=0.3, tau_b=0.6)
     assert load_gait(write(tmp_path, gait_file(tau_b_s=0.45)), scenario).tau_b == 0.45
-    assert load_gait(write(tmp_path, without("name")), scenario).name == "mine"
 
 
 @pytest.mark.parametrize("tetrahedra", [2, 4])
@@ -72,46 +67,40 @@ def test_a_saved_gait_loads_back_to_the_last_bit(tmp_path, tau_b, written, scena
     assert ("tau_b_s" in gait.to_json(scenario)) == written, "only where it is not the default"
 
 
-BAD_TIMES = [-0.3, 0, math.inf, "0.3"]
-BAD_VALUES = {
-    "weights[7]": [math.nan, -0.1, "1.5", None, [1.5]],
-    "tau_a_s": BAD_TIMES,
-    "tau_b_s": BAD_TIMES,
-    "name": [5],
-    "schema": [3],
-}
-
-
 @pytest.mark.parametrize(
-    ("key", "value"), [(key, value) for key, values in BAD_VALUES.items() for value in values]
+    ("key", "value", "found"),
+    [
+        ("weights[7]", math.nan, "nan"),
+        ("weights[7]", -0.1, "-0.1"),
+        ("weights[7]", None, "nothing"),
+        ("tau_a_s", 0, "0"),
+        ("tau_b_s", "0.3", "0.3"),
+        ("tau_b_s", math.inf, "inf"),
+        ("name", 5, "5"),
+        ("schema", 3, "3"),
+    ],
 )
-def test_a_bad_value_is_refused_with_file_key_and_value(tmp_path, key, value, refused, scenario):
-    weights = {"weights": [*WEIGHTS[:7], value, *WEIGHTS[8:]]}
-    file = write(tmp_path, gait_file(**(weights if key == "weights[7]" else {key: value})))
-    shown = {None: "nothing", True: "true"}.get(value) if value is None or value is True else ""
-    with refused(file, key, shown or ("a list" if isinstance(value, list) else str(value))):
-        load_gait(file, scenario)
+def test_a_bad_value_is_refused_with_file_key_and_value(
+    tmp_path, key, value, found, refused, scenario
+):
+    changes = {"weights": [*WEIGHTS[:7], value, *WEIGHTS[8:]]} if "[" in key else {key: value}
+    with refused(write(tmp_path, gait_file(**changes)), key, found):
+        load_gait(tmp_path / "mine.json", scenario)
 
 
 @pytest.mark.parametrize(
     ("content", "key", "found"),
     [
         (gait_file(weights=WEIGHTS[:23]), "weights", "23"),
-        (gait_file(weights=[*WEIGHTS, 1]), "weights", "25"),
-        (gait_file(weights=1.5), "weights", "1.5"),
         (gait_file(weights={"1->2 flexor": -1}), "weights.1->2 flexor", "-1"),
-        (gait_file(turn=1.01), "turn", "1.01"),
         (gait_file(gains={"lenght": 0.1}), "gains.lenght", "'length'"),
         (gait_file(gains={"load": 0.5}), "gains.load", "0.5"),  # the thesis has no feedback
         (gait_file(turn=0.5), "turn", "0.5"),  # its cables are driven in pairs, left and right
-        *[(without(key), key, "") for key in ("schema", "weights", "tau_a_s")],
+        ({"schema": 1, "weights": WEIGHTS}, "tau_a_s", ""),
         (gait_file(tau_c_s=1), "tau_c_s", "tau_"),
-        (gait_file(tau_a_s=10**400), "tau_a_s", "1000"),
-        ([1, 2], "", "list"),
         ('{"schema": 1, "schema": 1, "weights": [], "tau_a_s": 0.3}', "", "twice"),
         ('{"tau_a_s": 1' + "0" * 5000 + "}", "", "JSON"),  # beyond Python's limit of digits
         (json.dumps(gait_file())[:100], "", "JSON"),
-        ("", "", "JSON"),
         ("[" * 100_000, "", "JSON"),
     ],
     ids=itertools.count(),
@@ -124,8 +113,6 @@ def test_a_bad_file_is_refused_with_file_and_key(tmp_path, content, key, found, 
 
 SPACES = {
     "thesis": {},
-    "undulation": {},
-    "all-cables": {},
     "turning": {},
     "feedback": {"gait_bounds.independent_tau_b": True},
 }
@@ -155,7 +142,6 @@ def test_a_saved_gait_of_any_scenario_loads_back_with_its_names_in_any_order(tmp
     [
         ({"2->1 extensor": None}, "misses 1 ('2->1 extensor')"),
         ({"5->1 flexor": 1.0}, "has in excess 1 ('5->1 flexor')"),
-        ({"2->1 extensor": None, "2->1 Extensor": 1.0}, "did you mean '2->1 extensor'?"),
     ],
 )
 def test_missing_and_unknown_names_are_refused(tmp_path, scenario, refused, change, found):
@@ -165,9 +151,6 @@ def test_missing_and_unknown_names_are_refused(tmp_path, scenario, refused, chan
     file = write(tmp_path, gait_file(schema=2, weights=weights))
     with refused(file, "weights", found):
         load_gait(file, scenario)
-    write(tmp_path, {"gait": gait_file(schema=2, weights=weights)})
-    with refused(file, "gait.weights", found):
-        load_gait(file, scenario, key="gait")
 
 
 # Parameter space
@@ -219,12 +202,6 @@ def test_gains_have_bounds_and_no_floor():
     assert (gait.tau_a, gait.tau_b) == (27.0, 28.0)
 
 
-def test_a_pathway_that_is_not_fed_back_has_no_gain():
-    one = ParameterSpace.of(load_scenario("feedback").with_changes({"cpg.feedback": ["load"]}))
-    assert one.names[24:] == ("gain load", "tau_A", "tau_B")
-    assert one.gait(np.arange(27.0), name="any").gains == Gains(load=24.0)
-
-
 def test_a_turn_is_that_of_the_scenario_and_no_parameter(tmp_path):
     half = load_scenario("turning").with_changes({"gait_bounds.turn": -0.5})
     space = ParameterSpace.of(half)
@@ -234,14 +211,6 @@ def test_a_turn_is_that_of_the_scenario_and_no_parameter(tmp_path):
     # A gait's own turn counts when it is loaded, whatever those are that the scenario evolves.
     content = dataclasses.replace(gait, turn=0.25).to_json(half)
     assert load_gait(write(tmp_path, content), half).turn == 0.25
-
-
-def test_names_follow_the_listing(scenario):
-    names = ParameterSpace.of(scenario).names
-    # w1 to w3 act on neuron 1 from neurons 3, 5, 7; w4 on neuron 2 from neuron 4; w7 on 3 from 1.
-    assert names[:3] == tuple(f"weight {other}->1 extensor" for other in (2, 3, 4))
-    assert (names[3], names[6]) == ("weight 2->1 flexor", "weight 1->2 extensor")
-    assert names[-2:] == ("tau_A", "tau_B")
 
 
 def test_floors_are_the_thesis_s(scenario):
@@ -326,11 +295,3 @@ def test_a_printed_gait_has_turn_and_gains_where_they_are_set():
     lines = str(set_all).splitlines()
     assert "turn -0.5" in lines and "gain of load 0.25" in lines
     assert not any(word in str(gait) for word in ("turn", "length", "pitch"))
-
-
-def test_weights_without_names_are_printed_in_a_row():
-    gait = Gait(name="any", weights=(1.25, 2.0), tau_a=0.3, tau_b=0.6)
-    assert "weights 1.25 2" in str(gait)
-    named = dataclasses.replace(gait, weight_names=("2->1 flexor",))
-    assert str(named) == str(gait)
-    assert "weights none" in str(dataclasses.replace(gait, weights=()))

@@ -50,14 +50,6 @@ def test_mirror_images_of_weights_exchange_left_and_right(scenario):
     np.testing.assert_array_equal(thesis.images, np.arange(24), "each group is its own image")
 
 
-def test_time_constants_are_those_of_the_gait_for_all_neurons(scenario):
-    both = scenario.with_changes(SIDES)
-    gait = dataclasses.replace(seeded_gait(both), tau_a=0.25, tau_b=0.4)
-    network = make_network(both, MakeStructure(both), gait)
-    np.testing.assert_allclose(1.0 / network.per_tau_a, np.full(16, 0.25), rtol=1e-14)
-    np.testing.assert_allclose(1.0 / network.per_tau_b, np.full(16, 0.4), rtol=1e-14)
-
-
 def test_a_turn_strengthens_the_left_by_what_it_weakens_the_right(scenario):
     actuation = [["outer bottom_left"], ["outer top"], ["inner bottom_right"]]
     three = scenario.with_changes({"robot.actuation": actuation, "robot.tetrahedra": 3})
@@ -74,15 +66,9 @@ def test_a_steering_signal_is_sampled_and_checked(scenario):
     assert sample_turns(both, MakeStructure(both), gait, None).tolist() == [0.3]
     turns = sample_turns(both, MakeStructure(both), gait, lambda time: time / 4.0)
     np.testing.assert_allclose(turns, np.linspace(0.0, 1.0, 8001), atol=1e-15)
-    for wrong in (1.5, float("nan")):
-        with pytest.raises(InputError) as caught:
-            sample_turns(
-                both,
-                MakeStructure(both),
-                gait,
-                lambda time, wrong=wrong: wrong if time > 1.0 else 0.0,
-            )
-        assert caught.value.source == "steering" and str(wrong) in str(caught.value)
+    with pytest.raises(InputError) as caught:
+        sample_turns(both, MakeStructure(both), gait, lambda time: 1.5 if time > 1.0 else 0.0)
+    assert caught.value.source == "steering" and "1.5" in str(caught.value)
     with pytest.raises(InputError):
         sample_turns(
             scenario, MakeStructure(scenario), gait, lambda time: 0.0

@@ -58,14 +58,6 @@ def test_the_network_beforehand_is_that_of_the_diagram(scenario, structure, gait
         np.testing.assert_allclose(found, live, atol=1e-4)
 
 
-def test_without_weights_all_oscillators_give_the_same_signal(scenario, data):
-    scenario = scenario.with_changes({"cpg.signals": "live"})
-    samples = signal_samples(scenario, load_gait(data / "single_oscillators.json", scenario))
-    np.testing.assert_allclose(samples, samples[:, :1] * np.ones(4), atol=1e-12)
-    # Eq. 9 with a gain of 2 lbf: about a pound peak to peak.
-    assert 0.5 * 4.448 < np.ptp(samples[6000:]) < 2.0 * 4.448
-
-
 def read_csv(path: Path) -> tuple[list[str], np.ndarray]:
     lines = path.read_text().splitlines()
     assert lines[0].startswith("# ") and "thesis" in lines[0]

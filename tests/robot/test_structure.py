@@ -1,6 +1,5 @@
 """The robot's structure, its inertia and its bodies in a plant."""
 
-import itertools
 import math
 
 import numpy as np
@@ -52,14 +51,10 @@ def tumbling(structure: Structure) -> np.ndarray:
 # The tetrahedron
 
 
-def test_struts_of_six_inches_join_all_nodes_around_the_centre_of_mass(structure):
-    assert sorted(STRUTS) == list(itertools.combinations(range(4), 2))
+def test_struts_of_six_inches_join_all_nodes_base_vertical_and_tip_forward(structure):
     edges = [np.linalg.norm(structure.p_BN[i] - structure.p_BN[j]) for i, j in STRUTS]
     assert edges == pytest.approx([6 * IN] * 6, rel=1e-14)
     assert structure.p_BN.mean(axis=0) == pytest.approx(np.zeros(3), abs=1e-17)
-
-
-def test_the_base_triangle_stands_vertical_and_the_tip_points_forward(structure):
     left, right, top, tip = structure.p_BN
     assert left[0] == right[0] == top[0] < tip[0]
     assert left[1] == -right[1] > 0  # y points left
@@ -116,20 +111,13 @@ def test_ten_bodies_welded_together_have_the_inertia_of_the_tetrahedron(structur
 # Any number of tetrahedra
 
 
-def test_the_robot_starts_at_rest_on_its_bottom_nodes(row):
-    height = start(row)[:, :, 2]
-    assert height[:, :2] == pytest.approx(0, abs=1e-16)
-    assert height[:, 2:].min() > 0
-    assert not row.initial_state[7 * len(row.bodies) :].any()
-
-
-def test_base_triangles_are_parallel_and_spaced_evenly_from_zero_on(row, scenario):
-    expected = np.arange(len(row.bodies))[:, None] * scenario.robot.spacing * np.ones(3)
-    assert start(row)[:, :3, 0] == pytest.approx(expected, abs=1e-16)
-
-
-def test_the_robot_starts_left_right_symmetric(row):
+def test_the_robot_starts_at_rest_on_its_bottom_nodes_evenly_spaced_and_symmetric(row, scenario):
     p_WN = start(row)
+    assert p_WN[:, :2, 2] == pytest.approx(0, abs=1e-16)
+    assert p_WN[:, 2:, 2].min() > 0
+    assert not row.initial_state[7 * len(row.bodies) :].any()
+    expected = np.arange(len(row.bodies))[:, None] * scenario.robot.spacing * np.ones(3)
+    assert p_WN[:, :3, 0] == pytest.approx(expected, abs=1e-16)
     assert np.array_equal(p_WN[:, [1, 0, 2, 3]] * [1, -1, 1], p_WN)
 
 

@@ -20,7 +20,6 @@ MINE = "base: thesis\nname: mine\nevolution: {evaluations: 900}\noptimizer: "
     [
         ("!CmaEs {sample: 7, population: 20}", CmaEs(sample=7, population=20)),
         ("!RandomSearch", RandomSearch()),
-        ("!QualityDiversity {draws: 9}", QualityDiversity(draws=9)),
         (
             "!QualityDiversity {measures: {speed: [0 in/s, 2 in/s], lifted: [0, 1]}}",
             QualityDiversity(measures={"speed": [0.0, 2.0 * INCH], "lifted": [0.0, 1.0]}),
@@ -46,14 +45,11 @@ def test_the_thesiss_algorithm_is_the_default_and_is_not_written(scenario):
 @pytest.mark.parametrize(
     ("text", "key"),
     [
-        ("!CmaEs {starts: 0}", "optimizer.starts"),
         ("!CmaEs {populaton: 9}", "optimizer.populaton"),
         ("!CmaEs {population: 3}", "optimizer.population"),
-        ("!SteadyState {sample: 9}", "optimizer.sample"),
         ("!CMAES {}", "optimizer"),
         ("!QualityDiversity {measures: {lifted: [0, 1]}}", "optimizer.measures"),
         ("!QualityDiversity {measures: {lited: [0, 1]}}", "optimizer.measures.lited"),
-        ("!QualityDiversity {measures: {lifted: [0, 1, 2]}}", "optimizer.measures.lifted"),
         (
             "!QualityDiversity {measures: {lifted: [0, 1], tension: [1 lbf, 0 lbf]}}",
             "optimizer.measures.tension",

@@ -16,7 +16,6 @@ from tetra_drake.scenario.load import (
     load_scenario,
     shipped_scenarios,
 )
-from tetra_drake.scenario.sections import TAG
 
 # Exact by definition.
 IN = 0.0254
@@ -82,19 +81,15 @@ LEFT = ["outer bottom_left"]
     ("changes", "key", "found"),
     [
         ({"robot.actuation": []}, "robot.actuation", "[]"),
-        ({"robot.actuation": [LEFT, []]}, "robot.actuation", "[]"),
         ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
         ({"robot.actuation": [["outer left"]]}, "robot.actuation[0][0]", "'outer left'"),
         ({"robot.actuation": [LEFT], "gait_bounds.mirrored": True}, "gait_bounds.mirrored", "true"),
-        ({"cpg.reach": -1}, "cpg.reach", "-1"),
-        ({"cpg.feedback": ["sight"]}, "cpg.feedback[0]", "'sight'"),
         ({"cpg.feedback": ["load"]}, "cpg.signals", "'listing'"),
         (
             {"cpg.feedback": ["load"], "cpg.signals": "live", "robot.gravity": 0.0},
             *("robot.gravity", "0 m/s^2"),
         ),
         ({"cpg.listing_step": "16 s"}, "cpg.listing_step", "16.0 s"),
-        ({"gait_bounds.turn": 1.5}, "gait_bounds.turn", "1.5"),
         ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
     ],
     ids=itertools.count(),
@@ -111,12 +106,6 @@ TOO_LARGE = [
     ({"engine.step": "1e-7 s", "engine": "!Mujoco"}, "engine.step", "1e-07 s"),
     ({"optimizer.population": 10**9}, "optimizer.population", "1000000000"),
     ({"disturbances": {"draws": 10**9}}, "disturbances.draws", "1000000000"),
-    ({"optimizer": {TAG: "CmaEs", "population": 10**9}}, "optimizer.population", "1000000000"),
-    (
-        {"optimizer": {TAG: "QualityDiversity", "cells": [10**6, 20]}},
-        "optimizer.cells[0]",
-        "1000000",
-    ),
 ]
 
 
@@ -129,11 +118,6 @@ def test_what_no_memory_holds_is_refused(scenario, refused, changes, key, found)
 def test_what_is_large_but_fits_is_not_refused(scenario):
     long = scenario.with_changes({"simulation.duration": "1 h", "cpg.listing_step": "1 ms"})
     assert long.simulation.duration == 3600.0
-
-
-def test_the_quick_scenario_is_short():
-    quick = load_scenario("quick")
-    assert quick.evolution.evaluations * quick.simulation.duration < 300.0, "some minutes, as said"
 
 
 # Recorded files
@@ -172,7 +156,6 @@ def test_a_base_file_is_found_beside_the_file_that_names_it(tmp_path, scenario):
 @pytest.mark.parametrize(
     ("base", "given", "expected"),
     [
-        ("", "{stiction_range: 1 mm}", None),
         ("", "!ResetIntegrator {stiction_range: 1 mm}", None),
         ("", "!Coulomb {static: 0.6}", Coulomb(static=0.6)),
         ("!Coulomb {static: 0.6}", "!Coulomb {kinetic: 0.4}", Coulomb(static=0.6, kinetic=0.4)),
@@ -229,31 +212,21 @@ def test_differences_are_keys_and_readable_values(scenario):
 # Bad files: the key at fault, and what was found there or is suggested
 
 BAD = [
-    ("robot: {tetrahedron: 4}", "robot.tetrahedron", "'tetrahedra'"),
-    ("robot:", "robot", "nothing"),
     ("evolution: {evaluations: 49}", "evolution.evaluations", "49"),
-    ("robot: {spacing: 3}", "robot.spacing", "3 without a unit"),
     ("robot: {offsets: [[0 m, 0 m, 0 m]]}", "robot.offsets", "1 items"),
     ("gait_bounds: {tau_a_min: 0.6 s}", "gait_bounds.tau_a_min", "0.6"),
-    ("gait_bounds: {weight_max: 0.5}", "gait_bounds.weight_min", "1.0"),
-    ("simulation: {steady_from: 15 s}", "simulation.steady_from", "15.0 s"),
     ("friction: !Coulomb {static: 0.4}", "friction.kinetic", "0.5"),
     ("friction: !Coulomb {stiction_range: 1 in}", "friction.stiction_range", "!ResetIntegrator"),
-    ("friction: {static: 0.4}", "friction.static", "!Coulomb"),
     ("friction: {stiction_rage: 1 in}", "friction.stiction_rage", "'stiction_range'"),
     ("robot: {contacts: some}", "robot.contacts", "'thesis' or 'all'"),
     ("cables: {free_length: 1 km}", "robot.spacing", "balance"),
 ]
 BAD_FILES = [
     ("name: mine", "robot", "missing"),
-    ("name: mine\nrobot: {tetrahedra: 4}", "robot.strut_length", "missing"),
     ("base: theses", "base", "'theses'"),
-    ("base: 5", "base", "5"),
     ("base: mine.yaml", "base", "itself"),
     ("", "", "mapping"),
-    ("- 1", "", "mapping"),
     ("robot: [1\n", "", "YAML, line 2, column 1"),
-    ("base: thesis\nrobot: {\n  spacing: 3 in\n", "", "YAML"),
     ("base: thesis\nrobot: {spacing: 2 in, spacing: 3 in}", "", "'spacing'"),
     ("!!python/object/apply:os.getcwd []", "", "YAML"),
     ("[" * 1000, "", "YAML"),
@@ -278,14 +251,6 @@ def test_scenarios_based_on_each_other_are_refused(tmp_path, refused):
         load_scenario(first)
 
 
-def test_a_base_file_is_sought_beside_the_file_that_names_it_only(tmp_path, refused, monkeypatch):
-    write(tmp_path, "base: thesis\n", "elsewhere/other.yaml")
-    monkeypatch.chdir(tmp_path / "elsewhere")
-    file = write(tmp_path, "base: other.yaml\n")
-    with refused(file, "base", "'other.yaml'"):
-        load_scenario(file)
-
-
 def test_a_fault_names_the_file_that_has_it(tmp_path, refused):
     base = write(tmp_path, "base: thesis\nsimulation: {duration: 3 kg}\n", "low.yaml")
     file = write(tmp_path, "base: low.yaml\nsimulation: {steady_from: 5 s}\n")
@@ -296,11 +261,12 @@ def test_a_fault_names_the_file_that_has_it(tmp_path, refused):
         load_scenario(file)
 
 
-@pytest.mark.parametrize("name", [".", "missing.yaml", "binary.yaml", "binary.yaml/below.yaml"])
-def test_what_is_no_text_file_is_refused(tmp_path, refused, name):
+def test_what_is_no_text_file_is_refused(tmp_path, refused):
     (tmp_path / "binary.yaml").write_bytes(b"\x89PNG\r\n\x1a\n\x00\xff")
-    with refused(tmp_path / name, "", ""):
-        load_scenario(tmp_path / name)
+    (tmp_path / "large.yaml").write_text("#" * (2**20 + 1))
+    for name in ("missing.yaml", "binary.yaml", "large.yaml", "/dev/zero"):
+        with refused(tmp_path / name, "", ""):
+            load_scenario(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -308,10 +274,6 @@ def test_what_is_no_text_file_is_refused(tmp_path, refused, name):
     [
         "root:x:0:0:secret:/root:/bin/sh\ndaemon:x:1:1:secret:/:/bin/sh\n",  # YAML: a text
         "a: [1, 2\nsecret: {x: 1\n  secret\n",
-        "key: 'secret\n",
-        "secret: *secret\n",
-        "- secret\n",
-        "\tsecret: {}\n",
     ],
 )
 def test_a_base_that_is_no_scenario_is_not_shown(tmp_path, content):
@@ -320,12 +282,4 @@ def test_a_base_that_is_no_scenario_is_not_shown(tmp_path, content):
     with pytest.raises(InputError) as caught:
         load_scenario(file)
     assert caught.value.source == str(tmp_path / "any")
-    assert "secret" not in caught.value.problem.replace("alias 'secret'", "")
-
-
-def test_files_that_never_end_or_are_too_large_are_refused(tmp_path, refused):
-    (tmp_path / "large.yaml").write_text("#" * (2**20 + 1))
-    for base, problem in (("/dev/zero", "device"), (tmp_path / "large.yaml", "1 MB")):
-        file = write(tmp_path, f"base: {base}\n")
-        with refused(base, "", problem):
-            load_scenario(file)
+    assert "secret" not in caught.value.problem

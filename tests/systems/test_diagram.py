@@ -1,22 +1,13 @@
 """The wiring of the robot's diagram."""
 
-import gc
-import os
-from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
-from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import MatsuokaCpg
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
-
-NEEDS_DRAKE_THAT_FREES = pytest.mark.skipif(
-    tuple(int(part) for part in version("drake").split(".")[:2]) < (1, 56),
-    reason="Drake before 1.56 never frees a diagram that holds a Python system with outputs",
-)
 
 
 @pytest.fixture
@@ -45,24 +36,3 @@ def test_the_friction_brings_no_continuous_state(scenario, gait):
     live = MakeTensegrityDiagram(scenario, gait)
     assert isinstance(live.GetSubsystemByName("cpg"), MatsuokaCpg)
     assert live.CreateDefaultContext().num_continuous_states() == 13 * 5 + 4 * 4
-
-
-def resident_megabytes() -> float:
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
-
-
-@pytest.mark.slow
-@NEEDS_DRAKE_THAT_FREES
-@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads memory from /proc")
-def test_three_hundred_diagrams_do_not_fill_the_memory(scenario, gait):
-    def build_and_run(count: int) -> float:
-        for _ in range(count):
-            simulator = MakeSimulator(MakeTensegrityDiagram(scenario, gait), scenario.engine)
-            simulator.AdvanceTo(0.02)
-            del simulator
-        gc.collect()
-        return resident_megabytes()
-
-    settled = build_and_run(100)
-    assert build_and_run(300) - settled < 30.0, "a leak of one diagram each would be some 600 MB"

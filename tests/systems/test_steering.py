@@ -15,10 +15,9 @@ def doubled(turn: np.ndarray) -> np.ndarray:
     [
         (0.25, None, 0.25),
         (lambda time: 0.1 * time, None, 0.3),
-        (0.25, -0.5, -0.5),
         (lambda time: 0.1 * time, -0.5, -0.5),
     ],
-    ids=["number", "function of time", "port, not the number", "port, not the function"],
+    ids=["number", "function of time", "port"],
 )
 def test_the_port_decides_if_it_is_connected(turn, port, decides):
     steering = Steering(doubled, turn=turn)

@@ -246,7 +246,7 @@ def test_a_simulation_can_be_watched_as_it_runs(browser, tmp_path):
 def test_the_report_of_a_run_shows_its_figures_and_leads_to_the_replay(
     browser, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("tetra_drake.figures.book.save_figure", quick_figures.save_figure)
+    monkeypatch.setattr("tetra_drake.report.book.save_figure", quick_figures.save_figure)
     scenario = tiny_scenario(name='tiny <i>"run"</i> &')
     run = write_run(tmp_path / "run", [[[(1.0, 0), (2.0, 1)]]], scenario=scenario)
     _, replay, report = write_report(run)

@@ -1,4 +1,4 @@
-"""What judging has found about the robustness of gaits, as a figure and files."""
+"""The robustness of gaits as a figure and files."""
 
 from __future__ import annotations
 
@@ -21,10 +21,21 @@ from tetra_drake.figures.style import OKABE_ITO, REFERENCE, SHADE, common_style,
 from tetra_drake.formatting import fixed
 from tetra_drake.scenario.units import INCH
 
-_DOTS: Any = {"color": OKABE_ITO["sky_blue"], "linestyle": "", "marker": "o", "markersize": 2.0}
-_DOTS |= {"alpha": 0.4, "zorder": 0}
-_BOX: Any = {"orientation": "horizontal", "widths": 0.6, "whis": (5, 95), "showfliers": False}
-_BOX |= {"manage_ticks": False}
+_DOTS: Any = {
+    "color": OKABE_ITO["sky_blue"],
+    "linestyle": "",
+    "marker": "o",
+    "markersize": 2.0,
+    "alpha": 0.4,
+    "zorder": 0,
+}
+_BOX: Any = {
+    "orientation": "horizontal",
+    "widths": 0.6,
+    "whis": (5, 95),
+    "showfliers": False,
+    "manage_ticks": False,
+}
 
 
 def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
@@ -63,10 +74,10 @@ def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -
     line: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.2}
     lines: Any = {f"{part}props": line for part in ("box", "median", "whisker", "cap")}
     for place, gait in enumerate(gaits.index):
-        own = draws[draws["gait"] == gait]
-        shares = own["distance"] / own["undisturbed"]
+        walks = draws[draws["gait"] == gait]
+        shares = walks["distance"] / walks["undisturbed"]
         # The golden ratio spreads any number of dots evenly.
-        heights = place + 0.6 * (own["draw"] * 0.618034 % 1.0 - 0.5)
+        heights = place + 0.6 * (walks["draw"] * 0.618034 % 1.0 - 0.5)
         axes.plot(shares, heights, **_DOTS)
         axes.boxplot(shares, positions=[place], **_BOX, **lines)
     axes.axvline(1.0 - LOSS, **REFERENCE)

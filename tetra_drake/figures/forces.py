@@ -24,14 +24,14 @@ _SECOND: Any = {"color": OKABE_ITO["vermillion"], "linestyle": (0, (4, 1.2))}
 _LANDING: Any = {"color": "black", "marker": "v", "markersize": 4.0, "linestyle": ""}
 
 _TOP = 0.94
-"""Where landings are marked, as a share of a panel's height."""
+"""Height of the marks of landings, as a share of a panel's height."""
 
 _IMPACTS, _MARGIN = 0.01, 0.25
 """Share of the samples at either end of their range that does not count for the scale of forces,
 and the margin beside the rest, as a share of it."""
 
 _ROWS, _COLUMNS = 10, 4
-"""Panels one below the other before there is another column, and the most columns."""
+"""Largest number of panels one below the other, and of columns."""
 
 _MIRRORED = 0.01
 """Mean difference, as a share of the mean force, below which two nodes are mirror images."""
@@ -100,8 +100,7 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
 
 
 def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | None:
-    """The range of the forces of nodes that touch, without the hundredth at either end, where
-    impacts are, and with a margin; None if no node touches."""
+    """Range of the forces of nodes that touch, without impacts; None if no node touches."""
     touching = forces.where(forces.normal_force > 0.0)
     normal, friction = touching.normal_force, touching.friction_force.sel(horizontal="x")
     values = np.concatenate([normal.values.ravel(), friction.values.ravel(), [0.0]])
@@ -111,8 +110,8 @@ def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | Non
 
 
 def _contacts_to_show(trajectory: xarray.Dataset) -> list[str]:
-    """The bottom left nodes, those right ones that bear something else, the lead's tip where the
-    tips of others cannot touch, and other nodes that do."""
+    """Names of the bottom left nodes, of right ones that bear something else, of the lead's tip
+    where the tips of others cannot touch, and of other nodes that touch."""
     shown, normal = [], trajectory.normal_force
     thesis = not trajectory.contact.str.endswith(" top").any()
     for name in trajectory.contact.values:
@@ -127,12 +126,10 @@ def _contacts_to_show(trajectory: xarray.Dataset) -> list[str]:
     return shown
 
 
-def _panels_over_time(names: Sequence[str], *, groups: int = 1) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with one panel of forces per name, so that a column shows the same part of each
-    group of so many."""
-    wanted = min(max(math.ceil(len(names) / _ROWS), min(groups, 2)), _COLUMNS)
-    whole = [c for c in range(1, _COLUMNS + 1) if c % groups == 0 or groups % c == 0]
-    columns = next((c for c in whole if c >= wanted), whole[-1])
+def _panels_over_time(names: Sequence[str], *, groups: int) -> tuple[Figure, dict[str, Axes]]:
+    """A figure with one panel of forces per name, in a column for each group if these are few."""
+    several = 1 < groups <= _COLUMNS
+    columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)
     size = (7.5 if columns == 1 else 9.0), 1.1 + rows * max(min(1.4, 10.0 / rows), 0.75)
     figure = Figure(figsize=size)

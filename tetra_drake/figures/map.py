@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pandas
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tetra_drake.analysis.elites import CELLS, LUCKY, chosen, distinct_gaits, elites, robust
@@ -21,7 +24,7 @@ _NUMBER: Any = {"ha": "center", "va": "center", "fontsize": 7.0, "fontweight": "
 _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "black"}
 
 _LINE = 70
-"""Letters below a panel."""
+"""Largest number of letters in a line below a panel."""
 
 
 @common_style()
@@ -32,45 +35,63 @@ def map_of_gaits(run: Run) -> Figure:
     Numbers are the fittest gait and those nearest to the corners."""
     kind = run.manifest.scenario.optimizer
     assert isinstance(kind, QualityDiversity)
-    found = elites(run)
-    kept, judged = robust(found), bool(found["kept"].notna().any())
-    figure, [row] = make_figure(
-        width_in=4.6 + 4.0 * judged, height_in=4.6, columns=1 + judged, sharey=True
-    )
-    lucky = found[found["kept"] < LUCKY]
-    panels = [("fitness", kept, kept["fitness"], {"cmap": "viridis"})]
+    gaits = elites(run)
+    kept = robust(gaits)
+    judged = bool(gaits["kept"].notna().any())
+    panels = 2 if judged else 1
+    width_in = 0.6 + 4.0 * panels
+    figure, [row] = make_figure(width_in=width_in, height_in=4.6, columns=panels, sharey=True)
+    measures = zip(kind.measures, kind.measures.values(), kind.cells, strict=True)
+    edges = [_edges(name, limits, count) for name, limits, count in measures]
+    _draw_cells(row[0], kept, kept["fitness"], edges, title="fitness", cmap="viridis")
+    row[0].plot(*_middles(gaits[gaits["kept"] < LUCKY], edges), **_LUCKY)
     if judged:
-        shares: Any = {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
-        panels.append(("draws kept (%)", found, 100.0 * found["kept"], shares))
-    edges = [_edges(*each) for each in zip(kind.measures.items(), kind.cells, strict=True)]
-    middles, named = [(edge[:-1] + edge[1:]) / 2.0 for edge in edges], distinct_gaits(chosen(run))
-    for axes, (title, gaits, values, look) in zip(row, panels, strict=True):
-        grid = np.full(kind.cells, np.nan)
-        grid[tuple(gaits[CELLS].to_numpy().T)] = values
-        mesh = axes.pcolormesh(*edges, grid.T, rasterized=True, **look)
-        figure.colorbar(mesh, ax=axes, label=title)
-        axes.grid(visible=False)
-        axes.set(xlabel=_label(kind, 0))
-        if axes is row[0]:
-            axes.plot(*(m[lucky[c]] for m, c in zip(middles, CELLS, strict=True)), **_LUCKY)
+        shares = 100.0 * gaits["kept"]
+        look: Any = {"cmap": "cividis", "vmin": 0.0, "vmax": 100.0}
+        _draw_cells(row[1], gaits, shares, edges, title="draws kept (%)", **look)
+    named = distinct_gaits(chosen(run))
+    x_label, y_label = (_label(name) for name in kind.measures)
+    row[0].set(ylabel=y_label)
+    for axes in row:
+        axes.set(xlabel=x_label)
         for number, (_, gait) in enumerate(named, start=1):
-            place = [m[gait[c]] for m, c in zip(middles, CELLS, strict=True)]
-            axes.text(*place, str(number), bbox=_DISC, **_NUMBER)
-    row[0].set(ylabel=_label(kind, 1))
-    labels = (f"{i}  {listed(n)}: {gait_label(gait)}" for i, (n, gait) in enumerate(named, start=1))
-    lines = [textwrap.fill(label, _LINE * len(row), subsequent_indent="    ") for label in labels]
+            axes.text(*_middles(gait, edges), str(number), bbox=_DISC, **_NUMBER)
+    labels = [f"{i}  {listed(n)}: {gait_label(gait)}" for i, (n, gait) in enumerate(named, start=1)]
+    lines = [textwrap.fill(label, _LINE * panels, subsequent_indent="    ") for label in labels]
     figure.supxlabel("\n".join(lines), fontsize=8.5, ha="left", x=0.08)
     share = fixed(100.0 * len(kept) / np.prod(kind.cells), 0)
     figure.suptitle(f"Map of gaits\n{len(kept)} of {np.prod(kind.cells)} cells ({share} %)")
     return figure
 
 
-def _edges(measure: tuple[str, list[float]], count: int) -> np.ndarray:
-    name, (low, high) = measure
+def _draw_cells(
+    axes: Axes,
+    gaits: pandas.DataFrame,
+    values: pandas.Series,
+    edges: Sequence[np.ndarray],
+    *,
+    title: str,
+    **look: Any,
+) -> None:
+    """Colours the cell of each gait by its value."""
+    grid = np.full([len(edge) - 1 for edge in edges], np.nan)
+    grid[tuple(gaits[CELLS].to_numpy().T)] = values
+    mesh = axes.pcolormesh(*edges, grid.T, rasterized=True, **look)
+    axes.figure.colorbar(mesh, ax=axes, label=title)
+    axes.grid(visible=False)
+
+
+def _middles(gaits: Any, edges: Sequence[np.ndarray]) -> list[Any]:
+    """The middles of the cells of one gait or a table of gaits, along each axis."""
+    pairs = zip(edges, CELLS, strict=True)
+    return [(edge[:-1] + edge[1:])[gaits[cell]] / 2.0 for edge, cell in pairs]
+
+
+def _edges(name: str, limits: Sequence[float], count: int) -> np.ndarray:
+    low, high = limits
     return np.linspace(low, high, count + 1) / customary(METRICS[name])[0]
 
 
-def _label(kind: QualityDiversity, axis: int) -> str:
-    name = list(kind.measures)[axis]
+def _label(name: str) -> str:
     unit = customary(METRICS[name])[1]
     return name.replace("_", " ") + f" ({unit})" * bool(unit)

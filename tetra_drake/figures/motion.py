@@ -35,7 +35,7 @@ OVERHEAD, SIDE = (X, Y), (X, Z)
 """World axes shown by a view, across and up the page."""
 
 _PITCH_IN = 7.3
-"""Distance between the rows of a time lapse, in inches of the robot's world, at least."""
+"""Least distance between the rows of a time lapse, in inches of the robot's world."""
 
 _MARGIN_IN = 0.6
 """Free space around a time lapse, in inches of the robot's world."""
@@ -44,7 +44,7 @@ _NAME_WIDTH, _NAME_HEIGHT = 0.33, 0.2
 """Room for the name of a tetrahedron, in inches on paper."""
 
 _PATHS = 12
-"""Most panels of paths side by side."""
+"""Largest number of panels of paths side by side."""
 
 _PROFILE_IN = 0.05
 """Distance between points of the ground's profile, in inches."""
@@ -53,7 +53,7 @@ _ARROW = 0.08
 """Length of an arrow over that of the path."""
 
 _PATH_ON_PAPER = 6.0, 5.0
-"""Width and height of the path of the centre on paper, in inches, at most."""
+"""Largest width and height of the path of the centre on paper, in inches."""
 
 _ON_GROUND: Any = {"color": "0.25", "linewidth": 0.8, "linestyle": "-"}
 _LIFTED: Any = {"color": OKABE_ITO["vermillion"], "linewidth": 1.6, "linestyle": "-"}
@@ -169,8 +169,10 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
     second half of the trajectory, its last quarter is shown."""
     ends = measures.last_step(trajectory)
     start, end = ends or (float(trajectory.time.quantile(0.75)), float(trajectory.time[-1]))
-    why = "\nno step, as no signal has two periods in the second half"
-    what, why = ("one step", "") if ends else ("the end", why)
+    title = f"Time lapse of one step, {start:.2f} to {end:.2f} s"
+    if ends is None:
+        title = f"Time lapse of the end, {start:.2f} to {end:.2f} s\n"
+        title += "no step, as no signal has two periods in the second half"
     step = trajectory.sel(time=slice(start, end))
     inches, off, since = step.p_WN.values / INCH, measures.lifted(step), step.time - step.time[0]
     rows = []
@@ -197,13 +199,13 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
     _draw_paths(below, step, off, ground)
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
     legend_below(figure, {**lines, "path of the bottom nodes": _PATH})
-    figure.suptitle(f"Time lapse of {what}, {start:.2f} to {end:.2f} s{why}")
+    figure.suptitle(title)
     return figure
 
 
 def _profile(nodes: np.ndarray, sample: int, ground: Ground) -> np.ndarray:
-    """Points (points, 3) of the ground along x wherever nodes (samples, n, 4, 3) are, at their mean
-    y in a sample; in inches."""
+    """Points (points, 3) of the ground along x, in inches, wherever nodes (samples, n, 4, 3) are,
+    at their mean y in a sample."""
     x, y = nodes[..., X], nodes[sample, ..., Y].mean()
     along = np.arange(x.min() - _MARGIN_IN, x.max() + _MARGIN_IN, _PROFILE_IN)
     x_y = np.column_stack([along, np.full_like(along, y)])
@@ -247,7 +249,7 @@ class _Row:
     styles: Sequence[Any]
     """Line style of each tetrahedron."""
     paths: np.ndarray
-    """(samples, nodes, 3): where some nodes have been."""
+    """(samples, nodes, 3): earlier positions of some nodes."""
     path_style: Any
     profile: np.ndarray | None = None
     """(points, 3) of the ground, for views from the side."""

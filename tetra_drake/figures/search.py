@@ -1,4 +1,4 @@
-"""How well runs search, as a figure and files."""
+"""The search of several runs, compared, as a figure and files."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from tetra_drake.figures.style import (
 from tetra_drake.scenario.units import shown
 
 _LEGEND_WIDTH = 60
-"""Letters below an axis."""
+"""Largest number of letters in a row of the legend, per panel."""
 
 _FIRST = 10
-"""Where the axes of costs begin."""
+"""Beginning of the axes of costs, in simulations."""
 
 
 def save_comparison(compared: Compared, folder: Path) -> list[str]:

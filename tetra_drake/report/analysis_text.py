@@ -1,4 +1,4 @@
-"""What `robustness` and `compare` print: tables of an analysis, distances in inches."""
+"""Texts that `robustness` and `compare` print: tables of an analysis, distances in inches."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     import pandas
 
 _LONGEST_NAME = 12
-"""Letters of a gait's name; longer ones are cut."""
+"""Largest number of letters of a gait's name; longer ones are cut."""
 
 
 def robustness_text(judgement: Judgement) -> str:
-    """How far gaits walk under disturbances, and which of these hurt most."""
+    """Tables of the distances of gaits under disturbances, and of which of these hurt most."""
     gaits, count = by_gait(judgement), judgement.draws["draw"].nunique()
     require = bool(judgement.scenario.require)
     misses = " and misses no requirement" if require else ""
@@ -66,7 +66,7 @@ def _changes_table(changes: pandas.DataFrame) -> Table:
 
 
 def comparison_text(compared: Compared) -> str:
-    """How well runs search, side by side."""
+    """Tables of the fitness and the distances that runs reach, side by side."""
     texts = [
         f"Fitness of the best of each trial after {compared.common} simulations, where the "
         "shortest run ends, and\nin the end: interquartile mean over trials, in brackets its 95 % "

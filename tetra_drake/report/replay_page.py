@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.source import load_source
 from tetra_drake.files import check_folder
-from tetra_drake.report.result_folder import RESULT, RUN_MANIFEST, StoredResult, load_result_folder
-from tetra_drake.visualization.replay import save_replay
+from tetra_drake.report.result_folder import (
+    RESULT,
+    RUN_MANIFEST,
+    GaitMotion,
+    load_result_folder,
+    simulate_gait,
+)
 
 
 def write_replay(
@@ -21,25 +25,19 @@ def write_replay(
     viewer: Path | None = None,
     warn: Callable[[str], None] = lambda text: None,
 ) -> str:
-    """Writes the replay page of what load_or_simulate() finds; returns the page's title.
+    """Writes the replay page of a result folder, a gait file or a run; returns the page's title.
 
-    With `viewer`, a file, the page shares Meshcat's script with others (see save_replay); `warn` as
-    of load_source().
+    With `viewer`, a file, the page shares Meshcat's script with others (see save_replay); `warn`:
+    see load_source().
     Raises InputError, before anything is simulated, if the files cannot be written.
     """
     for file in (out,) if viewer is None else (out, viewer):
         if file.is_dir():
             raise InputError(file, "", "is a directory, expected a file to write")
         check_folder(file.parent)
-    stored = load_or_simulate(source, scenario=scenario, warn=warn)
-    save_replay(
-        out,
-        scenario=stored.scenario,
-        trajectory=stored.trajectory,
-        title=stored.title,
-        viewer=viewer,
-    )
-    return stored.title
+    motion = load_or_simulate(source, scenario=scenario, warn=warn)
+    motion.save_replay(out, viewer=viewer)
+    return motion.title
 
 
 def load_or_simulate(
@@ -47,10 +45,10 @@ def load_or_simulate(
     *,
     scenario: str | None = None,
     warn: Callable[[str], None] = lambda text: None,
-) -> StoredResult:
+) -> GaitMotion:
     """The motion in a result folder, or of a gait file or a run's fittest gait, simulated.
 
-    `scenario` is for gait files, `warn` as of load_source(); folders have their own scenarios.
+    `scenario` is for gait files only, as folders have scenarios; `warn`: see load_source().
     Raises InputError if there is no motion, or if a scenario is given for a folder, and
     SimulationFailure.
     """
@@ -62,6 +60,4 @@ def load_or_simulate(
     if not source.is_file() and not is_run:
         raise InputError(source, "", "expected a folder of `simulate` or `evolve`, or a gait file")
     loaded = load_source(source, scenario=scenario, warn=warn)
-    result = simulate(scenario=loaded.scenario, gait=loaded.best, record=True)
-    assert result.trajectory is not None
-    return StoredResult(loaded.scenario, loaded.best, result.trajectory, vars(result.metrics))
+    return simulate_gait(loaded.scenario, loaded.best)

@@ -39,20 +39,41 @@ RUN_MANIFEST = "manifest.json"
 
 
 @dataclass(frozen=True)
-class StoredResult:
-    """The motion of one gait, with all that is needed to show it."""
+class GaitMotion:
+    """A gait and its motion, with all that is needed to show it."""
 
     scenario: Scenario
     gait: Gait
     trajectory: xarray.Dataset
-    """See results.trajectory.assemble_dataset."""
+    """Motion and forces; see results.trajectory.assemble_dataset."""
     metrics: Mapping[str, float]
-    """By the names of METRICS, in SI."""
+    """Values in SI of all METRICS."""
 
     @property
     def title(self) -> str:
         """The gait's name and what it did."""
         return f"{self.gait.name}: {headline(self.scenario, self.metrics)}"
+
+    def save_replay(self, path: Path, *, viewer: Path | None = None) -> None:
+        """Writes the page that plays the motion; see visualization.replay.save_replay."""
+        from tetra_drake.visualization.replay import save_replay
+
+        save_replay(
+            path,
+            scenario=self.scenario,
+            trajectory=self.trajectory,
+            title=self.title,
+            viewer=viewer,
+        )
+
+
+def simulate_gait(scenario: Scenario, gait: Gait) -> GaitMotion:
+    """Simulates a gait and keeps its motion. Raises SimulationFailure."""
+    from tetra_drake.engines.simulate import simulate
+
+    result = simulate(scenario=scenario, gait=gait, record=True)
+    assert result.trajectory is not None
+    return GaitMotion(scenario, gait, result.trajectory, vars(result.metrics))
 
 
 def check_result_folder(folder: Path) -> None:
@@ -71,21 +92,19 @@ def save_result_folder(
     """
     from tetra_drake.results.result import save_result
     from tetra_drake.results.trajectory import save_dataset
-    from tetra_drake.visualization.replay import save_replay
 
-    trajectory = result.trajectory
-    assert trajectory is not None
+    assert result.trajectory is not None
+    motion = GaitMotion(scenario, gait, result.trajectory, vars(result.metrics))
     # Written last and removed first: where there is a result.json, the other files belong to it.
     if (folder / RESULT).is_file():
         (folder / RESULT).unlink()
     write_whole(folder / SCENARIO, dump_scenario(scenario))
-    save_dataset(trajectory, folder / TRAJECTORY)
-    title = StoredResult(scenario, gait, trajectory, vars(result.metrics)).title
-    save_replay(folder / REPLAY, scenario=scenario, trajectory=trajectory, title=title)
+    save_dataset(motion.trajectory, folder / TRAJECTORY)
+    motion.save_replay(folder / REPLAY)
     save_result(folder / RESULT, scenario, gait, result)
 
 
-def load_result_folder(folder: Path) -> StoredResult:
+def load_result_folder(folder: Path) -> GaitMotion:
     """Reads a simulation's scenario, gait and trajectory back.
 
     Raises InputError, naming the file, if one is missing, damaged, or not of this scenario.
@@ -96,7 +115,7 @@ def load_result_folder(folder: Path) -> StoredResult:
             raise InputError(folder, name, problem)
     scenario = load_scenario(folder / SCENARIO)
     structure = MakeStructure(scenario)
-    return StoredResult(
+    return GaitMotion(
         scenario=scenario,
         gait=load_gait(folder / RESULT, scenario, key="gait"),
         trajectory=_load_trajectory(folder / TRAJECTORY, structure),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
@@ -14,19 +13,18 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
 from tetra_drake.evolution.manifest import SCENARIO
 from tetra_drake.evolution.run import gait_label, load_run
-from tetra_drake.figures.book import draw_run, draw_trajectory
-from tetra_drake.figures.study import Study, simulate_again, study_run
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, fixed, render
 from tetra_drake.machine import versions
+from tetra_drake.report.book import draw_run, draw_trajectory
 from tetra_drake.report.result_folder import RESULT, RUN_MANIFEST, load_result_folder
+from tetra_drake.report.study import Study, simulate_again, study_run
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import ParameterSpace, save_gait
 from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
 from tetra_drake.scenario.metric_units import METRICS, inverse
 from tetra_drake.scenario.units import shown
-from tetra_drake.visualization.replay import save_replay
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites.csv"
@@ -63,10 +61,9 @@ def write_report(directory: Path) -> list[Path]:
     """
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
     study = study_run(load_run(directory))
-    scenario, best = study.run.manifest.scenario, study.best
     captions = draw_run(study, figures)
     _write_map(study, directory)
-    save_replay(replay, scenario=scenario, trajectory=best.trajectory, title=best.title)
+    study.best.motion.save_replay(replay)
     write_whole(report, render_report(study, captions, folder=figures))
     return [figures, replay, report]
 
@@ -74,16 +71,16 @@ def write_report(directory: Path) -> list[Path]:
 def _write_map(study: Study, directory: Path) -> None:
     """Writes all gaits of the run's map as a table, and the chosen ones as gait files and, but for
     the run's best, replay pages."""
-    run, scenario = study.run, study.run.manifest.scenario
+    run = study.run
     on_map = distinct_gaits(chosen(run))
     if on_map:
         write_whole(directory / ELITES / ELITES_CSV, elites(run).to_csv(index=False))
     for names, row in on_map:
-        motion = simulate_again(run, row["trial"], row["index"])
-        file, page = (directory / each for each in _map_files(names, row, study))
-        save_gait(motion.gait, file, scenario)
-        if page != directory / REPLAY:
-            save_replay(page, scenario=scenario, trajectory=motion.trajectory, title=motion.title)
+        motion = simulate_again(run, row["trial"], row["index"]).motion
+        gait_file, page = _map_files(names, row, study)
+        save_gait(motion.gait, directory / gait_file, motion.scenario)
+        if page != Path(REPLAY):
+            motion.save_replay(directory / page)
 
 
 def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[Path, Path]:
@@ -94,21 +91,23 @@ def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[
 
 
 def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) -> str:
-    """The page, with the pictures in `folder` by name and caption in it; its links are relative."""
+    """The report as HTML, with the pictures in `folder`, whose captions are given by name."""
     run, manifest = study.run, study.run.manifest
     best_gait = trial_folder(Path(), study.trial) / BEST_GAIT
     named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded}
     gaits, on_map = distinct_gaits(named), distinct_gaits(chosen(run))
-    on_map_files = {n: _map_files(each, gait, study) for each, gait in on_map for n in each}
+    on_map_files = {
+        name: _map_files(names, gait, study) for names, gait in on_map for name in names
+    }
     space = ParameterSpace.of(manifest.scenario)
-    best_values = zip(space.names, space.vector(study.best.gait), strict=True)
+    best_values = zip(space.names, space.vector(study.best.motion.gait), strict=True)
     parameters = [[name, fixed(value, 4)] for name, value in best_values]
     again, changed = {}, {}
-    for motion in (study.best, study.initial):
-        again[motion.label] = motion.distance_in
-        change = abs(motion.distance_in - motion.recorded["distance_in"])
+    for gait in (study.best, study.initial):
+        again[gait.label] = gait.distance_in
+        change = abs(gait.distance_in - gait.recorded["distance_in"])
         if change > 1e-6:
-            changed[motion.label] = change
+            changed[gait.label] = change
     return render(
         "report/report.html.jinja",
         run=run,
@@ -119,7 +118,6 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         again=again,
         changed=changed,
         versions=versions(),
-        json=json.dumps,
         differences=differences(manifest.scenario, load_scenario("thesis")),
         results=results(run),
         trials=trials_table(run),
@@ -143,17 +141,15 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
 
 
 def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str]) -> str:
-    """Numbers by names of metrics as a scenario has them, each in what `unit_of` makes of that
-    metric's unit."""
+    """Weights or limits of metrics as text; `unit_of` makes their unit from the metric's."""
     return ", ".join(f"{n}: {shown(x, unit_of(METRICS[n]))}" for n, x in weights.items())
 
 
 def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]]) -> Table:
-    """The metrics of gaits that have names."""
     return metrics_table({names[0]: gait for names, gait in gaits})
 
 
 def _embedded(picture: Path) -> str:
-    """As the URL of an image of its own, so that no two drawings share names within the page."""
+    """A picture as the URL of an image, so that no two drawings share names within the page."""
     svg = " ".join(picture.read_text(encoding="utf-8").split())
     return "data:image/svg+xml," + quote(svg, safe=" /:=,;()!?*+@$")  # base64 is a fifth longer

@@ -12,8 +12,7 @@ import numpy as np
 from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.evolution.trials import TrialStatus
-from tetra_drake.formatting import Table, duration, fixed, signed
-from tetra_drake.machine import available_cores
+from tetra_drake.formatting import Table, fixed, signed
 from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
@@ -31,8 +30,8 @@ if TYPE_CHECKING:
 
 
 def metrics_table(gaits: Mapping[str, Mapping[str, Any] | pandas.Series]) -> Table:
-    """Fitness and metrics of gaits, a column for each, given as rows of `Run.evaluations`; what
-    none of them has, as in older records, is left out."""
+    """Fitness and metrics of gaits, a column for each, given as rows of `Run.evaluations`; metrics
+    that none of them has are left out."""
     columns = [*gaits.values()]
     rows = [["fitness", *(fixed(gait["fitness"], 3) for gait in columns)]]
     for name, unit in METRICS.items():
@@ -44,9 +43,9 @@ def metrics_table(gaits: Mapping[str, Mapping[str, Any] | pandas.Series]) -> Tab
             rows.append(["distance, worst draw (in)", *(fixed(inches, 3) for inches in worst)])
     kept = (gait.get("kept", math.nan) for gait in columns)
     rows.append(["draws kept, disturbed (%)", *(fixed(100.0 * share, 0) for share in kept)])
-    shares = [[x for name, x in gait.items() if name.startswith("lifted_T")] for gait in columns]
-    lifted = [" ".join(fixed(100.0 * share, 0) for share in each) for each in shares]
-    rows.append([f"lifted, T1 to T{len(shares[0])} (%)", *lifted])
+    bodies = [name for name in dict(columns[0]) if name.startswith("lifted_T")]
+    lifted = [" ".join(fixed(100.0 * gait[name], 0) for name in bodies) for gait in columns]
+    rows.append([f"lifted, T1 to T{len(bodies)} (%)", *lifted])
     with_numbers = [row for row in rows if any(value.strip("- ") for value in row[1:])]
     return Table(["", *gaits], with_numbers)
 
@@ -69,7 +68,7 @@ def result_text(scenario: Scenario, gait: Gait, result: SimulationResult) -> str
 
 
 def _work_text(result: SimulationResult) -> str:
-    """What the integrator of an engine was asked for, and what it took."""
+    """Scheme, tolerance and steps of a simulation's integrator."""
     work = result.integrator
     if result.engine == "mujoco":
         return f"{work.scheme}, {work.steps} steps of {1e3 * work.accuracy:g} ms"
@@ -79,10 +78,10 @@ def _work_text(result: SimulationResult) -> str:
 
 
 def ground_text(scenario: Scenario) -> str:
-    """On what the robot walks, in a line; empty for the thesis's flat ground and friction.
+    """Terrain and friction in a line; empty for the thesis's flat ground and friction.
 
-    As "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)". Lengths are in inches;
-    values that are their defaults are left out, but for the coefficients of friction.
+    For example, "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)". Lengths are
+    in inches; values that are their defaults are left out, but for the coefficients of friction.
     """
     terrain, law = scenario.terrain, scenario.friction
     if isinstance(law, Coulomb):
@@ -149,18 +148,6 @@ def trials_table(run: Run) -> Table:
 
 def _rise(before: float, after: float) -> str:
     return f"{fixed(before)} → {fixed(after)}"
-
-
-def whole_experiment(scenario: Scenario, *, seconds: float) -> str:
-    """What evolving on a whole scenario takes on this machine's cores, and its command; seconds:
-    wall time per evaluation on the compiled engine."""
-    settings, cores, name = scenario.evolution, available_cores(), scenario.name
-    time = duration(settings.trials * settings.evaluations * seconds / cores)
-    return (
-        f"this is a first look; scenario {name}, {settings.trials} trials of at most "
-        f"{settings.evaluations} evaluations, takes about {time} (h:mm:ss) on the {cores} cores "
-        f"here: tetra-drake evolve --scenario {name} --engine compiled --out runs/{name}"
-    )
 
 
 def results(run: Run) -> list[tuple[str, str]]:

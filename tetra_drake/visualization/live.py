@@ -57,7 +57,7 @@ class LiveView:
         set_surroundings(meshcat, self._structure, self._ground, points)
 
     def wants(self, time: float) -> bool:
-        """Whether the frame before is over at this time (s)."""
+        """True if the frame before is over at this time (s)."""
         return time >= self._due
 
     def show(self, frame: xarray.Dataset) -> None:

@@ -9,7 +9,6 @@ import logging
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -20,8 +19,9 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import render
+from tetra_drake.physics.contact import Ground
 from tetra_drake.robot.ground import make_ground
-from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, MakeStructure
+from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.visualization.scene import (
     ASPECT,
@@ -42,8 +42,8 @@ FRAMES_PER_SECOND = 25.0
 """Key frames per second of motion, at most."""
 
 RESOLUTION = 2.0**-16
-"""To what pages round positions and sizes (m) and quaternions; 15 s of the thesis's robot then take
-0.2 MB, and Meshcat's script 1 MB."""
+"""Step to which pages round positions and sizes (m) and quaternions; 15 s of the thesis's robot
+then take 0.2 MB, and Meshcat's script 1 MB."""
 
 TRACE_FRAMES = 5
 """Key frames per piece of the traces, each of which becomes visible when it ends."""
@@ -52,7 +52,7 @@ TICKS_PER_SECOND = 100_000
 """Resolution of the time of key frames: Meshcat counts in integers."""
 
 REPETITIONS = 1_000_000
-"""How often the motion is played before it stops."""
+"""Number of times that the motion is played before it stops."""
 
 LEGEND = {
     "actuated": "actuated cable",
@@ -63,30 +63,6 @@ LEGEND = {
     "trace": "path of the bottom nodes",
     "forward": "arrow on the floor: forward (+x)",
 }
-
-
-@dataclass(frozen=True)
-class Film:
-    """What moves in a scene, and when."""
-
-    ticks: list[int]
-    """Of the key frames, from 0."""
-    motions: list[Motion]
-    """Over these frames."""
-    traces: dict[str, int]
-    """By path in the scene: the tick when a piece becomes visible."""
-
-    def packed(self) -> dict[str, Any]:
-        """The film as overlay.html.jinja plays it, small when compressed: motions are steps from
-        frame to frame, the first one from 0, in RESOLUTION, in a row for each component."""
-        return {
-            "per_second": TICKS_PER_SECOND,
-            "resolution": RESOLUTION,
-            "repetitions": REPETITIONS,
-            "ticks": self.ticks,
-            "motions": {motion.path: _steps(motion) for motion in self.motions},
-            "traces": self.traces,
-        }
 
 
 def save_replay(
@@ -107,22 +83,26 @@ def save_replay(
     """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     structure = MakeStructure(scenario)
-    add_robot(meshcat, structure)
-    film = add_film(meshcat, scenario=scenario, trajectory=trajectory)
+    film = _add_film(meshcat, structure, make_ground(scenario, structure), trajectory)
     absent = set(CABLE_KINDS) - {cable_kind(cable) for cable in structure.cables}
     legend = {name: meaning for name, meaning in LEGEND.items() if name not in absent}
     page = meshcat.StaticHtml()
     if viewer is not None:
-        page, script = _without_viewer(page, address=_relative(viewer, Path(path).parent))
-        _write_once(viewer, script)
+        address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
+        page, script = _without_viewer(page, address=address)
+        _write_once(Path(viewer), script)
     write_whole(path, pack_page(_with_overlay(page, title, legend, film), title=title))
 
 
-def add_film(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset) -> Film:
-    """Sets the first frame of a trajectory, its surroundings and its traces in a Meshcat that shows
-    the scenario's robot (scene.add_robot), but plays nothing."""
-    structure = MakeStructure(scenario)
-    ground = make_ground(scenario, structure)
+def _add_film(
+    meshcat: Meshcat, structure: Structure, ground: Ground, trajectory: xarray.Dataset
+) -> dict[str, Any]:
+    """Adds robot, surroundings and traces in the first frame; returns the film.
+
+    It is what overlay.html.jinja plays, small when compressed: motions are steps from frame to
+    frame, the first one from 0, in RESOLUTION, in a row for each component.
+    """
+    add_robot(meshcat, structure)
     set_surroundings(meshcat, structure, ground, trajectory["p_WN"].values)
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     times = frames["time"].values
@@ -131,11 +111,18 @@ def add_film(meshcat: Meshcat, *, scenario: Scenario, trajectory: xarray.Dataset
     for motion in moving:
         meshcat.SetTransform(motion.path, motion.matrix(0))
     bottom = _rounded(frames["p_WN"].values[:, :, [BOTTOM_LEFT, BOTTOM_RIGHT]]) * RESOLUTION
-    return Film(ticks, moving, _add_traces(meshcat, bottom, ticks))
+    return {
+        "per_second": TICKS_PER_SECOND,
+        "resolution": RESOLUTION,
+        "repetitions": REPETITIONS,
+        "ticks": ticks,
+        "motions": {motion.path: _steps(motion) for motion in moving},
+        "traces": _add_traces(meshcat, bottom, ticks),
+    }
 
 
 def _add_traces(meshcat: Meshcat, paths: np.ndarray, ticks: list[int]) -> dict[str, int]:
-    """Paths (frames, ..., 3) in m of nodes, in pieces; returns when each has been walked."""
+    """Adds paths (frames, ..., 3) in m in pieces; returns the tick at which a piece is walked."""
     steps = np.stack([paths[:-1], paths[1:]]).reshape(2, len(paths) - 1, -1, 3)
     traces = {}
     for first in range(0, len(paths) - 1, TRACE_FRAMES):
@@ -153,7 +140,7 @@ def _rounded(values: np.ndarray) -> np.ndarray:
 
 
 def _steps(motion: Motion) -> dict[str, list[list[int]]]:
-    """By property of the object: a row of steps for each component (see Film.packed)."""
+    """Steps in RESOLUTION of the object's properties, a row for each component."""
     values = {"position": motion.positions, "scale": motion.scales}
     if motion.quaternions is not None:
         values["quaternion"] = np.roll(motion.quaternions, -1, axis=1)  # x y z w
@@ -164,14 +151,14 @@ def _steps(motion: Motion) -> dict[str, list[list[int]]]:
     }
 
 
-def frame_samples(times: np.ndarray, rate: float = FRAMES_PER_SECOND) -> np.ndarray:
-    """Indices of the samples to show, at most `rate` per second, the first and the last included.
+def frame_samples(times: np.ndarray) -> np.ndarray:
+    """Indices of the samples to show, the first and the last included.
 
     `times` (samples,) in s, evenly spaced.
     """
-    frames = min(int((times[-1] - times[0]) * rate + 1e-9) + 1, len(times))
-    chosen = np.linspace(0, len(times) - 1, max(frames, min(len(times), 2)))
-    return chosen.round().astype(int)
+    frames = min(int((times[-1] - times[0]) * FRAMES_PER_SECOND + 1e-9) + 1, len(times))
+    samples = np.linspace(0, len(times) - 1, max(frames, min(len(times), 2)))
+    return samples.round().astype(int)
 
 
 def quiet_meshcat(params: MeshcatParams) -> Meshcat:
@@ -191,7 +178,7 @@ def pack_page(page: str, *, title: str) -> str:
     return render("visualization/packed_page.html.jinja", title=title, packed=packed)
 
 
-def _with_overlay(page: str, title: str, legend: Mapping[str, str], film: Film) -> str:
+def _with_overlay(page: str, title: str, legend: Mapping[str, str], film: Mapping[str, Any]) -> str:
     """Meshcat's page that plays a film, with a title, and over the scene a heading, a legend and a
     clock."""
     overlay = render(
@@ -199,7 +186,7 @@ def _with_overlay(page: str, title: str, legend: Mapping[str, str], film: Film) 
         title=title,
         legend=[(COLOURS[name], meaning) for name, meaning in legend.items()],
         aspect=ASPECT,
-        film=film.packed(),
+        film=film,
     )
     # Functions, as backslashes in a replacement text would mean something.
     named = f"<title>{html.escape(title)}</title>"
@@ -215,14 +202,8 @@ def _without_viewer(page: str, *, address: str) -> tuple[str, str]:
     return (before + after).replace("</head>", f"{reader}</head>", 1), script
 
 
-def _relative(path: str | Path, folder: Path) -> str:
-    """The address of a file as pages in a folder refer to it."""
-    return quote(Path(os.path.relpath(path, folder)).as_posix())
-
-
-def _write_once(path: str | Path, text: str) -> None:
+def _write_once(path: Path, text: str) -> None:
     """Writes a file unless it holds the text already; raises InputError if it holds another."""
-    path = Path(path)
     if not path.exists():
         write_whole(path, text)
     elif not path.is_file() or path.read_bytes() != text.encode("utf-8"):

@@ -67,11 +67,11 @@ MARGIN, UNEVEN_MARGIN = 2, 6
 _BEND = 1e-6  # m: a second difference of heights below which the ground is straight
 
 FINEST, MOST_POINTS = 12, 12_000
-"""Points per inch at which uneven ground is looked at, and in all that are drawn, about: they take
+"""Largest number of points per inch of uneven ground, and of all that are drawn, about: they take
 some 0.8 MB of a page."""
 
 RELIEF, WALL = 2.0, 0.25 * INCH
-"""How many times as steep slopes are shaded as they are; height of the lowest wall, in m."""
+"""Steepness with which slopes are shaded, over the true one; height of the lowest wall, in m."""
 
 _GAMMA = 2.2  # browsers take the colours of vertices as linear, others as sRGB
 
@@ -79,7 +79,7 @@ LIGHT = np.array([-0.5, 0.3, 0.8]) / np.linalg.norm([-0.5, 0.3, 0.8])
 """Direction to the light that shades uneven ground: from behind the robot and its left."""
 
 FIELD_OF_VIEW, ASPECT = 35.0, 1.7
-"""Of the camera: degrees top to bottom, and the width to height of a window it is placed for."""
+"""Camera's degrees from top to bottom, and width over height of the window it is placed for."""
 
 VIEW = -0.35, 1.0, -0.4
 """Direction in which the camera looks: from the robot's right and front, down on it."""
@@ -213,7 +213,7 @@ def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def rgba(name: str) -> Rgba:
-    """One of COLOURS, opaque."""
+    """Colour of this name in COLOURS, opaque."""
     red, green, blue = (value / 255 for value in bytes.fromhex(COLOURS[name][1:]))
     return Rgba(red, green, blue, 1.0)
 
@@ -230,14 +230,13 @@ def _add_tetrahedron(meshcat: Meshcat, structure: Structure, path: str, colour: 
 
 
 def cable_kind(cable: np.void) -> str:
-    """One of CABLE_KINDS."""
+    """Kind of a cable: one of CABLE_KINDS."""
     if cable["signal"] != PASSIVE:
         return "actuated"
     return "inner" if cable["node_a"] % len(NODES) == TIP else "outer"
 
 
 def _cable_path(cable: np.void, name: str) -> str:
-    """Path of a cable in the scene, in one folder per kind."""
     return f"/cables/{cable_kind(cable)}/{name}"
 
 

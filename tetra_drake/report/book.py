@@ -14,8 +14,8 @@ import xarray
 from tetra_drake.analysis.elites import elites
 from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.map import map_of_gaits
-from tetra_drake.figures.study import Study
 from tetra_drake.figures.style import save_figure
+from tetra_drake.report.study import Study
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import MakeStructure
 from tetra_drake.scenario.schema import Scenario
@@ -39,7 +39,7 @@ def draw_trajectory(trajectory: xarray.Dataset, scenario: Scenario, folder: Path
 
 
 def draw_run(study: Study, folder: Path) -> dict[str, str]:
-    """As draw_trajectory() of its best gait, with the figures of a run."""
+    """Writes the figures of a run and of its best gait; returns captions as draw_trajectory()."""
     run, initial, best = study.run, study.initial, study.best
     pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
     trials = fitness.initial_extremes(run).index
@@ -49,9 +49,9 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
         pictures.append((fitness.initial_fitness, run, study.trial))
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
-    walks = [(walk.label, walk.trajectory) for walk in (initial, best)]
+    walks = [(gait.label, gait.motion.trajectory) for gait in (initial, best)]
     pictures.append((motion.before_and_after, walks))
-    trajectory_figures = draw_trajectory(best.trajectory, run.manifest.scenario, folder)
+    trajectory_figures = draw_trajectory(best.motion.trajectory, run.manifest.scenario, folder)
     return _save(folder, *pictures) | trajectory_figures
 
 
