@@ -67,7 +67,7 @@ def parts_of_weight(scenario: Scenario) -> tuple[float, float]:
 
 def uphill(scenario: Scenario) -> np.ndarray:
     """(3,): unit vector up the slope."""
-    return start_axes(make_standing_tetrahedron(scenario))[0]
+    return start_axes(make_standing_tetrahedron(scenario).structure)[0]
 
 
 def travel(motion: Motion, scenario: Scenario) -> np.ndarray:

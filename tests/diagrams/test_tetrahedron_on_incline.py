@@ -40,7 +40,7 @@ from tetra_drake.scenario.units import INCH
 
 def centre_velocity(motion, scenario):
     """(samples, 3): that of the centre of mass along t1, t2 and the normal."""
-    return motion.v_WN.mean(axis=1) @ start_axes(make_standing_tetrahedron(scenario)).T
+    return motion.v_WN.mean(axis=1) @ start_axes(make_standing_tetrahedron(scenario).structure).T
 
 
 def slips(motion):
