@@ -7,8 +7,7 @@ from helpers.states import body_velocities
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.model import make_model
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot
 
 G = 9.80665
 FALLING = {
@@ -30,8 +29,8 @@ FALLING = {
 @pytest.mark.parametrize("engine", ["drake", "compiled"])
 def test_a_falling_robot_keeps_momentum_and_energy(scenario, engine):
     falling = scenario.with_changes({**FALLING, "simulation.engine": engine})
-    structure = MakeStructure(falling)
-    body = make_model(falling, structure).body
+    robot = Robot.of(falling)
+    structure, body = robot.structure, robot.model.body
     mass, moment = body.mass[0], body.moment[0]
     flight = simulate(scenario=falling, gait=seeded_gait(falling), record=True).trajectory
     assert flight is not None

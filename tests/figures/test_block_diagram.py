@@ -9,12 +9,13 @@ from pydrake.systems.primitives import Gain, Integrator
 
 from tetra_drake.figures.block_diagram import graphviz_source, save_block_diagram
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 @pytest.fixture
 def robot(scenario):
-    return MakeTensegrityDiagram(scenario, seeded_gait(scenario))
+    return MakeTensegrityDiagram(Robot.of(scenario), seeded_gait(scenario))
 
 
 def label(source, block):
