@@ -43,7 +43,7 @@ R_WB = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True)
-class Motion:
+class Samples:
     """Samples at the ends of steps, in SI units; contact nodes in the order of BASE."""
 
     times: np.ndarray
@@ -105,7 +105,7 @@ def make_diagram(scenario: Scenario, *, witness: bool = True) -> Diagram:
 
 def let_go(
     scenario: Scenario, *, height: float, velocity: Sequence[float], duration: float
-) -> Motion:
+) -> Samples:
     """Simulates the tetrahedron from `height` (m) of its base over the ground and `velocity` (3,)
     in m/s along t1, t2 and the ground's normal."""
     tetrahedron = make_standing_tetrahedron(scenario).structure
@@ -126,7 +126,7 @@ def let_go(
     def logged(port: str) -> np.ndarray:
         return diagram.GetSubsystemByName(f"{port}_log").FindLog(context).data().T
 
-    return Motion(
+    return Samples(
         times=diagram.GetSubsystemByName("state_log").FindLog(context).sample_times(),
         p_WN=np.array([node_positions(tetrahedron, state) for state in logged("state")]),
         v_WN=np.array([node_velocities(tetrahedron, state) for state in logged("state")]),

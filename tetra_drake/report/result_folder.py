@@ -45,7 +45,7 @@ class StoredResult:
     scenario: Scenario
     gait: Gait
     trajectory: xarray.Dataset
-    """See results.trajectory.assemble_dataset."""
+    """See results.trajectory.make_dataset."""
     metrics: Mapping[str, float]
     """By the names of METRICS, in SI."""
 
