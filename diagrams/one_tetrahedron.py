@@ -23,7 +23,8 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
-from tetra_drake.robot.bodies import AddTetrahedra, tetrahedron_inertia
+from tetra_drake.robot.bodies import AddTetrahedra
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import (
     BASE,
     BOTTOM_LEFT,
@@ -42,7 +43,7 @@ R_WB = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True)
-class Motion:
+class Samples:
     """Samples at the ends of steps, in SI units; contact nodes in the order of BASE."""
 
     times: np.ndarray
@@ -58,22 +59,23 @@ class Motion:
     """(samples, 3, 3): contact, and friction modes along t1 and t2, as GroundContact has them."""
 
 
-def make_standing_tetrahedron(scenario: Scenario) -> Structure:
+def make_standing_tetrahedron(scenario: Scenario) -> Robot:
     """One tetrahedron of the robot, without cables, with its base on the ground around the origin.
 
     Its body frame is turned with it, which its inertia, the same about all axes, allows.
     """
-    robot = MakeStructure(scenario)
-    p_BN = robot.p_BN @ R_WB.T
-    return dataclasses.replace(
-        robot,
+    row = MakeStructure(scenario)
+    p_BN = row.p_BN @ R_WB.T
+    tetrahedron = dataclasses.replace(
+        row,
         bodies=("T1",),
         p_BN=p_BN,
-        p_WB=-p_BN[TRAILING, 2] * start_axes(robot)[None, 2],
-        cables=robot.cables[:0],
+        p_WB=-p_BN[TRAILING, 2] * start_axes(row)[None, 2],
+        cables=row.cables[:0],
         cable_names=(),
         contacts=np.array(BASE),
     )
+    return Robot.of(scenario, tetrahedron)
 
 
 def start_axes(structure: Structure) -> np.ndarray:
@@ -87,11 +89,10 @@ def make_diagram(scenario: Scenario, *, witness: bool = True) -> Diagram:
     tetrahedron = make_standing_tetrahedron(scenario)
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-    AddTetrahedra(plant, tetrahedron)
+    AddTetrahedra(plant, tetrahedron.structure)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
-    contact = GroundContact(tetrahedron, scenario, witness=witness)
-    ground = builder.AddNamedSystem("ground", contact)
+    ground = builder.AddNamedSystem("ground", GroundContact(tetrahedron, witness=witness))
 
     state, force = plant.get_state_output_port(), ground.GetOutputPort("generalized_force")
     builder.Connect(state, ground.GetInputPort("state"))
@@ -104,10 +105,11 @@ def make_diagram(scenario: Scenario, *, witness: bool = True) -> Diagram:
 
 def let_go(
     scenario: Scenario, *, height: float, velocity: Sequence[float], duration: float
-) -> Motion:
+) -> Samples:
     """Simulates the tetrahedron from `height` (m) of its base over the ground and `velocity` (3,)
     in m/s along t1, t2 and the ground's normal."""
-    tetrahedron, diagram = make_standing_tetrahedron(scenario), make_diagram(scenario)
+    tetrahedron = make_standing_tetrahedron(scenario).structure
+    diagram = make_diagram(scenario)
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-4).set_target_accuracy(1e-4)
     context = simulator.get_mutable_context()
@@ -124,7 +126,7 @@ def let_go(
     def logged(port: str) -> np.ndarray:
         return diagram.GetSubsystemByName(f"{port}_log").FindLog(context).data().T
 
-    return Motion(
+    return Samples(
         times=diagram.GetSubsystemByName("state_log").FindLog(context).sample_times(),
         p_WN=np.array([node_positions(tetrahedron, state) for state in logged("state")]),
         v_WN=np.array([node_velocities(tetrahedron, state) for state in logged("state")]),
@@ -136,6 +138,4 @@ def let_go(
 
 def weight(scenario: Scenario) -> float:
     """Weight of one tetrahedron in N."""
-    return (
-        tetrahedron_inertia(make_standing_tetrahedron(scenario)).get_mass() * scenario.robot.gravity
-    )
+    return make_standing_tetrahedron(scenario).weight

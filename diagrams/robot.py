@@ -27,11 +27,11 @@ from pathlib import Path
 from block_diagram import save_block_diagram
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from tetra_drake.engines.sampler import Sampler, make_dataset
+from tetra_drake.engines.sampler import Sampler
 from tetra_drake.results.measures import distance_walked
-from tetra_drake.results.trajectory import sample_times
+from tetra_drake.results.trajectory import make_dataset, sample_times
 from tetra_drake.robot.gait import load_gait
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.units import INCH
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
@@ -45,18 +45,18 @@ def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = DIA
     """Simulates the beginning of a gait and writes the pictures."""
     scenario = load_scenario("thesis")
     gait = load_gait(gait_file, scenario)
-    diagram = MakeTensegrityDiagram(scenario, gait)
+    robot = Robot.of(scenario)
+    diagram = MakeTensegrityDiagram(robot, gait)
     save_block_diagram(diagram, out / "robot.svg")
 
     # Contact and stiction change where a step ends, so no step may be long.
     simulator = Simulator(diagram)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.001)
-    structure = MakeStructure(scenario)
-    sampler = Sampler(structure, sample_times(duration, 0.01))
+    sampler = Sampler(diagram, sample_times(duration, 0.01))
     simulator.set_monitor(sampler.after_step)
     simulator.AdvanceTo(duration)
 
-    trajectory = make_dataset(diagram, structure, sampler.samples)
+    trajectory = make_dataset(robot, sampler.motion())
     inches = float(distance_walked(trajectory)[-1]) / INCH
     title = f"{gait.name}: {inches:.2f} inches in {duration:g} s"
     save_replay(out / "robot.html", scenario=scenario, trajectory=trajectory, title=title)

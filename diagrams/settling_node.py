@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from block_diagram import save_block_diagram
 from matplotlib.figure import Figure
-from one_tetrahedron import TRAILING, Motion, let_go, make_diagram
+from one_tetrahedron import TRAILING, Samples, let_go, make_diagram
 
 from tetra_drake.figures.style import common_style, make_figure, save_figure
 from tetra_drake.scenario.load import load_scenario
@@ -29,20 +29,20 @@ THESIS_RESTITUTION = 0.9
 DURATION = 0.04  # s
 
 
-def settle(scenario: Scenario) -> Motion:
+def settle(scenario: Scenario) -> Samples:
     """A fall from rest that meets the ground at IMPACT_SPEED."""
     height = IMPACT_SPEED**2 / (2.0 * scenario.robot.gravity)
     return let_go(scenario, height=height, velocity=[0.0, 0.0, 0.0], duration=DURATION)
 
 
-def bounce(scenario: Scenario, *, speed: float = IMPACT_SPEED) -> Motion:
+def bounce(scenario: Scenario, *, speed: float = IMPACT_SPEED) -> Samples:
     """An impact at `speed` (m/s) without gravity, 0.3 ms after the start."""
     weightless = scenario.with_changes({"robot.gravity": 0.0})
     velocity = [0.0, 0.0, -speed]
     return let_go(weightless, height=3e-4 * speed, velocity=velocity, duration=DURATION)
 
 
-def contact_speeds(motion: Motion) -> tuple[float, float]:
+def contact_speeds(motion: Samples) -> tuple[float, float]:
     """Speeds (m/s) at which a node first meets the ground and leaves it; NaN if it stays."""
     height, rate = motion.p_WN[:, TRAILING, 2], motion.v_WN[:, TRAILING, 2]
     first = int(np.argmax(height <= 0.0))
@@ -56,7 +56,7 @@ def velocity_correction(scenario: Scenario) -> float:
 
 
 @common_style()
-def draw(settling: Motion, bouncing: Motion) -> Figure:
+def draw(settling: Samples, bouncing: Samples) -> Figure:
     """Height and normal force of one node over time."""
     figure, axes = make_figure(width_in=7.0, height_in=5.0, rows=2, sharex=True)
     above, below = axes[:, 0]

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from one_tetrahedron import LEADING, TRAILING, Motion, let_go, weight
+from one_tetrahedron import LEADING, TRAILING, Samples, let_go, weight
 
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
 from tetra_drake.results.measures import intervals
@@ -29,29 +29,29 @@ from tetra_drake.scenario.units import INCH, POUND_FORCE
 INITIAL_SPEED = 30.0 * INCH  # m/s
 
 
-def slide(scenario: Scenario, *, speed: float = INITIAL_SPEED, duration: float = 0.1) -> Motion:
+def slide(scenario: Scenario, *, speed: float = INITIAL_SPEED, duration: float = 0.1) -> Samples:
     """A start at the forward `speed` (m/s) from where the ground bears the weight."""
     depth = weight(scenario) / (len(BASE) * scenario.ground.stiffness)
     return let_go(scenario, height=-depth, velocity=[speed, 0.0, 0.0], duration=duration)
 
 
-def slips(motion: Motion, node: int) -> list[tuple[float, float]]:
+def slips(motion: Samples, node: int) -> list[tuple[float, float]]:
     """Intervals (s) in which a contact node slips along x."""
     return intervals(motion.times, motion.modes[:, node, 1] != 0.0)
 
 
-def flights(motion: Motion, node: int) -> list[tuple[float, float]]:
+def flights(motion: Samples, node: int) -> list[tuple[float, float]]:
     """Intervals (s) in which a contact node is off the ground."""
     return intervals(motion.times, motion.modes[:, node, 0] == 0.0)
 
 
-def travel(motion: Motion, node: int) -> np.ndarray:
+def travel(motion: Samples, node: int) -> np.ndarray:
     """(samples,): displacement of a node along x in m."""
     return motion.p_WN[:, node, 0] - motion.p_WN[0, node, 0]
 
 
 @common_style()
-def draw(motion: Motion, *, stiction_range: float) -> Figure:
+def draw(motion: Samples, *, stiction_range: float) -> Figure:
     """Velocity, friction and travel of two nodes: at the start, and all the way to rest."""
     figure, axes = make_figure(width_in=8.0, height_in=6.5, rows=3, columns=2, sharex="col")
     milliseconds = 1e3 * motion.times

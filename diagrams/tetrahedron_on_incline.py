@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from one_tetrahedron import Motion, let_go, make_standing_tetrahedron, start_axes, weight
+from one_tetrahedron import Samples, let_go, make_standing_tetrahedron, start_axes, weight
 
 from tetra_drake.figures.style import OKABE_ITO, common_style, make_figure, save_figure
 from tetra_drake.robot.structure import BASE
@@ -41,7 +41,7 @@ OURS: Any = [
     {"color": OKABE_ITO[colour], "linestyle": "-", "linewidth": 3.0}
     for colour in ("sky_blue", "orange")
 ]
-Runs = dict[str, tuple[Scenario, Motion]]
+Runs = dict[str, tuple[Scenario, Samples]]
 
 
 def on_incline(slope: float, *, stiffness: float = STIFFNESS) -> Scenario:
@@ -52,7 +52,7 @@ def on_incline(slope: float, *, stiffness: float = STIFFNESS) -> Scenario:
     )
 
 
-def start(scenario: Scenario, *, speed: float = 0.0, duration: float) -> Motion:
+def start(scenario: Scenario, *, speed: float = 0.0, duration: float) -> Samples:
     """A start at `speed` (m/s) up the slope from where the ground bears the weight."""
     depth = parts_of_weight(scenario)[1] / (len(BASE) * scenario.ground.stiffness)
     return let_go(scenario, height=-depth, velocity=[speed, 0.0, 0.0], duration=duration)
@@ -67,25 +67,25 @@ def parts_of_weight(scenario: Scenario) -> tuple[float, float]:
 
 def uphill(scenario: Scenario) -> np.ndarray:
     """(3,): unit vector up the slope."""
-    return start_axes(make_standing_tetrahedron(scenario))[0]
+    return start_axes(make_standing_tetrahedron(scenario).structure)[0]
 
 
-def travel(motion: Motion, scenario: Scenario) -> np.ndarray:
+def travel(motion: Samples, scenario: Scenario) -> np.ndarray:
     """(samples,): displacement of the base up the slope in m."""
     return (motion.p_WN - motion.p_WN[0])[:, BASE].mean(axis=1) @ uphill(scenario)
 
 
-def velocity(motion: Motion, scenario: Scenario) -> np.ndarray:
+def velocity(motion: Samples, scenario: Scenario) -> np.ndarray:
     """(samples,): velocity of the base up the slope in m/s."""
     return motion.v_WN[:, BASE].mean(axis=1) @ uphill(scenario)
 
 
-def friction_ratio(motion: Motion) -> np.ndarray:
+def friction_ratio(motion: Samples) -> np.ndarray:
     """(samples,): friction up the slope over normal force, of all nodes together."""
     return motion.friction_forces[:, :, 0].sum(axis=1) / motion.normal_forces.sum(axis=1)
 
 
-def stopping(motion: Motion, scenario: Scenario) -> tuple[float, float]:
+def stopping(motion: Samples, scenario: Scenario) -> tuple[float, float]:
     """When (s) a tetrahedron thrown uphill stops, and how far up (m)."""
     first = int(np.argmax(velocity(motion, scenario) <= 0.0))
     return float(motion.times[first]), float(travel(motion, scenario)[first])
@@ -114,7 +114,7 @@ def acceleration(scenario: Scenario, *, way: float) -> float:
     return -scenario.robot.gravity * (down + way * law.kinetic * into) / weight(scenario)
 
 
-def analytic_travel(motion: Motion, scenario: Scenario) -> np.ndarray:
+def analytic_travel(motion: Samples, scenario: Scenario) -> np.ndarray:
     """(samples,): what `travel` should be, by how the motion starts."""
     law, times, speed = scenario.friction, motion.times, float(velocity(motion, scenario)[0])
     assert isinstance(law, Coulomb)

@@ -13,6 +13,7 @@ from tetra_drake.engines.compiled import lane_pool
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import open_trials, run_trials
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -48,6 +49,12 @@ def scenario() -> Scenario:
 def structure(scenario: Scenario) -> Structure:
     """That of the thesis's robot."""
     return MakeStructure(scenario)
+
+
+@pytest.fixture
+def robot(scenario: Scenario) -> Robot:
+    """The thesis's robot on its ground."""
+    return Robot.of(scenario)
 
 
 @pytest.fixture(autouse=True, scope="session")

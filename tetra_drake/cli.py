@@ -336,10 +336,11 @@ def _cpg(options: Options) -> None:
     shortens the cables that its oscillator drives. The file's first lines, which begin with #, say
     what each column is. Feedback depends on the robot: gaits with it are refused.
     """
+    from tetra_drake.robot.robot import Robot
     from tetra_drake.robot.signals import save_signals
 
     scenario, gait = _chosen_gait(options)
-    save_signals(options.out, scenario, gait)
+    save_signals(options.out, Robot.of(scenario), gait)
 
 
 def _add_scenario(command: Command, *, default: str) -> None:

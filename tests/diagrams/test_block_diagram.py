@@ -8,12 +8,13 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Gain, Integrator
 
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 @pytest.fixture
 def robot(scenario):
-    return MakeTensegrityDiagram(scenario, seeded_gait(scenario))
+    return MakeTensegrityDiagram(Robot.of(scenario), seeded_gait(scenario))
 
 
 def label(source, block):

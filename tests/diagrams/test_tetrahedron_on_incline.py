@@ -40,7 +40,7 @@ from tetra_drake.scenario.units import INCH
 
 def centre_velocity(motion, scenario):
     """(samples, 3): that of the centre of mass along t1, t2 and the normal."""
-    return motion.v_WN.mean(axis=1) @ start_axes(make_standing_tetrahedron(scenario)).T
+    return motion.v_WN.mean(axis=1) @ start_axes(make_standing_tetrahedron(scenario).structure).T
 
 
 def slips(motion):
@@ -50,7 +50,7 @@ def slips(motion):
 
 def energy(motion, scenario):
     """(samples,): of motion, weight, ground, and the bristles that stick."""
-    structure = make_standing_tetrahedron(scenario)
+    structure = make_standing_tetrahedron(scenario).structure
     inertia, law = tetrahedron_inertia(structure), scenario.friction
     t1, t2, n = start_axes(structure)
     v_WB, p_WB = motion.v_WN.mean(axis=1), motion.p_WN.mean(axis=1)

@@ -7,8 +7,7 @@ from helpers.states import body_velocities
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.model import make_model
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 
 G = 9.80665
@@ -34,8 +33,8 @@ FALLING = {
 )
 def test_a_falling_robot_keeps_momentum_and_energy(scenario, engine):
     falling = scenario.with_changes({**FALLING, "engine": engine})
-    structure = MakeStructure(falling)
-    body = make_model(falling, structure).body
+    robot = Robot.of(falling)
+    structure, body = robot.structure, robot.model.body
     mass, moment = body.mass[0], body.moment[0]
     flight = simulate(scenario=falling, gait=seeded_gait(falling), record=True).trajectory
     assert flight is not None

@@ -7,16 +7,30 @@ import numpy as np
 import pytest
 import xarray
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
 
 from tetra_drake.engines.drake import MakeSimulator
+from tetra_drake.engines.sampler import Sampler
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import StepBudgetExceeded
+from tetra_drake.results.trajectory import make_dataset
 from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, node_positions
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.terrain_kinds import Rough
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+PORTS = {
+    "signal": "signals",
+    "tension": "tensions",
+    "length": "lengths",
+    "normal_force": "normal_forces",
+    "friction_force": "friction_forces",
+}
+"""Output ports of the diagram, by the variables of a trajectory."""
 
 
 @pytest.fixture
@@ -26,7 +40,7 @@ def gait(scenario: Scenario, data: Path) -> Gait:
 
 def test_settles_where_the_independent_simulation_does(scenario, structure, gait, data):
     still = scenario.with_changes({"cpg.start_up": "100.0 s", "engine.max_step": "1e-3 s"})
-    diagram = MakeTensegrityDiagram(still, gait)
+    diagram = MakeTensegrityDiagram(Robot.of(still), gait)
     simulator = MakeSimulator(diagram, still.engine)
     simulator.AdvanceTo(8.0)
     context = simulator.get_context()
@@ -57,8 +71,8 @@ def test_a_live_network_walks_as_the_listing_with_short_steps_does(scenario, gai
     assert live.metrics.distance_in == pytest.approx(beforehand.metrics.distance_in, abs=2e-3)
 
 
-def test_a_step_ends_at_the_start_up_jump(scenario, gait):
-    diagram = MakeTensegrityDiagram(scenario, gait)
+def test_a_step_ends_at_the_start_up_jump(scenario, robot, gait):
+    diagram = MakeTensegrityDiagram(robot, gait)
     simulator = MakeSimulator(diagram, scenario.engine)
     ends: list[float] = []
     simulator.set_monitor(lambda context: ends.append(context.get_time()))
@@ -92,14 +106,37 @@ def test_the_work_counts_all_steps_from_the_start(scenario, gait):
     assert work.derivative_evaluations > 5 * work.steps
 
 
+@pytest.mark.parametrize("changes", [{}, {"terrain": Rough(amplitude=2e-3, wavelength=0.1)}])
+def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scenario, changes):
+    robot = Robot.of(
+        scenario.with_changes({"robot.tetrahedra": 3, "cpg.start_up": "0 s"} | changes)
+    )
+    diagram = MakeTensegrityDiagram(robot, seeded_gait(robot.scenario))
+    simulator = MakeSimulator(diagram, robot.scenario.simulation)
+    sampler, there = Sampler(diagram, np.array([0.05, 0.1])), []
+
+    def after_step(context: Context) -> None:
+        sampler.after_step(context)
+        there.append({port: diagram.GetOutputPort(port).Eval(context) for port in PORTS.values()})
+
+    simulator.set_monitor(after_step)
+    for end in (0.05, 0.1):  # where a step ends, and with it those modes
+        simulator.AdvanceTo(end)
+        walk = make_dataset(robot, sampler.motion()).isel(time=-1)
+        for name, port in PORTS.items():
+            np.testing.assert_array_equal(walk[name].values.ravel(), there[-1][port])
+    assert np.abs(there[-1]["friction_forces"]).max() > 0.0
+    assert there[-1]["signals"].any()
+
+
 def test_the_budget_of_evaluations_is_for_the_whole_simulation(scenario, gait):
     budget = scenario.with_changes({"simulation.max_evaluations": 5000})
     with pytest.raises(StepBudgetExceeded):
         simulate(scenario=budget, gait=gait)
 
 
-def test_a_mode_change_is_due_until_it_is_made(scenario, gait):
-    diagram = MakeTensegrityDiagram(scenario, gait)
+def test_a_mode_change_is_due_until_it_is_made(scenario, robot, gait):
+    diagram = MakeTensegrityDiagram(robot, gait)
     simulator = MakeSimulator(diagram, scenario.engine)
     ground = diagram.GetSubsystemByName("ground")
     context = ground.GetMyContextFromRoot(simulator.get_context())
@@ -142,9 +179,9 @@ def test_any_number_of_tetrahedra_walks(scenario, tetrahedra):
     assert np.ptp(walking.values) > 0.1 * INCH > 10.0 * np.ptp(settled.values)
 
 
-def test_plain_drake_simulates_the_diagram_too(scenario, gait):
+def test_plain_drake_simulates_the_diagram_too(scenario, robot, gait):
     # No hidden set-up: the diagram with its default context is all a Drake user needs.
-    diagram = MakeTensegrityDiagram(scenario, gait)
+    diagram = MakeTensegrityDiagram(robot, gait)
     simulator = Simulator(diagram)
     simulator.AdvanceTo(0.05)
     height = diagram.GetOutputPort("state").Eval(simulator.get_context())[6]

@@ -12,8 +12,8 @@ from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
-from tetra_drake.robot.ground import ground_frames, make_ground
-from tetra_drake.robot.model import make_model
+from tetra_drake.robot.ground import ground_frames
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import MakeStructure, node_positions
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
@@ -84,7 +84,7 @@ def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction, e
     inclined = short.with_changes({"terrain": Incline(slope=slope)})
     up_the_slope = trajectory(inclined, CONVERGED[engine])["p_WN"].values[-1].reshape(-1, 3)
 
-    diagram = MakeTensegrityDiagram(short, seeded_gait(short, 2))
+    diagram = MakeTensegrityDiagram(Robot.of(short), seeded_gait(short, 2))
     g, s, c = short.robot.gravity, np.sin(slope), np.cos(slope)
     gravity = diagram.GetSubsystemByName("plant").mutable_gravity_field()
     gravity.set_gravity_vector([-g * s, 0.0, -g * c])
@@ -104,8 +104,8 @@ def test_contact_never_gives_energy(scenario, friction):
     fall = {"robot__offsets": [[0.0, 0.0, "5 mm"]] * 5, "robot__contacts": "all", "cpg__gain": 0.0}
     rough = Rough(amplitude=0.25 * INCH, wavelength=4.0 * INCH, seed=5)
     falling = shortly(scenario, 0.6, terrain=rough, friction=friction, **fall)
-    structure, gravity = MakeStructure(falling), falling.robot.gravity
-    body = make_model(falling, structure).body
+    robot, gravity = Robot.of(falling), falling.robot.gravity
+    structure, body = robot.structure, robot.model.body
     walk = trajectory(
         falling.with_changes({"simulation.sample_period": "2e-3 s"}), CONVERGED["compiled"]
     )
@@ -114,8 +114,8 @@ def test_contact_never_gives_energy(scenario, friction):
     energy += body.mass[0] * gravity * walk.p_WB.values[:, :, 2].sum(axis=1)
     stretch = walk.length.values - structure.cables["free_length"]
     energy += 0.5 * stretch**2 @ structure.cables["stiffness"]
-    ground = make_ground(falling, structure)
-    gaps = ground_frames(walk.p_WN.values.reshape(-1, 3), ground)[:, 0].reshape(len(energy), -1)
+    p_WN = walk.p_WN.values.reshape(-1, 3)
+    gaps = ground_frames(p_WN, robot.ground)[:, 0].reshape(len(energy), -1)
     energy += 0.5 * falling.ground.stiffness * (np.minimum(gaps, 0.0) ** 2).sum(axis=1)
     lost = energy[0] - energy[-1]
     assert np.diff(energy).max() < 1e-4 * lost
@@ -153,14 +153,13 @@ def test_the_robot_stands_on_what_is_under_it(scenario):
     }
     resting = scenario.with_changes({**times, **rough})
     end = trajectory(resting, Compiled()).isel(time=-1)
-    structure, ground = MakeStructure(resting), make_ground(resting, MakeStructure(resting))
-    p_WN = end.p_WN.values.reshape(-1, 3)[structure.contacts]
-    gaps = ground_frames(p_WN, ground)[:, 0]
+    robot = Robot.of(resting)
+    p_WN = end.p_WN.values.reshape(-1, 3)[robot.structure.contacts]
+    gaps = ground_frames(p_WN, robot.ground)[:, 0]
     expected = resting.ground.stiffness * np.maximum(-gaps, 0.0)
     np.testing.assert_allclose(end.normal_force, expected, atol=0.01 * expected.max())
     assert 5 <= (gaps < 0.0).sum() < 11, "some feet hang in the air"
-    weight = 5 * make_model(resting, structure).body.mass[0] * resting.robot.gravity
-    assert expected.sum() == pytest.approx(weight, rel=0.02)
+    assert expected.sum() == pytest.approx(robot.weight, rel=0.02)
 
 
 SLOWLY = {

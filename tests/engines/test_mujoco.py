@@ -12,9 +12,8 @@ from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import MUJOCO_FRICTION, Compiled, Mujoco
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
@@ -44,8 +43,7 @@ def trajectory_of(scenario: Scenario) -> xarray.Dataset:
 
 def weight_of(scenario: Scenario) -> float:
     """Of the robot, in N."""
-    mass = tetrahedron_inertia(MakeStructure(scenario)).get_mass()
-    return scenario.robot.tetrahedra * mass * scenario.robot.gravity
+    return Robot.of(scenario).weight
 
 
 @needs_mujoco

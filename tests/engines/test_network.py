@@ -13,7 +13,7 @@ from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
-from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
@@ -152,7 +152,7 @@ def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
     gait = seeded_gait(short)
     states = []
     for steering in (None, lambda time: -0.5):
-        diagram = MakeTensegrityDiagram(short, gait, steering=steering)
+        diagram = MakeTensegrityDiagram(Robot.of(short), gait, steering=steering)
         simulator = MakeSimulator(diagram, Drake())
         if steering is None:
             diagram.GetInputPort("turn").FixValue(simulator.get_mutable_context(), [-0.5])

@@ -17,7 +17,6 @@ from helpers.analytic import (
 from helpers.quantities import with_unit
 from pytest import approx
 
-from tetra_drake.engines.compiled.lane_engine import PreparedGait
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mean
@@ -27,6 +26,7 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.robot.gait import ParameterSpace
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.settings import Disturbances
 from tetra_drake.scenario.terrain_kinds import Steps
@@ -76,14 +76,14 @@ def test_a_gait_is_simulated_in_each_of_its_draws(tiny, vector):
     assert other.draws["fitness"] != fitnesses
 
 
-def test_in_lanes_each_draw_is_prepared_once_for_all_gaits_of_an_iteration(tiny, monkeypatch):
-    prepared, prepare = [], PreparedGait.of
+def test_in_lanes_each_draw_has_one_robot_for_all_gaits_of_an_iteration(tiny, monkeypatch):
+    made, make = [], Robot.of
 
-    def counted(*given, **kwargs):
-        prepared.append(given)
-        return prepare(*given, **kwargs)
+    def counted(scenario):
+        made.append(scenario)
+        return make(scenario)
 
-    monkeypatch.setattr(PreparedGait, "of", counted)
+    monkeypatch.setattr(Robot, "of", counted)
     generator, space = np.random.default_rng(2), ParameterSpace.of(tiny)
     tasks = [SeededVector(space.random(generator), SEED) for _ in range(6)]
     with LanePool(2) as lanes:
@@ -92,7 +92,7 @@ def test_in_lanes_each_draw_is_prepared_once_for_all_gaits_of_an_iteration(tiny,
         with ThreadPoolExecutor(5) as executor:
             rest = list(executor.map(evaluate, tasks[1:]))
     assert len({each.fitness for each in (first, *rest)}) == 6
-    assert len(prepared) == 3
+    assert len(made) == 3
 
 
 def test_an_objective_is_that_of_each_draw(tiny, vector):

@@ -19,8 +19,9 @@ from tetra_drake.figures.motion import (
 )
 from tetra_drake.figures.style import OKABE_ITO, common_style
 from tetra_drake.results.measures import last_step, lifted
-from tetra_drake.robot.ground import ground_heights, make_ground
-from tetra_drake.robot.structure import STRUTS, MakeStructure
+from tetra_drake.robot.ground import ground_heights
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import STRUTS
 from tetra_drake.scenario.cable_names import CABLES
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
@@ -43,7 +44,7 @@ DOWNSTAIRS = {
 
 def ground_on(changes=None):
     scenario = load_scenario().with_changes(changes or {})
-    return make_ground(scenario, MakeStructure(scenario))
+    return Robot.of(scenario).ground
 
 
 FLAT = ground_on()

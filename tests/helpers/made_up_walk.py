@@ -3,8 +3,9 @@
 import numpy as np
 import xarray
 
-from tetra_drake.results.trajectory import assemble_dataset
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.results.trajectory import Motion, make_dataset
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 
 PERIOD = 2.0  # s
@@ -21,7 +22,8 @@ def make_walk(
     scenario = load_scenario("thesis")
     groups = actuation or scenario.robot.actuation
     scenario = scenario.with_changes({"robot.tetrahedra": bodies, "robot.actuation": groups})
-    structure = MakeStructure(scenario)
+    robot = Robot.of(scenario)
+    structure = robot.structure
     times = np.linspace(0.0, duration, round(duration / 0.01) + 1)
     phase = 2.0 * np.pi * times / PERIOD
     turn = np.where(np.arange(bodies) % 2, -1.0, 1.0)
@@ -36,15 +38,10 @@ def make_walk(
     stands = (lift[:, structure.contacts // 4] == 0.0) & (names != f"T{bodies} tip")
     normal = np.where(stands, LOAD, 0.0)
     signals = 2.0 * np.sin(phase[:, np.newaxis] - np.arange(structure.signals))
+    modes = np.zeros((*stands.shape, MODE_COLUMNS))
+    modes[..., CONTACT] = stands
+    pushes = np.stack([-0.5 * normal, 0.0 * normal, normal], axis=-1)
+    walk = make_dataset(robot, Motion(times, states, signals, modes, pushes))
     driver = structure.cables["signal"]
-    return assemble_dataset(
-        structure,
-        times=times,
-        states=states,
-        signals=signals,
-        tensions=3.0 + np.where(driver < 0, 0.0, signals[:, driver]),
-        lengths=np.ones((len(times), len(driver))),
-        normal_forces=normal,
-        friction_forces=np.stack([-0.5 * normal, 0.0 * normal], axis=-1),
-        modes=np.stack([stands, 0 * stands, 0 * stands], axis=-1).reshape(len(times), -1),
-    )
+    walk.tension[:] = 3.0 + np.where(driver < 0, 0.0, signals[:, driver])
+    return walk

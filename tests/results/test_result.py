@@ -6,39 +6,38 @@ import numpy as np
 import pytest
 from helpers.totals import make_totals
 
+from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.results.result import (
     IntegratorWork,
     SimulationResult,
     make_result,
-    result_times,
+    motion_times,
     save_result,
 )
+from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.units import INCH
 
 RADIUS = 0.3  # m
 
 
-def result_of(scenario, structure, states) -> SimulationResult:
+def result_of(robot, states) -> SimulationResult:
     """That of a robot which is in these states at the times that count."""
-    return make_result(
-        scenario,
-        structure,
-        times=result_times(scenario.simulation),
+    motion = Motion(
+        times=motion_times(robot.scenario.simulation, record=False),
         states=states,
-        signals=np.zeros((len(states), structure.signals)),
-        totals=make_totals(),
-        mass=0.02,
-        wall_time=1.0,
-        integrator=IntegratorWork("none", 1.0, 1, 1),
-        trajectory=None,
+        signals=np.zeros((len(states), robot.structure.signals)),
+        modes=np.zeros((len(states), len(robot.structure.contacts), MODE_COLUMNS)),
     )
+    work = IntegratorWork("none", 1.0, 1, 1)
+    return make_result(robot, motion, totals=make_totals(), work=work, wall_time=1.0, record=False)
 
 
-def on_a_circle(scenario, structure, *, per_second, radius=RADIUS) -> np.ndarray:
+def on_a_circle(robot, *, per_second, radius=RADIUS) -> np.ndarray:
     """States of a robot that is carried along a circle and turns by so many rad in each second: to
     the left, forward if the radius is positive."""
-    times = result_times(scenario.simulation)
+    times = motion_times(robot.scenario.simulation, record=False)
+    structure = robot.structure
     states = np.tile(structure.initial_state, (len(times), 1))
     angles = per_second * times
     c, s = np.cos(angles), np.sin(angles)
@@ -51,34 +50,34 @@ def on_a_circle(scenario, structure, *, per_second, radius=RADIUS) -> np.ndarray
 
 
 @pytest.mark.parametrize("radius", [RADIUS, -RADIUS], ids=["forward", "backward"])
-def test_a_robot_on_a_circle_has_turned_by_its_angle(scenario, structure, radius):
-    states = on_a_circle(scenario, structure, per_second=0.5, radius=radius)
-    result = result_of(scenario, structure, states)
+def test_a_robot_on_a_circle_has_turned_by_its_angle(robot, radius):
+    states = on_a_circle(robot, per_second=0.5, radius=radius)
+    result = result_of(robot, states)
     assert result.metrics.heading_change == pytest.approx(7.5)  # in 15 s: more than one turn
     assert result.metrics.path_curvature == pytest.approx(1.0 / RADIUS, rel=1e-4)
     assert result.metrics.path_radius == pytest.approx(RADIUS, rel=1e-4)
     np.testing.assert_allclose(np.diff(result.path.times), 0.25)
     assert result.path.times[[0, -1]].tolist() == [0.0, 15.0]
     np.testing.assert_allclose(result.path.heading, 0.5 * result.path.times, atol=1e-12)
-    np.testing.assert_allclose(result.path.centre[:, 2], structure.p_WB[0, 2])
+    np.testing.assert_allclose(result.path.centre[:, 2], robot.structure.p_WB[0, 2])
 
 
-def test_mirrored_states_negate_turning_and_bending(scenario, structure):
-    states = on_a_circle(scenario, structure, per_second=0.3)
+def test_mirrored_states_negate_turning_and_bending(robot):
+    states = on_a_circle(robot, per_second=0.3)
     poses = states[:, :35].reshape(-1, 5, 7)
     poses = poses + np.random.default_rng(1).normal(scale=0.02, size=poses.shape)
     mirrored = states.copy()
     states[:, :35] = poses.reshape(-1, 35)
     mirrored[:, :35] = (poses * [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]).reshape(-1, 35)
-    left, right = (result_of(scenario, structure, each).metrics for each in (states, mirrored))
+    left, right = (result_of(robot, each).metrics for each in (states, mirrored))
     assert left.heading_change > 4.0 and left.path_curvature > 3.0
     assert right.heading_change == pytest.approx(-left.heading_change, rel=1e-12)
     assert right.path_curvature == pytest.approx(-left.path_curvature, rel=1e-9)
 
 
-def test_the_path_is_written(scenario, structure, tmp_path):
+def test_the_path_is_written(scenario, robot, tmp_path):
     gait = seeded_gait(scenario)
-    result = result_of(scenario, structure, on_a_circle(scenario, structure, per_second=-0.5))
+    result = result_of(robot, on_a_circle(robot, per_second=-0.5))
     save_result(tmp_path / "result.json", scenario, gait, result)
     content = json.loads((tmp_path / "result.json").read_text())
     assert content["path_radius_in"] == pytest.approx(RADIUS / INCH, rel=1e-4)
@@ -87,6 +86,6 @@ def test_the_path_is_written(scenario, structure, tmp_path):
     assert list(content["path"].values()) == [column.tolist() for column in columns]
     assert list(content["path"]) == ["time_s", "x_m", "y_m", "heading_rad"]
 
-    standing = result_of(scenario, structure, on_a_circle(scenario, structure, per_second=0.0))
+    standing = result_of(robot, on_a_circle(robot, per_second=0.0))
     save_result(tmp_path / "result.json", scenario, gait, standing)
     assert json.loads((tmp_path / "result.json").read_text())["path_radius_in"] is None

@@ -8,36 +8,33 @@ from helpers.quantities import with_unit
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot import equilibrium
-from tetra_drake.robot.bodies import tetrahedron_inertia
-from tetra_drake.robot.equilibrium import settled_lengths, settled_state
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.structure import BOTTOM_LEFT, TIP, MakeStructure, node_positions
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import BOTTOM_LEFT, TIP, node_positions
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 
-def normal_forces(scenario: Scenario) -> np.ndarray:
+def resting_nodes(robot: Robot) -> np.ndarray:
+    """(nodes, 3) in m."""
+    return node_positions(robot.structure, robot.rest.state)
+
+
+def normal_forces(robot: Robot) -> np.ndarray:
     """(contacts,) in N at rest: stiffness times depth."""
-    structure = MakeStructure(scenario)
-    height = node_positions(structure, settled_state(scenario))[structure.contacts, 2]
-    return scenario.ground.stiffness * np.maximum(0.0, -height)
+    height = resting_nodes(robot)[robot.structure.contacts, 2]
+    return robot.scenario.ground.stiffness * np.maximum(0.0, -height)
 
 
-def weight(scenario: Scenario) -> float:
-    mass = tetrahedron_inertia(MakeStructure(scenario)).get_mass()
-    return scenario.robot.tetrahedra * mass * scenario.robot.gravity
-
-
-def test_rests_where_the_independent_simulation_does(scenario, structure, data):
+def test_rests_where_the_independent_simulation_does(robot, data):
     # Its normal forces are 7e-6 off our weight (the digits of its mass, and what still moved).
     expected = json.loads((data / "expected.json").read_text())["settled"]
-    p_WN = node_positions(structure, settled_state(scenario)) / INCH
+    p_WN = resting_nodes(robot) / INCH
     spacing = np.diff(p_WN[BOTTOM_LEFT::4, 0])
     np.testing.assert_allclose(spacing, expected["spacing_in"], rtol=1e-5)
     assert p_WN[4 * 4 + TIP, 2] == pytest.approx(expected["tip5_height_in"], rel=1e-5)
-    normal = normal_forces(scenario) / POUND_FORCE
+    normal = normal_forces(robot) / POUND_FORCE
     atol = 1e-5 * expected["normal_sum_lbf"]
     np.testing.assert_allclose(normal, expected["normals"], atol=atol)
 
@@ -62,7 +59,7 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     }
     scenario = scenario.with_changes(still | changes)
     walk = simulate(scenario=scenario, gait=seeded_gait(scenario, 0), record=True).trajectory
-    np.testing.assert_allclose(walk.length[-1], settled_lengths(scenario), rtol=1e-6)
+    np.testing.assert_allclose(walk.length[-1], Robot.of(scenario).rest.lengths, rtol=1e-6)
 
 
 @pytest.mark.parametrize(("tetrahedra", "contacts"), [(2, "thesis"), (5, "all")])
@@ -75,8 +72,8 @@ def test_the_ground_bears_the_weight_whatever_the_stiffnesses(scenario, tetrahed
             "cables.inner_stiffness": with_unit(inner * cables.inner_stiffness, "N/m"),
             "ground.stiffness": with_unit(hard * ground.stiffness, "N/m"),
         }
-        changed = scenario.with_changes(changes)
-        assert normal_forces(changed).sum() == pytest.approx(weight(changed), rel=1e-9)
+        robot = Robot.of(scenario.with_changes(changes))
+        assert normal_forces(robot).sum() == pytest.approx(robot.weight, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -88,35 +85,33 @@ def test_the_ground_bears_the_weight_whatever_the_stiffnesses(scenario, tetrahed
     ],
 )
 def test_no_force_is_left_on_any_body(scenario, changes, slack):
-    scenario = scenario.with_changes(changes | {"cables.slack": True})
-    structure, state = MakeStructure(scenario), settled_state(scenario)
-    p_WN, bodies, cables = node_positions(structure, state), len(structure.bodies), structure.cables
+    robot = Robot.of(scenario.with_changes(changes | {"cables.slack": True}))
+    structure, state, p_WN = robot.structure, robot.rest.state, resting_nodes(robot)
+    bodies, cables = len(structure.bodies), structure.cables
     force = np.zeros_like(p_WN)
-    force[structure.contacts, 2] = normal_forces(scenario)
+    force[structure.contacts, 2] = normal_forces(robot)
     along = p_WN[cables["node_b"]] - p_WN[cables["node_a"]]
     length = np.linalg.norm(along, axis=1)
-    np.testing.assert_allclose(settled_lengths(scenario), length, rtol=0, atol=0.51e-9)
+    np.testing.assert_allclose(robot.rest.lengths, length, rtol=0, atol=0.51e-9)
     tension = np.maximum(0.0, cables["stiffness"] * (length - cables["free_length"]))
     assert (tension == 0.0).sum() == slack
     pull = along * (tension / length)[:, np.newaxis]
     np.add.at(force, cables["node_a"], pull)
     np.add.at(force, cables["node_b"], -pull)
     by_body, p_WB = force.reshape(-1, 4, 3), state[: 7 * bodies].reshape(-1, 1, 7)[..., 4:]
-    total = by_body.sum(axis=1) - [0.0, 0.0, weight(scenario) / bodies]
+    total = by_body.sum(axis=1) - [0.0, 0.0, robot.weight / bodies]
     torque = np.cross(p_WN.reshape(-1, 4, 3) - p_WB, by_body).sum(axis=1)
-    assert np.abs(total).max() < 1e-9 * weight(scenario)
-    assert np.abs(torque).max() < 1e-9 * weight(scenario) * scenario.robot.strut_length
+    assert np.abs(total).max() < 1e-9 * robot.weight
+    assert np.abs(torque).max() < 1e-9 * robot.weight * robot.scenario.robot.strut_length
 
 
-def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario):
+def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario, robot):
     # It gets there in other last digits on another processor, and so it does from another start.
     elsewhere = scenario.with_changes({"robot.spacing": f"{1.01 * scenario.robot.spacing} m"})
-    spacings = [np.diff(settled_state(each)[4:35:7]).tolist() for each in (scenario, elsewhere)]
-    assert spacings[0] != spacings[1]
-    assert np.array_equal(settled_lengths(elsewhere), settled_lengths(scenario))
+    other = Robot.of(elsewhere).rest
+    assert (np.diff(other.state[4:35:7]) != np.diff(robot.rest.state[4:35:7])).any()
+    assert np.array_equal(other.lengths, robot.rest.lengths)
 
-
-def test_neither_terrain_nor_offsets_nor_friction_matter(scenario):
     elsewhere = scenario.with_changes(
         {
             "terrain": Incline(slope=0.2, start=None),
@@ -124,10 +119,10 @@ def test_neither_terrain_nor_offsets_nor_friction_matter(scenario):
             "robot.offsets": with_unit([[0.01 * i, 0.01, 0.1] for i in range(5)], "m"),
         }
     )
-    assert np.array_equal(settled_state(elsewhere), settled_state(scenario))
+    assert np.array_equal(Robot.of(elsewhere).rest.state, robot.rest.state)
 
 
-def test_a_robot_that_finds_no_rest_is_refused_by_name(scenario, refused, monkeypatch):
+def test_a_robot_that_finds_no_rest_is_refused_by_name(robot, refused, monkeypatch):
     monkeypatch.setattr(equilibrium, "ITERATIONS", 2)
     with refused("thesis", "robot", "no rest"):
-        settled_state(scenario)
+        _ = robot.rest

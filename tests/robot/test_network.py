@@ -8,17 +8,16 @@ import pytest
 from tetra_drake.errors import InputError
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gait, seeded_gait
-from tetra_drake.robot.network import make_network, make_senses, sample_turns, tonic_input
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot
 
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 
 
-def test_weights_stand_in_the_listings_order(scenario, structure):
+def test_weights_stand_in_the_listings_order(robot):
     # B.2: sum(1) takes w(1) y(3), w(2) y(5), w(3) y(7) and the partner y(2); sum(2) takes
     # w(4) y(4) ...; sum(8) takes w(22) y(2), w(23) y(4), w(24) y(6).
     gait = Gait(name="1 to 24", weights=tuple(np.arange(1.0, 25.0)), tau_a=0.3, tau_b=0.6)
-    matrix = make_network(scenario, structure, gait).inhibition
+    matrix = robot.network(gait).inhibition
     assert matrix[0].tolist() == [0, 1.5, 1, 0, 2, 0, 3, 0]
     assert matrix[1].tolist() == [1.5, 0, 0, 4, 0, 5, 0, 6]
     assert matrix[7].tolist() == [0, 22, 0, 23, 0, 24, 1.5, 0]
@@ -32,7 +31,7 @@ def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
     junction = actuation.junctions[actuation.couplings // 2]
     assert (np.abs(np.diff(junction, axis=1)) <= 1).all()
     gait = seeded_gait(near)
-    matrix = make_network(near, MakeStructure(near), gait).inhibition
+    matrix = Robot.of(near).network(gait).inhibition
     assert np.count_nonzero(matrix) == len(actuation.couplings) + 16  # and the partners
     alone = scenario.with_changes({"cpg.reach": 0})
     assert seeded_gait(alone).weights == ()
@@ -53,26 +52,25 @@ def test_mirror_images_of_weights_exchange_left_and_right(scenario):
 def test_a_turn_strengthens_the_left_by_what_it_weakens_the_right(scenario):
     actuation = [["outer bottom_left"], ["outer top"], ["inner bottom_right"]]
     three = scenario.with_changes({"robot.actuation": actuation, "robot.tetrahedra": 3})
-    tonic = tonic_input(three, MakeStructure(three), np.array([0.0, 0.4]))
+    tonic = Robot.of(three).tonic_input(np.array([0.0, 0.4]))
     u0 = scenario.cpg.external_input
     np.testing.assert_array_equal(tonic[0], u0)
     once = np.repeat([1.4, 1.0, 0.6], 2)  # extensor and flexor of left, middle, right
     np.testing.assert_allclose(tonic[1], u0 * np.tile(once, 2), rtol=1e-15)
 
 
-def test_a_steering_signal_is_sampled_and_checked(scenario):
+def test_a_steering_signal_is_sampled_and_checked(scenario, robot):
     both = scenario.with_changes(SIDES | {"simulation.duration": "4.0 s"})
     gait = dataclasses.replace(seeded_gait(both), turn=0.3)
-    assert sample_turns(both, MakeStructure(both), gait, None).tolist() == [0.3]
-    turns = sample_turns(both, MakeStructure(both), gait, lambda time: time / 4.0)
+    steered = Robot.of(both)
+    assert steered.turns(gait).tolist() == [0.3]
+    turns = steered.turns(gait, lambda time: time / 4.0)
     np.testing.assert_allclose(turns, np.linspace(0.0, 1.0, 8001), atol=1e-15)
     with pytest.raises(InputError) as caught:
-        sample_turns(both, MakeStructure(both), gait, lambda time: 1.5 if time > 1.0 else 0.0)
+        steered.turns(gait, lambda time: 1.5 if time > 1.0 else 0.0)
     assert caught.value.source == "steering" and "1.5" in str(caught.value)
     with pytest.raises(InputError):
-        sample_turns(
-            scenario, MakeStructure(scenario), gait, lambda time: 0.0
-        )  # the thesis's robot has no sides
+        robot.turns(gait, lambda time: 0.0)  # the thesis's robot has no sides
 
 
 def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
@@ -80,8 +78,7 @@ def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
     actuation = [["outer bottom_left", "outer bottom_right"], ["inner top"]]
     pathways = {"cpg.signals": "live", "cpg.feedback": ["length", "load", "pitch"]}
     other = scenario.with_changes({"robot.actuation": actuation} | pathways)
-    structure = MakeStructure(other)
-    senses = make_senses(other, structure)
+    senses = Robot.of(other).senses
     assert senses.drivers[:6].tolist() == [0, 0, -1, -1, -1, 1]
     assert senses.drivers[6:12].tolist() == [2, 2, -1, -1, -1, 3]
     assert senses.ahead.tolist() == [1, 1, 2, 2, 3, 3, 4, 4]
@@ -93,7 +90,7 @@ def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
     assert senses.carriers.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4]
 
 
-def test_a_gait_that_does_not_fit_is_refused(scenario, structure, refused):
+def test_a_gait_that_does_not_fit_is_refused(scenario, robot, refused):
     gait = dataclasses.replace(seeded_gait(scenario), weights=(1.0,) * 23)
     with refused(f"gait {gait.name}", "weights", "expected"):
-        make_network(scenario, structure, gait)
+        robot.network(gait)

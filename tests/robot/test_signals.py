@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
-from tetra_drake.robot.network import initial_neurons, make_network
+from tetra_drake.robot.robot import Robot, initial_neurons
 from tetra_drake.robot.signals import raw_output, save_signals, signal_samples
 from tetra_drake.systems import MatsuokaCpg
 
@@ -25,9 +25,9 @@ def gait(scenario, data) -> Gait:
     return load_gait(data / "gait_b.json", scenario)
 
 
-def test_stepped_as_the_listing_steps_it_gives_the_listings_output(scenario, listing):
+def test_stepped_as_the_listing_steps_it_gives_the_listings_output(robot, listing):
     gait, steps, reference = listing
-    output = raw_output(scenario, gait)
+    output = raw_output(robot, gait)
     assert output.shape == (30_000, 4)
     np.testing.assert_allclose(output[steps], reference, rtol=0, atol=1e-9)
 
@@ -36,21 +36,23 @@ def test_the_converged_network_stays_within_the_listings_own_error(scenario, lis
     # Euler's error reaches 1.4e-2 by 15 s on gait_a. The listing stamps a state one step early.
     gait, steps, reference = listing
     scenario = scenario.with_changes({"cpg.signals": "live"})
-    error = np.abs(raw_output(scenario, gait)[steps + 1] - reference).max(axis=1)
+    error = np.abs(raw_output(Robot.of(scenario), gait)[steps + 1] - reference).max(axis=1)
     assert error[steps * 0.5e-3 <= 3.0].max() < 2e-3
     assert error.max() < 2e-2
 
 
-def test_the_network_beforehand_is_that_of_the_diagram(scenario, structure, gait):
+def test_the_network_beforehand_is_that_of_the_diagram(scenario, gait):
     # Drake's error-controlled integration of the same equations; RK4 in steps of 0.5 ms meets a
     # kink of max(0, u) between samples, which costs it up to 1e-5.
     scenario = scenario.with_changes({"cpg.signals": "live"})
-    law, network = scenario.cpg, make_network(scenario, structure, gait)
+    robot, law = Robot.of(scenario), scenario.cpg
     start = initial_neurons(law, 4)
-    cpg = MatsuokaCpg(network, tonic=law.external_input, initial_state=start, gain=law.gain)
+    cpg = MatsuokaCpg(
+        robot.network(gait), tonic=law.external_input, initial_state=start, gain=law.gain
+    )
     simulator = Simulator(cpg)
     ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.01).set_target_accuracy(1e-9)
-    samples = signal_samples(scenario, gait)
+    samples = signal_samples(robot, gait)
     for time in (1.0, 2.5, 7.0):
         simulator.AdvanceTo(time)
         live = simulator.get_system().GetOutputPort("signals").Eval(simulator.get_context())
@@ -69,7 +71,7 @@ def read_csv(path: Path) -> tuple[list[str], np.ndarray]:
 def test_the_csv_names_the_cables_of_each_signal(scenario, tmp_path):
     groups = [["outer top", "inner top"], ["outer bottom_left"]]
     scenario = scenario.with_changes({"robot.tetrahedra": 3, "robot.actuation": groups})
-    save_signals(tmp_path / "lbf.csv", scenario, seeded_gait(scenario))
+    save_signals(tmp_path / "lbf.csv", Robot.of(scenario), seeded_gait(scenario))
     header, _ = read_csv(tmp_path / "lbf.csv")
     lines = (tmp_path / "lbf.csv").read_text().splitlines()
     assert header[1:] == [f"signal_{i}" for i in (1, 2, 3, 4)]
@@ -81,12 +83,12 @@ def test_the_csv_names_the_cables_of_each_signal(scenario, tmp_path):
     ]
 
 
-def test_the_csv_holds_what_the_cables_are_fed(scenario, gait, tmp_path):
-    save_signals(tmp_path / "lbf.csv", scenario, gait)
+def test_the_csv_holds_what_the_cables_are_fed(robot, gait, tmp_path):
+    save_signals(tmp_path / "lbf.csv", robot, gait)
     header, table = read_csv(tmp_path / "lbf.csv")
     assert header == ["time_s", "signal_1", "signal_2", "signal_3", "signal_4"]
     assert table[0, 0] == 0.0 and table[-1, 0] == 15.0 and len(table) == 30_001
     started = table[:, 0] >= 1.25
-    fed = signal_samples(scenario, gait)[: len(table)] / 4.4482216152605
+    fed = signal_samples(robot, gait)[: len(table)] / 4.4482216152605
     assert not table[~started, 1:].any()
     np.testing.assert_allclose(table[started, 1:], fed[started], atol=1e-10)

@@ -24,7 +24,7 @@ def make_simulator(
     accuracy: float = 1e-6,
 ) -> Simulator:
     """Of a tetrahedron with its base `height` (m) over the ground, moving along x at v_x (m/s)."""
-    structure = make_standing_tetrahedron(scenario)
+    structure = make_standing_tetrahedron(scenario).structure
     simulator = Simulator(make_diagram(scenario, witness=witness))
     ResetIntegratorFromFlags(simulator, "runge_kutta3", max_step).set_target_accuracy(accuracy)
     context = simulator.get_mutable_context()
@@ -50,7 +50,8 @@ def test_initialize_takes_contact_and_stick_points_from_the_pose(scenario, heigh
     assert (modes[:, CONTACT] == touches).all()
     assert (modes[:, MODE : MODE + 2] == STICK).all()
     if touches:
-        p_WN = node_positions(make_standing_tetrahedron(scenario), state_of(simulator))
+        structure = make_standing_tetrahedron(scenario).structure
+        p_WN = node_positions(structure, state_of(simulator))
         np.testing.assert_allclose(modes[:, 3:5], p_WN[:3, :2], atol=1e-15)
 
 

@@ -16,8 +16,7 @@ from tetra_drake.physics.oscillator import (
     neuron_rates,
 )
 from tetra_drake.robot.gait import Gait, load_gait
-from tetra_drake.robot.network import initial_neurons, make_network
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.robot import Robot, initial_neurons
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import MatsuokaCpg
 
@@ -28,8 +27,8 @@ def gait(scenario: Scenario, data: Path) -> Gait:
 
 
 @pytest.fixture
-def network(scenario: Scenario, structure: Structure, gait: Gait) -> Network:
-    return make_network(scenario, structure, gait)
+def network(robot: Robot, gait: Gait) -> Network:
+    return robot.network(gait)
 
 
 @pytest.fixture

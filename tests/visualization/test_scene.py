@@ -10,8 +10,8 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.geometry import MeshcatParams
 from pydrake.math import RotationMatrix
 
-from tetra_drake.robot.ground import ground_heights, make_ground
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.ground import ground_heights
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH
@@ -21,13 +21,13 @@ from tetra_drake.visualization.scene import (
     FIELD_OF_VIEW,
     MOST_POINTS,
     UNEVEN_MARGIN,
-    Motion,
+    Track,
     aligning_quaternions,
     camera_position,
     floor_corners,
     floor_points,
-    motions,
     set_surroundings,
+    tracks,
 )
 
 UNEVEN = {
@@ -37,10 +37,8 @@ UNEVEN = {
 }
 
 
-def ground_of(terrain):
-    scenario = load_scenario("coulomb").with_changes({"terrain": terrain})
-    structure = MakeStructure(scenario)
-    return structure, make_ground(scenario, structure)
+def robot_on(terrain):
+    return Robot.of(load_scenario("coulomb").with_changes({"terrain": terrain}))
 
 
 def test_aligning_quaternions_turn_z_into_the_direction():
@@ -75,9 +73,9 @@ def test_camera_sees_every_point():
 
 @pytest.mark.parametrize("bodies", [2, 3, 7, 12, 25])
 def test_the_camera_is_as_near_to_a_robot_of_any_length_as_it_can_be(bodies):
-    structure, ground = ground_of(load_scenario().terrain)
+    robot = robot_on(load_scenario().terrain)
     meshcat, p_WN = Mock(), make_walk(bodies=bodies).p_WN.values
-    set_surroundings(meshcat, structure, ground, p_WN)
+    set_surroundings(meshcat, robot, p_WN)
     assert 0.5 < max(extent(p_WN, *meshcat.SetCameraPose.call_args.args)) < 1.0
 
 
@@ -88,17 +86,18 @@ def test_the_floor_reaches_around_every_point_in_whole_inches():
 
 def test_a_matrix_moves_turns_and_stretches():
     quarter_turn_about_x = np.array([[1.0, 1.0, 0.0, 0.0]]) / np.sqrt(2.0)
-    motion = Motion("", np.array([[1.0, 2.0, 3.0]]), quarter_turn_about_x, np.array([[4.0, 5, 6]]))
+    track = Track("", np.array([[1.0, 2.0, 3.0]]), quarter_turn_about_x, np.array([[4.0, 5, 6]]))
     expected = [[4, 0, 0, 1], [0, 0, -6, 2], [0, 5, 0, 3], [0, 0, 0, 1]]
-    np.testing.assert_allclose(motion.matrix(0), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(track.matrix(0), expected, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
 def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
-    structure, ground = ground_of(terrain)
+    robot = robot_on(terrain)
+    ground, radius = robot.ground, robot.structure.node_radius
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     points = make_walk().p_WN.values
-    set_surroundings(meshcat, structure, ground, points)
+    set_surroundings(meshcat, robot, points)
     page = meshcat.StaticHtml()
     objects = {c["path"]: c["object"] for c in commands(page, "/floor/") if "object" in c}
     assert "/floor/slab" not in objects
@@ -109,7 +108,7 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
     }
     assert len(vertices) == 3
     for path, p_WV in vertices.items():
-        above = p_WV[:, 2] - ground_heights(p_WV[:, :2], ground) + structure.node_radius
+        above = p_WV[:, 2] - ground_heights(p_WV[:, :2], ground) + radius
         walls = p_WV[:, 2] < p_WV[:, 2].min() + 1e-6 if path == "/floor/relief" else False
         assert np.abs(above[~walls] if path == "/floor/relief" else above - 3e-4).max() < 1.1e-4
     low, high = floor_corners(points, UNEVEN_MARGIN) * INCH
@@ -118,13 +117,13 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
     moved = {c["path"]: c["matrix"] for c in commands(page, "set_transform")}
     arrow = np.reshape(moved["/floor/forward"], (4, 4))  # its columns, one after the other
     ends = np.array([arrow[3, :3], arrow[3, :3] + arrow[2, :3]])
-    clear = ends[:, 2] - ground_heights(ends[:, :2], ground) + structure.node_radius
+    clear = ends[:, 2] - ground_heights(ends[:, :2], ground) + radius
     assert clear.min() > -0.05 * INCH and clear.max() < 0.3 * INCH
 
 
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
 def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
-    _, ground = ground_of(terrain)
+    ground = robot_on(terrain).ground
     corners = np.array([[-6, -9], [60, 9]])
     floor = floor_points(ground, corners)
     assert floor.shape[0] * floor.shape[1] <= MOST_POINTS
@@ -139,11 +138,10 @@ def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
 
 def test_force_arrows_stand_on_the_slope():
     slope = 0.2
-    structure, ground = ground_of(Incline(slope=slope))
     frames = make_walk().isel(time=[0, 50])
-    flat = ground_of(load_scenario().terrain)
-    found = {m.path: m for m in motions(structure, ground, frames)}
-    level = {m.path: m for m in motions(*flat, frames)}
+    inclined, flat = robot_on(Incline(slope=slope)), robot_on(load_scenario().terrain)
+    found = {track.path: track for track in tracks(inclined, frames)}
+    level = {track.path: track for track in tracks(flat, frames)}
     for kind, expected in (
         ("normal", [-np.sin(slope), 0.0, np.cos(slope)]),
         ("friction", [-np.cos(slope), 0.0, -np.sin(slope)]),  # backward in the walk

@@ -9,18 +9,15 @@ from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, S
 from pydrake.systems.framework import Context, Diagram
 
 from tetra_drake.engines.observer import Observer
-from tetra_drake.engines.sampler import Sample, Sampler, evaluate_ports, make_dataset
+from tetra_drake.engines.sampler import Sample, Sampler, motion_of
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
-from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
-from tetra_drake.results.trajectory import sample_times
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
+from tetra_drake.results.trajectory import make_dataset
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.model import make_model
-from tetra_drake.robot.network import SteeringSignal
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.scenario.engine_kinds import Drake
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import SimulationSection
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -33,39 +30,34 @@ _RENEW_FROM = 8e-4  # s: shorter steps converge with any Jacobian, most often
 
 
 def simulate_drake(
-    *,
-    scenario: Scenario,
+    robot: Robot,
     gait: Gait,
+    *,
     record: bool = False,
     viewer: Viewer | None = None,
     steering: SteeringSignal | None = None,
 ) -> SimulationResult:
     """Simulates a gait as simulate() does, on the Drake diagram."""
-    settings, engine = scenario.simulation, scenario.settings_of(Drake)
-    diagram = MakeTensegrityDiagram(scenario, gait, steering=steering)
-    structure = MakeStructure(scenario)
-    model = make_model(scenario, structure)
+    settings, engine = robot.scenario.simulation, robot.scenario.settings_of(Drake)
+    diagram = MakeTensegrityDiagram(robot, gait, steering=steering)
     simulator = MakeSimulator(diagram, engine)
     integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
-    signals, observer = diagram.GetOutputPort("signals"), Observer(scenario, structure, model)
+    signals, observer = diagram.GetOutputPort("signals"), Observer(robot)
     work = _Work(integrator)
     aimer = _StepAimer(diagram, simulator, engine, work)
-    samples = sample_times(settings.duration, settings.sample_period) if record else np.empty(0)
-    needed = result_times(settings)
-    times = np.union1d(needed, samples)
-    sampler = Sampler(structure, times)
+    sampler = Sampler(diagram, motion_times(settings, record=record))
 
     def after_step(context: Context) -> None:
         # What is done here must not depend on whether somebody records or watches.
         check_time()
         bodies, now = state.Eval(context), context.get_time()
-        velocities = bodies[7 * len(structure.bodies) :]
+        velocities = bodies[7 * len(robot.structure.bodies) :]
         _check(settings, now, velocities, work)
         aimer.aim(context, velocities)
         sampler.after_step(context)
         observer.add(now, bodies, signals.Eval(context))
         if viewer is not None and viewer.wants(now):
-            viewer.show(make_dataset(diagram, structure, [Sample.of(context)]))
+            viewer.show(make_dataset(robot, motion_of(diagram, [Sample.of(context)])))
 
     simulator.set_monitor(after_step)
     started = time.perf_counter()
@@ -80,26 +72,20 @@ def simulate_drake(
         raise Diverged(time=now, reason=reason.splitlines()[0]) from error
     wall_time = time.perf_counter() - started
 
-    kept = sampler.samples
-    chosen, ours = ([kept[i] for i in np.searchsorted(times, at)] for at in (samples, needed))
     steps, derivative_evaluations, jacobian_evaluations = work.total()
     return make_result(
-        scenario,
-        structure,
-        times=needed,
-        states=np.array([each.continuous[: 13 * len(structure.bodies)] for each in ours]),
-        signals=evaluate_ports(diagram, ours, ["signals"])["signals"],
+        robot,
+        sampler.motion(),
         totals=observer.totals(),
-        mass=float(model.body.mass[0]),
-        wall_time=wall_time,
-        integrator=IntegratorWork(
+        work=IntegratorWork(
             scheme=engine.scheme,
             accuracy=engine.accuracy,
             steps=steps,
             derivative_evaluations=derivative_evaluations,
             jacobian_evaluations=jacobian_evaluations,
         ),
-        trajectory=make_dataset(diagram, structure, chosen) if record else None,
+        wall_time=wall_time,
+        record=record,
     )
 
 

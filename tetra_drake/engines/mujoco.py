@@ -13,11 +13,10 @@ The ground is a plane, level or inclined; other terrains are refused.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
@@ -25,23 +24,19 @@ import numpy as np
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
-from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, cable_forces
-from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, result_times
-from tetra_drake.results.trajectory import assemble_dataset, sample_times
+from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
+from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import ground_axes
-from tetra_drake.robot.model import Model, make_model
-from tetra_drake.robot.network import SteeringSignal
+from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.robot.signals import signals_at
-from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.engine_kinds import MUJOCO_FRICTION, Mujoco
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
-
-if TYPE_CHECKING:
-    import xarray
 
 Array = np.ndarray
 
@@ -70,73 +65,61 @@ at times far forward; a walking robot stays below 0.2 m/s."""
 
 
 def simulate_mujoco(
-    *, scenario: Scenario, gait: Gait, record: bool, steering: SteeringSignal | None = None
+    robot: Robot, gait: Gait, *, record: bool, steering: SteeringSignal | None = None
 ) -> SimulationResult:
     """Simulates a gait as simulate() does, in MuJoCo, in steps of `engine.step`.
 
     Instants asked for, as of samples, are those of the nearest steps. Other threads run meanwhile.
     Raises InputError, too, if MuJoCo is missing or cannot do it.
     """
-    (outcome,) = simulate_in_rollouts(
-        scenario=scenario, gaits=[gait], record=record, threads=1, steering=steering
-    )
+    (outcome,) = simulate_in_rollouts(robot, [gait], record=record, threads=1, steering=steering)
     if isinstance(outcome, SimulationFailure):
         raise outcome
     return outcome
 
 
 def simulate_in_rollouts(
-    *,
-    scenario: Scenario,
+    robot: Robot,
     gaits: Sequence[Gait],
+    *,
     record: bool,
     threads: int,
     steering: SteeringSignal | None = None,
 ) -> list[SimulationResult | SimulationFailure]:
     """Simulates gaits as simulate_mujoco() does, on so many threads of MuJoCo's `Rollout`: the
     same numbers, bit for bit; for a gait that fails its Diverged or StepBudgetExceeded."""
+    scenario = robot.scenario
     check_mujoco(scenario)
     simulation, step = scenario.simulation, scenario.settings_of(Mujoco).step
     steps = max(1, round(simulation.duration / step))
     if steps > simulation.max_evaluations:
         reason = f"{steps} steps exceed the budget of {simulation.max_evaluations}"
         return [StepBudgetExceeded(time=0.0, reason=reason) for _ in gaits]
-    samples = sample_times(simulation.duration, simulation.sample_period)
-    times = np.union1d(result_times(simulation), samples if record else ())
-    recorded = np.searchsorted(times, samples)
-    robot = _Robot(scenario)
-    work = IntegratorWork(INTEGRATOR, step, steps, steps)
+    times, starts = motion_times(simulation, record=record), step * np.arange(steps)
+    simulator = _Simulator(robot)
     outcomes: list[SimulationResult | SimulationFailure] = []
     for first in range(0, len(gaits), threads * _GAITS):
         group = gaits[first : first + threads * _GAITS]
-        starts = step * np.arange(steps)
-        signals = [signals_at(scenario, gait, starts, steering=steering) for gait in group]
+        signals = [signals_at(robot, gait, starts, steering=steering) for gait in group]
+        observers = [Observer(robot) for _ in group]
         started = time.perf_counter()
-        observers = [robot.observer() for _ in group]
         wanted = np.rint(times / step).astype(int)
-        courses = robot.simulate(signals, wanted, observers, threads=threads)
+        courses = simulator.simulate(signals, wanted, observers, threads=threads)
         wall_time = (time.perf_counter() - started) * min(threads, len(group)) / len(group)
         for gait, course, observer in zip(group, courses, observers, strict=True):
             if isinstance(course, Diverged):
                 course.wall_time = wall_time
                 outcomes.append(course)
                 continue
+            driving = signals_at(robot, gait, times, steering=steering)
             result = make_result(
-                scenario,
-                robot.structure,
-                times=times,
-                states=robot.states(course),
-                signals=signals_at(scenario, gait, times, steering=steering),
+                robot,
+                simulator.motion(times, course, driving),
                 totals=observer.totals(),
-                mass=robot.mass,
+                work=IntegratorWork(INTEGRATOR, step, steps, steps),
                 wall_time=wall_time,
-                integrator=work,
-                trajectory=None,
+                record=record,
             )
-            if record:
-                driving = signals_at(scenario, gait, samples, steering=steering)
-                trajectory = robot.dataset(samples, course[recorded], driving)
-                result = dataclasses.replace(result, trajectory=trajectory)
             outcomes.append(result)
     return outcomes
 
@@ -150,23 +133,24 @@ def installed() -> bool:
     return True
 
 
-def make_mjcf(scenario: Scenario, structure: Structure, robot: Model) -> str:
+def make_mjcf(robot: Robot) -> str:
     """The robot and its ground in MuJoCo's format, with one motor per driven cable."""
+    scenario = robot.scenario
     model = Element("mujoco", model=scenario.name)
     steps = {"integrator": INTEGRATOR, "timestep": scenario.settings_of(Mujoco).step}
     _add(model, "compiler", inertiafromgeom="false")
     _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], cone="elliptic", **steps)
     world = _add(model, "worldbody")
-    _add_floor(world, scenario, structure)
-    _add_bodies(model, world, structure, robot, _contact(scenario, structure, robot))
-    _add_cables(model, structure)
+    _add_floor(world, robot)
+    _add_bodies(model, world, robot)
+    _add_cables(model, robot.structure)
     return tostring(model, encoding="unicode")
 
 
-class _Robot:
-    """MuJoCo's model of the robot."""
+class _Simulator:
+    """MuJoCo with its model of a robot."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, robot: Robot) -> None:
         import mujoco
 
         if mujoco.get_mju_user_warning() is None:
@@ -174,21 +158,14 @@ class _Robot:
             # working folder. Not set back: other threads may be simulating.
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
-        self._scenario, self._step = scenario, scenario.settings_of(Mujoco).step
-        self.structure = MakeStructure(scenario)
-        self._robot = robot = make_model(scenario, self.structure)
-        self.mass = float(robot.body.mass[0])
+        self._robot = robot
         try:
-            self._model = mujoco.MjModel.from_xml_string(make_mjcf(scenario, self.structure, robot))
+            self._model = mujoco.MjModel.from_xml_string(make_mjcf(robot))
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
-            raise InputError(scenario.name, "robot", problem) from error
-        driven = self.structure.cables["signal"]
+            raise InputError(robot.scenario.name, "robot", problem) from error
+        driven = robot.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # the signal of each motor
-
-    def observer(self) -> Observer:
-        """A new observer of this robot, which takes normal forces for those of our law."""
-        return Observer(self._scenario, self.structure, self._robot)
 
     def simulate(
         self,
@@ -235,13 +212,13 @@ class _Robot:
         if not chosen.size:
             return
         steps = np.minimum(first + chosen + 1, len(signals) - 1)
-        step = self._step
+        step = self._robot.scenario.settings_of(Mujoco).step
         for k, (at, state) in enumerate(zip(steps, self.states(states[chosen]), strict=True)):
             observer.add(step * (first + chosen[k] + 1), state, signals[at])
 
     def _failure(self, states: Array, first: int) -> Diverged | None:
         """How the states after step `first` and the next ones tell that a simulation failed."""
-        step = self._step
+        step = self._robot.scenario.settings_of(Mujoco).step
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
         fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= MAX_SPEED)
         if fast.any():
@@ -265,32 +242,14 @@ class _Robot:
         parts = (pose[..., 3:], pose[..., :3]), (w_WB, velocity[..., :3])
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
-    def dataset(self, times: Array, found: Array, signals: Array) -> xarray.Dataset:
-        """The trajectory: MuJoCo's states at `times` (s) and the signals, and the forces there."""
-        structure, states = self.structure, self.states(found)
-        pulls = np.empty((len(times), len(structure.cables), PULL_COLUMNS))
-        nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
-        generalized = np.empty(6 * len(structure.bodies))
-        for state, driving, pull in zip(states, signals, pulls, strict=True):
-            cable_forces(
-                state, driving, structure.p_BN, structure.cables, False, nodes, pull, generalized
-            )
+    def motion(self, times: Array, found: Array, signals: Array) -> Motion:
+        """The motion in MuJoCo's states at `times` (s), driven by the signals."""
         data = self._mujoco.MjData(self._model)
         rows = zip(found, signals, strict=True)
-        ground = np.array([self._ground_forces(data, *row) for row in rows])
-        modes = np.zeros_like(ground)  # of friction: 0, as MuJoCo's has none
-        modes[:, :, 0] = ground[:, :, 2] > 0.0
-        return assemble_dataset(
-            structure,
-            times=times,
-            states=states,
-            signals=signals,
-            tensions=pulls[:, :, TENSION],
-            lengths=pulls[:, :, LENGTH],
-            normal_forces=ground[:, :, 2],
-            friction_forces=ground[:, :, :2],
-            modes=modes,
-        )
+        pushes = np.array([self._ground_forces(data, *row) for row in rows])
+        modes = np.zeros((*pushes.shape[:2], MODE_COLUMNS))  # of friction: 0, as there are none
+        modes[:, :, CONTACT] = pushes[:, :, 2] > 0.0
+        return Motion(times, self.states(found), signals, modes, pushes)
 
     def _ground_forces(self, data: Any, found: Array, signals: Array) -> Array:
         """(contacts, 3): MuJoCo's contact forces on the nodes along t1, t2 and n, in N."""
@@ -298,12 +257,13 @@ class _Robot:
         mujoco.mj_setState(model, data, found, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         data.ctrl[:] = signals[self._motors]
         mujoco.mj_forward(model, data)
-        forces, wrench = np.zeros((len(self.structure.contacts), 3)), np.zeros(6)
+        forces, wrench = np.zeros((len(self._robot.structure.contacts), 3)), np.zeros(6)
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(model, data, i, wrench)
             # The floor is geom 0; those of the contact nodes follow in their order.
             forces[contact.geom[1] - 1] += contact.frame.reshape(3, 3).T @ wrench[:3]
-        axes = ground_axes(data.site_xpos[self.structure.contacts], self._robot.ground)
+        nodes = data.site_xpos[self._robot.structure.contacts]
+        axes = ground_axes(nodes, self._robot.ground)
         return (axes @ forces[:, :, None])[:, :, 0]
 
 
@@ -333,24 +293,19 @@ def _is_plane(terrain: Terrain) -> bool:
     return isinstance(terrain, Flat) or (isinstance(terrain, Incline) and terrain.start is None)
 
 
-def _add_floor(world: Element, scenario: Scenario, structure: Structure) -> None:
+def _add_floor(world: Element, robot: Robot) -> None:
     """The floor, a plane, which is geom 0."""
-    slope = getattr(scenario.terrain, "slope", 0.0)
+    slope = getattr(robot.scenario.terrain, "slope", 0.0)
     pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
-    turned = {"pos": pos, "quat": structure.q_WB}
+    turned = {"pos": pos, "quat": robot.structure.q_WB}
     _add(world, "geom", name="floor", type="plane", size="0 0 1", **turned, **_ALONE)
 
 
-def _add_bodies(
-    model: Element,
-    world: Element,
-    structure: Structure,
-    robot: Model,
-    contact: dict,
-) -> None:
+def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
     """The tetrahedra, with a site at each node, and spheres on those that touch the floor."""
+    structure, contact = robot.structure, _contact(robot)
     pairs, names = _add(model, "contact"), iter(enumerate(structure.node_names))
-    mass, moment = robot.body.mass[0], robot.body.moment[0]
+    mass, moment = robot.model.body.mass[0], robot.model.body.moment[0]
     for body_name, p_WB in zip(structure.bodies, structure.p_WB, strict=True):
         body = _add(world, "body", name=body_name, pos=p_WB, quat=structure.q_WB)
         _add(body, "freejoint")
@@ -363,15 +318,15 @@ def _add_bodies(
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
 
 
-def _contact(scenario: Scenario, structure: Structure, robot: Model) -> dict:
+def _contact(robot: Robot) -> dict:
     """How the floor acts on a node."""
-    ground, law = scenario.ground, scenario.friction
+    ground, law = robot.scenario.ground, robot.scenario.friction
     if isinstance(law, Coulomb):
         friction, stiction_damping = law.kinetic, law.damping
     else:
         friction, stiction_damping = MUJOCO_FRICTION, law.stiction_damping
-    mass, bodies = robot.body.mass[0], len(structure.bodies)
-    borne = mass * bodies * scenario.robot.gravity / (2 * bodies + 1)  # by a foot of the thesis's
+    mass, bodies = robot.model.body.mass[0], len(robot.structure.bodies)
+    borne = robot.weight / (2 * bodies + 1)  # by a foot of the thesis's
     rest_damping = ground.damping * borne / ground.stiffness
     # MuJoCo takes accelerations for forces, and divides them by 1 - impedance. The minus says
     # that the numbers are stiffness and damping.

@@ -8,12 +8,11 @@ from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_r
 from tetra_drake.physics.cable import PULL_COLUMNS
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.model import Model
 from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.results.metrics import empty_tally
-from tetra_drake.robot.model import Model
-from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.robot.robot import Robot
 from tetra_drake.simd.compiling import compiled
 from tetra_drake.simd.lanes import Table
 
@@ -26,13 +25,14 @@ class Observer:
     It only reads states, so observing cannot change the simulation.
     """
 
-    def __init__(self, scenario: Scenario, structure: Structure, model: Model) -> None:
+    def __init__(self, robot: Robot) -> None:
+        structure = robot.structure
         bodies, cables = len(structure.bodies), len(structure.cables)
         contacts, sizes = len(structure.contacts), dict.fromkeys(Tally._fields, 1)
         sizes |= {"signals": structure.signals, "lengths": cables, "lifted": bodies}
-        values = empty_tally(scenario)
+        values = empty_tally(robot.scenario)
         columns = (np.full(sizes[name], value) for name, value in values._asdict().items())
-        self._model, self._tally = model, Tally(*columns)
+        self._model, self._tally = robot.model, Tally(*columns)
         self._modes = np.zeros((contacts, MODE_COLUMNS))
         self._forces = Forces(
             nodes=np.empty((len(structure.node_names), NODE_COLUMNS)),

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
+from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.kinematics import interpolate_state
-from tetra_drake.results.trajectory import assemble_dataset
-from tetra_drake.robot.structure import Structure
-
-if TYPE_CHECKING:
-    import xarray
+from tetra_drake.results.trajectory import Motion
 
 
 class Sample(NamedTuple):
@@ -42,25 +39,30 @@ class Sampler:
     forces and lengths for later, so recording cannot change the simulation.
     """
 
-    def __init__(self, structure: Structure, times: np.ndarray) -> None:
-        self._structure, self._times = structure, times
-        self.samples: list[Sample] = []
+    def __init__(self, diagram: Diagram, times: np.ndarray) -> None:
+        self._diagram, self._times = diagram, times
+        self._bodies = slice(diagram.GetOutputPort("state").size())
+        self._samples: list[Sample] = []
         self._latest: Sample | None = None
 
     def after_step(self, context: Context) -> None:
         """Takes the samples that are due in the step that ends here."""
         after = Sample.of(context)
         before, self._latest = self._latest or after, after
-        for time in self._times[len(self.samples) :]:
+        for time in self._times[len(self._samples) :]:
             if time > after.time:
                 return
-            self.samples.append(self._between(before, after, float(time)))
+            self._samples.append(self._between(before, after, float(time)))
+
+    def motion(self) -> Motion:
+        """The motion at the times that have passed."""
+        return motion_of(self._diagram, self._samples)
 
     def _between(self, before: Sample, after: Sample, time: float) -> Sample:
         """The sample at a time (s) of a step, with the discrete state of its end."""
         if time == after.time:
             return after
-        step, bodies = after.time - before.time, slice(13 * len(self._structure.bodies))
+        step, bodies = after.time - before.time, self._bodies
         part = (time - before.time) / step
         state = before.continuous + part * (after.continuous - before.continuous)
         ends = before.continuous[bodies], after.continuous[bodies]
@@ -68,25 +70,24 @@ class Sampler:
         return Sample(time, state, after.discrete)
 
 
-def make_dataset(diagram: Diagram, structure: Structure, samples: list[Sample]) -> xarray.Dataset:
-    """The samples with all that the diagram's output ports say of them; see assemble_dataset."""
-    ports = ("state", "signals", "tensions", "lengths", "normal_forces", "friction_forces", "modes")
-    table = evaluate_ports(diagram, samples, ports)
-    times = np.array([sample.time for sample in samples])
-    return assemble_dataset(structure, times=times, states=table.pop("state"), **table)
-
-
-def evaluate_ports(
-    diagram: Diagram, samples: Sequence[Sample], ports: Sequence[str]
-) -> dict[str, np.ndarray]:
-    """The values (samples, size) of output ports of the diagram, by their names."""
-    columns: dict[str, list[np.ndarray]] = {port: [] for port in ports}
+def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
+    """The motion in samples of a robot's diagram."""
+    state, signals = diagram.GetOutputPort("state"), diagram.GetOutputPort("signals")
     context = diagram.CreateDefaultContext()
+    ground = diagram.GetSubsystemByName("ground").GetMyContextFromRoot(context)
+    states_then, signals_then, modes_then = [], [], []
     for sample in samples:
         context.SetTime(sample.time)
         context.SetContinuousState(sample.continuous)
         for group, values in enumerate(sample.discrete):
             context.SetDiscreteState(group, values)
-        for port in ports:
-            columns[port].append(diagram.GetOutputPort(port).Eval(context))
-    return {port: np.array(rows) for port, rows in columns.items()}
+        states_then.append(state.Eval(context))
+        signals_then.append(signals.Eval(context))
+        modes = ground.get_discrete_state_vector().CopyToVector()
+        modes_then.append(modes.reshape(-1, MODE_COLUMNS))
+    return Motion(
+        times=np.array([sample.time for sample in samples]),
+        states=np.array(states_then),
+        signals=np.array(signals_then),
+        modes=np.array(modes_then),
+    )

@@ -12,9 +12,7 @@ from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
-from tetra_drake.robot.model import make_model
-from tetra_drake.robot.network import SteeringSignal, constant_steering
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot, SteeringSignal, constant_steering
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -46,19 +44,18 @@ def simulate(
         scenario = load_scenario(scenario)
     if steering is not None and not callable(steering):
         steering = constant_steering(steering)
+    robot = Robot.of(scenario)
     if scenario.engine_name == "drake":
         from tetra_drake.engines.drake import simulate_drake
 
-        return simulate_drake(
-            scenario=scenario, gait=gait, record=record, viewer=viewer, steering=steering
-        )
+        return simulate_drake(robot, gait, record=record, viewer=viewer, steering=steering)
     if viewer is not None:
         check_can_be_watched(scenario)
     if scenario.engine_name == "compiled":
         from tetra_drake.engines.compiled.engine import simulate_compiled as run
     else:
         from tetra_drake.engines.mujoco import simulate_mujoco as run
-    return run(scenario=scenario, gait=gait, record=record, steering=steering)
+    return run(robot, gait, record=record, steering=steering)
 
 
 def simulate_many(
@@ -98,7 +95,8 @@ def simulate_many(
     if isinstance(scenario, Scenario) and scenario.engine_name == "mujoco":
         from tetra_drake.engines.mujoco import simulate_in_rollouts
 
-        return simulate_in_rollouts(scenario=scenario, gaits=gaits, record=record, threads=threads)
+        robot = Robot.of(scenario)
+        return simulate_in_rollouts(robot, gaits, record=record, threads=threads)
     found: list[SimulationResult | SimulationFailure] = []
     for own, gait in zip(scenarios, gaits, strict=True):
         try:
@@ -111,7 +109,7 @@ def simulate_many(
 def check_scenario(scenario: Scenario) -> None:
     """Raises InputError if the scenario's engine cannot simulate it, say, as the robot would start
     in the ground."""
-    make_model(scenario, MakeStructure(scenario))
+    Robot.of(scenario)
     if scenario.engine_name == "mujoco":
         from tetra_drake.engines.mujoco import check_mujoco
 
@@ -124,7 +122,7 @@ def prepare(scenario: Scenario, *, many: bool = False) -> None:
     if scenario.engine_name == "compiled":
         from tetra_drake.engines.compiled.lane_engine import LaneEngine, PreparedGait, lanes_for
 
-        prepared = PreparedGait.of(scenario, seeded_gait(scenario), record=False)
+        prepared = PreparedGait.of(Robot.of(scenario), seeded_gait(scenario), record=False)
         for width in {1, lanes_for(math.inf) if many else 1}:
             LaneEngine(prepared, width=width)
         return

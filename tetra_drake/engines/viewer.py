@@ -18,7 +18,7 @@ class Viewer(Protocol):
         """Whether to be shown the state at this time (s)."""
 
     def show(self, frame: xarray.Dataset) -> None:
-        """Takes one sample of a trajectory (see results.trajectory.assemble_dataset)."""
+        """Takes one sample of a trajectory (see results.trajectory.make_dataset)."""
 
 
 def check_can_be_watched(scenario: Scenario) -> None:

@@ -16,8 +16,7 @@ from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.style import save_figure
 from tetra_drake.report.study import Study
-from tetra_drake.robot.ground import make_ground
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -26,7 +25,7 @@ def draw_trajectory(trajectory: xarray.Dataset, scenario: Scenario, folder: Path
 
     Raises InputError if the folder cannot be written to.
     """
-    ground = make_ground(scenario, MakeStructure(scenario))
+    ground = Robot.of(scenario).ground
     return _save(
         folder,
         (motion.time_lapse, trajectory),

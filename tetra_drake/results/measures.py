@@ -1,4 +1,4 @@
-"""Quantities derived from a recorded trajectory (see trajectory.assemble_dataset), in SI units."""
+"""Quantities derived from a recorded trajectory (see trajectory.make_dataset), in SI units."""
 
 from __future__ import annotations
 

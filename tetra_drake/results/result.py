@@ -18,9 +18,10 @@ from tetra_drake.results.metrics import (
     compute_metrics,
 )
 from tetra_drake.results.path import PERIOD, CentrePath, follow
-from tetra_drake.results.trajectory import sample_times
+from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.metric_units import Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import SimulationSection
@@ -61,16 +62,14 @@ class SimulationResult:
     path: CentrePath = field(repr=False, compare=False)
     """Of the robot's centre from start to end, in steps of results.path.PERIOD."""
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
-    """See results.trajectory.assemble_dataset; None unless asked for."""
+    """See results.trajectory.make_dataset; None unless asked for."""
 
 
-def result_times(simulation: SimulationSection) -> np.ndarray:
-    """The times (s), ascending, at which make_result() needs the states of a simulation."""
-    return np.unique([*_ends(simulation), *_path_times(simulation)])
-
-
-def _ends(simulation: SimulationSection) -> tuple[float, float, float]:
-    return 0.0, simulation.steady_from, simulation.duration
+def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
+    """The times (s), ascending, at which make_result() needs the motion of a simulation."""
+    samples = sample_times(simulation.duration, simulation.sample_period) if record else ()
+    ends = 0.0, simulation.steady_from, simulation.duration
+    return np.unique([*ends, *_path_times(simulation), *samples])
 
 
 def _path_times(simulation: SimulationSection) -> np.ndarray:
@@ -78,31 +77,26 @@ def _path_times(simulation: SimulationSection) -> np.ndarray:
 
 
 def make_result(
-    scenario: Scenario,
-    structure: Structure,
+    robot: Robot,
+    motion: Motion,
     *,
-    times: np.ndarray,
-    states: np.ndarray,
-    signals: np.ndarray,
     totals: Tally,
-    mass: float,
+    work: IntegratorWork,
     wall_time: float,
-    integrator: IntegratorWork,
-    trajectory: xarray.Dataset | None,
+    record: bool,
 ) -> SimulationResult:
-    """The result of a simulation on the scenario's engine.
+    """The result of a simulation, with a trajectory if it shall `record` one.
 
-    `times` (k,) in s, ascending, are those of result_times(), and maybe more; `states` (k, 13 n)
-    are [q; v] of the bodies and `signals` (k, m) those of the oscillators, in N, then; `totals` are
-    of the whole simulation; `mass` of a tetrahedron in kg, `wall_time` in s.
+    The motion's times are those of motion_times(), `totals` are of the whole simulation, and
+    `wall_time` is in s.
     """
-    simulation, bodies = scenario.simulation, len(structure.bodies)
-    ends = np.searchsorted(times, _ends(simulation))
-    start, steady, end = (node_positions(structure, states[i]) for i in ends)
+    simulation, structure = robot.scenario.simulation, robot.structure
     instants = _path_times(simulation)
-    rows = np.searchsorted(times, instants)
-    poses = states[rows, : 7 * bodies].reshape(-1, bodies, 7)
+    way = motion.at(instants)
+    poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
     path = follow(instants, poses)
+    ends = motion.at(np.array([0.0, simulation.steady_from, simulation.duration]))
+    start, steady, end = (node_positions(structure, state) for state in ends.states)
     metrics = compute_metrics(
         structure,
         start=start,
@@ -111,18 +105,19 @@ def make_result(
         path=path,
         steady_from=simulation.steady_from,
         totals=totals,
-        signals=signals[rows[instants >= simulation.steady_from]],
-        weight=bodies * mass * scenario.robot.gravity,
+        signals=way.signals[instants >= simulation.steady_from],
+        weight=robot.weight,
     )
+    samples = sample_times(simulation.duration, simulation.sample_period)
     return SimulationResult(
         metrics=metrics,
-        fitness=compute_fitness(metrics, scenario.objective),
+        fitness=compute_fitness(metrics, robot.scenario.objective),
         duration=simulation.duration,
         wall_time=wall_time,
-        integrator=integrator,
-        engine=scenario.engine_name,
+        integrator=work,
+        engine=robot.scenario.engine_name,
         path=path,
-        trajectory=trajectory,
+        trajectory=make_dataset(robot, motion.at(samples)) if record else None,
     )
 
 

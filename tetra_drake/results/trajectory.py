@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import io
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tetra_drake.files import write_whole
-from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.robot.structure import NODES, Structure, node_positions, node_velocities
+from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, cable_forces
+from tetra_drake.physics.contact import STICK_POINT, ground_forces
+from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN
+from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import NODES, Structure, moved_nodes
 
 if TYPE_CHECKING:
     import xarray
@@ -37,45 +42,62 @@ def sample_times(duration: float, period: float) -> np.ndarray:
     return np.linspace(0.0, duration, max(1, round(duration / period)) + 1)
 
 
-def assemble_dataset(
-    structure: Structure,
-    *,
-    times: np.ndarray,
-    states: np.ndarray,
-    signals: np.ndarray,
-    tensions: np.ndarray,
-    lengths: np.ndarray,
-    normal_forces: np.ndarray,
-    friction_forces: np.ndarray,
-    modes: np.ndarray,
-) -> xarray.Dataset:
-    """A trajectory from its columns, one row per sample; shapes are those of the diagram's ports.
+@dataclass(frozen=True)
+class Motion:
+    """The motion of a robot at k times, as its engine hands it on; SI units."""
+
+    times: np.ndarray
+    """(k,): ascending."""
+    states: np.ndarray
+    """(k, 13 n): [q; v] of the bodies."""
+    signals: np.ndarray
+    """(k, m): the actuation signals."""
+    modes: np.ndarray
+    """(k, contacts, MODE_COLUMNS): `modes` of physics.contact, those of the step in which, or at
+    whose end, the time lies."""
+    pushes: np.ndarray | None = None
+    """(k, contacts, 3): forces of the ground along t1, t2 and n, of an engine that has a law of its
+    own; otherwise they follow from states and modes."""
+
+    def at(self, times: np.ndarray) -> Motion:
+        """The motion at some of its times."""
+        rows = np.searchsorted(self.times, times)
+        return Motion(
+            times=self.times[rows],
+            states=self.states[rows],
+            signals=self.signals[rows],
+            modes=self.modes[rows],
+            pushes=None if self.pushes is None else self.pushes[rows],
+        )
+
+
+def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
+    """A trajectory: a motion with the lengths and forces that follow from it.
 
     Dimensions: time, tetrahedron, node, cable, contact, oscillator, axis, horizontal, quaternion.
     Every variable has a `units` attribute. Coordinates along `cable`: cable_junction, cable_role
     (outer or inner) and cable_signal, the oscillator that drives the cable ("" if none); along
     `oscillator`: oscillator_junction and oscillator_side (1 left, -1 right, else 0).
-    Forces and modes are those of the step in which, or at whose end, the sample lies.
     """
     import xarray
 
-    bodies, contacts = len(structure.bodies), len(structure.contacts)
-    modes = np.sign(modes).reshape(-1, contacts, 3).astype(np.int8)
-    positions = np.array([node_positions(structure, state) for state in states])
-    velocities = np.array([node_velocities(structure, state) for state in states])
-    q = states[:, : 7 * bodies].reshape(-1, bodies, 7)
-    node_shape = (-1, bodies, len(NODES), 3)
+    structure, bodies = robot.structure, len(robot.structure.bodies)
+    nodes = np.array([moved_nodes(structure, state) for state in motion.states])
+    nodes = nodes.reshape(-1, bodies, len(NODES), NODE_COLUMNS)
+    poses = motion.states[:, : 7 * bodies].reshape(-1, bodies, 7)
+    pulls, pushes = _forces(robot, motion)
+    modes = np.sign(motion.modes[:, :, :STICK_POINT]).astype(np.int8)
     slip = "0 sticks, +1 or -1 slips in that direction"
     variables = {
-        "p_WN": (positions.reshape(node_shape), "m", "node position"),
-        "v_WN": (velocities.reshape(node_shape), "m/s", "node velocity"),
-        "p_WB": (q[..., 4:], "m", "position of the body's origin"),
-        "q_WB": (q[..., :4], "1", "orientation of the body"),
-        "tension": (tensions, "N", "cable tension"),
-        "length": (lengths, "m", "cable length"),
-        "signal": (signals, "N", "actuation signal"),
-        "normal_force": (normal_forces, "N", "force along the normal of the ground"),
-        "friction_force": (friction_forces.reshape(-1, contacts, 2), "N", "friction force"),
+        "p_WN": (nodes[..., P_WN : P_WN + 3], "m", "node position"),
+        "v_WN": (nodes[..., V_WN : V_WN + 3], "m/s", "node velocity"),
+        "p_WB": (poses[..., 4:], "m", "position of the body's origin"),
+        "q_WB": (poses[..., :4], "1", "orientation of the body"),
+        "tension": (pulls[..., TENSION], "N", "cable tension"),
+        "length": (pulls[..., LENGTH], "m", "cable length"),
+        "signal": (motion.signals, "N", "actuation signal"),
+        "normal_force": (pushes[..., 2], "N", "force along the normal of the ground"),
+        "friction_force": (pushes[..., :2], "N", "friction force"),
         "in_contact": (modes[..., 0], "1", "1 on the ground"),
         "friction_mode": (modes[..., 1:], "1", slip),
     }
@@ -84,8 +106,24 @@ def assemble_dataset(
             name: (DIMENSIONS[name], values, {"units": unit, "long_name": meaning})
             for name, (values, unit, meaning) in variables.items()
         },
-        coords={"time": ("time", times, {"units": "s"}), **labels(structure)},
+        coords={"time": ("time", motion.times, {"units": "s"}), **labels(structure)},
     )
+
+
+def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """The cables' `pulls` (k, cables, PULL_COLUMNS) and the ground's `pushes` (k, contacts, 3)."""
+    model, (count, contacts, _) = robot.model, motion.modes.shape
+    nodes = np.empty((len(robot.structure.node_names), NODE_COLUMNS))
+    frames = np.empty((contacts, FRAME_COLUMNS))
+    pulls = np.empty((count, len(model.cables), PULL_COLUMNS))
+    pushes = np.empty((count, contacts, 3))
+    force = np.empty(6 * len(robot.structure.bodies))
+    for k, (state, signals) in enumerate(zip(motion.states, motion.signals, strict=True)):
+        cable_forces(state, signals, model.p_BN, model.cables, model.slack, nodes, pulls[k], force)
+        ground_forces(
+            state, motion.modes[k], model.p_BN, *model.ground, nodes, frames, pushes[k], force
+        )
+    return pulls, pushes if motion.pushes is None else motion.pushes
 
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:

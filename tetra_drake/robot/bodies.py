@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-from dataclasses import dataclass, field
-
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
@@ -36,23 +33,8 @@ def node_inertia(structure: Structure) -> SpatialInertia:
     return SpatialInertia.SolidSphereWithDensity(structure.density, structure.node_radius)
 
 
-@dataclass(frozen=True)
-class _Tetrahedron:
-    """All that an inertia depends on, and a structure that has it."""
-
-    numbers: tuple[float, ...]
-    structure: Structure = field(compare=False)
-
-
 def tetrahedron_inertia(structure: Structure) -> SpatialInertia:
     """M_BBo_B: six struts and four spheres about the body's origin."""
-    sizes = structure.strut_radius, structure.node_radius, structure.density
-    return _inertia(_Tetrahedron((*structure.p_BN.ravel().tolist(), *sizes), structure))
-
-
-@functools.lru_cache(maxsize=8)  # as most draws of disturbances leave it as it is
-def _inertia(tetrahedron: _Tetrahedron) -> SpatialInertia:
-    structure = tetrahedron.structure
     total = SpatialInertia.Zero()
     for strut in STRUTS:
         X_BS = strut_pose(structure, strut)

@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.contact import (
-    LAW,
-    MODE_COLUMNS,
-    Ground,
-    law_of,
-    modes_after_step,
-)
+from tetra_drake.physics.contact import LAW, Ground, law_of
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.physics.terrain import (
     FRAME_COLUMNS,
@@ -99,15 +93,6 @@ def _check_start(
         node = structure.node_names[structure.contacts[gaps.argmin()]]
         problem = f"the robot starts with node {node} {-gaps.min() / INCH:.3g} in below the ground"
         raise InputError(source, "terrain", f"{problem}; move what is there, or robot.offsets")
-
-
-def starting_modes(structure: Structure, ground: Ground) -> np.ndarray:
-    """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
-    state, count = structure.initial_state, len(ground.contacts)
-    nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
-    modes, frames = np.zeros((count, MODE_COLUMNS)), np.empty((count, FRAME_COLUMNS))
-    modes_after_step(state, structure.p_BN, ground, nodes, frames, modes)
-    return modes
 
 
 def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:

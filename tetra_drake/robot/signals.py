@@ -14,23 +14,13 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
 from tetra_drake.physics.oscillator import make_neurons, network_output
-from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.network import (
-    SteeringSignal,
-    initial_neurons,
-    make_network,
-    sample_turns,
-    tonic_input,
-)
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import POUND_FORCE
 
 
-def raw_output(
-    scenario: Scenario, gait: Gait, steering: SteeringSignal | None = None
-) -> np.ndarray:
+def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
     """y_extensor - y_flexor (samples, m) at 0, one `listing_step`, two ... from `cpg.signals`.
 
     `listing`: forward Euler as in listing B, which stamps the state after i + 1 steps with the
@@ -39,16 +29,15 @@ def raw_output(
     its middle. Raises InputError for a gait that does not fit, or one
     with feedback, whose signals depend on the robot.
     """
-    cpg, structure = scenario.cpg, MakeStructure(scenario)
+    cpg, oscillators = robot.scenario.cpg, robot.structure.signals
     if any(gain for _, gain in gait.gains):
         problem = "has feedback; its signals exist only while the robot is simulated"
         raise InputError(f"gait {gait.name}", "gains", problem)
-    network = make_network(scenario, structure, gait)
-    turns = sample_turns(scenario, structure, gait, steering)
+    network, turns = robot.network(gait), robot.turns(gait, steering)
     midway = 0.5 * (turns[:-1] + turns[1:]) if turns.size > 1 else turns
-    inputs = tonic_input(scenario, structure, midway)
-    neurons = make_neurons(initial_neurons(cpg, structure.signals))
-    output = np.empty((sample_count(scenario), structure.signals))
+    inputs = robot.tonic_input(midway)
+    neurons = make_neurons(initial_neurons(cpg, oscillators))
+    output = np.empty((sample_count(robot.scenario), oscillators))
     listing = cpg.signals == "listing"
     network_output(network, inputs, cpg.listing_step, listing, neurons, output)
     return output
@@ -60,43 +49,42 @@ def sample_count(scenario: Scenario) -> int:
     return round(steps) if scenario.cpg.signals == "listing" else math.ceil(steps) + 1
 
 
-def signal_samples(
-    scenario: Scenario, gait: Gait, steering: SteeringSignal | None = None
-) -> np.ndarray:
+def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
     """The signals (samples, m) in N at 0, one `cpg.listing_step`, two ... to beyond the duration.
 
     Between samples the signals are linear. Start-up is not applied.
     """
-    raw = raw_output(scenario, gait, steering)
-    return scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
+    raw = raw_output(robot, gait, steering)
+    return robot.scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
 
 
 def signals_at(
-    scenario: Scenario,
+    robot: Robot,
     gait: Gait,
     times: np.ndarray,
     *,
     steering: SteeringSignal | None = None,
 ) -> np.ndarray:
     """The signals (times, m) in N that cables are fed at `times` (s), zero before the start-up."""
-    samples = signal_samples(scenario, gait, steering)
-    grid = scenario.cpg.listing_step * np.arange(len(samples))
+    samples, cpg = signal_samples(robot, gait, steering), robot.scenario.cpg
+    grid = cpg.listing_step * np.arange(len(samples))
     signals = np.column_stack([np.interp(times, grid, column) for column in samples.T])
-    signals[times < scenario.cpg.start_up - 1e-9] = 0.0
+    signals[times < cpg.start_up - 1e-9] = 0.0
     return signals
 
 
-def save_signals(path: str | Path, scenario: Scenario, gait: Gait) -> None:
+def save_signals(path: str | Path, robot: Robot, gait: Gait) -> None:
     """Writes the signals that the cables of a gait are fed as CSV: time_s, signal_1 ... signal_m,
     in lbf, one sample per `cpg.listing_step`.
 
     The first lines, which begin with #, say what the columns are.
     """
-    cpg, duration = scenario.cpg, scenario.simulation.duration
+    scenario, cpg = robot.scenario, robot.scenario.cpg
+    duration = scenario.simulation.duration
     times = cpg.listing_step * np.arange(math.floor(duration / cpg.listing_step + 1e-9) + 1)
-    signals = signals_at(scenario, gait, times) / POUND_FORCE
-    names = [f"signal_{i + 1}" for i in range(scenario.oscillators)]
-    cables = zip(names, Actuation.of(scenario).cables, strict=True)
+    signals = signals_at(robot, gait, times) / POUND_FORCE
+    names = [f"signal_{i + 1}" for i in range(robot.structure.signals)]
+    cables = zip(names, robot.actuation.cables, strict=True)
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",
         "# time_s: time in s; signal_i: force in lbf that shortens the cables",

@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.physics.feedback import Senses, sense
+from tetra_drake.physics.feedback import sense
+from tetra_drake.robot.robot import Robot
 
 
 class Feedback(LeafSystem):
@@ -20,12 +21,13 @@ class Feedback(LeafSystem):
     | feedback      | (2m,)        | 1    | f of Eq. 7 for the neurons of m oscillators      |
     """
 
-    def __init__(self, senses: Senses, *, gains: npt.ArrayLike, bodies: int) -> None:
-        """`gains` of length, load and pitch."""
+    def __init__(self, robot: Robot, *, gains: npt.ArrayLike) -> None:
+        """`gains` of length, load and pitch. Raises InputError if the robot finds no rest."""
         super().__init__()
-        self._senses, self._gains = senses, np.array(gains, dtype=float)
-        self._neurons = 2 * len(senses.ahead)
-        sizes = (13 * bodies, len(senses.drivers), len(senses.carriers))
+        structure, self._senses = robot.structure, robot.senses
+        self._gains = np.array(gains, dtype=float)
+        self._neurons = 2 * structure.signals
+        sizes = 13 * len(structure.bodies), len(structure.cables), len(structure.contacts)
         names = ("state", "lengths", "normal_forces")
         self._inputs = [
             self.DeclareVectorInputPort(name, size) for name, size in zip(names, sizes, strict=True)

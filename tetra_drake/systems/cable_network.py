@@ -7,7 +7,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from tetra_drake.physics.cable import LENGTH, PULL_COLUMNS, TENSION, cable_forces
 from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.robot import Robot
 
 
 class CableNetwork(LeafSystem):
@@ -21,13 +21,12 @@ class CableNetwork(LeafSystem):
     | tensions          | (6 (n - 1),)   | N      | tension of each cable                    |
     | lengths           | (6 (n - 1),)   | m      | length of each cable                     |
 
-    With `slack`, a cable that would have to push goes slack.
+    With `cables.slack`, a cable that would have to push goes slack.
     """
 
-    def __init__(self, structure: Structure, *, slack: bool) -> None:
+    def __init__(self, robot: Robot) -> None:
         super().__init__()
-        self._p_BN, self._cables = structure.p_BN, structure.cables
-        self._slack = slack
+        structure, self._model = robot.structure, robot.model
         bodies, count = len(structure.bodies), len(structure.cables)
         # Room for the kernel, which writes all of it at every call.
         self._nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
@@ -45,9 +44,9 @@ class CableNetwork(LeafSystem):
         cable_forces(
             self._state.Eval(context),
             self._signals.Eval(context),
-            self._p_BN,
-            self._cables,
-            self._slack,
+            self._model.p_BN,
+            self._model.cables,
+            self._model.slack,
             self._nodes,
             self._pulls,
             self._force,

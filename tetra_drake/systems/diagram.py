@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder, System
@@ -12,18 +10,9 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.robot.bodies import AddTetrahedra
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.network import (
-    SteeringSignal,
-    initial_neurons,
-    make_network,
-    make_senses,
-    sample_turns,
-    tonic_input,
-)
+from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import signal_samples
-from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.engine_kinds import Drake
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import (
     CableNetwork,
     Feedback,
@@ -35,7 +24,7 @@ from tetra_drake.systems import (
 
 
 def MakeTensegrityDiagram(
-    scenario: Scenario, gait: Gait, *, steering: SteeringSignal | None = None
+    robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None
 ) -> Diagram:
     """The robot walking by a gait; its default context is the scenario's start.
 
@@ -55,7 +44,7 @@ def MakeTensegrityDiagram(
     the systems' docstrings give shapes and units. There is no SceneGraph: pictures are made from
     trajectories.
     """
-    structure = MakeStructure(scenario)
+    scenario, structure = robot.scenario, robot.structure
     builder = DiagramBuilder()
 
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
@@ -64,13 +53,12 @@ def MakeTensegrityDiagram(
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
-    cpg = _AddCpg(builder, scenario, structure, gait, steering)
+    cpg = _AddCpg(builder, robot, gait, steering)
     gate = StartUpGate(structure.signals, start_up=scenario.cpg.start_up)
     start_up = builder.AddNamedSystem("start_up", gate)
-    cables = builder.AddNamedSystem("cables", CableNetwork(structure, slack=scenario.cables.slack))
+    cables = builder.AddNamedSystem("cables", CableNetwork(robot))
     witness = isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness"
-    contact = GroundContact(structure, scenario, witness=witness)
-    ground = builder.AddNamedSystem("ground", contact)
+    ground = builder.AddNamedSystem("ground", GroundContact(robot, witness=witness))
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
 
     state, signals = plant.get_state_output_port(), start_up.GetOutputPort("signals")
@@ -82,12 +70,8 @@ def MakeTensegrityDiagram(
     builder.Connect(ground.GetOutputPort("generalized_force"), forces.get_input_port(1))
     builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
     if scenario.cpg.feedback:
-        sensors = Feedback(
-            make_senses(scenario, structure),
-            gains=[gain for _, gain in gait.gains],
-            bodies=len(structure.bodies),
-        )
-        feedback = builder.AddNamedSystem("feedback", sensors)
+        gains = [gain for _, gain in gait.gains]
+        feedback = builder.AddNamedSystem("feedback", Feedback(robot, gains=gains))
         builder.Connect(state, feedback.GetInputPort("state"))
         builder.Connect(cables.GetOutputPort("lengths"), feedback.GetInputPort("lengths"))
         builder.Connect(
@@ -107,31 +91,26 @@ def MakeTensegrityDiagram(
 
 
 def _AddCpg(
-    builder: DiagramBuilder,
-    scenario: Scenario,
-    structure: Structure,
-    gait: Gait,
-    steering: SteeringSignal | None,
+    builder: DiagramBuilder, robot: Robot, gait: Gait, steering: SteeringSignal | None
 ) -> System:
     """Adds `cpg`, whose first output port has the signals: a live network with its `steering`, or
     the signals computed beforehand."""
-    cpg = scenario.cpg
+    cpg = robot.scenario.cpg
     if cpg.signals != "live":
-        samples = signal_samples(scenario, gait, steering)
+        samples = signal_samples(robot, gait, steering)
         times = cpg.listing_step * np.arange(len(samples))
         source = TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, samples.T))
         return builder.AddNamedSystem("cpg", source)
-    sample_turns(scenario, structure, gait, steering)  # raises InputError for a wrong turn
+    robot.turns(gait, steering)  # raises InputError for a wrong turn
     neurons = MatsuokaCpg(
-        make_network(scenario, structure, gait),
+        robot.network(gait),
         tonic=cpg.external_input,
-        initial_state=initial_neurons(cpg, structure.signals),
+        initial_state=initial_neurons(cpg, robot.structure.signals),
         gain=cpg.gain,
     )
     oscillators = builder.AddNamedSystem("cpg", neurons)
-    tonic = functools.partial(tonic_input, scenario, structure)
     turn = gait.turn if steering is None else steering
-    steers = builder.AddNamedSystem("steering", Steering(tonic, turn=turn))
+    steers = builder.AddNamedSystem("steering", Steering(robot.tonic_input, turn=turn))
     builder.Connect(steers.get_output_port(), oscillators.GetInputPort("tonic"))
     builder.ExportInput(steers.GetInputPort("turn"), "turn")
     return oscillators

@@ -24,9 +24,7 @@ from tetra_drake.physics.contact import (
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.mode_change import mode_margin, next_mode_change
 from tetra_drake.physics.terrain import FRAME_COLUMNS
-from tetra_drake.robot.ground import make_ground
-from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.robot.robot import Robot
 
 
 class GroundContact(LeafSystem):
@@ -53,10 +51,10 @@ class GroundContact(LeafSystem):
     window: 0.01 s times the accuracy set by Context.SetAccuracy.
     """
 
-    def __init__(self, structure: Structure, scenario: Scenario, *, witness: bool = False) -> None:
-        """Raises InputError as make_ground does."""
+    def __init__(self, robot: Robot, *, witness: bool = False) -> None:
         super().__init__()
-        self._p_BN, self._ground = structure.p_BN, make_ground(scenario, structure)
+        structure = robot.structure
+        self._p_BN, self._ground = structure.p_BN, robot.ground
         bodies, count = len(structure.bodies), len(structure.contacts)
         # Room for the kernels, which write what they need of it at every call.
         self._nodes = np.empty((len(structure.node_names), NODE_COLUMNS))

@@ -29,7 +29,7 @@ class MatsuokaCpg(LeafSystem):
 
     Continuous state: u (2n,), then v (2n,), the inner states and the self-inhibitions. Outputs
     depend on it alone, so what they drive may feed back without an algebraic loop. The signals are
-    those of the network from t = 0 on. The robot's network is made by `robot.network`;
+    those of the network from t = 0 on. The robot's network is `Robot.network`;
     diagrams/entrainment.py closes a loop around an oscillator of its own.
     """
 

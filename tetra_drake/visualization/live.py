@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from tetra_drake.robot.ground import ground_heights, make_ground
-from tetra_drake.robot.structure import MakeStructure, node_positions
+from tetra_drake.robot.ground import ground_heights
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.replay import quiet_meshcat
-from tetra_drake.visualization.scene import add_robot, motions, set_surroundings
+from tetra_drake.visualization.scene import add_robot, set_surroundings, tracks
 
 if TYPE_CHECKING:
     import xarray
@@ -44,17 +45,17 @@ class LiveView:
     ) -> None:
         self._meshcat = meshcat
         self._clock, self._sleep = clock, sleep
-        self._structure = MakeStructure(scenario)
+        self._robot = Robot.of(scenario)
         self._started: float | None = None
         self._due = 0.0
-        self._ground = make_ground(scenario, self._structure)
-        p_WN = node_positions(self._structure, self._structure.initial_state)
+        structure, ground = self._robot.structure, self._robot.ground
+        p_WN = node_positions(structure, structure.initial_state)
         room = np.array([ROOM, 0.0, 0.0])
         points = np.stack([p_WN - room, p_WN + room])
-        rise = ground_heights(points[..., :2], self._ground)
-        points[..., 2] += rise - ground_heights(p_WN[:, :2], self._ground)
-        add_robot(meshcat, self._structure)
-        set_surroundings(meshcat, self._structure, self._ground, points)
+        rise = ground_heights(points[..., :2], ground)
+        points[..., 2] += rise - ground_heights(p_WN[:, :2], ground)
+        add_robot(meshcat, structure)
+        set_surroundings(meshcat, self._robot, points)
 
     def wants(self, time: float) -> bool:
         """True if the frame before is over at this time (s)."""
@@ -65,8 +66,8 @@ class LiveView:
         time = float(frame["time"].values[0])
         if self._started is not None:
             self._sleep(max(0.0, self._started + time - self._clock()))
-        for motion in motions(self._structure, self._ground, frame):
-            self._meshcat.SetTransform(motion.path, motion.matrix(0))
+        for track in tracks(self._robot, frame):
+            self._meshcat.SetTransform(track.path, track.matrix(0))
         if self._started is None:
             while self._meshcat.GetNumActiveConnections() == 0:
                 self._sleep(_PATIENCE)

@@ -19,20 +19,19 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import render
-from tetra_drake.physics.contact import Ground
-from tetra_drake.robot.ground import make_ground
-from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, MakeStructure, Structure
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.visualization.scene import (
     ASPECT,
     CABLE_KINDS,
     COLOURS,
-    Motion,
+    Track,
     add_robot,
     cable_kind,
-    motions,
     rgba,
     set_surroundings,
+    tracks,
 )
 
 if TYPE_CHECKING:
@@ -82,9 +81,9 @@ def save_replay(
     Raises InputError if `path` or `viewer` cannot be written, or `viewer` holds anything else.
     """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
-    structure = MakeStructure(scenario)
-    film = _add_film(meshcat, structure, make_ground(scenario, structure), trajectory)
-    absent = set(CABLE_KINDS) - {cable_kind(cable) for cable in structure.cables}
+    robot = Robot.of(scenario)
+    film = _add_film(meshcat, robot, trajectory)
+    absent = set(CABLE_KINDS) - {cable_kind(cable) for cable in robot.structure.cables}
     legend = {name: meaning for name, meaning in LEGEND.items() if name not in absent}
     page = meshcat.StaticHtml()
     if viewer is not None:
@@ -94,29 +93,27 @@ def save_replay(
     write_whole(path, pack_page(_with_overlay(page, title, legend, film), title=title))
 
 
-def _add_film(
-    meshcat: Meshcat, structure: Structure, ground: Ground, trajectory: xarray.Dataset
-) -> dict[str, Any]:
+def _add_film(meshcat: Meshcat, robot: Robot, trajectory: xarray.Dataset) -> dict[str, Any]:
     """Adds robot, surroundings and traces in the first frame; returns the film.
 
     It is what overlay.html.jinja plays, small when compressed: motions are steps from frame to
     frame, the first one from 0, in RESOLUTION, in a row for each component.
     """
-    add_robot(meshcat, structure)
-    set_surroundings(meshcat, structure, ground, trajectory["p_WN"].values)
+    add_robot(meshcat, robot.structure)
+    set_surroundings(meshcat, robot, trajectory["p_WN"].values)
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     times = frames["time"].values
     ticks = np.rint((times - times[0]) * TICKS_PER_SECOND).astype(int).tolist()
-    moving = list(motions(structure, ground, frames))
-    for motion in moving:
-        meshcat.SetTransform(motion.path, motion.matrix(0))
+    moving = list(tracks(robot, frames))
+    for track in moving:
+        meshcat.SetTransform(track.path, track.matrix(0))
     bottom = _rounded(frames["p_WN"].values[:, :, [BOTTOM_LEFT, BOTTOM_RIGHT]]) * RESOLUTION
     return {
         "per_second": TICKS_PER_SECOND,
         "resolution": RESOLUTION,
         "repetitions": REPETITIONS,
         "ticks": ticks,
-        "motions": {motion.path: _steps(motion) for motion in moving},
+        "motions": {track.path: _steps(track) for track in moving},
         "traces": _add_traces(meshcat, bottom, ticks),
     }
 
@@ -139,11 +136,11 @@ def _rounded(values: np.ndarray) -> np.ndarray:
     return np.rint(values / RESOLUTION).astype(int)
 
 
-def _steps(motion: Motion) -> dict[str, list[list[int]]]:
+def _steps(track: Track) -> dict[str, list[list[int]]]:
     """Steps in RESOLUTION of the object's properties, a row for each component."""
-    values = {"position": motion.positions, "scale": motion.scales}
-    if motion.quaternions is not None:
-        values["quaternion"] = np.roll(motion.quaternions, -1, axis=1)  # x y z w
+    values = {"position": track.positions, "scale": track.scales}
+    if track.quaternions is not None:
+        values["quaternion"] = np.roll(track.quaternions, -1, axis=1)  # x y z w
     return {
         name: np.diff(_rounded(rows.T), prepend=0).tolist()
         for name, rows in values.items()

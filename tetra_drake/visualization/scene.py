@@ -15,6 +15,7 @@ from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import Ground
 from tetra_drake.robot.bodies import strut_pose
 from tetra_drake.robot.ground import ground_axes, ground_heights
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import NODES, STRUTS, TIP, Structure
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -86,7 +87,7 @@ VIEW = -0.35, 1.0, -0.4
 
 
 @dataclass(frozen=True)
-class Motion:
+class Track:
     """Motion of the object at a path of the scene over some frames."""
 
     path: str
@@ -109,7 +110,7 @@ class Motion:
 
 
 def add_robot(meshcat: Meshcat, structure: Structure) -> None:
-    """Adds the objects that motions() moves: tetrahedra, cables, and arrows for forces."""
+    """Adds the objects that tracks() move: tetrahedra, cables, and arrows for forces."""
     for i, body in enumerate(structure.bodies):
         _add_tetrahedron(meshcat, structure, f"/robot/{body}", rgba("even" if i % 2 else "odd"))
     for cable, name in zip(structure.cables, structure.cable_names, strict=True):
@@ -121,11 +122,11 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
             _add_unit_arrow(meshcat, path, rgba(kind))
 
 
-def motions(structure: Structure, ground: Ground, frames: xarray.Dataset) -> Iterator[Motion]:
-    """Motions of all objects over `frames`, samples of a trajectory."""
-    yield from _tetrahedron_motions(structure, frames)
-    yield from _cable_motions(structure, frames)
-    yield from _force_motions(structure, ground, frames)
+def tracks(robot: Robot, frames: xarray.Dataset) -> Iterator[Track]:
+    """Tracks of all objects over `frames`, samples of a trajectory."""
+    yield from _tetrahedron_tracks(robot.structure, frames)
+    yield from _cable_tracks(robot.structure, frames)
+    yield from _force_tracks(robot, frames)
 
 
 def aligning_quaternions(directions: np.ndarray) -> np.ndarray:
@@ -144,15 +145,14 @@ def aligning_quaternions(directions: np.ndarray) -> np.ndarray:
     return q / norm
 
 
-def set_surroundings(
-    meshcat: Meshcat, structure: Structure, ground: Ground, points: np.ndarray
-) -> None:
+def set_surroundings(meshcat: Meshcat, robot: Robot, points: np.ndarray) -> None:
     """Sets floor, light and camera for a robot whose nodes stay around `points` (..., 3), in m.
 
     The floor is the ground lowered by the radius of a node, as the ground acts on node centres.
     """
+    ground = robot.ground
     corners = floor_corners(points, MARGIN if ground.flat else UNEVEN_MARGIN)
-    floor = floor_points(ground, corners) - [0.0, 0.0, structure.node_radius]
+    floor = floor_points(ground, corners) - [0.0, 0.0, robot.structure.node_radius]
     if ground.flat:
         _add_slab(meshcat, floor)
     else:
@@ -252,21 +252,21 @@ def _add_unit_arrow(meshcat: Meshcat, path: str, colour: Rgba) -> None:
     )
 
 
-def _tetrahedron_motions(structure: Structure, frames: xarray.Dataset) -> Iterator[Motion]:
+def _tetrahedron_tracks(structure: Structure, frames: xarray.Dataset) -> Iterator[Track]:
     q_WB = frames["q_WB"].values
     q_WB = q_WB / np.linalg.norm(q_WB, axis=-1, keepdims=True)
     for i, body in enumerate(structure.bodies):
-        yield Motion(f"/robot/{body}", frames["p_WB"].values[:, i], q_WB[:, i])
+        yield Track(f"/robot/{body}", frames["p_WB"].values[:, i], q_WB[:, i])
 
 
-def _cable_motions(structure: Structure, frames: xarray.Dataset) -> Iterator[Motion]:
+def _cable_tracks(structure: Structure, frames: xarray.Dataset) -> Iterator[Track]:
     """Unit cylinders scaled to reach from node to node, with radii proportional to tension."""
     p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
     radius = (CABLE_RADIUS * frames["tension"].values).clip(min=HAIRLINE)
     for c, (cable, name) in enumerate(zip(structure.cables, structure.cable_names, strict=True)):
         p_WA, p_WB = p_WN[:, cable["node_a"]], p_WN[:, cable["node_b"]]
         length = np.linalg.norm(p_WB - p_WA, axis=1)
-        yield Motion(
+        yield Track(
             _cable_path(cable, name),
             (p_WA + p_WB) / 2,
             aligning_quaternions(p_WB - p_WA),
@@ -274,26 +274,24 @@ def _cable_motions(structure: Structure, frames: xarray.Dataset) -> Iterator[Mot
         )
 
 
-def _force_motions(
-    structure: Structure, ground: Ground, frames: xarray.Dataset
-) -> Iterator[Motion]:
+def _force_tracks(robot: Robot, frames: xarray.Dataset) -> Iterator[Track]:
     """Unit arrows on the contact nodes, scaled to the forces there, along the ground's normal and
     in its tangent plane."""
     p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
     normal, friction = frames["normal_force"].values, frames["friction_force"].values
-    for c, node in enumerate(structure.contacts):
-        name = structure.node_names[node]
+    for c, node in enumerate(robot.structure.contacts):
+        name = robot.structure.node_names[node]
         force = np.append(friction[:, c], np.zeros((len(friction), 1)), axis=1)
         size = np.linalg.norm(force, axis=1)
         upright = None
-        if not ground.flat:
-            axes = ground_axes(p_WN[:, node], ground)
+        if not robot.ground.flat:
+            axes = ground_axes(p_WN[:, node], robot.ground)
             upright = aligning_quaternions(normal[:, c, np.newaxis] * axes[:, 2])
             force = np.einsum("fi,fij->fj", force, axes)
         scales = _arrow_scales(normal[:, c])
-        yield Motion(f"/forces/normal/{name}", p_WN[:, node], upright, scales)
+        yield Track(f"/forces/normal/{name}", p_WN[:, node], upright, scales)
         quaternions = aligning_quaternions(force)
-        yield Motion(f"/forces/friction/{name}", p_WN[:, node], quaternions, _arrow_scales(size))
+        yield Track(f"/forces/friction/{name}", p_WN[:, node], quaternions, _arrow_scales(size))
 
 
 def _arrow_scales(sizes: np.ndarray) -> np.ndarray:
@@ -370,7 +368,7 @@ def _add_forward_arrow(meshcat: Meshcat, floor: np.ndarray) -> None:
     z = np.interp(start + way * FORWARD_LENGTH, row[:, 0], row[:, 2])
     rise = z[-1] - z[0]
     lift = (z - z[0] - way * rise).max()  # onto what is between its ends
-    forward = Motion(
+    forward = Track(
         "/floor/forward",
         np.array([[start, y + INCH, z[0] + lift]]),
         aligning_quaternions(np.array([[1.0, 0.0, rise / FORWARD_LENGTH]])),

@@ -11,7 +11,7 @@ from pydrake.multibody.tree import SpatialInertia, UnitInertia
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import WALKING_SEED, load_gait, seeded_gait
-from tetra_drake.robot.model import make_model
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.schema import Scenario
 
@@ -130,17 +130,17 @@ def test_signals_integrated_with_error_control_are_those_of_the_diagram(compiled
 def test_structures_the_engine_cannot_simulate_are_refused(scenario, structure):
     structure.cables[0]["node_b"] += 4  # from T1 to T3
     with pytest.raises(ValueError):
-        make_model(scenario, structure)
+        Robot.of(scenario, structure)
 
 
 @pytest.mark.parametrize(("lengthwise", "possible"), [(1.0 + 1e-14, True), (1.0 + 1e-9, False)])
 def test_bodies_that_turn_more_easily_about_one_axis_are_refused(
-    scenario, structure, monkeypatch, lengthwise, possible
+    scenario, monkeypatch, lengthwise, possible
 ):
     inertia = SpatialInertia(0.02, np.zeros(3), UnitInertia(3e-3, 3e-3, 3e-3 * lengthwise))
-    monkeypatch.setattr("tetra_drake.robot.model.tetrahedron_inertia", lambda structure: inertia)
+    monkeypatch.setattr("tetra_drake.robot.robot.tetrahedron_inertia", lambda structure: inertia)
     if possible:
-        assert make_model(scenario, structure).body.moment[0] == pytest.approx(6e-5, rel=1e-12)
+        assert Robot.of(scenario).model.body.moment[0] == pytest.approx(6e-5, rel=1e-12)
         return
     with pytest.raises(ValueError):
-        make_model(scenario, structure)
+        Robot.of(scenario)

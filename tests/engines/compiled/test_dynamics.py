@@ -13,10 +13,10 @@ from tetra_drake.engines.compiled.dynamics import (
 from tetra_drake.physics.cable import PULL_COLUMNS
 from tetra_drake.physics.contact import MODE_COLUMNS, modes_after_step
 from tetra_drake.physics.kinematics import NODE_COLUMNS, move_bodies
+from tetra_drake.physics.model import JUNCTION_CABLES, Model
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.model import JUNCTION_CABLES, Model, make_model
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
@@ -46,9 +46,9 @@ def inertia_of(robot: Model, bodies: int) -> np.ndarray:
 
 def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, np.ndarray]:
     """The robot, its state in motion with some nodes in the ground, and their modes."""
-    structure = MakeStructure(scenario)
+    whole = Robot.of(scenario)
+    robot, structure = whole.model, whole.structure
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
-    robot = make_model(scenario, structure)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
     forces = tables_of(robot, len(structure.bodies))
     modes_after_step(state, robot.p_BN, robot.ground, forces.nodes, forces.frames, modes)
@@ -66,7 +66,7 @@ def test_accelerations_are_those_of_the_diagram(scenario, tetrahedra, changes, s
     robot, state, modes = disturbed_robot(scenario, seed)
     acceleration = forces_of(robot, state, modes)[1] / inertia_of(robot, tetrahedra)
 
-    diagram = MakeTensegrityDiagram(scenario, seeded_gait(scenario))
+    diagram = MakeTensegrityDiagram(Robot.of(scenario), seeded_gait(scenario))
     context = diagram.CreateDefaultContext()
     context.SetContinuousState(state)
     ground = diagram.GetSubsystemByName("ground")

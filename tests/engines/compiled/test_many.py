@@ -23,6 +23,7 @@ from tetra_drake.errors import (
 )
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
@@ -63,10 +64,17 @@ def courses(walks: list[PreparedGait], width: int) -> list[Course]:
     return [found[i] for i in range(len(walks))]
 
 
+def prepared(scenario: Scenario, seed: int = 0) -> PreparedGait:
+    """A seeded gait to be recorded."""
+    return PreparedGait.of(Robot.of(scenario), seeded_gait(scenario, seed), record=True)
+
+
 def same(a: Course, b: Course) -> bool:
     """Whether two courses agree to the last bit, cost aside."""
-    ours, theirs = ([*each[:-2], *each.totals] for each in (a, b))
-    pairs = zip(ours, theirs, strict=True)
+    pairs = [(a.status, b.status), (a.time, b.time), (a.evaluations, b.evaluations)]
+    for name in ("times", "states", "signals", "modes"):
+        pairs.append((getattr(a.motion, name), getattr(b.motion, name)))
+    pairs += zip(vars(a.totals).values(), vars(b.totals).values(), strict=True)
     return all(np.array_equal(x, y, equal_nan=True) for x, y in pairs)
 
 
@@ -74,7 +82,10 @@ def same(a: Course, b: Course) -> bool:
 def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, width):
     kinds = [short, short.with_changes(FAR_TOO_STRONG), short, short.with_changes(TOO_STRONG)]
     scenarios = [kinds[i % 4] for i in range(11)]
-    walks = [PreparedGait.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(scenarios)]
+    walks = [
+        PreparedGait.of(Robot.of(s), seeded_gait(s, i), record=True)
+        for i, s in enumerate(scenarios)
+    ]
     alone = [courses([walk], 1)[0] for walk in walks]
     statuses = [course.status for course in alone[:4]]
     assert statuses == [DONE, STEP_TOO_SMALL, DONE, TOO_MANY_EVALUATIONS]
@@ -94,7 +105,10 @@ def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short, wid
     firm = Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)
     finer = rough | {"terrain": Rough(amplitude=3e-3, wavelength=0.05, seed=1), "friction": firm}
     kinds = [short.with_changes(changes) for changes in (finer, rough, rough | FAR_TOO_STRONG)]
-    walks = [PreparedGait.of(s, seeded_gait(s, i), record=True) for i, s in enumerate(kinds * 3)]
+    walks = [
+        PreparedGait.of(Robot.of(s), seeded_gait(s, i), record=True)
+        for i, s in enumerate(kinds * 3)
+    ]
     alone = [courses([walk], 1)[0] for walk in walks]
     assert [course.status for course in alone[:3]] == [DONE, DONE, STEP_TOO_SMALL]
     assert not same(alone[1], alone[4])
@@ -168,7 +182,7 @@ def test_cables_are_fed_the_signals_of_the_network(short):
     trajectory = simulate(scenario=short, gait=gait, record=True).trajectory
     times = trajectory.time.values
     times = times[np.abs(times - short.cpg.start_up) > 1e-9]  # there the signals jump
-    expected = signals_at(short, gait, times)
+    expected = signals_at(Robot.of(short), gait, times)
     assert np.abs(expected).max() > 1.0, "N"
     np.testing.assert_allclose(trajectory.signal.sel(time=times), expected, atol=1e-12)
 
@@ -205,7 +219,7 @@ def test_of_a_large_robot_fewer_steps_are_made_without_a_look_at_the_time(
     short, monkeypatch, tetrahedra, rounds
 ):
     scenario = short.with_changes({"robot.tetrahedra": tetrahedra})
-    engine = LaneEngine(PreparedGait.of(scenario, seeded_gait(scenario), record=False), width=1)
+    engine = LaneEngine(prepared(scenario), width=1)
     asked = []
     monkeypatch.setattr(engine, "_advance", lambda *arguments: asked.append(arguments[-1]))
     assert engine.advance(20 * ROUND) == []

@@ -9,9 +9,10 @@ from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.cable import PULL_COLUMNS
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
 from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.model import JUNCTION_CABLES
 from tetra_drake.physics.terrain import FRAME_COLUMNS
-from tetra_drake.robot.model import JUNCTION_CABLES, make_model
-from tetra_drake.robot.structure import MakeStructure, Structure, node_positions
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.schema import Scenario
 
 PULL = np.array([1.0, -2.0, 3.0, 0.5])
@@ -23,8 +24,8 @@ class Stepper:
     signals: nothing jumps, so a method shows its order."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self.structure: Structure = MakeStructure(scenario)
-        self.robot = make_model(scenario, self.structure)
+        robot = Robot.of(scenario)
+        self.structure, self.robot = robot.structure, robot.model
         bodies, contacts = len(self.structure.bodies), self.structure.contacts
         self.modes = np.zeros((len(contacts), MODE_COLUMNS))
         self.modes[:-1, CONTACT] = 1.0

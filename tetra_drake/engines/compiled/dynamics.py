@@ -21,8 +21,8 @@ from tetra_drake.physics.contact import (
 )
 from tetra_drake.physics.friction import STICK, coulomb_damping
 from tetra_drake.physics.kinematics import P_BN_W, gather_forces
+from tetra_drake.physics.model import JUNCTION_CABLES, Model
 from tetra_drake.physics.terrain import to_world
-from tetra_drake.robot.model import JUNCTION_CABLES, Model
 from tetra_drake.simd.compiling import compiled, inlined, merged
 from tetra_drake.simd.lanes import Real, Table, any_lane, select
 

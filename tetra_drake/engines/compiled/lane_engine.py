@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
 from dataclasses import dataclass
@@ -37,27 +36,17 @@ from tetra_drake.physics.cable import PULL_COLUMNS, Cables
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, Law
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.model import JUNCTION_CABLES, Body, Model
 from tetra_drake.physics.oscillator import NEURON_COLUMNS, Network, make_neurons
 from tetra_drake.physics.tally import Tally
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.results.metrics import empty_tally
-from tetra_drake.results.result import result_times
-from tetra_drake.results.trajectory import sample_times
+from tetra_drake.results.result import motion_times
+from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.ground import starting_modes
-from tetra_drake.robot.model import JUNCTION_CABLES, Body, Model, make_model
-from tetra_drake.robot.network import (
-    SteeringSignal,
-    initial_neurons,
-    make_network,
-    make_senses,
-    sample_turns,
-    tonic_input,
-)
+from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import sample_count
-from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.engine_kinds import Compiled
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
 _INDICES = 3  # the first fields of Senses, which lanes share
@@ -67,54 +56,42 @@ _INDICES = 3  # the first fields of Senses, which lanes share
 class PreparedGait:
     """A gait on a scenario, prepared for a lane."""
 
-    scenario: Scenario
+    robot: Robot
     gait: Gait
     record: bool
-    structure: Structure
-    model: Model
-    times: np.ndarray
-    """The times (s) of the samples to keep, those of result_times() among them."""
-    marks: np.ndarray
-    """The times (s) at which steps end."""
     steering: SteeringSignal | None
     """In place of the gait's turn."""
-    senses: Senses
+    times: np.ndarray
+    """The times (s) of the samples to keep, those of motion_times()."""
+    marks: np.ndarray
+    """The times (s) at which steps end."""
 
     @classmethod
     def of(
         cls,
-        scenario: Scenario,
+        robot: Robot,
         gait: Gait,
         *,
         record: bool,
         steering: SteeringSignal | None = None,
     ) -> PreparedGait:
         """Prepares a gait."""
-        simulation, start_up = scenario.simulation, scenario.cpg.start_up
-        structure = MakeStructure(scenario)
+        simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
         ends = 0.0, simulation.steady_from, simulation.duration
-        times = sample_times(simulation.duration, simulation.sample_period) if record else ()
         return cls(
-            scenario,
+            robot,
             gait,
             record,
-            structure,
-            make_model(scenario, structure),
-            times=np.union1d(result_times(simulation), times),
+            steering,
+            times=motion_times(simulation, record=record),
             marks=np.unique([*ends, *([start_up] if start_up <= simulation.duration else [])]),
-            steering=steering,
-            senses=make_senses(scenario, structure),
         )
-
-    def with_gait(self, gait: Gait) -> PreparedGait:
-        """Another gait on the same scenario."""
-        return dataclasses.replace(self, gait=gait)
 
     @property
     def kind(self) -> tuple[object, ...]:
         """What simulations that share an engine must have in common."""
-        scenario, ground = self.scenario, self.model.ground
-        drivers = tuple(self.structure.actuation.drivers.tolist())
+        scenario, ground = self.robot.scenario, self.robot.ground
+        drivers = tuple(self.robot.actuation.drivers.tolist())
         return (
             scenario.robot.tetrahedra,
             len(ground.contacts),
@@ -128,13 +105,14 @@ class PreparedGait:
     @property
     def live(self) -> bool:
         """Whether the network is integrated with the robot."""
-        return self.scenario.cpg.signals == "live"
+        return self.robot.scenario.cpg.signals == "live"
 
     @property
     def recent_signals(self) -> int:
         """How many samples of the signals an engine has to hold: those within a step, and as many
         for lanes that run ahead; a power of two."""
-        within = self.scenario.settings_of(Compiled).max_step / self.scenario.cpg.listing_step
+        scenario = self.robot.scenario
+        within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
         return 1 << math.ceil(math.log2(2.0 * within + 32.0))
 
     @property
@@ -142,7 +120,8 @@ class PreparedGait:
         """How many samples of the turn an engine has to hold."""
         if self.steering is None:
             return 1
-        return round(self.scenario.simulation.duration / self.scenario.cpg.listing_step) + 1
+        scenario = self.robot.scenario
+        return round(scenario.simulation.duration / scenario.cpg.listing_step) + 1
 
 
 class Course(NamedTuple):
@@ -153,10 +132,7 @@ class Course(NamedTuple):
     """When it ended, in s."""
     steps: int
     evaluations: int
-    times: np.ndarray
-    states: np.ndarray
-    modes: np.ndarray
-    signals: np.ndarray
+    motion: Motion
     totals: Tally
     wall_time: float
     """What it cost, in s: shared with the other lanes of the same core."""
@@ -168,10 +144,10 @@ class LaneEngine:
     def __init__(self, first: PreparedGait, *, width: int) -> None:
         """For gaits like the first; see `accepts`. Compiles the engine where that is not done."""
         self._kind = first.kind
-        robot, self._robot_tables = _lane_model(first.model, width)
-        self._heights = robot.ground.heights.array.reshape(width, -1)
-        self._tables = _zeros(first, robot, width)
-        structure = first.structure
+        model, self._model_tables = _lane_model(first.robot.model, width)
+        self._heights = model.ground.heights.array.reshape(width, -1)
+        self._tables = _zeros(first.robot, model, width)
+        structure = first.robot.structure
         self._bodies = len(structure.bodies)
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
@@ -205,7 +181,7 @@ class LaneEngine:
             and len(prepared.times) < log.times.shape[1]
             and prepared.recent_signals <= log.recent.shape[1]
             and prepared.turn_samples <= log.turns.shape[1]
-            and prepared.model.ground.heights.size <= self._heights.shape[1]
+            and prepared.robot.ground.heights.size <= self._heights.shape[1]
         )
 
     @property
@@ -215,12 +191,12 @@ class LaneEngine:
 
     def load(self, lane: int, prepared: PreparedGait) -> None:
         """Starts a gait in a lane; raises InputError if it does not fit its scenario."""
-        scenario, model, structure = prepared.scenario, prepared.model, prepared.structure
-        gait, start = prepared.gait, structure.initial_state
-        modes = starting_modes(structure, model.ground)
+        robot, gait = prepared.robot, prepared.gait
+        scenario, model, structure = robot.scenario, robot.model, robot.structure
+        start, modes = structure.initial_state, robot.starting_modes()
         cpg, simulation = scenario.cpg, scenario.simulation
-        network = make_network(scenario, structure, gait)
-        senses, turns = prepared.senses, sample_turns(scenario, structure, gait, prepared.steering)
+        network, senses = robot.network(gait), robot.senses
+        turns = robot.turns(gait, prepared.steering)
         engine = scenario.settings_of(Compiled)
         numbers: dict[str, Any] = dict(engine)
         numbers |= {"max_speed": MAX_SPEED, "max_evaluations": simulation.max_evaluations}
@@ -230,7 +206,7 @@ class LaneEngine:
         numbers["external_input"] = cpg.external_input
         numbers["gains"] = [gain for _, gain in gait.gains]
         numbers["sides"] = np.repeat(structure.actuation.sides, 2)
-        numbers["tonic"] = tonic_input(scenario, structure, turns)[0]
+        numbers["tonic"] = robot.tonic_input(turns)[0]
         for name, values in numbers.items():
             getattr(self._tables, name).array[..., lane] = values
         for table, value in zip(self._tables.tally, empty_tally(scenario), strict=True):
@@ -238,7 +214,7 @@ class LaneEngine:
         first, beyond, *tables = self._tables.network
         first.array[:] = np.minimum(first.array, network.first)  # so that they hold for all lanes
         beyond.array[:] = np.maximum(beyond.array, network.beyond)
-        tables += [*self._robot_tables, *self._tables.senses[_INDICES:]]
+        tables += [*self._model_tables, *self._tables.senses[_INDICES:]]
         constants = *network[2:], *_numbers(model), *senses[_INDICES:]
         for table, values in zip(tables, constants, strict=True):
             table.array[..., lane] = values
@@ -290,10 +266,12 @@ class LaneEngine:
             time=float(clock[TIME]),
             steps=int(clock[TAKEN]),
             evaluations=EVALUATIONS * int(clock[TRIED]),
-            times=log.times[lane, kept].copy(),
-            states=log.states[lane, kept].copy(),
-            modes=log.modes[lane, kept].copy(),
-            signals=log.signals[lane, kept].copy(),
+            motion=Motion(
+                times=log.times[lane, kept].copy(),
+                states=log.states[lane, kept].copy(),
+                signals=log.signals[lane, kept].copy(),
+                modes=log.modes[lane, kept].copy(),
+            ),
             totals=Tally(*(t.array[..., lane].copy() for t in self._tables.tally)),
             wall_time=self._wall_times[lane],
         )
@@ -345,9 +323,9 @@ def _lane_model(model: Model, width: int) -> tuple[Model, list[FieldArray]]:
     return lanes, tables
 
 
-def _zeros(first: PreparedGait, robot: Model, width: int) -> LaneTables:
-    """The tables of gaits like the first, zeros."""
-    structure, senses = first.structure, first.senses
+def _zeros(robot: Robot, model: Model, width: int) -> LaneTables:
+    """The tables of gaits of robots like this one, zeros, with its `model` in lanes."""
+    structure, senses = robot.structure, robot.senses
     bodies, signals = len(structure.bodies), structure.signals
     contacts, size, neurons = len(structure.contacts), BLOCK * bodies, 2 * signals
 
@@ -358,7 +336,7 @@ def _zeros(first: PreparedGait, robot: Model, width: int) -> LaneTables:
     tables: dict[str, Any] = {name: table(1) for name in LaneTables._fields}
     tables |= {name: table(signals) for name in ("output", "signals", "end_signals")}
     tables |= {
-        "robot": robot,
+        "robot": model,
         "network": Network(
             first=FieldArray(np.full(neurons, neurons)),
             beyond=FieldArray(np.zeros(neurons, dtype=np.int64)),

@@ -15,6 +15,7 @@ from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, Prepare
 from tetra_drake.errors import InputError, SimulationFailure, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.schema import Scenario
 
 _GATHERING = 1e-3
@@ -24,8 +25,8 @@ _BODY_STEPS = 25_000
 """Iterations times bodies, some 30 ms, after which a thread looks for time budgets and the pool's
 end."""
 
-_PREPARED = 32
-"""Scenarios that are kept prepared, for gaits that are simulated on the same one."""
+_ROBOTS = 32
+"""Robots that are kept, for gaits that are simulated on the same scenario."""
 
 
 @dataclass(eq=False)
@@ -49,7 +50,7 @@ class LanePool:
         self._waiting: deque[_Job] = deque()
         self._changed = threading.Condition()
         self._closing = False
-        self._prepare = _Preparation()
+        self._robots = _Robots()
         self._threads = [threading.Thread(target=self._work, daemon=True) for _ in range(threads)]
         for thread in self._threads:
             thread.start()
@@ -102,7 +103,7 @@ class LanePool:
 
     def _work(self) -> None:
         """What each thread does: fills idle lanes, simulates, hands over what has ended."""
-        crew = _Crew(self._prepare)
+        crew = _Crew(self._robots)
         while (jobs := self._take(crew)) is not None:
             for job in jobs:
                 if not crew.load(job, among=len(jobs)):
@@ -130,32 +131,30 @@ class LanePool:
             return [self._waiting.popleft() for _ in range(min(room, len(self._waiting)))]
 
 
-class _Preparation:
-    """Prepares gaits, each scenario once for all threads that need it at a time."""
+class _Robots:
+    """Makes robots, each once for all threads that need it at a time."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._latest: dict[tuple[int, bool], PreparedGait] = {}
+        self._latest: dict[int, Robot] = {}
         """By the scenario's identity, the one last used at the end."""
 
-    def __call__(self, job: _Job) -> PreparedGait:
-        key = id(job.scenario), job.record
+    def __call__(self, scenario: Scenario) -> Robot:
         with self._lock:
-            prepared = self._latest.pop(key, None)
-            prepared = prepared or PreparedGait.of(job.scenario, job.gait, record=job.record)
-            self._latest[key] = prepared  # with its scenario, so that no other one gets its id
-            if len(self._latest) > _PREPARED:
+            robot = self._latest.pop(id(scenario), None) or Robot.of(scenario)
+            self._latest[id(scenario)] = robot  # with its scenario, so no other one gets its id
+            if len(self._latest) > _ROBOTS:
                 del self._latest[next(iter(self._latest))]
-        return prepared.with_gait(job.gait)
+        return robot
 
 
 class _Crew:
     """The lanes of one thread and the jobs in them."""
 
-    def __init__(self, prepare: _Preparation) -> None:
+    def __init__(self, robots: _Robots) -> None:
         self.jobs: dict[int, _Job] = {}
         """By lane."""
-        self._prepare = prepare
+        self._robots = robots
         self._engine: LaneEngine | None = None
         self._engines: dict[int, LaneEngine] = {}
         """By width."""
@@ -171,7 +170,8 @@ class _Crew:
         If they are, there will be lanes for as many jobs as it is `among`.
         """
         try:
-            prepared = self._prepare(job)
+            robot = self._robots(job.scenario)
+            prepared = PreparedGait.of(robot, job.gait, record=job.record)
             engine = self._engine if self.jobs else self._engine_for(prepared, lanes_for(among))
             if engine is None or not engine.accepts(prepared):
                 return False

@@ -26,6 +26,7 @@ from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.feedback import Senses, sense
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
+from tetra_drake.physics.model import Model
 from tetra_drake.physics.oscillator import (
     Network,
     correct_neurons,
@@ -35,7 +36,6 @@ from tetra_drake.physics.oscillator import (
     steered_input,
 )
 from tetra_drake.physics.tally import Tally, look, observe
-from tetra_drake.robot.model import Model
 from tetra_drake.simd.compiling import compiled, inlined, merged
 from tetra_drake.simd.lanes import Real, Table, any_lane, by_lane, maximum, minimum, select
 

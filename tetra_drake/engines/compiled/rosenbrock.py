@@ -29,7 +29,7 @@ from tetra_drake.engines.compiled.dynamics import (
     move_robot,
 )
 from tetra_drake.physics.kinematics import move_bodies
-from tetra_drake.robot.model import Model
+from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, select
 

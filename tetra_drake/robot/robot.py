@@ -1,0 +1,187 @@
+"""The robot of a scenario, made once per simulation: what engines and results know of it."""
+
+from __future__ import annotations
+
+import functools
+import numbers
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.contact import MODE_COLUMNS, Ground, modes_after_step
+from tetra_drake.physics.feedback import Senses
+from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.model import JUNCTION_CABLES, Body, Model
+from tetra_drake.physics.oscillator import Network, steered_input
+from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.robot.actuation import Actuation
+from tetra_drake.robot.bodies import tetrahedron_inertia
+from tetra_drake.robot.equilibrium import Rest, find_rest
+from tetra_drake.robot.gait import Gait, check_gait
+from tetra_drake.robot.ground import make_ground
+from tetra_drake.robot.structure import NODES, MakeStructure, Structure
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import CpgSection
+from tetra_drake.scenario.terrain_kinds import Flat
+
+SteeringSignal = Callable[[float], float]
+"""The turn, from -1 to 1, at a time in s."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot on its ground."""
+
+    scenario: Scenario
+    structure: Structure
+    model: Model
+    """The numbers of its bodies, cables and ground, as kernels take them."""
+
+    @classmethod
+    def of(cls, scenario: Scenario, structure: Structure | None = None) -> Self:
+        """The robot of a scenario, with another structure if one is given.
+
+        Raises InputError if it would start in the ground, or off its terrain.
+        """
+        structure = structure or MakeStructure(scenario)
+        return cls(scenario, structure, _make_model(scenario, structure))
+
+    @property
+    def actuation(self) -> Actuation:
+        """The oscillators and what they drive."""
+        return self.structure.actuation
+
+    @property
+    def ground(self) -> Ground:
+        """The ground under the robot."""
+        return self.model.ground
+
+    @property
+    def weight(self) -> float:
+        """Weight of all bodies in N."""
+        mass = len(self.structure.bodies) * float(self.model.body.mass[0])
+        return mass * self.scenario.robot.gravity
+
+    @functools.cached_property
+    def rest(self) -> Rest:
+        """How the robot rests on flat ground without actuation, whatever the scenario's terrain and
+        offsets; raises InputError if it finds no rest."""
+        undisturbed = self.scenario.robot.model_copy(update={"offsets": []})
+        robot = Robot.of(self.scenario.with_sections(terrain=Flat(), robot=undisturbed))
+        rest = find_rest(robot.model, robot.structure.initial_state)
+        if rest is None:
+            count = len(robot.structure.bodies)
+            problem = f"{count} tetrahedra come to no rest on flat ground without actuation"
+            raise InputError(self.scenario.name, "robot", problem)
+        return rest
+
+    @functools.cached_property
+    def senses(self) -> Senses:
+        """What the oscillators can sense; raises InputError if the robot finds no rest."""
+        drivers, pathways = self.actuation.drivers, self.scenario.cpg.feedback
+        sizes = np.bincount(drivers[drivers != PASSIVE])[drivers]  # cables of each cable's group
+        settled = self.rest.lengths if "length" in pathways else np.ones(len(drivers))
+        per_load = 1.0 / self.weight if "load" in pathways else 0.0
+        return Senses(
+            drivers=drivers,
+            ahead=self.actuation.junctions + 1,
+            carriers=self.structure.contacts // len(NODES),
+            settled=settled,
+            per_length=1.0 / (settled * sizes),
+            per_load=np.array([per_load]),
+        )
+
+    def network(self, gait: Gait) -> Network:
+        """The network of a gait; raises InputError where the gait does not fit the scenario."""
+        cpg, actuation = self.scenario.cpg, self.actuation
+        check_gait(gait, self.scenario, actuation, source=f"gait {gait.name}")
+        neurons = np.arange(2 * len(actuation.names))
+        inhibition = np.zeros((neurons.size, neurons.size))
+        inhibition[neurons, neurons ^ 1] = cpg.partner_weight
+        inhibition[tuple(actuation.couplings.T)] = gait.weights
+        return Network.of(
+            inhibition,
+            tau_a=gait.tau_a,
+            tau_b=gait.tau_b,
+            self_inhibition_weight=cpg.self_inhibition_weight,
+        )
+
+    def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
+        """The turns at 0, one `cpg.listing_step`, two ... to the duration; one alone if constant.
+
+        Raises InputError if a turn is not a number from -1 to 1, or where nothing can be steered.
+        """
+        if steering is None:
+            return np.array([gait.turn])
+        if not self.actuation.sides.any():
+            raise InputError("steering", "", "no oscillator is on one side of the robot")
+        step = self.scenario.cpg.listing_step
+        times = step * np.arange(round(self.scenario.simulation.duration / step) + 1)
+        turns = np.array([float(steering(time)) for time in times.tolist()])
+        wrong = ~(np.abs(turns) <= 1.0)
+        if wrong.any():
+            time, turn = times[wrong.argmax()], turns[wrong.argmax()]
+            raise InputError("steering", f"at {time:g} s", f"found {turn}, expected -1 to 1")
+        return turns
+
+    def tonic_input(self, turns: np.ndarray) -> np.ndarray:
+        """(..., 2m): u0 by neuron for turns (...); see physics.oscillator.steered_input."""
+        sides = np.repeat(self.actuation.sides, 2)
+        u0 = self.scenario.cpg.external_input
+        steered: np.ndarray = steered_input(u0, turns[..., np.newaxis], sides)
+        return steered
+
+    def starting_modes(self) -> np.ndarray:
+        """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
+        structure, count = self.structure, len(self.structure.contacts)
+        nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
+        modes, frames = np.zeros((count, MODE_COLUMNS)), np.empty((count, FRAME_COLUMNS))
+        start = structure.initial_state
+        modes_after_step(start, structure.p_BN, self.ground, nodes, frames, modes)
+        return modes
+
+
+def constant_steering(turn: float) -> SteeringSignal:
+    """The signal of a constant turn; InputError if it is not a number."""
+    if isinstance(turn, bool) or not isinstance(turn, numbers.Real):
+        expected = "a number from -1 to 1, or a function of the time in s"
+        raise InputError("steering", "", f"found {turn!r}, expected {expected}")
+    return lambda time: turn
+
+
+def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:
+    """(4n,): u, then v, of all neurons at t = 0 (Table 4)."""
+    inner_state, extensor_self_inhibition, flexor_self_inhibition = cpg.initial_state
+    u = np.full(2 * oscillators, inner_state)
+    v = np.tile([extensor_self_inhibition, flexor_self_inhibition], oscillators)
+    return np.concatenate([u, v])
+
+
+def _make_model(scenario: Scenario, structure: Structure) -> Model:
+    """The structure and its laws as the kernels take them; cables and ground are records."""
+    nodes, cables = len(structure.p_BN), structure.cables
+    junction = np.arange(len(cables)) // JUNCTION_CABLES
+    rear, front = cables["node_a"] // nodes, cables["node_b"] // nodes
+    if not ((rear == junction).all() and (front == junction + 1).all()):
+        raise ValueError("a cable does not join a body to the next one")
+    inertia = tetrahedron_inertia(structure)
+    mass = inertia.get_mass()
+    moments = mass * inertia.get_unit_inertia().get_moments()
+    if np.ptp(moments) > 1e-12 * moments[0]:
+        raise ValueError("the bodies' inertia is not isotropic")
+    return Model(
+        p_BN=structure.p_BN,
+        cables=cables,
+        ground=make_ground(scenario, structure),
+        body=Body(
+            mass=np.array([mass]),
+            moment=np.array([moments[0]]),
+            radius=np.array([np.linalg.norm(structure.p_BN, axis=1).max()]),
+            gravity=np.array([scenario.robot.gravity]),
+        ),
+        slack=scenario.cables.slack,
+    )
