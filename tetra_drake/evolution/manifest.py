@@ -18,7 +18,7 @@ import types
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -133,7 +133,7 @@ class _File(BaseModel):
     """The content of manifest.json."""
 
     model_config = ConfigDict(strict=True)
-    version: Literal[3] = Field(alias="schema")
+    version: int = Field(alias="schema", ge=SCHEMA, le=SCHEMA)
     seed: Annotated[int, Field(ge=0)]
     versions: dict[str, str]
     scenario_sha256: str
