@@ -18,7 +18,9 @@ import types
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.draws import SeededVector
@@ -103,26 +105,13 @@ def read_manifest(directory: Path) -> Manifest:
     path = directory / MANIFEST
     if not path.exists():
         raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
-    raw = _read_json(path)
-    if raw.get("schema") != SCHEMA:
-        raise InputError(path, "schema", f"found {raw.get('schema')!r}, expected {SCHEMA}")
-    seed, versions, thinned = raw.get("seed"), raw.get("versions"), raw.get("thinned", False)
-    objective, optimizer = raw.get("objective"), raw.get("optimizer")
-    if type(seed) is not int or seed < 0:
-        raise _damaged(path, "seed")
-    if not isinstance(versions, dict):
-        raise _damaged(path, "versions")
-    if not isinstance(thinned, bool):
-        raise _damaged(path, "thinned")
-    if not isinstance(objective, str):
-        raise _damaged(path, "objective")
-    if not isinstance(optimizer, str):
-        raise _damaged(path, "optimizer")
+    file = _read_file(path)
     scenario_file = directory / SCENARIO
     scenario = load_scenario(scenario_file)
-    if raw.get("scenario_sha256") != _sha256(read_text(scenario_file, "scenario file")):
+    if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):
         raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
-    return Manifest(scenario, seed, versions, Method(objective, optimizer), thinned)
+    method = Method(file.objective, file.optimizer)
+    return Manifest(scenario, file.seed, file.versions, method, file.thinned)
 
 
 def write_manifest(directory: Path, manifest: Manifest) -> None:
@@ -140,17 +129,30 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+class _File(BaseModel):
+    """The content of manifest.json."""
+
+    model_config = ConfigDict(strict=True)
+    version: int = Field(alias="schema", ge=SCHEMA, le=SCHEMA)
+    seed: Annotated[int, Field(ge=0)]
+    versions: dict[str, str]
+    scenario_sha256: str
+    objective: str
+    optimizer: str
+    thinned: bool = False
+
+
+def _read_file(path: Path) -> _File:
     text = read_text(path, "manifest of a run")
     try:
-        raw = json.loads(text)
+        return _File.model_validate(json.loads(text))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = str(first["loc"][0]) if first["loc"] else ""
+        problem = f"is missing, damaged or of another version: {first['msg'].lower()}"
+        raise InputError(path, key, problem) from error
     except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"cannot be read: {error}") from error
-    return raw if isinstance(raw, dict) else {}
-
-
-def _damaged(path: Path, key: str) -> InputError:
-    return InputError(path, key, "is missing or damaged")
 
 
 def _sha256(text: str) -> str:
