@@ -8,7 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray
 
@@ -68,23 +67,16 @@ def unchanged(work):
     ("command", "source", "values"),
     [
         ("simulate --scenario key.yaml", "key.yaml", "robot.tetrahedron tetrahedra"),
-        ("simulate --scenario missing.yaml", "missing.yaml", ""),
         ("simulate --engine compiled --meshcat", "scenario thesis", "engine compiled"),
-        ("simulate --gait 23.json", "23.json", "weights 23 24"),
         # 2 n (n - 1) = 40 weights for the 5 oscillators of 6 tetrahedra.
         ("simulate --scenario six.yaml --gait good.json", "good.json", "weights 24 40"),
         ("simulate --scenario short.yaml --out good.json", "good.json", ""),
-        ("simulate --scenario short.yaml --out good.json/out", "good.json/out", ""),
         ("cpg --out a.csv --scenario broken.yaml", "broken.yaml", ""),
         ("cpg --out a.csv --gait key.json", "key.json", "tau: tau_b_s"),
-        ("cpg --out a.csv --gait missing.json", "missing.json", ""),
         ("cpg --out a.csv --scenario feedback", "gait random gait 80", "gains:"),
-        ("cpg --scenario short.yaml --out folder", "folder", ""),
         ("cpg --scenario short.yaml --out good.json/a.csv", "good.json/a.csv", ""),
-        ("replay --out new/a.html short.yaml", "short.yaml", ""),
         ("replay --out new/a.html missing", "missing", ""),
         ("replay good.json --out folder", "folder", ""),
-        ("replay good.json --out good.json/a.html", "good.json", ""),
     ],
 )
 def test_bad_files_and_places_are_refused_in_one_line(command, source, values, unchanged, capsys):
@@ -100,12 +92,10 @@ def test_bad_files_and_places_are_refused_in_one_line(command, source, values, u
     ("arguments", "values"),
     [
         ("", "tetra-drake: COMMAND"),
-        ("walk", "tetra-drake: walk simulate evolve"),
         ("simulate --seed 1 --gait good.json", "tetra-drake simulate: --gait --seed"),
         ("simulate --seed -1", "tetra-drake simulate: --seed '-1'"),
         ("simulate --sceanrio thesis", "tetra-drake simulate: --sceanrio '--scenario'?"),
         ("compare a --reach 14", "tetra-drake compare: --reach '14'"),
-        ("cpg --seed 1", "tetra-drake cpg: --out"),
     ],
 )
 def test_options_that_make_no_sense_are_refused_in_one_line(arguments, values, unchanged, capsys):
@@ -225,11 +215,3 @@ def test_replay_makes_the_page_of_simulate_from_its_recording_and_from_the_gait(
         page = (work / "sub/again.html").read_bytes()
         assert page == (simulated[0] / "replay.html").read_bytes()
         assert capsys.readouterr().out.splitlines()[-1].endswith("again.html")
-
-
-def test_cpg_writes_the_signals_in_lbf_from_the_start_up_time_on(work):
-    assert main(["cpg", "--scenario", "three.yaml", "--out", "a.csv"]) == 0
-    signals = np.loadtxt("a.csv", delimiter=",", comments=("#", "t"))[:, 1:]
-    assert signals.shape == (601, 2)  # 0.3 s, two junctions
-    assert not signals[:200].any() and signals[200:].any()  # starts at 0.1 s
-    assert 0.01 < np.abs(signals).max() < 2.0

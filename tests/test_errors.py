@@ -11,9 +11,7 @@ LONG = 100_000 * "x"
     ("problem", "kept"),
     [
         (f"found '{LONG}', expected a number", "', expected a number"),
-        (f"found {LONG}, expected a number", "expected a number"),
         (f"found '{LONG.replace('xx', 'x ')}', expected a number", "', expected a number"),
-        ("found " + LONG.replace("xx", "' x"), "found"),
         ("word " * 20_000, "word"),
     ],
 )

@@ -8,32 +8,25 @@ import stat
 import subprocess
 import sys
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray
 
-from tetra_drake.figures.style import save_figure
 from tetra_drake.files import read_text, whole_file, write_whole
 from tetra_drake.results.trajectory import save_dataset
 
 
-def test_a_written_file_holds_the_text_and_nothing_else_is_there(tmp_path):
-    file = tmp_path / "new" / "a.txt"
-    for text in ("longer than λ", "λ = 27\n"):
-        write_whole(str(file), text)
-        assert file.read_bytes() == text.encode()
-        assert os.listdir(file.parent) == ["a.txt"]
-
-
-def test_the_temporary_file_is_on_the_same_disk_of_the_same_kind_and_unseen(tmp_path):
-    # Renaming needs the first; writers that go by the suffix need the second.
-    file = tmp_path / "a.svg"
-    with whole_file(file) as temporary:
-        assert (temporary.parent, temporary.suffix) == (tmp_path, ".svg")
+def test_a_file_appears_whole_from_a_temporary_one_beside_it_of_the_same_kind(tmp_path):
+    # Renaming needs the same disk; writers that go by the suffix need the same suffix.
+    file = tmp_path / "new" / "a.svg"
+    with whole_file(str(file)) as temporary:
+        assert (temporary.parent, temporary.suffix) == (file.parent, ".svg")
         temporary.write_text("whole")
         assert not file.exists()
     assert file.read_text() == "whole"
+    write_whole(file, "λ")
+    assert file.read_bytes() == "λ".encode()
+    assert os.listdir(file.parent) == ["a.svg"]
 
 
 def test_a_block_that_raises_leaves_the_old_file_and_no_other(tmp_path):
@@ -55,18 +48,17 @@ def test_two_writers_of_one_file_do_not_meet(tmp_path):
     assert os.listdir(tmp_path) == ["a.txt"]
 
 
-@pytest.mark.parametrize(("mask", "mode"), [(0o022, 0o644), (0o077, 0o600)])
-def test_the_mode_follows_the_umask(tmp_path, mask, mode):
-    before = os.umask(mask)
+def test_the_mode_follows_the_umask(tmp_path):
+    before = os.umask(0o027)
     try:
         write_whole(tmp_path / "a.txt", "text")
-        assert os.umask(mask) == mask  # and is left as it was
+        assert os.umask(0o027) == 0o027  # is left as it was
     finally:
         os.umask(before)
-    assert stat.S_IMODE((tmp_path / "a.txt").stat().st_mode) == mode
+    assert stat.S_IMODE((tmp_path / "a.txt").stat().st_mode) == 0o640
 
 
-@pytest.mark.parametrize("place", ["a.txt/b.txt", "a.txt/b/c.txt", "", 300 * "b", "b\0"], ids=repr)
+@pytest.mark.parametrize("place", ["a.txt/b.txt", "", 300 * "b", "b\0"], ids=repr)
 def test_what_cannot_be_written_is_refused(tmp_path, place, refused):
     (tmp_path / "a.txt").write_text("old")
     with refused(tmp_path / place, "", ""):
@@ -113,21 +105,9 @@ def big_dataset(path):
     save_dataset(xarray.Dataset({"a": ("time", values)}), path)
 
 
-def big_figure(path):
-    figure, axes = plt.subplots()
-    axes.plot(np.random.default_rng(0).normal(size=500))
-    save_figure(figure, path.parent, path.stem, kinds=[path.suffix[1:]])
-    plt.close(figure)
-
-
 @pytest.mark.parametrize(
     ("name", "write"),
-    [
-        ("a.html", lambda path: write_whole(path, 5000 * "x")),
-        ("a.nc", big_dataset),
-        ("a.svg", big_figure),
-        ("a.png", big_figure),
-    ],
+    [("a.html", lambda path: write_whole(path, 5000 * "x")), ("a.nc", big_dataset)],
 )
 def test_a_full_disk_is_told_in_a_line_and_the_old_file_kept(tmp_path, refused, name, write):
     file = tmp_path / name

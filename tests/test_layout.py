@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import subprocess
 import sys
 from pathlib import Path
@@ -22,15 +23,16 @@ ORDER = (
 
 def imports(file: Path) -> set[str]:
     """The modules that a file imports anywhere, as dotted names."""
-    found = set()
+    modules = set()
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
-            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return found
+            modules |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return modules
 
 
+@functools.cache
 def modules() -> dict[str, set[str]]:
     """The modules of the package with what they import of it, names below "tetra_drake."."""
     names = {}
@@ -38,9 +40,9 @@ def modules() -> dict[str, set[str]]:
         parts = file.relative_to(PACKAGE).with_suffix("").parts
         if parts[0] not in ("__init__", "__main__"):
             name = ".".join(part for part in parts if part != "__init__")
-            own = {i.removeprefix("tetra_drake.") for i in imports(file) if "tetra_drake." in i}
-            names[name] = own
-    return {name: {i for i in found if i in names} for name, found in names.items()}
+            ours = [i for i in imports(file) if "tetra_drake." in i]
+            names[name] = {i.removeprefix("tetra_drake.") for i in ours}
+    return {name: {i for i in imported if i in names} for name, imported in names.items()}
 
 
 def test_data_flows_one_way() -> None:
@@ -80,7 +82,6 @@ HEAVY = {"pydrake", "numba", "scipy", "cma", "ribs", "pandas", "xarray", "matplo
     ("module", "absent"),
     [
         ("tetra_drake", HEAVY | {"numpy"}),
-        ("tetra_drake.formatting", HEAVY | {"numpy"}),
         ("tetra_drake.cli", HEAVY),
         ("tetra_drake.evolution.trials", HEAVY),  # and so executors, which every worker imports
     ],

@@ -4,8 +4,6 @@ import re
 
 import pytest
 from block_diagram import graphviz_source, save_block_diagram
-from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import Gain, Integrator
 
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -34,18 +32,6 @@ def test_blocks_ports_in_use_and_their_connections_are_shown(robot):
     assert len(edges) == len(robot.connection_map()) + robot.num_output_ports()
     assert '"cables":y0:e -> "forces":u0:w' in edges
     assert '"ground":y3:e -> "diagram outputs":u6:w' in edges
-
-
-def test_exported_inputs_are_shown():
-    builder = DiagramBuilder()
-    gain = builder.AddNamedSystem("gain", Gain(k=2.0, size=1))
-    integral = builder.AddNamedSystem("integral", Integrator(1))
-    builder.Connect(gain.get_output_port(), integral.get_input_port())
-    builder.ExportInput(gain.get_input_port(), "speed")
-    source = graphviz_source(builder.Build())
-    assert "<y0> speed" in label(source, "diagram inputs")
-    assert '"diagram inputs":y0:e -> "gain":u0:w' in source
-    assert "diagram outputs" not in source and "y0" not in label(source, "integral")
 
 
 def test_a_missing_graphviz_is_named(robot, tmp_path, refused, monkeypatch):

@@ -1,16 +1,10 @@
 """The look that figures share, and how they are written."""
 
-import subprocess
-import sys
-
 import matplotlib
 import pytest
 
 from tetra_drake.figures.style import (
-    LINE_COLOURS,
-    OKABE_ITO,
     common_style,
-    line_style,
     make_figure,
     save_figure,
 )
@@ -47,17 +41,3 @@ def test_a_figure_that_cannot_be_drawn_leaves_nothing(tmp_path):
     with pytest.raises(ValueError, match="nonsense"):
         saved(tmp_path, title=r"$\nonsense$")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_series_differ_in_colour_and_many_in_colour_and_dashes():
-    assert len({line_style(i)["color"] for i in range(len(LINE_COLOURS))}) == len(LINE_COLOURS)
-    assert len({(s["color"], s["linestyle"]) for s in map(line_style, range(28))}) == 28
-    assert OKABE_ITO["yellow"] not in LINE_COLOURS  # too faint on white
-
-
-@pytest.mark.slow
-def test_figures_need_no_pyplot_and_so_no_display():
-    modules = ("book", "disturbed", "search")
-    lines = [f"import tetra_drake.figures.{module}" for module in modules]
-    program = "\n".join([*lines, "import sys; sys.exit('matplotlib.pyplot' in sys.modules)"])
-    assert subprocess.run([sys.executable, "-c", program]).returncode == 0

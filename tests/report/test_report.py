@@ -15,7 +15,7 @@ from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.run import load_run
 from tetra_drake.report.run_page import render_report, write_report
 from tetra_drake.report.study import study_run
-from tetra_drake.report.summary import ground_text, results
+from tetra_drake.report.summary import ground_text
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.terrain_kinds import Incline
 
@@ -184,11 +184,6 @@ def test_gaits_of_a_run_with_disturbances_are_shown_undisturbed(tmp_path, study)
     assert shown.best.distance_in == study.best.distance_in
     (note,) = (text for text in render(shown).texts["p"] if "3 draws" in text)
     assert f"{shown.best.label}: {shown.best.distance_in:.2f} in" in note
-
-
-def test_the_results_stand_on_the_page(study, page):
-    for name, value in results(study.run):
-        assert name in page.texts["th"] and value in page.texts["td"]
 
 
 def test_the_commands_to_reproduce_it_are_commands(page):

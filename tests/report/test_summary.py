@@ -56,10 +56,8 @@ def test_the_work_of_an_engine_is_called_by_its_name(tiny, gait, result, engine,
 @pytest.mark.parametrize(
     ("scenario", "changes", "words"),
     [
-        ("thesis", {"engine": "!Compiled"}, set()),
         ("thesis", {"engine": "!Mujoco"}, {"flat", "MuJoCo", "0.5"}),
         ("thesis", {"terrain": Rough(amplitude=0.0254, wavelength=0.1)}, {"amplitude 1 in"}),
-        ("coulomb", {"engine": "!Mujoco"}, {"flat", "Coulomb"}),
         ("incline", {}, {"incline", "slope 5 deg", "static 0.5", "kinetic 0.5"}),
         ("steps", {"friction": Coulomb(lateral=2.0)}, {"height 0.25 in", "count 4", "lateral 2"}),
         ("thesis", {"terrain": HeightField(file="/far/away/a.npy", cell=0.0254)}, {"a.npy"}),

@@ -287,11 +287,3 @@ def test_a_printed_gait_has_weights_in_the_row_of_the_inhibited_oscillator(tmp_p
     assert extensors[1:3] == [["onto", "1", "2", "3", "4"], ["1", "-", "1.00", "2.00", "3.00"]]
     assert flexors[2] == ["1", "-", "4.00", "5.00", "6.00"]
     assert flexors[5] == ["4", "22.00", "23.00", "24.00", "-"]
-
-
-def test_a_printed_gait_has_turn_and_gains_where_they_are_set():
-    gait = seeded_gait(load_scenario("feedback").with_changes({"cpg.feedback": ["load"]}))
-    set_all = dataclasses.replace(gait, turn=-0.5, gains=Gains(load=0.25))
-    lines = str(set_all).splitlines()
-    assert "turn -0.5" in lines and "gain of load 0.25" in lines
-    assert not any(word in str(gait) for word in ("turn", "length", "pitch"))

@@ -4,11 +4,9 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 
 import analyse
-import pandas
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
-from tetra_drake.analysis.robustness import START, by_gait, default_disturbances, judge
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.scenario.friction_kinds import Coulomb
@@ -71,15 +69,6 @@ def test_only_what_an_engine_can_simulate_is_asked_of_it():
     assert set(analyse.settings_of(load_scenario("incline"))) == {analyse.TIGHT, analyse.MUJOCO}
 
 
-def test_the_best_gaits_are_judged_on_the_default_disturbances(folder):
-    found, run = analyse.load_analysis(folder), load_run(folder)
-    spreads = default_disturbances(run.manifest.scenario).spreads
-    assert set(found.changes["what"]) == {START, *spreads}
-    gaits = {0: run.gait(0, 2), 2: run.gait(2, 0)}
-    expected = by_gait(judge(run.manifest.scenario, gaits))
-    pandas.testing.assert_frame_equal(found.gaits, expected[list(found.gaits)])
-
-
 def test_a_run_without_any_fitness_is_refused(tmp_path, refused):
     run = write_run(tmp_path / "run", [[[(None, 0)]]])
     with refused(run, "", "fitness"):
@@ -91,11 +80,9 @@ def test_a_run_without_any_fitness_is_refused(tmp_path, refused):
     "change",
     [
         lambda text: text[:-9],
-        lambda text: "[]",
         lambda text: json.dumps(json.loads(text) | {"resimulations": [{"trial": 0}]}),
-        lambda text: json.dumps(json.loads(text) | {"robustness": {}}),
     ],
-    ids=["cut off", "no object", "columns", "robustness"],
+    ids=["cut off", "columns"],
 )
 def test_a_missing_or_damaged_analysis_is_refused(folder, tmp_path, refused, change):
     path = tmp_path / analyse.ANALYSIS

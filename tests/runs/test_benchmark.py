@@ -43,8 +43,3 @@ def test_every_engine_robot_and_ground_is_measured(small, tmp_path, capsys):
     assert tetrahedra == "2" and int(steps.replace(",", "")) > 0
     assert float(alone) == pytest.approx(2.0 * float(per_tetrahedron), abs=0.02)
     assert len(grounds) == 6 and all(float(row[-1]) > 0.0 for row in grounds)
-
-
-def test_a_table_that_does_not_exist_is_refused(scenario, refused):
-    with refused("TABLE", "", "engine"):
-        benchmark.main(["engine"], scenario)

@@ -66,10 +66,3 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     record.record("tiny", TINY, scratch=scratch, out=out)
     assert load_run(out / "tiny").evaluations.equals(run.evaluations)
     assert analysed == [scratch / "tiny"]
-
-
-def test_every_experiment_is_a_scenario():
-    for name, experiment in record.EXPERIMENTS.items():
-        scenario = experiment.scenario(name)
-        assert scenario.name == name
-        assert (scenario.engine_name == "drake") == (name == "thesis-drake")

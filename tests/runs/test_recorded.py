@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 import record
 import tables
-from analyse import best_gaits, load_analysis
+from analyse import load_analysis
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import read_manifest
-from tetra_drake.evolution.run import load_run
 from tetra_drake.machine import versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
@@ -70,14 +69,6 @@ def test_a_run_begins_as_its_scenario_and_seed_say(name):
     with lzma.open(folder / "trial_00/evaluations.jsonl.xz", "rt") as lines:
         recorded = [json.loads(line)["genome"] for line in itertools.islice(lines, len(asked))]
     assert np.array_equal(asked, recorded)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", FOLDERS)
-def test_the_analysis_is_of_the_best_gaits_of_the_record(name):
-    folder = tables.HERE / name
-    best = load_analysis(folder).best_gaits.reset_index()
-    assert best.to_dict("records") == best_gaits(load_run(folder))
 
 
 def test_the_pages_show_the_recorded_runs():

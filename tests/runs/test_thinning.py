@@ -17,7 +17,6 @@ from tetra_drake.evolution.reevaluation import BEST_GAITS, evaluate_again
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.source import load_source
-from tetra_drake.report.run_page import write_report
 from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
@@ -117,12 +116,6 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     assert ours.drop(columns="run").equals(theirs.drop(columns="run"))
     assert thinned.reevaluations["distance"].equals(run.reevaluations["distance"])
     assert math.isnan(thinned.reevaluations["tau_a_s"].item())
-
-
-@pytest.mark.slow
-def test_the_report_of_a_thinned_run_can_be_written(runs):
-    for page in write_report(runs[1].directory):
-        assert page.exists()
 
 
 def test_a_thinned_run_is_reevaluated_but_not_resumed(runs, refused):

@@ -37,11 +37,6 @@ def test_a_file_chooses_the_optimiser_and_its_budget(tmp_path, text, kind):
     assert load_scenario().with_changes({"optimizer": kind}).optimizer == kind
 
 
-def test_the_thesiss_algorithm_is_the_default_and_is_not_written(scenario):
-    assert scenario.optimizer == SteadyState()
-    assert "optimizer" not in dump_scenario(scenario)
-
-
 @pytest.mark.parametrize(
     ("text", "key"),
     [

@@ -136,20 +136,6 @@ def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
 
 
 @pytest.mark.parametrize(
-    ("base", "changes", "result"),
-    [
-        ("a: {b: 1, c: 2}", "a: {c: 3}", "a: {b: 1, c: 3}"),
-        ("a: [1, 2]", "a: [3]", "a: [3]"),
-        ("a: !X {b: 1}", "a: !X {c: 2}", "a: !X {b: 1, c: 2}"),
-        ("a: !X {b: 1}", "a: !Y {c: 2}", "a: !Y {c: 2}"),
-    ],
-)
-def test_a_file_is_merged_with_its_base(base, changes, result):
-    trees = [parse_yaml(f"{{{text} }}", "file") for text in (base, changes, result)]
-    assert merge(trees[0], trees[1]) == trees[2]
-
-
-@pytest.mark.parametrize(
     ("changes", "name", "value"),
     [
         ({"terrain": Flat()}, "terrain", Flat()),

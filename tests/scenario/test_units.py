@@ -51,10 +51,6 @@ def test_people_read_inches_pounds_force_and_degrees_of_the_same_size(unit, read
     assert shown(2.5 * size, unit) == f"2.5 {read}"
 
 
-def test_numbers_without_a_unit_stay_bare():
-    assert (customary(""), shown(0.25, "")) == ((1.0, ""), "0.25")
-
-
 REFUSED = [
     "6 lbf",  # not a length
     "25 lb/in",  # a pound is a mass

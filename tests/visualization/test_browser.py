@@ -19,7 +19,6 @@ from helpers.meshcat_page import unpack
 from helpers.synthetic_run import tiny_scenario, write_run
 from matplotlib.colors import hex2color, rgb_to_hsv
 from matplotlib.image import imread
-from PIL import Image, ImageSequence
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.report.run_page import write_report
@@ -184,36 +183,6 @@ def test_every_window_shows_the_whole_robot_and_its_path(page, trajectory):
         )
         extent = np.abs(np.array(seen)[:, :2]).max()
         assert 0.5 < extent < 1.0, f"in a window of {width} to {height}"
-
-
-@pytest.mark.slow
-def test_a_page_is_filmed_and_its_end_pictured_as_wide_as_files_may_be_large(
-    browser, replay, tmp_path, monkeypatch, refused
-):
-    monkeypatch.setattr(animation, "STEP", 1.5)
-    monkeypatch.setitem(animation.LIMITS, ".gif", 30_000)
-    film, picture = tmp_path / "walking.gif", tmp_path / "walking.png"
-    with refused(tmp_path / "walking.jpg", "", ".png"):
-        animation.make_pictures(browser, replay, [film, tmp_path / "walking.jpg"])
-    animation.make_pictures(browser, replay, [film, picture])
-    with Image.open(film) as gif:
-        shots = [np.asarray(shot.convert("RGB")) / 255 for shot in ImageSequence.Iterator(gif)]
-    assert len(shots) == 3  # at 1, 2.5 and 4 s of 5
-    end = imread(picture)[..., :3]
-    width = max(animation.WIDTHS)
-    assert end.shape[1] == width and width > shots[0].shape[1] in animation.WIDTHS
-    assert film.stat().st_size <= 30_000 and picture.stat().st_size <= 60_000
-    for shot in (*shots, end):
-        assert len(pixels_of(shot, "inner")) > 100
-        assert (shot[[0, -1], [0, 0]] == 1.0).all(), "no sky, no texts"
-    for seen in (np.min(shots, axis=0), end):
-        edges = seen[:5], seen[-5:], seen[:, :5], seen[:, -5:]
-        assert all((edge < 1.0).any() for edge in edges), "no margins"
-    odd = [pixels_of(shot, "odd")[:, 1].mean() for shot in (shots[0], shots[-1])]
-    assert odd[0] < odd[1]  # it walks to the right
-    behind = [shot[:, : pixels_of(shot, "inner")[:, 1].min() - 50] for shot in (shots[-1], end)]
-    dark = [(pixels.max(axis=-1) < 0.5).sum() for pixels in behind]
-    assert dark[0] == 0 < 100 < dark[1], "only the picture shows the paths"
 
 
 @pytest.mark.slow

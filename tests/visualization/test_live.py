@@ -12,10 +12,7 @@ from pydrake.geometry import MeshcatParams
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.structure import MakeStructure, node_positions
-from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.terrain_kinds import Incline
-from tetra_drake.visualization.live import FRAMES_PER_SECOND, ROOM, LiveView, open_view
+from tetra_drake.visualization.live import FRAMES_PER_SECOND, LiveView, open_view
 from tetra_drake.visualization.replay import quiet_meshcat
 
 HANDSHAKE = (
@@ -115,16 +112,3 @@ def test_waits_for_a_browser(short, meshcat):
     with pytest.raises(TimeoutError):
         simulate(scenario=short, gait=seeded_gait(short), viewer=view)
     assert sleep.call_count == 3
-
-
-def test_the_view_starts_with_floor_around_a_robot_on_a_slope(meshcat):
-    scenario = load_scenario("incline").with_changes({"terrain": Incline(slope=0.5)})
-    LiveView(meshcat, scenario)
-    (relief,) = (c for c in commands(meshcat.StaticHtml(), "/floor/relief") if "object" in c)
-    (geometry,) = relief["object"]["geometries"]
-    p_WV = np.reshape(geometry["data"]["attributes"]["position"]["array"], (-1, 3))
-    structure = MakeStructure(scenario)
-    x = node_positions(structure, structure.initial_state)[:, 0]
-    low, high = x.min() - ROOM, x.max() + ROOM
-    assert p_WV[:, 0].min() <= low and high <= p_WV[:, 0].max()
-    assert p_WV[:, 2].max() > high * np.tan(0.5)

@@ -21,9 +21,7 @@ from tetra_drake.visualization.scene import (
     FIELD_OF_VIEW,
     MOST_POINTS,
     UNEVEN_MARGIN,
-    Track,
     aligning_quaternions,
-    camera_position,
     floor_corners,
     floor_points,
     set_surroundings,
@@ -62,33 +60,12 @@ def extent(points, camera, target):
     return np.abs(rays @ right / edge).max() / ASPECT, np.abs(rays @ upward / edge).max()
 
 
-def test_camera_sees_every_point():
-    points = np.random.default_rng(4).uniform((0, -0.1, 0), (0.8, 0.1, 0.15), (200, 3))
-    target = points.mean(axis=0)
-    camera = camera_position(points, target)
-    assert camera[2] > 0.15  # looks down on the floor
-    assert camera[1] < -0.1  # from the right, so that the robot walks to the right
-    assert max(extent(points, camera, target)) < 1.0
-
-
-@pytest.mark.parametrize("bodies", [2, 3, 7, 12, 25])
+@pytest.mark.parametrize("bodies", [2, 12])
 def test_the_camera_is_as_near_to_a_robot_of_any_length_as_it_can_be(bodies):
     robot = robot_on(load_scenario().terrain)
     meshcat, p_WN = Mock(), make_walk(bodies=bodies).p_WN.values
     set_surroundings(meshcat, robot, p_WN)
     assert 0.5 < max(extent(p_WN, *meshcat.SetCameraPose.call_args.args)) < 1.0
-
-
-def test_the_floor_reaches_around_every_point_in_whole_inches():
-    points = np.array([[[0.0, -0.08, 0.1]], [[0.51, 0.09, 0.0]]])
-    np.testing.assert_array_equal(floor_corners(points), [[-2, -6], [23, 6]])
-
-
-def test_a_matrix_moves_turns_and_stretches():
-    quarter_turn_about_x = np.array([[1.0, 1.0, 0.0, 0.0]]) / np.sqrt(2.0)
-    track = Track("", np.array([[1.0, 2.0, 3.0]]), quarter_turn_about_x, np.array([[4.0, 5, 6]]))
-    expected = [[4, 0, 0, 1], [0, 0, -6, 2], [0, 5, 0, 3], [0, 0, 0, 1]]
-    np.testing.assert_allclose(track.matrix(0), expected, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
