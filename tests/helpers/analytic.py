@@ -69,9 +69,12 @@ class DrawnBowl:
     delay: float = 0.0
 
     def __call__(self, task):
-        generators = [np.random.default_rng([*task.seed, k]) for k in range(3)]
-        moved = [task.vector + generator.normal(size=task.vector.size) for generator in generators]
-        return combine([Bowl(self.delay / 3, fails_every=15)(each) for each in moved], TAIL)
+        bowl = Bowl(self.delay / 3, fails_every=15)
+        draws = []
+        for k in range(3):
+            generator = np.random.default_rng([*task.seed, k])
+            draws.append(bowl(task.vector + generator.normal(size=task.vector.size)))
+        return combine(draws, TAIL)
 
 
 @dataclass(frozen=True)
@@ -123,6 +126,15 @@ def read_record(directory: Path) -> dict[str, object]:
                 del entry["wall_time_s"], entry["crc"]
             record[name] = [json.dumps(entry) for entry in entries]
     return record
+
+
+def optimise(optimizer, evaluate):
+    """All vectors that an optimiser asks for, batch by batch, and its iterations."""
+    batches, iterations = [], []
+    while not iterations or iterations[-1].stop is None:
+        batches.append(optimizer.ask())
+        iterations.append(optimizer.tell([evaluate(vector) for vector in batches[-1]]))
+    return batches, iterations
 
 
 class RandomSearch:
