@@ -8,6 +8,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,10 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.evolution.draws import combine
-from tetra_drake.optimizers.base import Evaluation, Iteration
+from tetra_drake.evolution.executors import MakeExecutor
+from tetra_drake.evolution.run_record import RunRecord
+from tetra_drake.evolution.trials import TrialStatus, open_trials, run_trials
+from tetra_drake.optimizers.base import Evaluation, Iteration, MakeOptimizer
 from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -38,6 +42,9 @@ class Bowl:
         fitness = -float(((genome[:-2] - 2.0) ** 2).sum())
         metrics = {"distance": 10.0 + fitness, **measures(genome)}
         return Evaluation(fitness, metrics, wall_time=self.delay)
+
+
+BOWL = Bowl()
 
 
 def measures(genome):
@@ -110,6 +117,27 @@ def drawn_scenario(**options) -> Scenario:
     """small_scenario() among draws, of which the tail counts."""
     settings = Disturbances(draws=3, tail=TAIL)
     return small_scenario(**options).with_changes({"disturbances": settings})
+
+
+def record_run(
+    directory: Path,
+    scenario: Scenario | None = None,
+    *,
+    seed: int = 5,
+    evaluate: Callable[[Any], Evaluation] = BOWL,
+    workers: int = 2,
+    executor: MakeExecutor = ThreadPoolExecutor,
+    optimizer: MakeOptimizer | None = None,
+    **options: Any,
+) -> list[TrialStatus]:
+    """Begins a run in a new directory, or without a scenario goes on with one; its trials' ends."""
+    if scenario is None:
+        record = RunRecord.resume(directory)
+    else:
+        record = RunRecord.create(directory, scenario=scenario, seed=seed)
+    with record:
+        trials = open_trials(record, optimizer=optimizer)
+        return run_trials(trials, evaluate=evaluate, workers=workers, executor=executor, **options)
 
 
 def read_record(directory: Path) -> dict[str, object]:
