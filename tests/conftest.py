@@ -2,17 +2,14 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from helpers.analytic import Bowl, small_scenario
+from helpers.analytic import BOWL, record_run, small_scenario
 from helpers.widths import WIDEST
 
 from tetra_drake.engines.compiled import lane_pool
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.load import load_scenario
@@ -70,20 +67,10 @@ def few_widths() -> Iterator[None]:
 def run_small(tmp_path):
     """run_small(name, ...): a small run in threads; its directory."""
 
-    def run(name="run", *, seed=5, workers=2, evaluate=None, resume=False, changes=None, **options):
+    def run(name="run", *, seed=5, workers=2, evaluate=BOWL, resume=False, changes=None, **options):
         directory = tmp_path / name
-        if resume:
-            record = RunRecord.resume(directory)
-        else:
-            scenario = small_scenario(**options).with_changes(changes or {})
-            record = RunRecord.create(directory, scenario=scenario, seed=seed)
-        with record:
-            run_trials(
-                open_trials(record),
-                evaluate=evaluate or Bowl(),
-                workers=workers,
-                executor=ThreadPoolExecutor,
-            )
+        scenario = None if resume else small_scenario(**options).with_changes(changes or {})
+        record_run(directory, scenario, seed=seed, evaluate=evaluate, workers=workers)
         return directory
 
     return run

@@ -19,13 +19,12 @@ from helpers.analytic import (
     drawn_scenario,
     is_deadly,
     read_record,
+    record_run,
 )
 
 from tetra_drake import cli
 from tetra_drake.evolution.cluster import dask_cluster, local_cluster
 from tetra_drake.evolution.executors import evaluate_all
-from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.robot.gait import ParameterSpace
 
 dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
@@ -84,10 +83,9 @@ class Killer:
 
 def record_on(executor, directory, **options):
     """The record of two trials of 28 evaluations among draws, in chunks."""
+    evaluate = Chunked(DrawnBowl(delay=0.05))
     scenario = drawn_scenario(iterations=8)
-    with RunRecord.create(directory, scenario=scenario, seed=9) as record:
-        evaluate = Chunked(DrawnBowl(delay=0.05))
-        run_trials(open_trials(record), evaluate=evaluate, workers=2, executor=executor, **options)
+    record_run(directory, scenario, evaluate=evaluate, executor=executor, **options)
     return read_record(directory)
 
 

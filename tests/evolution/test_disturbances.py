@@ -12,6 +12,7 @@ from helpers.analytic import (
     TAIL,
     DrawnBowl,
     drawn_scenario,
+    record_run,
     small_scenario,
 )
 from helpers.quantities import with_unit
@@ -23,8 +24,6 @@ from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mea
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.reevaluation import evaluate_again
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
@@ -33,6 +32,7 @@ from tetra_drake.scenario.terrain_kinds import Steps
 
 STIFFNESS = {"cables.outer_stiffness": 0.05}
 SEED = (5, 0, 3)
+BOWL = DrawnBowl()
 
 
 @pytest.fixture(scope="module")
@@ -185,12 +185,8 @@ def test_a_draw_that_fails_or_cannot_start_fails_its_gait_with_and_without_lanes
 def run_drawn(tmp_path):
     """run_drawn(...): a small run among draws; its directory."""
 
-    def run(*, evaluate=None, **options):
-        scenario = drawn_scenario(**options)
-        with RunRecord.create(tmp_path / "run", scenario=scenario, seed=5) as record:
-            evaluate = evaluate or DrawnBowl()
-            trials = open_trials(record)
-            run_trials(trials, evaluate=evaluate, workers=1, executor=ThreadPoolExecutor)
+    def run(*, evaluate=BOWL, **options):
+        record_run(tmp_path / "run", drawn_scenario(**options), evaluate=evaluate)
         return tmp_path / "run"
 
     return run

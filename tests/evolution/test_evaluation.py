@@ -53,11 +53,6 @@ def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vect
     [
         ({"simulation.max_evaluations": 50}, None, "step budget: "),
         ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, None, "diverged: "),
-        (
-            {"simulation.duration": "15.0 s", "evolution.time_budget": "0.3 s"},
-            None,
-            "time budget: ",
-        ),
         ({}, lambda result: math.nan, "diverged: "),
     ],
 )

@@ -5,15 +5,13 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.analytic import DrawnBowl, drawn_scenario, read_record
+from helpers.analytic import DrawnBowl, drawn_scenario, read_record, record_run
 
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import open_trials, run_trials
 
 PROGRAM = Path(__file__).parents[1] / "helpers" / "killed_run.py"
 
@@ -51,10 +49,7 @@ def wait_until_gone(session):
 @pytest.fixture(scope="module")
 def uninterrupted(tmp_path_factory):
     directory = tmp_path_factory.mktemp("uninterrupted") / "whole"
-    with RunRecord.create(directory, scenario=drawn_scenario(iterations=150), seed=9) as record:
-        run_trials(
-            open_trials(record), evaluate=DrawnBowl(), workers=2, executor=ThreadPoolExecutor
-        )
+    record_run(directory, drawn_scenario(iterations=150), seed=9, evaluate=DrawnBowl())
     return read_record(directory)
 
 

@@ -4,18 +4,15 @@ import dataclasses
 import json
 import lzma
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from helpers.analytic import Bowl, small_scenario
+from helpers.analytic import Bowl, record_run, small_scenario
 from helpers.synthetic_run import write_run
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines, read_lines
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.report.summary import results
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.units import INCH
@@ -125,10 +122,7 @@ def test_the_best_gait_is_saved_and_the_last_population_is_that_of_the_mean(run_
 
 
 def test_the_record_says_what_the_run_said_at_its_end(tmp_path):
-    with RunRecord.create(tmp_path / "run", scenario=small_scenario(), seed=3) as record:
-        ended = run_trials(
-            open_trials(record), evaluate=Bowl(delay=0.001), workers=2, executor=ThreadPoolExecutor
-        )
+    ended = record_run(tmp_path / "run", small_scenario(), evaluate=Bowl(delay=0.001))
     recorded = load_run(tmp_path / "run").statuses
     alike = {"wall_time": 0.0, "evaluations_at_most": 0}
     for ours, theirs in zip(recorded, ended, strict=True):

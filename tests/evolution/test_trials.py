@@ -2,16 +2,14 @@
 
 import json
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 
 import numpy as np
 import pytest
-from helpers.analytic import Bowl, RandomSearch, read_record, small_scenario
+from helpers.analytic import Bowl, RandomSearch, read_record, record_run, small_scenario
 
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.run import load_run
-from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import open_trials, run_trials
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.report.summary import run_text
 
@@ -65,8 +63,7 @@ def test_neither_workers_nor_executor_nor_timing_change_the_record(run_small, tm
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
     for name, workers, executor in (("pool", 2, process_executor), ("plain", 3, AtOnce)):
-        with RunRecord.create(tmp_path / name, scenario=small_scenario(), seed=5) as record:
-            run_trials(open_trials(record), evaluate=Bowl(), workers=workers, executor=executor)
+        record_run(tmp_path / name, small_scenario(), workers=workers, executor=executor)
         assert read_record(tmp_path / name) == reference
 
 
@@ -108,13 +105,7 @@ def test_an_error_in_the_program_is_no_failed_evaluation(run_small):
 
 
 def test_another_optimiser_reports_its_own_numbers(tmp_path):
-    with RunRecord.create(tmp_path / "run", scenario=small_scenario(), seed=2) as record:
-        statuses = run_trials(
-            open_trials(record, optimizer=RandomSearch),
-            evaluate=Bowl(),
-            workers=2,
-            executor=ThreadPoolExecutor,
-        )
+    statuses = record_run(tmp_path / "run", small_scenario(), seed=2, optimizer=RandomSearch)
     assert [(status.evaluations, status.stop) for status in statuses] == [(8, "done")] * 2
     run = load_run(tmp_path / "run")
     assert "placed" not in run.evaluations

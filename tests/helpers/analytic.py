@@ -8,6 +8,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,10 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.evolution.draws import combine
-from tetra_drake.optimizers.base import Evaluation, Iteration
+from tetra_drake.evolution.executors import MakeExecutor
+from tetra_drake.evolution.run_record import RunRecord
+from tetra_drake.evolution.trials import TrialStatus, open_trials, run_trials
+from tetra_drake.optimizers.base import Evaluation, Iteration, MakeOptimizer
 from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -38,6 +42,9 @@ class Bowl:
         fitness = -float(((genome[:-2] - 2.0) ** 2).sum())
         metrics = {"distance": 10.0 + fitness, **measures(genome)}
         return Evaluation(fitness, metrics, wall_time=self.delay)
+
+
+BOWL = Bowl()
 
 
 def measures(genome):
@@ -69,9 +76,12 @@ class DrawnBowl:
     delay: float = 0.0
 
     def __call__(self, task):
-        generators = [np.random.default_rng([*task.seed, k]) for k in range(3)]
-        moved = [task.vector + generator.normal(size=task.vector.size) for generator in generators]
-        return combine([Bowl(self.delay / 3, fails_every=15)(each) for each in moved], TAIL)
+        bowl = Bowl(self.delay / 3, fails_every=15)
+        draws = []
+        for k in range(3):
+            generator = np.random.default_rng([*task.seed, k])
+            draws.append(bowl(task.vector + generator.normal(size=task.vector.size)))
+        return combine(draws, TAIL)
 
 
 @dataclass(frozen=True)
@@ -109,6 +119,27 @@ def drawn_scenario(**options) -> Scenario:
     return small_scenario(**options).with_changes({"disturbances": settings})
 
 
+def record_run(
+    directory: Path,
+    scenario: Scenario | None = None,
+    *,
+    seed: int = 5,
+    evaluate: Callable[[Any], Evaluation] = BOWL,
+    workers: int = 2,
+    executor: MakeExecutor = ThreadPoolExecutor,
+    optimizer: MakeOptimizer | None = None,
+    **options: Any,
+) -> list[TrialStatus]:
+    """Begins a run in a new directory, or without a scenario goes on with one; its trials' ends."""
+    if scenario is None:
+        record = RunRecord.resume(directory)
+    else:
+        record = RunRecord.create(directory, scenario=scenario, seed=seed)
+    with record:
+        trials = open_trials(record, optimizer=optimizer)
+        return run_trials(trials, evaluate=evaluate, workers=workers, executor=executor, **options)
+
+
 def read_record(directory: Path) -> dict[str, object]:
     """All files of a run, wall times taken out, by their names."""
     record: dict[str, object] = {}
@@ -123,6 +154,15 @@ def read_record(directory: Path) -> dict[str, object]:
                 del entry["wall_time_s"], entry["crc"]
             record[name] = [json.dumps(entry) for entry in entries]
     return record
+
+
+def optimise(optimizer, evaluate):
+    """All vectors that an optimiser asks for, batch by batch, and its iterations."""
+    batches, iterations = [], []
+    while not iterations or iterations[-1].stop is None:
+        batches.append(optimizer.ask())
+        iterations.append(optimizer.tell([evaluate(vector) for vector in batches[-1]]))
+    return batches, iterations
 
 
 class RandomSearch:

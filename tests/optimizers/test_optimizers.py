@@ -8,7 +8,7 @@ import zlib
 
 import numpy as np
 import pytest
-from helpers.analytic import measures, read_record, small_scenario
+from helpers.analytic import measures, optimise, read_record, small_scenario
 
 from tetra_drake.optimizers import cma_es, optimizer_of, quality_diversity
 from tetra_drake.optimizers.base import Evaluation
@@ -52,12 +52,7 @@ def failing(vector):
 
 
 def run(optimizer, evaluate=bowl):
-    """All vectors asked for, batch by batch, and the iterations."""
-    batches, iterations = [], []
-    while not iterations or iterations[-1].stop is None:
-        batches.append(optimizer.ask())
-        iterations.append(optimizer.tell([evaluate(vector) for vector in batches[-1]]))
-    return batches, iterations
+    return optimise(optimizer, evaluate)
 
 
 def fitnesses(batches):
