@@ -97,7 +97,7 @@ def test_no_force_is_left_on_any_body(scenario, changes, slack):
 def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario):
     # It gets there in other last digits on another processor, and so it does from another start.
     elsewhere = scenario.with_changes({"robot.spacing": f"{1.01 * scenario.robot.spacing} m"})
-    spacings = [np.diff(settled_state(each)[4:35:7]).tolist() for each in (scenario, elsewhere)]
+    spacings = [np.diff(settled_state(start)[4:35:7]).tolist() for start in (scenario, elsewhere)]
     assert spacings[0] != spacings[1]
     assert np.array_equal(settled_lengths(elsewhere), settled_lengths(scenario))
 

@@ -52,8 +52,8 @@ def test_the_network_beforehand_is_that_of_the_diagram(scenario, structure, gait
     for time in (1.0, 2.5, 7.0):
         simulator.AdvanceTo(time)
         live = simulator.get_system().GetOutputPort("signals").Eval(simulator.get_context())
-        found = samples[round(time / scenario.cpg.listing_step)]
-        np.testing.assert_allclose(found, live, atol=1e-4)
+        beforehand = samples[round(time / scenario.cpg.listing_step)]
+        np.testing.assert_allclose(beforehand, live, atol=1e-4)
 
 
 def test_the_csv_holds_what_the_cables_are_fed(scenario, gait, tmp_path):

@@ -119,7 +119,7 @@ def test_force_arrows_stand_on_the_slope():
     structure, ground = ground_of(Incline(slope=slope))
     frames = make_walk().isel(time=[0, 50])
     flat = ground_of(load_scenario().terrain)
-    found = {m.path: m for m in motions(structure, ground, frames)}
+    sloping = {m.path: m for m in motions(structure, ground, frames)}
     level = {m.path: m for m in motions(*flat, frames)}
     for kind, expected in (
         ("normal", [-np.sin(slope), 0.0, np.cos(slope)]),
@@ -127,7 +127,7 @@ def test_force_arrows_stand_on_the_slope():
     ):
         path = f"/forces/{kind}/T1 bottom_left"
         assert frames.in_contact.values[0, 0] == 1
-        (quaternion, _), scales = found[path].quaternions, found[path].scales
+        (quaternion, _), scales = sloping[path].quaternions, sloping[path].scales
         z = RotationMatrix(Quaternion(quaternion)).matrix()[:, 2]
         np.testing.assert_allclose(z, expected, rtol=0, atol=1e-12)
         np.testing.assert_allclose(scales, level[path].scales, rtol=1e-12)

@@ -245,14 +245,14 @@ class _Row:
 
     label: str
     nodes: np.ndarray
-    """(n, 4, 3)."""
+    """Positions (n, 4, 3)."""
     styles: Sequence[Any]
     """Line style of each tetrahedron."""
     paths: np.ndarray
-    """(samples, nodes, 3): earlier positions of some nodes."""
+    """Earlier positions (samples, nodes, 3) of some nodes."""
     path_style: Any
     profile: np.ndarray | None = None
-    """(points, 3) of the ground, for views from the side."""
+    """Points (points, 3) of the ground, for views from the side."""
 
 
 def _heights(rows: Sequence[_Row]) -> np.ndarray:
