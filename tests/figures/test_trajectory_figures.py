@@ -157,9 +157,11 @@ def test_distances_before_and_after_have_one_scale(walk):
 
 
 def test_in_one_step_tetrahedra_off_the_ground_stand_out(walk):
-    times = np.linspace(*last_step(walk), 5)
-    aloft = lifted(walk).sel(time=times, method="nearest").values
-    for panel in one_step(walk, FLAT, instants=5).axes[:2]:
+    start, end = last_step(walk)
+    aloft = lifted(walk).sel(time=np.linspace(start, end, 5), method="nearest").values
+    figure = one_step(walk, FLAT, instants=5)
+    assert f"{start:.2f} to {end:.2f} s" in figure.get_suptitle()
+    for panel in figure.axes[:2]:
         assert panel.get_aspect() == 1.0
         colours = [[to_hex(line.get_color()) for line in row] for row in robots(panel)]
         np.testing.assert_array_equal(np.array(colours) == OKABE_ITO["vermillion"], aloft)

@@ -189,9 +189,9 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
     figure = Figure(figsize=(max(2 * width + 1.2, 5.8), sum(heights) + legend))
     above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
     panels: Any = above.subplots(1, 2)
-    for panel, view, title in zip(panels, (OVERHEAD, SIDE), ("above", "the side"), strict=True):
+    for panel, view, place in zip(panels, (OVERHEAD, SIDE), ("above", "the side"), strict=True):
         _draw_rows(panel, rows, view, names, width_in=width)
-        panel.set_title(f"from {title}")
+        panel.set_title(f"from {place}")
     panel.tick_params(left=False, labelleft=False)
     if ground.flat:
         for row in range(instants):
