@@ -33,7 +33,7 @@ LIMITS = {".gif": 500_000, ".png": 60_000}
 """Sizes of files in bytes, for which pictures become as narrow as they must."""
 
 GROUND_COLOURS = {".gif": 8, ".png": 64}
-"""How many colours of its own a picture has beside the robot's."""
+"""Number of colours that a picture has beside the robot's."""
 
 WIDTHS, SUPERSAMPLING = range(720, 239, -80), 2  # pixels
 START, END, STEP = 1.0, 15.0, 0.2  # s of the motion: of the frames, between frames
@@ -147,9 +147,9 @@ def _palette(image: Image.Image, count: int) -> Image.Image:
     rgb = {name: np.array(list(bytes.fromhex(code[1:]))) for name, code in COLOURS.items()}
     drawn = [rgb[name] for name in ("odd", "even", "actuated", "outer", "inner", "trace")]
     faded = [(colour + rgb["floor"]) // 2 for colour in drawn]
-    own = image.quantize(count).getpalette() or []
+    others = image.quantize(count).getpalette() or []
     palette = Image.new("P", (1, 1))
-    palette.putpalette(np.concatenate([[255, 255, 255], *drawn, *faded, own]).tolist())
+    palette.putpalette(np.concatenate([[255, 255, 255], *drawn, *faded, others]).tolist())
     return palette
 
 

@@ -87,7 +87,7 @@ def simulated_frequency(*, resonance: float, feedback: float, start: float = 0.0
 
 
 def own_frequency() -> float:
-    """That of the oscillator alone in Hz, by harmonic balance."""
+    """Frequency in Hz of the oscillator alone, by harmonic balance."""
     square = ((TAU_A + TAU_B) * BETA - TAU_A * WEIGHT) / (TAU_A * WEIGHT)
     return math.sqrt(square) / (2.0 * math.pi * TAU_B)
 
@@ -108,27 +108,27 @@ Points = tuple[np.ndarray, np.ndarray]
 
 
 def simulate_all(feedback: float, start: float) -> Points:
-    """What simulations give for RATIOS of resonance to own frequency."""
-    own = own_frequency()
+    """Simulated frequencies for RATIOS of resonance to own frequency."""
+    alone = own_frequency()
     frequencies = [
-        simulated_frequency(resonance=ratio * own, feedback=feedback, start=start) / own
+        simulated_frequency(resonance=ratio * alone, feedback=feedback, start=start) / alone
         for ratio in RATIOS
     ]
     return RATIOS, np.array(frequencies)
 
 
 def balance_all(feedback: float) -> Points:
-    """What harmonic balance gives, for ratios that lie closer."""
-    own, points = own_frequency(), []
+    """Frequencies by harmonic balance, for ratios that lie closer."""
+    alone, points = own_frequency(), []
     for ratio in np.geomspace(RATIOS[0], RATIOS[-1], 200):
-        found = balanced_frequencies(resonance=ratio * own, feedback=feedback) / own
-        points += [(ratio, frequency) for frequency in found]
+        balanced = balanced_frequencies(resonance=ratio * alone, feedback=feedback) / alone
+        points += [(ratio, frequency) for frequency in balanced]
     ratios, frequencies = np.array(points).T
     return ratios, frequencies
 
 
 def followed(points: Points) -> str:
-    """At which ratios the loop oscillates nearer the mass's resonance than the own frequency."""
+    """Range of ratios at which the loop is nearer the mass's resonance than the own frequency."""
     ratios, frequencies = points
     follows = ratios[np.abs(frequencies - ratios) < np.abs(frequencies - 1.0)]
     return f"{follows.min():.2f} to {follows.max():.2f}"
@@ -154,10 +154,10 @@ def draw(theory: dict[float, Points], simulated: dict[tuple[float, str], Points]
 
 def main(out: Path = Path(__file__).parent) -> None:
     """Simulates the loops and writes the pictures."""
-    own = own_frequency()
-    save_block_diagram(make_diagram(resonance=own, feedback=FEEDBACK), out / "entrainment.svg")
-    alone = simulated_frequency(resonance=own, feedback=0.0)
-    print(f"Without feedback: {alone:.3f} Hz (harmonic balance {own:.3f} Hz)")
+    alone = own_frequency()
+    save_block_diagram(make_diagram(resonance=alone, feedback=FEEDBACK), out / "entrainment.svg")
+    simulated_alone = simulated_frequency(resonance=alone, feedback=0.0)
+    print(f"Without feedback: {simulated_alone:.3f} Hz (harmonic balance {alone:.3f} Hz)")
 
     feedbacks = FEEDBACK, -FEEDBACK
     theory = {feedback: balance_all(feedback) for feedback in feedbacks}

@@ -34,7 +34,7 @@ from tetra_drake.scenario.units import INCH, POUND_FORCE
 GENTLE, STEEP = math.radians(10.0), math.radians(35.0)
 STATIC, KINETIC = 0.6, 0.5
 STIFFNESS = 25.0 * POUND_FORCE / INCH
-"""Of a bristle, N/m: with the damping, 0.4 lbf s/in, it settles within some 16 ms."""
+"""Stiffness of a bristle, N/m: with the damping, 0.4 lbf s/in, it settles within some 16 ms."""
 SPEED = 40.0 * INCH  # m/s
 ANALYTIC: Any = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 OURS: Any = [
@@ -95,7 +95,7 @@ def stopping(motion: Samples, scenario: Scenario) -> tuple[float, float]:
 
 
 def deflection(scenario: Scenario) -> float:
-    """How far (m) the bristles of all nodes stretch under the weight."""
+    """Stretch (m) of the bristles of all nodes under the weight."""
     assert isinstance(scenario.friction, Coulomb)
     return parts_of_weight(scenario)[0] / (len(BASE) * scenario.friction.stiffness)
 

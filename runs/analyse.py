@@ -53,7 +53,7 @@ _COLUMNS = {
     "changes": ("what", "median", "worst", "failed", "correlation", "correlation_size"),
 }
 _NUMBERS = [*SHOWN, "distance_in", "correlation", "correlation_size"]
-"""What may be null in all rows."""
+"""Columns that may be null in all rows."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +65,13 @@ class Analysis:
     """The fittest gait of each trial. Index: trial. Columns: evaluation, evaluations (of the whole
     trial), fitness and the metrics SHOWN, in SI units."""
     resimulations: pandas.DataFrame
-    """Those gaits on other engines and under other laws of friction: trial, setting, distance_in
+    """Fittest gaits on other engines and under other laws of friction: trial, setting, distance_in
     (NaN where it failed)."""
     gaits: pandas.DataFrame
-    """Those gaits on the compiled engine under draws of the default disturbances, as of
-    robustness.by_gait(), in m. Index: trial."""
+    """Fittest gaits on the compiled engine under draws of the default disturbances, in m; see
+    robustness.by_gait(). Index: trial."""
     changes: pandas.DataFrame
-    """As of robustness.by_change(), in m."""
+    """Effects of single changes, in m; see robustness.by_change()."""
 
     @property
     def best_trial(self) -> int:
@@ -156,12 +156,12 @@ def resimulate(
     vectors = [space.vector(gait) for gait in gaits.values()]
     rows = []
     for name, changed in settings_of(scenario).items():
-        found = dict(
+        evaluations = dict(
             evaluate_all(GaitEvaluation(changed), vectors, workers=workers, executor=executor)
         )
         for i, trial in enumerate(gaits):
-            distance = json_number(found[i].metrics.get("distance", math.nan) / INCH)
-            outcome = {"distance_in": distance, "failure": found[i].failure}
+            distance = json_number(evaluations[i].metrics.get("distance", math.nan) / INCH)
+            outcome = {"distance_in": distance, "failure": evaluations[i].failure}
             rows.append({"trial": trial, "setting": name} | outcome)
     return rows
 
@@ -179,13 +179,13 @@ def settings_of(scenario: Scenario) -> dict[str, Scenario]:
             other = load_scenario(shipped)
             compiled = other.with_changes({"engine": "!Compiled"})
             changes[law] = {"friction": other.friction, "engine": compiled.engine}
-    found = {}
+    settings = {}
     for name, change in changes.items():
         with contextlib.suppress(InputError):
             changed = scenario.with_changes(change)
             check_scenario(changed)
-            found[name] = changed
-    return found
+            settings[name] = changed
+    return settings
 
 
 def main(arguments: Sequence[str]) -> None:

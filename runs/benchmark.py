@@ -88,14 +88,14 @@ class Batch(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """What a batch took."""
+    """Speed and cost of a batch."""
 
     speed: float
     """Times real time, of all gaits together."""
     step_cost: float
-    """Of one gait, in μs of a core."""
+    """Time of one step of one gait, in μs of a core."""
     steps: float
-    """Of all gaits."""
+    """Number of steps of all gaits."""
 
 
 def measure(batches: Sequence[Batch]) -> list[Timing]:
@@ -108,7 +108,7 @@ def measure(batches: Sequence[Batch]) -> list[Timing]:
 
 
 def timing_of(batch: Batch) -> Timing:
-    """What a batch takes once."""
+    """Speed and cost of a batch, measured once."""
     scenario, count, cores = batch
     started = time.perf_counter()
     gaits = [seeded_gait(scenario, seed) for seed in range(count)]
@@ -161,7 +161,7 @@ def successes(
 
 
 def distances_in(outcomes: Sequence[SimulationResult | SimulationFailure]) -> np.ndarray:
-    """How far (in) gaits walk, NaN where the simulation failed."""
+    """Distances (in) of gaits, NaN where the simulation failed."""
     walked = [o.metrics.distance_in if isinstance(o, SimulationResult) else None for o in outcomes]
     return np.array(walked, dtype=float)
 

@@ -42,18 +42,18 @@ VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
 
 @dataclass(frozen=True)
 class Experiment:
-    """What makes a recorded run."""
+    """Scenario and title of a recorded run."""
 
     title: str
     base: str
     """A shipped scenario."""
     changes: Mapping[str, Any]
-    """By keys of the scenario, beside its name."""
+    """Changes by keys of the scenario, beside its name."""
     film: bool = False
-    """Whether its best gait is filmed, for README.md."""
+    """True if its best gait is filmed, for README.md."""
 
     def scenario(self, name: str) -> Scenario:
-        """Of the run of this name."""
+        """Scenario of the run of this name."""
         return load_scenario(self.base).with_changes({"name": name} | dict(self.changes))
 
 
@@ -119,7 +119,7 @@ EXPERIMENTS = {
         _by(QualityDiversity(), 1, 30000),
     ),
 }
-"""By the names of their folders, in the order of the gallery."""
+"""Experiments by the names of their folders, in the order of the gallery."""
 
 
 def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> None:
@@ -152,7 +152,7 @@ def take_pictures(page: Path, *pictures: Path) -> None:
 
 
 def _same(first: Path, second: Path) -> bool:
-    """Whether both files are there, and alike."""
+    """True if both files are there, and alike."""
     return first.exists() and second.exists() and filecmp.cmp(first, second, shallow=False)
 
 

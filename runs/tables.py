@@ -90,7 +90,7 @@ def trials_table(run: Analysis) -> str:
 
 
 def changes_table(run: Analysis) -> str:
-    """What hurts the best gaits most."""
+    """Effects of single changes on the best gaits."""
     rows = [[row["what"], *_change_cells(row)] for _, row in run.changes.iterrows()]
     headings = ["changed by 5 %", "alone: median change (worst), in"]
     return Table([*headings, "rank correlation: mean (median size)"], rows).markdown()
@@ -108,7 +108,7 @@ RUN_TABLES: dict[str, Callable[[Analysis], str]] = {
     "trials": trials_table,
     "changes": changes_table,
 }
-"""Of the run in whose folder the page is; beside them, there is the gallery."""
+"""Tables of the run in whose folder the page is; beside them, there is the gallery."""
 
 
 def pages(runs: Runs) -> list[Path]:

@@ -39,7 +39,7 @@ _DIGITS, _WALL_TIME_DIGITS = 3, 2
 """Significant ones of numbers of an evaluation without its genome, and of the time of all."""
 
 _DECIMALS = 9
-"""Of metrics in SI; less is rounding, such as the drift of a robot that is symmetric."""
+"""Decimals of metrics in SI; less is rounding, such as the drift of a symmetric robot."""
 
 _DOWN = decimal.Context(prec=6, rounding=decimal.ROUND_FLOOR)
 """For the fitness of an evaluation without its genome, so that none becomes a new best."""
@@ -98,9 +98,9 @@ def _rounded(value: Any, digits: int) -> Any:
     if isinstance(value, float):
         return float(f"{round(value, _DECIMALS) + 0.0:.{digits}g}")
     if isinstance(value, list):
-        return [_rounded(each, digits) for each in value]
+        return [_rounded(item, digits) for item in value]
     if isinstance(value, dict):
-        return {key: _rounded(each, digits) for key, each in value.items()}
+        return {key: _rounded(item, digits) for key, item in value.items()}
     return value
 
 

@@ -39,15 +39,6 @@ def test_a_block_that_raises_leaves_the_old_file_and_no_other(tmp_path):
     assert os.listdir(tmp_path) == ["a.txt"]
 
 
-def test_two_writers_of_one_file_do_not_meet(tmp_path):
-    file = tmp_path / "a.txt"
-    with whole_file(file) as first, whole_file(file) as second:
-        first.write_text("first")
-        second.write_text("second")
-    assert file.read_text() == "first"  # the outer block ends last
-    assert os.listdir(tmp_path) == ["a.txt"]
-
-
 def test_the_mode_follows_the_umask(tmp_path):
     before = os.umask(0o027)
     try:

@@ -91,11 +91,3 @@ def test_an_import_is_light(module: str, absent: set[str]) -> None:
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert module in loaded.stdout.split()
     assert not absent & set(loaded.stdout.split())
-
-
-def test_the_public_names_are_there() -> None:
-    for name in ("load_scenario", "load_gait", "simulate", "evolve", "load_run"):
-        assert callable(getattr(tetra_drake, name))
-        assert name in dir(tetra_drake)
-    with pytest.raises(AttributeError):
-        getattr(tetra_drake, "nothing")  # noqa: B009

@@ -16,8 +16,8 @@ def robot(scenario):
 
 
 def label(source, block):
-    [found] = re.findall(rf'^"{block}" \[label="(.*?)"', source, re.MULTILINE)
-    return found
+    [text] = re.findall(rf'^"{block}" \[label="(.*?)"', source, re.MULTILINE)
+    return text
 
 
 def test_blocks_ports_in_use_and_their_connections_are_shown(robot):

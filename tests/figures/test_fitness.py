@@ -32,8 +32,8 @@ def with_means(*means):
 
 def lines(figure):
     """The points of the lines with a label of their own."""
-    found = {line.get_label(): line.get_xydata().tolist() for line in figure.axes[0].lines}
-    return {label: points for label, points in found.items() if not label.startswith("_")}
+    points = {line.get_label(): line.get_xydata().tolist() for line in figure.axes[0].lines}
+    return {label: xy for label, xy in points.items() if not label.startswith("_")}
 
 
 def bar_groups(figure):
@@ -103,7 +103,7 @@ def test_the_best_fitness_is_shown_where_the_optimiser_reports_no_mean(run_of):
     ids=["ended trials count with their last mean", "the average ends with an unfinished trial"],
 )
 def test_the_average_over_trials(run_of, means, unfinished, average):
-    run = run_of(*(with_means(*each) for each in means), unfinished=unfinished)
+    run = run_of(*(with_means(*trial) for trial in means), unfinished=unfinished)
     axes = fitness_of_trials(run).axes[0]
     (errorbars,) = (c for c in axes.containers if isinstance(c, ErrorbarContainer))
     line, _, (segments,) = errorbars

@@ -27,8 +27,8 @@ def saved(folder, **options):
 
 def test_equal_data_give_equal_bytes_whatever_the_users_style(tmp_path):
     files = saved(tmp_path / "a")
-    own = {"lines.linewidth": 9.0, "svg.hashsalt": None, "xtick.labelsize": 20.0}
-    with matplotlib.rc_context(own):
+    users = {"lines.linewidth": 9.0, "svg.hashsalt": None, "xtick.labelsize": 20.0}
+    with matplotlib.rc_context(users):
         assert saved(tmp_path / "b") == files
         assert matplotlib.rcParams["lines.linewidth"] == 9.0
     assert saved(tmp_path / "c", value=2.0)["line.svg"] != files["line.svg"]

@@ -158,13 +158,14 @@ def test_distances_before_and_after_have_one_scale(walk):
 
 
 def test_in_one_step_tetrahedra_off_the_ground_stand_out(walk):
-    step = last_step(walk)
-    for panel in one_step(walk, FLAT, instants=5).axes[:2]:
+    start, end = last_step(walk)
+    aloft = lifted(walk).sel(time=np.linspace(start, end, 5), method="nearest").values
+    figure = one_step(walk, FLAT, instants=5)
+    assert f"{start:.2f} to {end:.2f} s" in figure.get_suptitle()
+    for panel in figure.axes[:2]:
         assert panel.get_aspect() == 1.0
-        for row, time in zip(robots(panel), np.linspace(*step, 5), strict=True):
-            off = lifted(walk).sel(time=time, method="nearest").values
-            marked = [to_hex(line.get_color()) == OKABE_ITO["vermillion"] for line in row]
-            assert marked == off.tolist()
+        colours = [[to_hex(line.get_color()) for line in row] for row in robots(panel)]
+        np.testing.assert_array_equal(np.array(colours) == OKABE_ITO["vermillion"], aloft)
 
 
 def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
@@ -244,15 +245,11 @@ def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
     _, side, *_ = figure.axes
     profiles = [line for line in side.lines if len(line.get_xdata()) > 300]
     assert len(profiles) == 3
-    lowest = []
     for line in profiles:
         x, z = line.get_xdata(), line.get_ydata()
         expected = ground_heights(np.column_stack([x, 0.0 * x]) * INCH, ground) / INCH
         np.testing.assert_allclose(z - z[0], expected - expected[0], rtol=0, atol=1e-9)
-        lowest.append((z[0] - expected[0], np.ptp(z)))
-    shift, depth = np.array(lowest).T
-    assert depth.min() > 0.9  # the robot's tip is above the first step down
-    assert -np.diff(shift).min() > 5.2 + depth.max()  # no row reaches into the next
+        assert np.ptp(z) > 0.9  # the robot's tip is above the first step down
     assert side.get_ylim()[0] < min(line.get_ydata().min() for line in profiles)
 
 

@@ -6,7 +6,6 @@ import math
 import pytest
 
 from tetra_drake.report.summary import ground_text, result_text
-from tetra_drake.results.result import IntegratorWork
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import HeightField, Rough
@@ -35,22 +34,6 @@ def test_requirements_that_are_not_met_are_named(tiny, gait, result):
     strict = tiny.with_changes({"require": {"distance": "4000 in", "twist": "0 in"}})
     (line,) = (line for line in result_text(strict, gait, result).splitlines() if "requir" in line)
     assert line.split()[0] == "distance" and "4000 in" in line
-
-
-@pytest.mark.parametrize(
-    ("engine", "words", "others"),
-    [
-        ("drake", {"accuracy 0.000125", "7 steps", "9 derivative"}, {"tolerance"}),
-        ("compiled", {"tolerance 0.000125 m/s", "7 steps", "9 derivative"}, {"accuracy"}),
-        ("mujoco", {"7 steps of 0.125 ms"}, {"accuracy", "tolerance", "derivative"}),
-    ],
-)
-def test_the_work_of_an_engine_is_called_by_its_name(tiny, gait, result, engine, words, others):
-    work = IntegratorWork("scheme", accuracy=0.125e-3, steps=7, derivative_evaluations=9)
-    result = dataclasses.replace(result, engine=engine, integrator=work)
-    line = result_text(tiny, gait, result).splitlines()[-1]
-    assert all(word in line for word in words)
-    assert not any(word in line for word in others)
 
 
 @pytest.mark.parametrize(

@@ -62,20 +62,6 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     np.testing.assert_allclose(walk.length[-1], Robot.of(scenario).rest.lengths, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("tetrahedra", "contacts"), [(2, "thesis"), (5, "all")])
-def test_the_ground_bears_the_weight_whatever_the_stiffnesses(scenario, tetrahedra, contacts):
-    scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra, "robot.contacts": contacts})
-    cables, ground = scenario.cables, scenario.ground
-    for outer, inner, hard in [(1.0, 1.5, 0.5), (0.5, 1.0, 1.5)]:
-        changes = {
-            "cables.outer_stiffness": with_unit(outer * cables.outer_stiffness, "N/m"),
-            "cables.inner_stiffness": with_unit(inner * cables.inner_stiffness, "N/m"),
-            "ground.stiffness": with_unit(hard * ground.stiffness, "N/m"),
-        }
-        robot = Robot.of(scenario.with_changes(changes))
-        assert normal_forces(robot).sum() == pytest.approx(robot.weight, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("changes", "slack"),
     [

@@ -37,18 +37,6 @@ def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
     assert seeded_gait(alone).weights == ()
 
 
-def test_mirror_images_of_weights_exchange_left_and_right(scenario):
-    actuation = Actuation.of(scenario.with_changes(SIDES | {"robot.tetrahedra": 3}))
-    names = actuation.weight_names
-    image = {name: names[i] for name, i in zip(names, actuation.images, strict=True)}
-    # Oscillators 1 and 2 are left and right of the first junction, 3 and 4 of the second.
-    assert image["2->1 extensor"] == "1->2 extensor"
-    assert image["3->2 flexor"] == "4->1 flexor"
-    assert all(image[image[name]] == name for name in names)
-    thesis = Actuation.of(scenario)
-    np.testing.assert_array_equal(thesis.images, np.arange(24), "each group is its own image")
-
-
 def test_a_turn_strengthens_the_left_by_what_it_weakens_the_right(scenario):
     actuation = [["outer bottom_left"], ["outer top"], ["inner bottom_right"]]
     three = scenario.with_changes({"robot.actuation": actuation, "robot.tetrahedra": 3})

@@ -51,15 +51,15 @@ def test_they_are_simulated_on_other_engines_and_under_other_laws(folder):
     scenario = run.manifest.scenario
     settings = analyse.settings_of(scenario)
     assert list(again["setting"]) == [name for name in settings for _ in range(2)]
-    engines = {name: each.engine_name for name, each in settings.items()}
+    engines = {name: changed.engine_name for name, changed in settings.items()}
     assert engines == {
         **{analyse.TIGHT: "drake", analyse.MUJOCO: "mujoco"},
         **{"reset integrator": "compiled", "Coulomb": "compiled"},
     }
     assert settings["Coulomb"].friction == Coulomb()
-    found = again.groupby("setting")["distance_in"].apply(list)
-    assert found["reset integrator"] == distances(run, scenario)
-    assert found[analyse.TIGHT] == distances(run, settings[analyse.TIGHT])
+    by_setting = again.groupby("setting")["distance_in"].apply(list)
+    assert by_setting["reset integrator"] == distances(run, scenario)
+    assert by_setting[analyse.TIGHT] == distances(run, settings[analyse.TIGHT])
     assert again["distance_in"].nunique() > 2
 
 

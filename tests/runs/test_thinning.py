@@ -92,11 +92,8 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
     before, after = run.evaluations.loc[rest], thinned.evaluations.loc[rest]
     loss = (before["fitness"] - after["fitness"]).dropna()
     assert (loss >= 0.0).all() and (loss < 1e-4).all() and (loss > 0.0).any()
-    twist = after["twist"].dropna()
-    assert [float(f"{x:.3g}") for x in before["twist"].dropna()] == twist.tolist()
+    assert [float(f"{x:.3g}") for x in before["twist"].dropna()] == after["twist"].dropna().tolist()
     assert thinned.whole["clearance"].notna().any() and after["clearance"].isna().all()
-    assert not np.signbit(after["lateral_drift"].dropna()).any()
-    assert set(after["lateral_drift"].dropna()) == {0.0}
     assert thinned.evaluations["failure"].equals(run.evaluations["failure"])
     trial, index = after.iloc[0][["trial", "index"]]
     with pytest.raises(Exception, match="genome"):

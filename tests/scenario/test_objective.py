@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from helpers.quantities import with_unit
 from pytest import approx
 
 from tetra_drake.errors import InputError
@@ -69,13 +68,6 @@ def test_a_draw_changes_what_it_names_within_its_spread(tmp_path):
     assert moves[..., 2].min() >= 0.0
     assert np.allclose(changed.robot.offsets, draw.moves)
     assert changed.disturbances is None
-
-
-def test_displaced_starts_add_to_the_offsets_of_the_scenario(tmp_path):
-    offsets = [[0.0, 0.0, 0.01 * i] for i in range(5)]
-    scenario = loaded(tmp_path, SPREADS).with_changes({"robot.offsets": with_unit(offsets, "m")})
-    draw = draw_disturbances(scenario, (1,))
-    assert np.allclose(disturbed(scenario, draw).robot.offsets, draw.moves + offsets, atol=1e-15)
 
 
 def test_every_draw_has_another_terrain(tmp_path):

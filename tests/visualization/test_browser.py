@@ -89,28 +89,6 @@ def page(browser, replay):
         yield loaded
 
 
-@pytest.mark.slow
-def test_pages_that_share_a_viewer_play_and_say_so_where_it_is_missing(
-    browser, trajectory, tmp_path
-):
-    path, viewer = tmp_path / "run" / "replay.html", tmp_path / "the viewer's.js"
-    scenario = load_scenario("thesis")
-    save_replay(path, scenario=scenario, trajectory=trajectory, title="small", viewer=viewer)
-    with opened(browser, path.as_uri(), beside=tmp_path) as page:
-        animation.wait_until_loaded(page)
-        assert page.evaluate("viewer.animator.duration") == pytest.approx(5.0)
-        page.wait_for_function("parseFloat(document.getElementById('clock').value) > 0.1")
-        assert page.locator("h1").text_content() == "small"
-        assert page.get_by_text("Open Controls", exact=True).is_visible()
-    viewer.rename(tmp_path / "elsewhere.js")
-    with contextlib.closing(browser.new_page()) as page:
-        page.goto(path.as_uri())
-        page.wait_for_function("document.body.innerText.startsWith('Missing')")
-        assert page.locator("body").inner_text().splitlines() == [
-            "Missing: ../the%20viewer%27s.js, the viewer of this page."
-        ]
-
-
 def pixels_of(image, name):
     """Rows and columns (pixels, 2) of what has the hue of one of COLOURS, however lit."""
     hue, saturation, _ = np.moveaxis(rgb_to_hsv(image), -1, 0)
@@ -152,17 +130,6 @@ def test_bodies_are_where_they_were(page, trajectory):
         )
         # Times of key frames are rounded to 0.01 ms, and nothing moves at 1 m/s.
         np.testing.assert_allclose(shown, frames["p_WB"].values[frame], rtol=0, atol=1e-5)
-
-
-def test_traces_grow_while_the_page_plays(page):
-    page.evaluate("viewer.animator.reset(); viewer.animator.play()")
-    page.wait_for_function("viewer.animator.time > 1.0")
-    time, ends = page.evaluate(
-        """() => [viewer.animator.time, viewer.scene_tree.find(['traces']).object.children
-            .filter(trace => trace.visible).map(trace => parseFloat(trace.name))]"""
-    )
-    assert ends == pytest.approx([0.2 * i for i in range(1, len(ends) + 1)])
-    assert time - 0.4 < max(ends) <= time
 
 
 def test_every_window_shows_the_whole_robot_and_its_path(page, trajectory):

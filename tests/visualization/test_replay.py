@@ -163,9 +163,9 @@ def test_arrows_stand_on_their_nodes_and_are_as_long_as_the_force(frames, tracks
 def test_the_title_is_text_and_not_markup(page, trajectory):
     packed = pack_page(page, title=TITLE)
     for tag, source in (("title", page), ("h1", page), ("title", packed)):
-        (found,) = re.findall(rf"<{tag}>(.*?)</{tag}>", source)
-        assert html.unescape(found) == TITLE
-        assert "<" not in found
+        (title,) = re.findall(rf"<{tag}>(.*?)</{tag}>", source)
+        assert html.unescape(title) == TITLE
+        assert "<" not in title
     assert "bad()</script>" not in page + packed
 
 

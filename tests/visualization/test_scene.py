@@ -117,7 +117,7 @@ def test_force_arrows_stand_on_the_slope():
     slope = 0.2
     frames = make_walk().isel(time=[0, 50])
     inclined, flat = robot_on(Incline(slope=slope)), robot_on(load_scenario().terrain)
-    found = {track.path: track for track in tracks(inclined, frames)}
+    sloping = {track.path: track for track in tracks(inclined, frames)}
     level = {track.path: track for track in tracks(flat, frames)}
     for kind, expected in (
         ("normal", [-np.sin(slope), 0.0, np.cos(slope)]),
@@ -125,7 +125,7 @@ def test_force_arrows_stand_on_the_slope():
     ):
         path = f"/forces/{kind}/T1 bottom_left"
         assert frames.in_contact.values[0, 0] == 1
-        (quaternion, _), scales = found[path].quaternions, found[path].scales
+        (quaternion, _), scales = sloping[path].quaternions, sloping[path].scales
         z = RotationMatrix(Quaternion(quaternion)).matrix()[:, 2]
         np.testing.assert_allclose(z, expected, rtol=0, atol=1e-12)
         np.testing.assert_allclose(scales, level[path].scales, rtol=1e-12)

@@ -189,9 +189,9 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
     figure = Figure(figsize=(max(2 * width + 1.2, 5.8), sum(heights) + legend))
     above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
     panels: Any = above.subplots(1, 2)
-    for panel, view, title in zip(panels, (OVERHEAD, SIDE), ("above", "the side"), strict=True):
+    for panel, view, place in zip(panels, (OVERHEAD, SIDE), ("above", "the side"), strict=True):
         _draw_rows(panel, rows, view, names, width_in=width)
-        panel.set_title(f"from {title}")
+        panel.set_title(f"from {place}")
     panel.tick_params(left=False, labelleft=False)
     if ground.flat:
         for row in range(instants):
@@ -245,14 +245,14 @@ class _Row:
 
     label: str
     nodes: np.ndarray
-    """(n, 4, 3)."""
+    """Positions (n, 4, 3)."""
     styles: Sequence[Any]
     """Line style of each tetrahedron."""
     paths: np.ndarray
-    """(samples, nodes, 3): earlier positions of some nodes."""
+    """Earlier positions (samples, nodes, 3) of some nodes."""
     path_style: Any
     profile: np.ndarray | None = None
-    """(points, 3) of the ground, for views from the side."""
+    """Points (points, 3) of the ground, for views from the side."""
 
 
 def _heights(rows: Sequence[_Row]) -> np.ndarray:

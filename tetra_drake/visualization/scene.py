@@ -92,14 +92,14 @@ class Track:
 
     path: str
     positions: np.ndarray
-    """(frames, 3) in m."""
+    """Positions (frames, 3) in m."""
     quaternions: np.ndarray | None = None
-    """(frames, 4), w first; None for an object that keeps the axes of World."""
+    """Rotations (frames, 4), w first; None for an object that keeps the axes of World."""
     scales: np.ndarray | None = None
-    """(frames, 3); None for an object that keeps its size."""
+    """Factors (frames, 3) along its axes; None for an object that keeps its size."""
 
     def matrix(self, frame: int) -> np.ndarray:
-        """(4, 4): the transformation, with scaling, of the object in one frame."""
+        """Transformation (4, 4), with scaling, of the object in one frame."""
         matrix = np.eye(4)
         if self.quaternions is not None:
             matrix[:3, :3] = RotationMatrix(Quaternion(self.quaternions[frame])).matrix()
