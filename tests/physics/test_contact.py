@@ -13,27 +13,34 @@ from tetra_drake.physics.contact import (
     MODE,
     MODE_COLUMNS,
     STICK_POINT,
-    Law,
+    NormalForce,
     add_ground_forces,
     normal_force,
     update_modes,
 )
-from tetra_drake.physics.friction import STICK, next_reset_mode, reset_force
+from tetra_drake.physics.friction import (
+    STICK,
+    ResetConstants,
+    first_zero,
+    next_reset_mode,
+    reset_force,
+)
 from tetra_drake.physics.kinematics import FORCE, NODE_COLUMNS
-from tetra_drake.physics.mode_change import first_zero, mode_margin, time_to_mode_change
+from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.schema import Scenario
 
 P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0
-LAW = Law(4000.0, 2e5, P0, SIGMA_1, A_C, SIGMA_0, *[0.0] * (len(Law._fields) - 6))
+LAW = ResetConstants(P0, SIGMA_1, A_C, SIGMA_0)
+NORMAL = NormalForce(stiffness=4000.0, damping=2e5)
 
 
 def test_normal_force_is_equation_1():
     # k d + lambda d dd/dt = 4000*1e-3 + 2e5*1e-3*0.01 = 4 + 2; 4 - 6 < 0: it does not pull.
-    assert normal_force(1e-3, 0.01, LAW) == pytest.approx(6.0, rel=1e-14)
-    assert normal_force(1e-3, -0.03, LAW) == 0.0
+    assert normal_force(1e-3, 0.01, NORMAL) == pytest.approx(6.0, rel=1e-14)
+    assert normal_force(1e-3, -0.03, NORMAL) == 0.0
 
 
 @pytest.mark.parametrize("velocity", [-0.02, 0.02])
@@ -67,7 +74,7 @@ def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
     ],
 )
 def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection, mode, after):
-    assert next_reset_mode(velocity, deflection, mode, P0) == after
+    assert next_reset_mode(velocity, deflection, mode, LAW) == after
 
 
 class RobotOnGround:
@@ -158,7 +165,7 @@ def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground):
 
 
 def test_the_margin_crosses_zero_at_a_mode_change(ground):
-    p0 = ground.ground.law["stiction_range"][0]
+    p0 = ResetConstants(*ground.ground.friction.constants).stiction_range
     ground.update(z=-1e-4)
 
     def margin(x: float = 0.0, z: float = -1e-4) -> float:
@@ -238,6 +245,6 @@ def test_normal_force_is_drakes_hunt_crossley_point_contact(scenario, structure,
     state = np.array([1.0, 0, 0, 0, 0, 0, radius - depth, 0, 0, 0, 0, 0, -rate])
     plant.GetMyMutableContextFromRoot(context).SetContinuousState(state)
     force = mass * diagram.EvalTimeDerivatives(context).CopyToVector()[12]
-    law = Law(*make_ground(scenario, structure).law[0].item())
+    law = NormalForce(*make_ground(scenario, structure).normal)
     expected = normal_force(depth, rate, law)
     assert force == pytest.approx(expected, rel=1e-9, abs=1e-12)

@@ -27,12 +27,8 @@ class Observer:
     """
 
     def __init__(self, scenario: Scenario, structure: Structure, model: Model) -> None:
-        bodies, cables = len(structure.bodies), len(structure.cables)
-        contacts, sizes = len(structure.contacts), dict.fromkeys(Tally._fields, 1)
-        sizes |= {"signals": structure.signals, "lengths": cables, "lifted": bodies}
-        values = empty_tally(scenario)
-        columns = (np.full(sizes[name], value) for name, value in values._asdict().items())
-        self._model, self._tally = model, Tally(*columns)
+        cables, contacts = len(structure.cables), len(structure.contacts)
+        self._model, self._tally = model, empty_tally(scenario, structure)
         self._modes = np.zeros((contacts, MODE_COLUMNS))
         self._forces = Forces(
             nodes=np.empty((len(structure.node_names), NODE_COLUMNS)),

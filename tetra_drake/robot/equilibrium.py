@@ -12,6 +12,7 @@ from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, ad
 from tetra_drake.physics.contact import (
     MODE_COLUMNS,
     Ground,
+    NormalForce,
     add_ground_forces,
     meet_ground,
     update_modes,
@@ -128,7 +129,7 @@ def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.nda
     """Displacements (6 n,) that bring the force to zero where the potential energy is convex, and
     lead downhill where it is not; the robot as a whole stays where it is."""
     stiffness, held = stiffness_at_rest(robot, state), _free_motions(robot, state)
-    hard, shift = robot.ground.law["stiffness"][0], 0.0
+    hard, shift = NormalForce(*robot.ground.normal).stiffness, 0.0
     stiffness = 0.5 * (stiffness + stiffness.T) + hard * held @ held.T
     while shift < np.inf:
         shifted = stiffness + shift * np.eye(len(force))

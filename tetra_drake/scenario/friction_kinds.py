@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from tetra_drake.physics.friction import CoulombConstants, FrictionLaw, ResetConstants
 from tetra_drake.scenario.sections import Kinds, Section, quantity, refuse
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -25,6 +26,10 @@ class ResetIntegrator(Section):
     """a_c."""
     proportional_stiction: float = quantity("N*s/m^2", ge=0)
     """sigma_0."""
+
+    def law(self) -> FrictionLaw:
+        """As kernels take it."""
+        return FrictionLaw.reset_integrator(ResetConstants(**dict(self)))
 
 
 class Coulomb(Section):
@@ -59,6 +64,20 @@ class Coulomb(Section):
         if self.kinetic > self.static:
             refuse("kinetic", f"found {self.kinetic}, expected at most static, {self.static}")
         return self
+
+    def law(self) -> FrictionLaw:
+        """As kernels take it."""
+        return FrictionLaw.coulomb(
+            CoulombConstants(
+                static=self.static,
+                kinetic=self.kinetic,
+                stiffness=self.stiffness,
+                damping=self.damping,
+                per_forward=1.0 / self.forward,
+                per_backward=1.0 / self.backward,
+                per_lateral=1.0 / self.lateral,
+            )
+        )
 
 
 Friction = Annotated[ResetIntegrator | Coulomb, Kinds()]

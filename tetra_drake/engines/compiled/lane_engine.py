@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import time
 from dataclasses import dataclass
@@ -27,25 +28,26 @@ from tetra_drake.engines.compiled.loop import (
     TIME,
     TRIED,
     WALKING,
-    LaneTables,
+    Constants,
     Log,
+    Walk,
     advance,
 )
 from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics.cable import PULL_COLUMNS, Cables
-from tetra_drake.physics.contact import MODE_COLUMNS, Ground, Law
+from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.physics.oscillator import NEURON_COLUMNS, Network, make_neurons
+from tetra_drake.physics.oscillator import make_neurons
 from tetra_drake.physics.tally import Tally
-from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.physics.terrain import FRAME_COLUMNS, SurfaceGrid
 from tetra_drake.results.metrics import Totals, empty_tally
 from tetra_drake.results.result import result_times
 from tetra_drake.results.trajectory import sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.ground import starting_modes
-from tetra_drake.robot.model import JUNCTION_CABLES, Body, Model, make_model
+from tetra_drake.robot.model import JUNCTION_CABLES, Model, make_model
 from tetra_drake.robot.network import (
     SteeringSignal,
     initial_neurons,
@@ -59,7 +61,8 @@ from tetra_drake.robot.structure import MakeStructure, Structure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
-_INDICES = 3  # the first fields of Senses, which lanes share
+FIRST = SurfaceGrid._fields.index("first")
+"""Where a grid has the index of its first height: those of all lanes stand in one row."""
 
 
 @dataclass(frozen=True)
@@ -121,13 +124,18 @@ class PreparedGait:
             drivers,
             self.live,
             ground.flat,
-            ground.coulomb,
+            ground.friction.kind,
         )
 
     @property
     def live(self) -> bool:
         """Whether the network is integrated with the robot."""
         return self.scenario.cpg.signals == "live"
+
+    @functools.cached_property
+    def turns(self) -> np.ndarray:
+        """See sample_turns(); raises InputError as it does."""
+        return sample_turns(self.scenario, self.structure, self.gait, self.steering)
 
     @property
     def recent_signals(self) -> int:
@@ -167,11 +175,18 @@ class LaneEngine:
     def __init__(self, first: PreparedGait, *, width: int) -> None:
         """For gaits like the first; see `accepts`. Compiles the engine where that is not done."""
         self._kind = first.kind
-        robot, self._robot_tables = _lane_model(first.model, width)
-        self._heights = robot.ground.heights.array.reshape(width, -1)
-        self._tables = _zeros(first, robot, width)
-        structure = first.structure
+        structure, points = first.structure, first.model.ground.heights.size
         self._bodies = len(structure.bodies)
+        self._heights = np.zeros((width, points))
+        constants = in_lanes(make_constants(first), width)
+        ground = constants.robot.ground._replace(heights=FieldArray(self._heights.ravel()))
+        shape = constants.network.inhibition.shape
+        inhibition = lane_table(shape, width, any_size=True)  # compiled once for robots of any size
+        self._constants = constants._replace(
+            robot=constants.robot._replace(ground=ground),
+            network=constants.network._replace(inhibition=inhibition),
+        )
+        self._walk = in_lanes(start_walk(first), width)
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
             marks=np.full((width, 5), math.inf),
@@ -185,9 +200,9 @@ class LaneEngine:
             turns=np.zeros((width, first.turn_samples)),
         )
         log = Log(*(FieldArray(array, any_size=True) for array in self._log))
-        self._arguments = self._tables, log, first.live
+        self._arguments = self._constants, self._walk, log, first.live
         # Called without looking for the types of all these tables each time.
-        kinds = tuple(typeof(each) for each in (*self._arguments, 0))
+        kinds = tuple(typeof(argument) for argument in (*self._arguments, 0))
         self._advance = advance.compile(kinds)  # type: ignore[attr-defined]
         self._in_lane: list[PreparedGait | None] = [None] * width
         self._wall_times = [0.0] * width
@@ -214,54 +229,36 @@ class LaneEngine:
 
     def load(self, lane: int, prepared: PreparedGait) -> None:
         """Starts a gait in a lane; raises InputError if it does not fit its scenario."""
-        scenario, model, structure = prepared.scenario, prepared.model, prepared.structure
-        gait, start = prepared.gait, structure.initial_state
-        modes = starting_modes(structure, model.ground)
-        cpg, simulation, compiled = scenario.cpg, scenario.simulation, scenario.compiled
-        network = make_network(scenario, structure, gait)
-        senses, turns = prepared.senses, sample_turns(scenario, structure, gait, prepared.steering)
-        numbers: dict[str, Any] = dict(compiled)
-        numbers |= {"max_speed": MAX_SPEED, "max_evaluations": simulation.max_evaluations}
-        numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
-        numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
-        numbers["neurons"] = make_neurons(initial_neurons(cpg, scenario.oscillators))
-        numbers["external_input"] = cpg.external_input
-        numbers["gains"] = [gain for _, gain in gait.gains]
-        numbers["sides"] = np.repeat(structure.actuation.sides, 2)
-        numbers["tonic"] = tonic_input(scenario, structure, turns)[0]
-        for name, values in numbers.items():
-            getattr(self._tables, name).array[..., lane] = values
-        for table, value in zip(self._tables.tally, empty_tally(scenario), strict=True):
-            table.array[..., lane] = value
-        first, beyond, *tables = self._tables.network
-        first.array[:] = np.minimum(first.array, network.first)  # so that they hold for all lanes
-        beyond.array[:] = np.maximum(beyond.array, network.beyond)
-        tables += [*self._robot_tables, *self._tables.senses[_INDICES:]]
-        constants = *network[2:], *_numbers(model), *senses[_INDICES:]
-        for table, values in zip(tables, constants, strict=True):
-            table.array[..., lane] = values
-        heights = self._heights[lane]
-        heights[: model.ground.heights.size] = model.ground.heights
-        self._tables.robot.ground.law.first.array[0, lane] = lane * heights.size
-        self._tables.step.state.array[:, lane] = start
+        constants, walk = make_constants(prepared), start_walk(prepared)
+        fill_lane(self._constants, constants, lane)
+        fill_lane(self._walk, walk, lane)
+        network, given = self._constants.network, constants.network
+        # So that they hold for all lanes.
+        network.first.array[:] = np.minimum(network.first.array, given.first)
+        network.beyond.array[:] = np.maximum(network.beyond.array, given.beyond)
+        heights = prepared.model.ground.heights
+        self._heights[lane, : heights.size] = heights
+        self._constants.robot.ground.grid.array[FIRST, lane] = lane * self._heights.shape[1]
 
-        log, clock = self._log, self._tables.clock.array
+        log, clock = self._log, self._walk.clock.array
+        turns = prepared.turns
         log.times[lane] = log.marks[lane] = math.inf
         log.times[lane, : len(prepared.times)] = prepared.times
         log.marks[lane, : len(prepared.marks)] = prepared.marks
         log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
-        log.states[lane, 0], log.modes[lane, 0], log.signals[lane, 0] = start, modes, 0.0
+        log.states[lane, 0], log.modes[lane, 0] = walk.step.state, walk.modes
+        log.signals[lane, 0] = 0.0
         log.kept[lane], log.passed[lane] = 1, 0
-        clock[:, lane] = 0.0
-        first_step = min(compiled.look_ahead, compiled.max_step)
-        clock[STATUS, lane], clock[STEP, lane] = WALKING, first_step
+        compiled = prepared.scenario.compiled
+        clock[STATUS, lane] = WALKING
+        clock[STEP, lane] = min(compiled.look_ahead, compiled.max_step)
         clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
         self._in_lane[lane], self._wall_times[lane] = prepared, 0.0
 
     def stop(self, lane: int) -> float:
         """Takes the gait out of a lane, wherever it is; returns what it cost, in s."""
         self._in_lane[lane] = None
-        self._tables.clock.array[STATUS, lane] = IDLE
+        self._walk.clock.array[STATUS, lane] = IDLE
         return self._wall_times[lane]
 
     def advance(self, body_steps: int) -> list[tuple[int, PreparedGait, Course]]:
@@ -275,13 +272,13 @@ class LaneEngine:
         ended = []
         for lane, prepared in busy:
             self._wall_times[lane] += share
-            if self._tables.clock.array[STATUS, lane] != WALKING:
+            if self._walk.clock.array[STATUS, lane] != WALKING:
                 ended.append((lane, prepared, self._course(lane)))
                 self.stop(lane)
         return ended
 
     def _course(self, lane: int) -> Course:
-        clock, log = self._tables.clock.array[:, lane], self._log
+        clock, log = self._walk.clock.array[:, lane], self._log
         kept = slice(log.kept[lane])
         return Course(
             status=int(clock[STATUS]),
@@ -292,7 +289,7 @@ class LaneEngine:
             states=log.states[lane, kept].copy(),
             modes=log.modes[lane, kept].copy(),
             signals=log.signals[lane, kept].copy(),
-            totals=Totals.of(Tally(*(t.array[..., lane] for t in self._tables.tally))),
+            totals=Totals.of(Tally(*(t.array[..., lane] for t in self._walk.tally))),
             wall_time=self._wall_times[lane],
         )
 
@@ -314,94 +311,88 @@ def processor_features() -> str:
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
 
 
-def _numbers(model: Model) -> list[np.ndarray]:
-    """The arrays of a model that differ between scenarios, in the order of its lane tables."""
-    cables = [model.cables[name] for name in Cables._fields[3:]]
-    law = [model.ground.law[name] for name in Law._fields]
-    return [model.p_BN, *cables, *law, *model.body]
-
-
-def _lane_model(model: Model, width: int) -> tuple[Model, list[FieldArray]]:
-    """The model in lanes, and those of its tables that differ between scenarios."""
-    tables = [lane_table(values.shape, width) for values in _numbers(model)]
-    rest = iter(tables)
-    p_BN = next(rest)
-    indices = [FieldArray(model.cables[name].copy()) for name in Cables._fields[:3]]
-    lanes = Model(
-        p_BN=p_BN,
-        cables=Cables(*indices, *(next(rest) for _ in Cables._fields[3:])),
-        ground=Ground(
-            contacts=FieldArray(model.ground.contacts.copy()),
-            law=Law(*(next(rest) for _ in Law._fields)),  # type: ignore[arg-type]
-            heights=FieldArray(np.zeros(width * model.ground.heights.size)),
-            flat=model.ground.flat,
-            coulomb=model.ground.coulomb,
-        ),
-        body=Body(*(next(rest) for _ in Body._fields)),
-        slack=model.slack,
+def make_constants(prepared: PreparedGait) -> Constants:
+    """The constants of one simulation, as arrays without lanes; of the ground without heights."""
+    scenario, structure, gait = prepared.scenario, prepared.structure, prepared.gait
+    cpg, model, compiled = scenario.cpg, prepared.model, scenario.compiled
+    cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
+    ground = model.ground._replace(heights=None)  # of which lanes have different numbers
+    return Constants(
+        robot=model._replace(cables=cables, ground=ground),
+        network=make_network(scenario, structure, gait),
+        senses=prepared.senses,
+        sides=np.repeat(structure.actuation.sides, 2).astype(float),
+        external_input=np.array([cpg.external_input]),
+        gains=np.array([gain for _, gain in gait.gains]),
+        gain=np.array([cpg.gain]),
+        period=np.array([cpg.listing_step]),
+        samples=np.array([sample_count(scenario)], dtype=float),
+        start_up=np.array([cpg.start_up]),
+        tolerance=np.array([compiled.tolerance]),
+        max_step=np.array([compiled.max_step]),
+        look_ahead=np.array([compiled.look_ahead]),
+        max_speed=np.array([MAX_SPEED]),
+        max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
     )
-    return lanes, tables
 
 
-def _zeros(first: PreparedGait, robot: Model, width: int) -> LaneTables:
-    """The tables of gaits like the first, zeros."""
-    structure, senses = first.structure, first.senses
+def start_walk(prepared: PreparedGait) -> Walk:
+    """The state of one simulation at its start, and room for what is computed on the way, as arrays
+    without lanes."""
+    scenario, structure = prepared.scenario, prepared.structure
     bodies, signals = len(structure.bodies), structure.signals
-    contacts, size, neurons = len(structure.contacts), BLOCK * bodies, 2 * signals
+    contacts, cables = len(structure.contacts), len(structure.cables)
+    velocities = np.zeros(BLOCK * bodies)
+    return Walk(
+        clock=np.zeros(CLOCK_ROWS),
+        step=Step(
+            state=structure.initial_state,
+            end=np.zeros(13 * bodies),
+            force=velocities,
+            end_force=velocities,
+            change=velocities,
+            stage=velocities,
+            k1=velocities,
+            k2=velocities,
+            rows=np.zeros((bodies, BLOCK, ROW)),
+            lines=np.zeros((JUNCTION_CABLES, 9)),
+        ),
+        forces=Forces(
+            nodes=np.zeros((len(structure.node_names), NODE_COLUMNS)),
+            frames=np.zeros((contacts, FRAME_COLUMNS)),
+            pulls=np.zeros((cables, PULL_COLUMNS)),
+            pushes=np.zeros((contacts, 3)),
+        ),
+        modes=starting_modes(structure, prepared.model.ground),
+        acceleration=velocities,
+        signals=np.zeros(signals),
+        end_signals=np.zeros(signals),
+        neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
+        output=np.zeros(signals),
+        tonic=tonic_input(scenario, structure, prepared.turns)[0],
+        inputs=np.zeros(2 * signals),
+        lengths=np.zeros(cables),
+        normal_forces=np.zeros(contacts),
+        tally=empty_tally(scenario, structure),
+    )
 
-    def table(*shape: int) -> FieldArray:
-        return lane_table(shape, width)
 
-    vectors = {name: table(size) for name in ("force", "end_force", "change", "stage", "k1", "k2")}
-    tables: dict[str, Any] = {name: table(1) for name in LaneTables._fields}
-    tables |= {name: table(signals) for name in ("output", "signals", "end_signals")}
-    tables |= {
-        "robot": robot,
-        "network": Network(
-            first=FieldArray(np.full(neurons, neurons)),
-            beyond=FieldArray(np.zeros(neurons, dtype=np.int64)),
-            inhibition=lane_table((neurons, neurons), width, any_size=True),
-            per_tau_a=table(neurons),
-            per_tau_b=table(neurons),
-            self_inhibition_weight=table(neurons),
-        ),
-        "senses": Senses(
-            *(FieldArray(indices.copy()) for indices in senses[:_INDICES]),
-            *(table(len(numbers)) for numbers in senses[_INDICES:]),
-        ),
-        "neurons": table(neurons, NEURON_COLUMNS),
-        "gains": table(3),
-        "sides": table(neurons),
-        "tonic": table(neurons),
-        "inputs": table(neurons),
-        "lengths": table(len(structure.cables)),
-        "normal_forces": table(contacts),
-        "clock": table(CLOCK_ROWS),
-        "modes": table(contacts, MODE_COLUMNS),
-        "acceleration": table(size),
-        "step": Step(
-            state=table(13 * bodies),
-            end=table(13 * bodies),
-            rows=table(bodies, BLOCK, ROW),
-            lines=table(JUNCTION_CABLES, 9),
-            **vectors,
-        ),
-        "forces": Forces(
-            nodes=table(len(structure.node_names), NODE_COLUMNS),
-            frames=table(contacts, FRAME_COLUMNS),
-            pulls=table(len(structure.cables), PULL_COLUMNS),
-            pushes=table(contacts, 3),
-        ),
-        "tally": Tally(
-            begins=table(1),
-            time=table(1),
-            signals=table(signals),
-            lengths=table(len(structure.cables)),
-            work=table(1),
-            roughness=table(1),
-            lifted=table(bodies),
-            tension=table(1),
-            clearance=table(1),
-        ),
-    }
-    return LaneTables(**tables)
+def in_lanes(values: Any, width: int) -> Any:
+    """A table in lanes for each array of real numbers in NamedTuples, zeros. Arrays of indices are
+    for all lanes; what is no array stays."""
+    if isinstance(values, tuple):
+        return type(values)(*(in_lanes(value, width) for value in values))
+    if not isinstance(values, np.ndarray):
+        return values
+    return (
+        FieldArray(values.copy()) if values.dtype == np.int64 else lane_table(values.shape, width)
+    )
+
+
+def fill_lane(tables: Any, values: Any, lane: int) -> None:
+    """Writes the real numbers in NamedTuples into a lane of such tables."""
+    if isinstance(values, tuple):
+        for table, value in zip(tables, values, strict=True):
+            fill_lane(table, value, lane)
+    elif isinstance(values, np.ndarray) and values.dtype == np.float64:
+        tables.array[..., lane] = values
