@@ -122,23 +122,6 @@ def test_contact_never_gives_energy(scenario, friction):
     assert lost > 0.5 * 5 * body.mass[0] * gravity * 0.005
 
 
-def test_on_a_rough_grid_without_relief_the_robot_walks_as_on_flat_ground(scenario):
-    # The same forces, by frames whose axes are World's.
-    changes = {
-        "simulation.duration": "2.0 s",
-        "simulation.engine": "compiled",
-        "cpg.start_up": "0.1 s",
-    }
-    flat = scenario.with_changes({**changes, "simulation.steady_from": "1.0 s"})
-    for friction in (scenario.friction, FIRM):
-        both = [
-            flat.with_changes({"terrain": t, "friction": friction})
-            for t in (Flat(), Rough(amplitude=0.0, wavelength=1.0))
-        ]
-        first, second = simulate_many(scenario=both, gaits=[seeded_gait(flat)] * 2)
-        assert second.metrics.distance == pytest.approx(first.metrics.distance, abs=1e-9)
-
-
 def test_the_robot_stands_on_what_is_under_it(scenario):
     # Settled on rough ground: contacts press by their depth, and together bear the weight.
     times = {
