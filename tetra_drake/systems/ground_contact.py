@@ -18,6 +18,7 @@ from pydrake.systems.framework import (
 from tetra_drake.physics.contact import (
     MODE_COLUMNS,
     STICK_POINT,
+    ground_arguments,
     ground_forces,
     modes_after_step,
 )
@@ -57,6 +58,7 @@ class GroundContact(LeafSystem):
         """Raises InputError as make_ground does."""
         super().__init__()
         self._p_BN, self._ground = structure.p_BN, make_ground(scenario, structure)
+        self._ground_arguments = ground_arguments(self._ground)
         bodies, count = len(structure.bodies), len(structure.contacts)
         # Room for the kernels, which write what they need of it at every call.
         self._nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
@@ -137,7 +139,7 @@ class GroundContact(LeafSystem):
             self._state.Eval(context),
             self._modes(context),
             self._p_BN,
-            *self._ground,
+            *self._ground_arguments,
             self._nodes,
             self._frames,
             self._pushes,
