@@ -6,7 +6,7 @@ import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.physics.cable import PULL_COLUMNS
-from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.contact import MODE_COLUMNS, PUSH_COLUMNS, update_modes
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.physics.terrain import FRAME_COLUMNS
@@ -34,7 +34,7 @@ class Observer:
             nodes=np.empty((len(structure.node_names), NODE_COLUMNS)),
             frames=np.empty((contacts, FRAME_COLUMNS)),
             pulls=np.empty((cables, PULL_COLUMNS)),
-            pushes=np.empty((contacts, 3)),
+            pushes=np.empty((contacts, PUSH_COLUMNS)),
         )
         self._waiting: list[tuple[float, np.ndarray, np.ndarray]] = []
 

@@ -45,6 +45,10 @@ CONTACT, MODE, STICK_POINT, HEADING, MODE_COLUMNS = 0, 1, 3, 6, 8
 """Columns of `modes`: contact (0 or 1), mode (along t1, t2), stick point (x, y, z) in m, heading
 (along t1, t2); and their number."""
 
+FRICTION_1, FRICTION_2, NORMAL, PUSH_COLUMNS = range(4)
+"""Columns of `pushes`, (contacts, 3), the forces of the ground: friction along t1 and t2, normal
+force (N); and their number."""
+
 
 class NormalForce(NamedTuple):
     """The constants of the normal force (Table 1), SI."""
@@ -121,21 +125,21 @@ def add_ground_forces(
 ) -> None:
     """Adds the forces of the ground to those on the `nodes` of `kinematics`.
 
-    `modes` is (contacts, MODE_COLUMNS). With `keep`, writes `pushes`, (contacts, 3): friction along
-    t1 and t2, normal force.
+    `modes` is (contacts, MODE_COLUMNS). With `keep`, writes `pushes`.
     """
     law = named(NormalForce, ground.normal)
     for i in range(pushes.shape[0]):
         node, touches = ground.contacts[i], modes[i, CONTACT] != 0.0
         if not any_lane(touches | (gap(nodes, ground, frames, i) <= 0.0)):
             if keep:
-                pushes[i, 0] = pushes[i, 1] = pushes[i, 2] = 0.0
+                pushes[i, FRICTION_1] = pushes[i, FRICTION_2] = pushes[i, NORMAL] = 0.0
             continue
         slide, _ = sliding(nodes, modes, ground, law, frames, i)
         f_1, f_2 = friction_force(slide, ground.friction)
         f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
         if keep:
-            pushes[i, 0], pushes[i, 1], pushes[i, 2] = f_1, f_2, slide.normal
+            pushes[i, FRICTION_1], pushes[i, FRICTION_2] = f_1, f_2
+            pushes[i, NORMAL] = slide.normal
         f_x, f_y, f_z = to_world(f_1, f_2, slide.normal, frames, i, ground.flat)
         nodes[node, FORCE] += f_x
         nodes[node, FORCE + 1] += f_y

@@ -11,6 +11,7 @@ from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
 from tetra_drake.physics.cable import DIRECTION, add_cable_forces
 from tetra_drake.physics.contact import (
     CONTACT,
+    NORMAL,
     Ground,
     NormalForce,
     add_ground_forces,
@@ -197,7 +198,7 @@ def add_contact(
     k_1, k_12, k_2 = friction_damping(slide, time, ground.friction)
     k_1, k_2 = select(touches, k_1, 0.0), select(touches, k_2, 0.0)
     k_12 = select(touches, k_12, 0.0)
-    presses = touches & (forces.pushes[i, 2] > 0.0)
+    presses = touches & (forces.pushes[i, NORMAL] > 0.0)
     k_n = select(presses, time * (law.damping * depth + time * law.stiffness), 0.0)
     body = node // (nodes.shape[0] // rows.shape[0])
     # The columns of the matrix in World, and from the frame's: R K, then (R K) Rᵀ.

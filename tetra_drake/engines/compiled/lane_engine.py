@@ -36,7 +36,7 @@ from tetra_drake.engines.compiled.loop import (
 from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics.cable import PULL_COLUMNS, Cables
-from tetra_drake.physics.contact import MODE_COLUMNS
+from tetra_drake.physics.contact import MODE_COLUMNS, PUSH_COLUMNS
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.oscillator import make_neurons
@@ -361,7 +361,7 @@ def start_walk(prepared: PreparedGait) -> Walk:
             nodes=np.zeros((len(structure.node_names), NODE_COLUMNS)),
             frames=np.zeros((contacts, FRAME_COLUMNS)),
             pulls=np.zeros((cables, PULL_COLUMNS)),
-            pushes=np.zeros((contacts, 3)),
+            pushes=np.zeros((contacts, PUSH_COLUMNS)),
         ),
         modes=starting_modes(structure, prepared.model.ground),
         acceleration=velocities,

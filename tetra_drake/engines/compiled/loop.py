@@ -22,7 +22,7 @@ from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
 from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.cable import LENGTH
-from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.feedback import Senses, sense
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
@@ -330,7 +330,7 @@ def feel(constants: Constants, walk: Walk, log: Log, time: Real, state: Table) -
     for i in range(walk.lengths.size):
         walk.lengths[i] = walk.forces.pulls[i, LENGTH]
     for i in range(walk.normal_forces.size):
-        walk.normal_forces[i] = walk.forces.pushes[i, 2]
+        walk.normal_forces[i] = walk.forces.pushes[i, NORMAL]
     sense(constants.senses, constants.gains, state, walk.lengths, walk.normal_forces, walk.inputs)
     for i in range(walk.inputs.size):
         walk.inputs[i] += walk.tonic[i]
