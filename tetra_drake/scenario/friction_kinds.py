@@ -1,12 +1,19 @@
-"""Kinds of friction and their constants."""
+"""Kinds of friction and their constants.
 
-from typing import Annotated
+The kernels of each, which need numba, are imported only where a law is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
-from tetra_drake.physics.friction import CoulombConstants, FrictionLaw, ResetConstants
 from tetra_drake.scenario.sections import Kinds, Section, quantity, refuse
 from tetra_drake.scenario.units import INCH, POUND_FORCE
+
+if TYPE_CHECKING:
+    from tetra_drake.physics.friction import FrictionLaw
 
 
 class ResetIntegrator(Section):
@@ -29,6 +36,8 @@ class ResetIntegrator(Section):
 
     def law(self) -> FrictionLaw:
         """As kernels take it."""
+        from tetra_drake.physics.friction import FrictionLaw, ResetConstants
+
         return FrictionLaw.reset_integrator(ResetConstants(**dict(self)))
 
 
@@ -60,13 +69,15 @@ class Coulomb(Section):
     """Factor on mu for sideways slip."""
 
     @model_validator(mode="after")
-    def _check(self) -> "Coulomb":
+    def _check(self) -> Coulomb:
         if self.kinetic > self.static:
             refuse("kinetic", f"found {self.kinetic}, expected at most static, {self.static}")
         return self
 
     def law(self) -> FrictionLaw:
         """As kernels take it."""
+        from tetra_drake.physics.friction import CoulombConstants, FrictionLaw
+
         return FrictionLaw.coulomb(
             CoulombConstants(
                 static=self.static,
