@@ -80,7 +80,7 @@ def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, heigh
 @pytest.mark.parametrize("engine", ["compiled", "drake"])
 def test_an_incline_is_flat_ground_under_a_rotated_gravity(scenario, friction, engine):
     slope, friction = np.radians(8.0), scenario.friction if friction == "reset" else friction
-    short = shortly(scenario, 0.3, friction=friction)
+    short = shortly(scenario, 0.3, friction=friction, engine=CONVERGED["drake"])
     inclined = short.with_changes({"terrain": Incline(slope=slope)})
     up_the_slope = trajectory(inclined, CONVERGED[engine])["p_WN"].values[-1].reshape(-1, 3)
 
@@ -120,23 +120,6 @@ def test_contact_never_gives_energy(scenario, friction):
     lost = energy[0] - energy[-1]
     assert np.diff(energy).max() < 1e-4 * lost
     assert lost > 0.5 * 5 * body.mass[0] * gravity * 0.005
-
-
-def test_on_a_rough_grid_without_relief_the_robot_walks_as_on_flat_ground(scenario):
-    # The same forces, by frames whose axes are World's.
-    changes = {
-        "simulation.duration": "2.0 s",
-        "engine": "!Compiled",
-        "cpg.start_up": "0.1 s",
-    }
-    flat = scenario.with_changes({**changes, "simulation.steady_from": "1.0 s"})
-    for friction in (scenario.friction, FIRM):
-        both = [
-            flat.with_changes({"terrain": t, "friction": friction})
-            for t in (Flat(), Rough(amplitude=0.0, wavelength=1.0))
-        ]
-        first, second = simulate_many(scenario=both, gaits=[seeded_gait(flat)] * 2)
-        assert second.metrics.distance == pytest.approx(first.metrics.distance, abs=1e-9)
 
 
 def test_the_robot_stands_on_what_is_under_it(scenario):

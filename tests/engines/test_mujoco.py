@@ -17,7 +17,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import MUJOCO_FRICTION, Compiled, Mujoco
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
+from tetra_drake.scenario.terrain_kinds import Incline, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 needs_mujoco = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
@@ -131,14 +131,6 @@ def test_where_mujoco_starts_again_the_simulation_has_failed_when_it_did(short):
     assert caught.value.time == pytest.approx(short.cpg.start_up, abs=2.5 * step)
 
 
-@pytest.mark.parametrize(("installed", "key"), [(True, "cables.slack"), (False, "engine")])
-def test_what_mujoco_cannot_simulate_is_refused(short, installed, key, monkeypatch):
-    monkeypatch.setattr(engine, "installed", lambda: installed)
-    with pytest.raises(InputError) as caught:
-        simulate(scenario=short.with_changes({"cables.slack": True}), gait=seeded_gait(short))
-    assert caught.value.key == key
-
-
 @needs_mujoco
 @pytest.mark.parametrize("workers", [1, 2])
 def test_many_gaits_walk_as_each_alone(short, workers, monkeypatch):
@@ -180,20 +172,6 @@ def test_the_command_simulate_takes_the_engine(tmp_path):
     found = json.loads((out / "result.json").read_text())
     assert found["engine"] == "mujoco" and "mujoco" in found["versions"]
     assert {"trajectory.nc", "replay.html"} <= {path.name for path in out.iterdir()}
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("static", 0.6), ("stiffness", 1e3), ("forward", 0.5), ("backward", 0.5), ("lateral", 2.0)],
-)
-def test_coulomb_friction_that_mujoco_has_not_is_refused(short, name, value, monkeypatch):
-    monkeypatch.setattr(engine, "installed", lambda: True)
-    with pytest.raises(InputError) as caught:
-        simulate(
-            scenario=short.with_changes({"friction": Coulomb(**{name: value})}),
-            gait=seeded_gait(short),
-        )
-    assert caught.value.key == f"friction.{name}"
 
 
 @needs_mujoco
@@ -248,16 +226,29 @@ def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
 
 
 @pytest.mark.parametrize(
-    "terrain",
+    ("key", "value"),
     [
-        Steps(height=INCH, depth=6.0 * INCH, count=2),
-        Incline(slope=0.1, start=3.0 * INCH),
-        Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
+        ("cables.slack", True),
+        ("friction.static", 0.6),
+        ("friction.stiffness", 1e3),
+        ("friction.forward", 0.5),
+        ("friction.backward", 0.5),
+        ("friction.lateral", 2.0),
+        ("terrain", Steps(height=INCH, depth=6.0 * INCH, count=2)),
+        ("terrain", Incline(slope=0.1, start=3.0 * INCH)),
     ],
-    ids=["steps", "incline with a start", "rough"],
 )
-def test_ground_that_is_no_plane_is_refused(short, terrain, monkeypatch):
+def test_what_mujoco_cannot_simulate_is_refused(short, key, value, monkeypatch):
     monkeypatch.setattr(engine, "installed", lambda: True)
+    section, _, name = key.partition(".")
+    changes = {"friction": Coulomb(**{name: value})} if section == "friction" else {key: value}
     with pytest.raises(InputError) as caught:
-        simulate(scenario=short.with_changes({"terrain": terrain}), gait=seeded_gait(short))
-    assert caught.value.key == "terrain"
+        simulate(scenario=short.with_changes(changes), gait=seeded_gait(short))
+    assert caught.value.key == key
+
+
+def test_without_mujoco_its_engine_is_refused(short, monkeypatch):
+    monkeypatch.setattr(engine, "installed", lambda: False)
+    with pytest.raises(InputError) as caught:
+        simulate(scenario=short, gait=seeded_gait(short))
+    assert caught.value.key == "engine"

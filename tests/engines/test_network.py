@@ -86,15 +86,6 @@ def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
 
 
 @BOTH
-def test_without_a_turn_a_mirrored_network_walks_straight_on(engine):
-    scenario = load_scenario("turning").with_changes({"gait_bounds.turn": 0.0})
-    scenario = shortly(scenario, 1.0)
-    walked = walk(scenario, seeded_gait(scenario), engine)
-    np.testing.assert_allclose(mirrored(walked), walked.p_WN.values, atol=1e-8)
-    assert np.ptp(walked.signal.values) > 1.0
-
-
-@BOTH
 def test_zero_gains_give_the_walk_without_feedback(scenario, engine):
     blind = shortly(scenario, 1.0, cpg__signals="live")
     senses = blind.with_changes({"cpg.feedback": list(PATHWAYS)})

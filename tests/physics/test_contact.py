@@ -13,27 +13,34 @@ from tetra_drake.physics.contact import (
     MODE,
     MODE_COLUMNS,
     STICK_POINT,
-    Law,
+    NormalForce,
     add_ground_forces,
     normal_force,
     update_modes,
 )
-from tetra_drake.physics.friction import STICK, next_reset_mode, reset_force
+from tetra_drake.physics.friction import (
+    STICK,
+    ResetConstants,
+    first_zero,
+    next_reset_mode,
+    reset_force,
+)
 from tetra_drake.physics.kinematics import FORCE, NODE_COLUMNS
-from tetra_drake.physics.mode_change import first_zero, mode_margin, time_to_mode_change
+from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.schema import Scenario
 
 P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0
-LAW = Law(4000.0, 2e5, P0, SIGMA_1, A_C, SIGMA_0, *[0.0] * (len(Law._fields) - 6))
+LAW = ResetConstants(P0, SIGMA_1, A_C, SIGMA_0)
+NORMAL = NormalForce(stiffness=4000.0, damping=2e5)
 
 
 def test_normal_force_is_equation_1():
     # k d + lambda d dd/dt = 4000*1e-3 + 2e5*1e-3*0.01 = 4 + 2; 4 - 6 < 0: it does not pull.
-    assert normal_force(1e-3, 0.01, LAW) == pytest.approx(6.0, rel=1e-14)
-    assert normal_force(1e-3, -0.03, LAW) == 0.0
+    assert normal_force(1e-3, 0.01, NORMAL) == pytest.approx(6.0, rel=1e-14)
+    assert normal_force(1e-3, -0.03, NORMAL) == 0.0
 
 
 @pytest.mark.parametrize("velocity", [-0.02, 0.02])
@@ -67,7 +74,7 @@ def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
     ],
 )
 def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection, mode, after):
-    assert next_reset_mode(velocity, deflection, mode, P0) == after
+    assert next_reset_mode(velocity, deflection, mode, LAW) == after
 
 
 class RobotOnGround:
@@ -92,13 +99,8 @@ class RobotOnGround:
         """The nodes in that state."""
         return moved_nodes(self.structure, self.state(**change))
 
-    def update(self, **change: float) -> np.ndarray:
-        """The modes updated in that state."""
-        self.changes(**change)
-        return self.modes
-
-    def changes(self, **change: float) -> bool:
-        """Whether the modes have changed in that state."""
+    def update(self, **change: float) -> bool:
+        """Brings the modes up to date with that state; whether they changed."""
         return update_modes(self.state(**change), self.nodes(**change), *self.args, self.modes)
 
     def margin(self, state: np.ndarray) -> float:
@@ -113,43 +115,36 @@ def ground(structure: Structure, scenario: Scenario) -> RobotOnGround:
 
 
 def test_a_node_that_lands_sticks_where_it_lands(ground):
-    assert not ground.update(z=1e-3)[:, CONTACT].any()
-    modes = ground.update(x=0.02, z=-1e-5, v_x=0.1)
+    ground.update(z=1e-3)
+    modes = ground.modes
+    assert not modes[:, CONTACT].any()
+    ground.update(x=0.02, z=-1e-5, v_x=0.1)
     assert modes[:-1, CONTACT].all()
     assert modes[-1, CONTACT] == 0.0, "the tip of the lead tetrahedron is off the ground"
     assert (modes[:, MODE : MODE + 2] == STICK).all()
     assert modes[0, STICK_POINT] == pytest.approx(0.02, abs=1e-15)
 
 
-def test_a_node_that_sticks_again_does_so_where_it_is(ground):
-    for x, v_x, mode, stick_point in [
-        (0.0, 0.1, STICK, 0.0),  # lands
-        (1e-3, 0.1, 1.0, 0.0),  # has gone ten stiction ranges: broken free
-        (5e-3, 0.1, 1.0, 0.0),  # slips on
-        (6e-3, -0.1, STICK, 6e-3),  # the reset: deflection 0 here
+def test_a_node_that_sticks_again_does_so_where_it_is_and_changes_are_told(ground):
+    assert not ground.update(z=1e-3), "in the air"
+    for x, v_x, mode, stick_point, changed in [
+        (0.0, 0.1, STICK, 0.0, True),  # lands
+        (0.0, 0.1, STICK, 0.0, False),
+        (1e-3, 0.1, 1.0, 0.0, True),  # has gone ten stiction ranges: broken free
+        (5e-3, 0.1, 1.0, 0.0, False),  # slips on
+        (6e-3, -0.1, STICK, 6e-3, True),  # the reset: deflection 0 here
     ]:
-        modes = ground.update(x=x, z=-1e-5, v_x=v_x)
-        assert modes[0, MODE] == mode
-        assert modes[0, STICK_POINT] == pytest.approx(stick_point, abs=1e-15)
-        assert modes[0, MODE + 1] == STICK, "the sideways axis is on its own"
-
-
-def test_an_update_tells_whether_a_mode_has_changed(ground):
-    for change, expected in [
-        ({"z": 1e-3}, False),
-        ({"z": -1e-5}, True),  # lands
-        ({"z": -1e-5}, False),
-        ({"z": -1e-5, "x": 1e-3, "v_x": 0.1}, True),  # breaks free
-        ({"z": -1e-5, "x": 2e-3, "v_x": 0.1}, False),
-        ({"z": -1e-5, "x": 2e-3, "v_x": -0.1}, True),  # sticks
-        ({"z": 1e-3}, True),
-    ]:
-        assert ground.changes(**change) == expected, change
+        assert ground.update(x=x, z=-1e-5, v_x=v_x) == changed
+        assert ground.modes[0, MODE] == mode
+        assert ground.modes[0, STICK_POINT] == pytest.approx(stick_point, abs=1e-15)
+        assert ground.modes[0, MODE + 1] == STICK, "the sideways axis is on its own"
+    assert ground.update(z=1e-3), "leaves the ground"
 
 
 def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground):
     ground.modes[:, CONTACT] = ground.modes[:, MODE] = 1.0
-    modes = ground.update(z=1e-3, v_x=0.1)
+    ground.update(z=1e-3, v_x=0.1)
+    modes = ground.modes
     assert not modes[:, : MODE + 2].any()
     nodes, pushes = ground.nodes(z=1e-3, v_x=0.1), np.full((len(modes), 3), np.nan)
     add_ground_forces(nodes, modes, *ground.args, True, pushes)
@@ -158,7 +153,7 @@ def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(ground):
 
 
 def test_the_margin_crosses_zero_at_a_mode_change(ground):
-    p0 = ground.ground.law["stiction_range"][0]
+    p0 = ResetConstants(*ground.ground.friction.constants).stiction_range
     ground.update(z=-1e-4)
 
     def margin(x: float = 0.0, z: float = -1e-4) -> float:
@@ -171,7 +166,8 @@ def test_the_margin_crosses_zero_at_a_mode_change(ground):
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("mode", [-1.0, 1.0])
 def test_the_margin_of_a_slipping_node_is_its_speed_that_way(ground, axis, mode):
-    ground.update(z=-1e-4)[2, MODE + axis] = mode  # of T2's bottom left
+    ground.update(z=-1e-4)
+    ground.modes[2, MODE + axis] = mode  # of T2's bottom left
     for speed in (3e-6, -3e-6):  # the least of all margins; the others are 1e-4 m
         state = ground.state(z=-1e-4)
         state[35 + 6 + 3 + axis] = mode * speed
@@ -205,7 +201,8 @@ def test_first_zero_of_a_quadratic(value, rate, rate_rate, expected):
     ],
 )
 def test_a_mode_change_is_foreseen_when_it_comes(ground, v_x, upward, expected):
-    modes = ground.update(z=-1e-4)
+    ground.update(z=-1e-4)
+    modes = ground.modes
     state, nodes = ground.state(z=-1e-4, v_x=v_x), ground.nodes(z=-1e-4, v_x=v_x)
     acceleration = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, upward], 5)
     time = time_to_mode_change(state, acceleration, nodes, modes, *ground.args, 1.0)
@@ -238,6 +235,6 @@ def test_normal_force_is_drakes_hunt_crossley_point_contact(scenario, structure,
     state = np.array([1.0, 0, 0, 0, 0, 0, radius - depth, 0, 0, 0, 0, 0, -rate])
     plant.GetMyMutableContextFromRoot(context).SetContinuousState(state)
     force = mass * diagram.EvalTimeDerivatives(context).CopyToVector()[12]
-    law = Law(*make_ground(scenario, structure).law[0].item())
+    law = NormalForce(*make_ground(scenario, structure).normal)
     expected = normal_force(depth, rate, law)
     assert force == pytest.approx(expected, rel=1e-9, abs=1e-12)

@@ -27,7 +27,9 @@ def tallied(times, *, lengths, signals, tensions=None, loads=None, begins=0.0) -
         pulls[:, LENGTH] = lengths[k]
         pulls[:, TENSION] = 1.0 if tensions is None else tensions[k]
         pushes[:, 2] = 0.0 if loads is None else loads[k]
-        observe(tally, CABLES, CONTACTS, time, np.array([signals[k]]), pulls, pushes)
+        # The rate of signals is 0 / 0 where no time has passed, which counts for nothing.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            observe(tally, CABLES, CONTACTS, time, np.array([signals[k]]), pulls, pushes)
     return tally
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tetra_drake.physics.contact import Ground, law_of
-from tetra_drake.physics.terrain import GAP, N_X, T1_X, T2_Y, surface
+from tetra_drake.physics.contact import Ground
+from tetra_drake.physics.terrain import GAP, N_X, T1_X, T2_Y, SurfaceGrid, surface
 from tetra_drake.robot.ground import ground_frames, ground_heights, make_ground
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
@@ -22,7 +22,7 @@ def ground(scenario: Scenario, structure: Structure):
 
 def at(ground: Ground, x: float, y: float) -> tuple[float, float, float]:
     """Height of the surface and its gradient."""
-    return surface(x, y, law_of(ground), ground.heights)
+    return surface(x, y, SurfaceGrid(*ground.grid), ground.heights)
 
 
 def saved(heights: np.ndarray, folder) -> str:
@@ -90,7 +90,7 @@ def test_a_frame_is_orthonormal_and_its_first_tangent_is_worlds_x_in_the_plane(g
 def test_a_node_above_the_highest_point_has_the_frame_of_level_ground_there(ground):
     made = ground(ROUGH)
     (frame,) = ground_frames(np.array([[0.3, 0.1, 0.02]]), made)
-    assert frame[GAP] == pytest.approx(0.02 - made.law["top"][0])
+    assert frame[GAP] == pytest.approx(0.02 - SurfaceGrid(*made.grid).top)
     assert tuple(frame[N_X:]) == (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0)
 
 

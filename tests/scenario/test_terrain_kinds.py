@@ -14,7 +14,6 @@ from tetra_drake.scenario.terrain_kinds import (
     Rough,
     Steps,
     Terrain,
-    make_grid,
 )
 
 IN = 0.0254
@@ -30,7 +29,7 @@ KINDS: list[Terrain] = [
 
 
 def grid_of(terrain: Terrain) -> Grid:
-    return make_grid(terrain, ahead=AHEAD, source="file")
+    return terrain.grid(ahead=AHEAD, source="file")
 
 
 def points(grid: Grid) -> tuple[np.ndarray, np.ndarray]:

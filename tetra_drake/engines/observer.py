@@ -6,7 +6,7 @@ import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.physics.cable import PULL_COLUMNS
-from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.contact import MODE_COLUMNS, PUSH_COLUMNS, update_modes
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.tally import Tally, look, observe
@@ -27,18 +27,14 @@ class Observer:
 
     def __init__(self, robot: Robot) -> None:
         structure = robot.structure
-        bodies, cables = len(structure.bodies), len(structure.cables)
-        contacts, sizes = len(structure.contacts), dict.fromkeys(Tally._fields, 1)
-        sizes |= {"signals": structure.signals, "lengths": cables, "lifted": bodies}
-        values = empty_tally(robot.scenario)
-        columns = (np.full(sizes[name], value) for name, value in values._asdict().items())
-        self._model, self._tally = robot.model, Tally(*columns)
+        cables, contacts = len(structure.cables), len(structure.contacts)
+        self._model, self._tally = robot.model, empty_tally(robot.scenario, structure)
         self._modes = np.zeros((contacts, MODE_COLUMNS))
         self._forces = Forces(
             nodes=np.empty((len(structure.node_names), NODE_COLUMNS)),
             frames=np.empty((contacts, FRAME_COLUMNS)),
             pulls=np.empty((cables, PULL_COLUMNS)),
-            pushes=np.empty((contacts, 3)),
+            pushes=np.empty((contacts, PUSH_COLUMNS)),
         )
         self._waiting: list[tuple[float, np.ndarray, np.ndarray]] = []
 

@@ -2,7 +2,7 @@
 
 What a contact node remembers is a row of `modes`, (contacts, 8): whether it touches the ground, its
 friction mode along the tangents t1 and t2 (see `friction`), its stick point, a point of World where
-its bristle deflection is zero, and, for Coulomb friction, the heading of its body at touchdown.
+its bristle deflection is zero, and the heading of its body at touchdown.
 
 The laws act in the frames of `terrain`: on flat ground these are the axes of World.
 """
@@ -11,17 +11,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from tetra_drake.physics.friction import (
     STICK,
-    Pair,
+    FrictionLaw,
     Slide,
-    coulomb_force,
-    next_coulomb_mode,
-    next_reset_mode,
-    reset_force,
-    sticks,
+    friction_force,
+    next_mode,
+    stuck_along,
 )
 from tetra_drake.physics.kinematics import (
     FORCE,
@@ -31,7 +27,7 @@ from tetra_drake.physics.kinematics import (
     gather_forces,
     move_nodes,
 )
-from tetra_drake.physics.terrain import GAP, find_frames, to_frame, to_world
+from tetra_drake.physics.terrain import GAP, SurfaceGrid, find_frames, to_frame, to_world
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import (
     Real,
@@ -40,6 +36,8 @@ from tetra_drake.simd.lanes import (
     any_lane,
     inverse_sqrt,
     maximum,
+    named,
+    not_,
     select,
 )
 
@@ -47,44 +45,16 @@ CONTACT, MODE, STICK_POINT, HEADING, MODE_COLUMNS = 0, 1, 3, 6, 8
 """Columns of `modes`: contact (0 or 1), mode (along t1, t2), stick point (x, y, z) in m, heading
 (along t1, t2); and their number."""
 
+FRICTION_1, FRICTION_2, NORMAL, PUSH_COLUMNS = range(4)
+"""Columns of `pushes`, (contacts, 3), the forces of the ground: friction along t1 and t2, normal
+force (N); and their number."""
 
-class Law(NamedTuple):
-    """The constants of the ground in SI units: Tables 1 and 2, Coulomb's law, and the grid of the
-    terrain. Those of what a ground does not have are zeros."""
+
+class NormalForce(NamedTuple):
+    """The constants of the normal force (Table 1), SI."""
 
     stiffness: Real
     damping: Real
-    stiction_range: Real
-    stiction_damping: Real
-    stiction_switch: Real
-    proportional_stiction: Real
-    static: Real
-    kinetic: Real
-    bristle_stiffness: Real
-    bristle_damping: Real
-    per_forward: Real
-    """1 / factor; likewise the next two."""
-    per_backward: Real
-    per_lateral: Real
-    corner_x: Real
-    """Of the first control point; m."""
-    corner_y: Real
-    per_cell_x: Real
-    """1 / m."""
-    per_cell_y: Real
-    last_row: Real
-    """The largest coordinate, in cells along x, with three rows of control points around it."""
-    last_column: Real
-    columns: Real
-    """Control points in a row."""
-    first: Real
-    """The index of the first one."""
-    top: Real
-    """Height of the highest one."""
-
-
-LAW = np.dtype([(name, float) for name in Law._fields])
-"""The same as a record."""
 
 
 class Ground(NamedTuple):
@@ -92,43 +62,14 @@ class Ground(NamedTuple):
 
     contacts: Table
     """(contacts,), the indices of the nodes."""
-    law: Table
-    """(1,) of dtype LAW, or Law of tables of one."""
+    normal: Table
+    """The numbers of a NormalForce."""
+    friction: FrictionLaw
+    flat: bool
+    grid: Table
+    """The numbers of a SurfaceGrid."""
     heights: Table
     """(points,): the control points of the surface in m, row by row."""
-    flat: bool
-    coulomb: bool
-    """Whether friction is Coulomb's, else the reset integrator's."""
-
-
-@compiled
-def law_of(ground: Ground) -> Law:
-    """The constants as numbers."""
-    law = ground.law
-    return Law(
-        law.stiffness[0],
-        law.damping[0],
-        law.stiction_range[0],
-        law.stiction_damping[0],
-        law.stiction_switch[0],
-        law.proportional_stiction[0],
-        law.static[0],
-        law.kinetic[0],
-        law.bristle_stiffness[0],
-        law.bristle_damping[0],
-        law.per_forward[0],
-        law.per_backward[0],
-        law.per_lateral[0],
-        law.corner_x[0],
-        law.corner_y[0],
-        law.per_cell_x[0],
-        law.per_cell_y[0],
-        law.last_row[0],
-        law.last_column[0],
-        law.columns[0],
-        law.first[0],
-        law.top[0],
-    )
 
 
 @inlined
@@ -137,7 +78,8 @@ def meet_ground(state: Table, p_BN: Table, ground: Ground, nodes: Table, frames:
     meet the ground: `frames`, (contacts, FRAME_COLUMNS), which flat ground leaves as they are."""
     move_nodes(state, p_BN, nodes)
     if not ground.flat:
-        find_frames(nodes, ground.contacts, law_of(ground), ground.heights, frames)
+        grid = named(SurfaceGrid, ground.grid)
+        find_frames(nodes, ground.contacts, grid, ground.heights, frames)
 
 
 @inlined
@@ -149,7 +91,7 @@ def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
 
 
 @inlined
-def normal_force(depth: Real, depth_rate: Real, law: Law) -> Real:
+def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
     """Force (N) along the normal on a node `depth` (m) in the ground, which sinks at `depth_rate`
     (m/s).
 
@@ -161,7 +103,7 @@ def normal_force(depth: Real, depth_rate: Real, law: Law) -> Real:
 
 @inlined
 def sliding(
-    nodes: Table, modes: Table, ground: Ground, law: Law, frames: Table, i: int
+    nodes: Table, modes: Table, ground: Ground, law: NormalForce, frames: Table, i: int
 ) -> tuple[Slide, Real]:
     """How a contact node slides, and the rate (m/s) at which its gap grows."""
     node, flat = ground.contacts[i], ground.flat
@@ -178,39 +120,44 @@ def sliding(
 
 
 @inlined
-def friction_force(slide: Slide, law: Law, coulomb: bool) -> Pair:
-    """Friction (N) along the tangents on a node that touches the ground."""
-    if coulomb:
-        return coulomb_force(slide, law)
-    (v_1, v_2), (x_1, x_2), (m_1, m_2) = slide.velocity, slide.deflection, slide.mode
-    return reset_force(v_1, x_1, m_1, law), reset_force(v_2, x_2, m_2, law)
-
-
-@inlined
 def add_ground_forces(
     nodes: Table, modes: Table, ground: Ground, frames: Table, keep: bool, pushes: Table
 ) -> None:
     """Adds the forces of the ground to those on the `nodes` of `kinematics`.
 
-    `modes` is (contacts, MODE_COLUMNS). With `keep`, writes `pushes`, (contacts, 3): friction along
-    t1 and t2, normal force.
+    `modes` is (contacts, MODE_COLUMNS). With `keep`, writes `pushes`.
     """
-    law = law_of(ground)
+    law = named(NormalForce, ground.normal)
     for i in range(pushes.shape[0]):
         node, touches = ground.contacts[i], modes[i, CONTACT] != 0.0
         if not any_lane(touches | (gap(nodes, ground, frames, i) <= 0.0)):
             if keep:
-                pushes[i, 0] = pushes[i, 1] = pushes[i, 2] = 0.0
+                pushes[i, FRICTION_1] = pushes[i, FRICTION_2] = pushes[i, NORMAL] = 0.0
             continue
         slide, _ = sliding(nodes, modes, ground, law, frames, i)
-        f_1, f_2 = friction_force(slide, law, ground.coulomb)
+        f_1, f_2 = friction_force(slide, ground.friction)
         f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
         if keep:
-            pushes[i, 0], pushes[i, 1], pushes[i, 2] = f_1, f_2, slide.normal
+            pushes[i, FRICTION_1], pushes[i, FRICTION_2] = f_1, f_2
+            pushes[i, NORMAL] = slide.normal
         f_x, f_y, f_z = to_world(f_1, f_2, slide.normal, frames, i, ground.flat)
         nodes[node, FORCE] += f_x
         nodes[node, FORCE + 1] += f_y
         nodes[node, FORCE + 2] += f_z
+
+
+def ground_arguments(ground: Ground) -> tuple[Table, Table, int, Table, bool, Table, Table]:
+    """A ground as ground_forces() takes it: no tuple within it."""
+    friction = ground.friction
+    return (
+        ground.contacts,
+        ground.normal,
+        friction.kind,
+        friction.constants,
+        ground.flat,
+        ground.grid,
+        ground.heights,
+    )
 
 
 @compiled
@@ -219,19 +166,21 @@ def ground_forces(
     modes: Table,
     p_BN: Table,
     contacts: Table,
-    law: Table,
-    heights: Table,
+    normal: Table,
+    kind: int,
+    constants: Table,
     flat: bool,
-    coulomb: bool,
+    grid: Table,
+    heights: Table,
     nodes: Table,
     frames: Table,
     pushes: Table,
     generalized_force: Table,
 ) -> None:
     """Writes [t_W; f_W] of the ground at each Bo, (6 bodies,), for a state of the bodies; also
-    `nodes`, `frames` and `pushes`. From `contacts` to `coulomb`, the arguments are the fields of
-    Ground: a call from Python takes half a microsecond longer if it has to unpack them."""
-    ground = Ground(contacts, law, heights, flat, coulomb)
+    `nodes`, `frames` and `pushes`. From `contacts` to `heights`, the arguments are those of
+    ground_arguments(): a call from Python takes a microsecond longer if it has to unpack them."""
+    ground = Ground(contacts, normal, FrictionLaw(kind, constants), flat, grid, heights)
     meet_ground(state, p_BN, ground, nodes, frames)
     add_ground_forces(nodes, modes, ground, frames, True, pushes)
     gather_forces(nodes, generalized_force)
@@ -245,7 +194,7 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
     A node that lands sticks where it lands; one that sticks again does so where it is
     (the reset of the integrator). The other arguments are those of `add_ground_forces`.
     """
-    changed, law = False, law_of(ground)
+    changed, law = False, named(NormalForce, ground.normal)
     for i in range(ground.contacts.size):
         touched = modes[i, CONTACT] != 0.0
         touches = gap(nodes, ground, frames, i) <= 0.0
@@ -253,21 +202,16 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
             continue
         modes[i, CONTACT] = select(touches, 1.0, 0.0)
         changed = changed | (touched ^ touches)
-        lands, stays = touches & (touched ^ touches), touched & touches
+        lands, stays = touches & not_(touched), touched & touches
         slide, _ = sliding(nodes, modes, ground, law, frames, i)
-        m_1, m_2 = slide.mode
-        if ground.coulomb:
-            n_1, n_2 = next_coulomb_mode(slide, law)
-            n_1, n_2 = select(stays, n_1, STICK), select(stays, n_2, STICK)
-            resets_1 = sticks((n_1, n_2)) & ((sticks(slide.mode) ^ True) | lands)
-            resets_2 = resets_1
+        (m_1, m_2), (n_1, n_2) = slide.mode, next_mode(slide, ground.friction)
+        n_1, n_2 = select(stays, n_1, STICK), select(stays, n_2, STICK)
+        before_1, before_2 = stuck_along((m_1, m_2), ground.friction)
+        after_1, after_2 = stuck_along((n_1, n_2), ground.friction)
+        resets_1 = after_1 & (lands | not_(before_1))
+        resets_2 = after_2 & (lands | not_(before_2))
+        if any_lane(lands):
             set_heading(state, nodes, ground, frames, i, lands, modes)
-        else:
-            (v_1, v_2), (x_1, x_2) = slide.velocity, slide.deflection
-            n_1 = select(stays, next_reset_mode(v_1, x_1, m_1, law.stiction_range), STICK)
-            n_2 = select(stays, next_reset_mode(v_2, x_2, m_2, law.stiction_range), STICK)
-            resets_1 = (n_1 == STICK) & ((m_1 != STICK) | lands)
-            resets_2 = (n_2 == STICK) & ((m_2 != STICK) | lands)
         modes[i, MODE], modes[i, MODE + 1] = n_1, n_2
         changed = changed | (n_1 != m_1) | (n_2 != m_2)
         move_stick_point(nodes, ground, frames, i, resets_1, resets_2, slide, modes)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION, Cables
 from tetra_drake.physics.clearance import CORNERS, least_strut_distance
+from tetra_drake.physics.contact import NORMAL
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
 
@@ -73,7 +74,7 @@ def add_lifted(tally: Tally, contacts: Table, passed: Real, pushes: Table) -> No
     for body in range(tally.lifted.size):
         load = 0.0 * passed
         while i < contacts.size and contacts[i] < CORNERS * (body + 1):
-            load += pushes[i, 2]
+            load += pushes[i, NORMAL]
             i += 1
         tally.lifted[body] += select(load == 0.0, passed, 0.0)
 

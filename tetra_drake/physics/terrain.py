@@ -11,7 +11,7 @@ t2 = n x t1. On flat ground these are z and the axes of World, and frames are ne
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 from tetra_drake.physics.kinematics import P_WN
 from tetra_drake.simd.compiling import compiled, inlined
@@ -31,12 +31,30 @@ GAP, N_X, N_Y, N_Z, T1_X, T1_Y, T1_Z, T2_Y, T2_Z, FRAME_COLUMNS = range(10)
 """Columns of `frames`, (contacts, 9): distance (m), n, t1, t2 (whose x is 0); and their number."""
 
 
+class SurfaceGrid(NamedTuple):
+    """Where the control points of a surface are; SI units."""
+
+    corner_x: Real
+    """Of the first control point, as is `corner_y`."""
+    corner_y: Real
+    per_cell_x: Real
+    per_cell_y: Real
+    last_row: Real
+    """The largest coordinate, in cells along x, with three rows of control points around it."""
+    last_column: Real
+    columns: Real
+    """Control points in a row."""
+    first: Real
+    """The index of the first one."""
+    top: Real
+    """Height of the highest one."""
+
+
 @inlined
-def surface(x: Real, y: Real, grid: Any, heights: Table) -> tuple[Real, Real, Real]:
+def surface(x: Real, y: Real, grid: SurfaceGrid, heights: Table) -> tuple[Real, Real, Real]:
     """Height (m) of the surface at x and y (m), and its gradient.
 
-    `heights`, (points,), are the control points, row by row; `grid` has the fields of
-    `contact.Law` that describe them.
+    `heights`, (points,), are the control points, row by row.
     """
     across = (x - grid.corner_x) * grid.per_cell_x, (y - grid.corner_y) * grid.per_cell_y
     # In this order, a NaN becomes a bound, and no index leaves the grid.
@@ -72,7 +90,9 @@ def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Re
 
 
 @compiled
-def find_frames(nodes: Table, contacts: Table, grid: Any, heights: Table, frames: Table) -> None:
+def find_frames(
+    nodes: Table, contacts: Table, grid: SurfaceGrid, heights: Table, frames: Table
+) -> None:
     """Writes the `frames` of the contact nodes, whose indices are `contacts`, (contacts,).
 
     A node above the highest control point has the frame of level ground at that height.

@@ -17,10 +17,19 @@ from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
 
 
-def empty_tally(scenario: Scenario) -> Tally:
-    """The tally of a walk that begins; each table as an array or its one value."""
-    begins = max(scenario.simulation.steady_from, scenario.cpg.start_up)
-    return Tally(begins, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, tension=math.inf, clearance=math.inf)
+def empty_tally(scenario: Scenario, structure: Structure) -> Tally:
+    """The tally of a walk that begins."""
+    return Tally(
+        begins=np.array([max(scenario.simulation.steady_from, scenario.cpg.start_up)]),
+        time=np.zeros(1),
+        signals=np.zeros(structure.signals),
+        lengths=np.zeros(len(structure.cables)),
+        work=np.zeros(1),
+        roughness=np.zeros(1),
+        lifted=np.zeros(len(structure.bodies)),
+        tension=np.array([math.inf]),
+        clearance=np.array([math.inf]),
+    )
 
 
 def compute_metrics(

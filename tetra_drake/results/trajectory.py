@@ -11,7 +11,7 @@ import numpy as np
 
 from tetra_drake.files import write_whole
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, cable_forces
-from tetra_drake.physics.contact import STICK_POINT, ground_forces
+from tetra_drake.physics.contact import STICK_POINT, ground_arguments, ground_forces
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.robot import Robot
@@ -117,12 +117,10 @@ def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     frames = np.empty((contacts, FRAME_COLUMNS))
     pulls = np.empty((count, len(model.cables), PULL_COLUMNS))
     pushes = np.empty((count, contacts, 3))
-    force = np.empty(6 * len(robot.structure.bodies))
+    force, ground = np.empty(6 * len(robot.structure.bodies)), ground_arguments(model.ground)
     for k, (state, signals) in enumerate(zip(motion.states, motion.signals, strict=True)):
         cable_forces(state, signals, model.p_BN, model.cables, model.slack, nodes, pulls[k], force)
-        ground_forces(
-            state, motion.modes[k], model.p_BN, *model.ground, nodes, frames, pushes[k], force
-        )
+        ground_forces(state, motion.modes[k], model.p_BN, *ground, nodes, frames, pushes[k], force)
     return pulls, pushes if motion.pushes is None else motion.pushes
 
 

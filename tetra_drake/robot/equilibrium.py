@@ -10,6 +10,7 @@ import numpy as np
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
 from tetra_drake.physics.contact import (
     MODE_COLUMNS,
+    NormalForce,
     add_ground_forces,
     meet_ground,
     update_modes,
@@ -102,7 +103,7 @@ def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.nda
     """Displacements (6 n,) that bring the force to zero where the potential energy is convex, and
     lead downhill where it is not; the robot as a whole stays where it is."""
     stiffness, held = stiffness_at_rest(robot, state), _free_motions(robot, state)
-    hard, shift = robot.model.ground.law["stiffness"][0], 0.0
+    hard, shift = NormalForce(*robot.model.ground.normal).stiffness, 0.0
     stiffness = 0.5 * (stiffness + stiffness.T) + hard * held @ held.T
     while shift < np.inf:
         shifted = stiffness + shift * np.eye(len(force))

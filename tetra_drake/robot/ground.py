@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.contact import LAW, Ground, law_of
+from tetra_drake.physics.contact import (
+    Ground,
+    NormalForce,
+)
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.physics.terrain import (
     FRAME_COLUMNS,
@@ -16,12 +19,12 @@ from tetra_drake.physics.terrain import (
     T1_Z,
     T2_Y,
     T2_Z,
+    SurfaceGrid,
     find_frames,
 )
 from tetra_drake.robot.structure import Structure, moved_nodes
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat, Grid, make_grid
+from tetra_drake.scenario.terrain_kinds import Flat, Grid
 from tetra_drake.scenario.units import INCH
 
 STEP_AHEAD = 1.0 * INCH
@@ -39,43 +42,34 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     """
     start = moved_nodes(structure, structure.initial_state)[structure.contacts, P_WN : P_WN + 3]
     ahead = start[:, 0].max() + STEP_AHEAD
-    grid = make_grid(scenario.terrain, ahead=ahead, source=scenario.name)
-    law, coulomb = np.zeros(1, dtype=LAW), isinstance(scenario.friction, Coulomb)
-    law["stiffness"], law["damping"] = scenario.ground.stiffness, scenario.ground.damping
-    numbers = dict(scenario.friction)
-    if coulomb:
-        for name in ("stiffness", "damping"):
-            numbers[f"bristle_{name}"] = numbers.pop(name)
-        for name in ("forward", "backward", "lateral"):
-            numbers[f"per_{name}"] = 1.0 / numbers.pop(name)
-    for name, number in (numbers | _grid_numbers(grid)).items():
-        law[name] = number
+    grid = scenario.terrain.grid(ahead=ahead, source=scenario.name)
     made = Ground(
         contacts=structure.contacts,
-        law=law,
-        heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
+        normal=np.array(NormalForce(scenario.ground.stiffness, scenario.ground.damping)),
+        friction=scenario.friction.law(),
         flat=isinstance(scenario.terrain, Flat),
-        coulomb=coulomb,
+        grid=np.array(_surface_grid(grid)),
+        heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
     )
     if not made.flat:
         _check_start(structure, made, start, grid, scenario.name)
     return made
 
 
-def _grid_numbers(grid: Grid) -> dict[str, float]:
+def _surface_grid(grid: Grid) -> SurfaceGrid:
     rows, columns = grid.heights.shape
-    (x, y), (cell_x, cell_y) = grid.corner, grid.cell
     inside = 1.5 + 1e-9  # so that rounding finds a control point beyond the last one's neighbour
-    return {
-        "corner_x": x,
-        "corner_y": y,
-        "per_cell_x": 1.0 / cell_x,
-        "per_cell_y": 1.0 / cell_y,
-        "last_row": rows - inside,
-        "last_column": columns - inside,
-        "columns": columns,
-        "top": grid.heights.max(),
-    }
+    return SurfaceGrid(
+        corner_x=grid.corner[0],
+        corner_y=grid.corner[1],
+        per_cell_x=1.0 / grid.cell[0],
+        per_cell_y=1.0 / grid.cell[1],
+        last_row=rows - inside,
+        last_column=columns - inside,
+        columns=columns,
+        first=0.0,
+        top=grid.heights.max(),
+    )
 
 
 def _check_start(
@@ -97,7 +91,7 @@ def _check_start(
 
 def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:
     """Heights (...) in m of the surface at x and y (..., 2) in m."""
-    top = np.full((x_y.size // 2, 1), ground.law["top"][0])
+    top = np.full((x_y.size // 2, 1), SurfaceGrid(*ground.grid).top)
     frames = ground_frames(np.hstack([x_y.reshape(-1, 2), top]), ground)
     return (top[:, 0] - frames[:, GAP] / frames[:, N_Z]).reshape(x_y.shape[:-1])
 
@@ -116,5 +110,6 @@ def ground_frames(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
     frames = np.empty((len(p_WN), FRAME_COLUMNS))
     nodes = np.zeros((len(p_WN), NODE_COLUMNS))
     nodes[:, P_WN : P_WN + 3] = p_WN
-    find_frames(nodes, np.arange(len(p_WN)), law_of(ground), ground.heights, frames)
+    grid = SurfaceGrid(*ground.grid)
+    find_frames(nodes, np.arange(len(p_WN)), grid, ground.heights, frames)
     return frames

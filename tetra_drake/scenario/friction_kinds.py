@@ -1,11 +1,19 @@
-"""Kinds of friction and their constants."""
+"""Kinds of friction and their constants.
 
-from typing import Annotated
+The kernels of each, which need numba, are imported only where a law is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.sections import Kinds, Section, quantity, refuse
 from tetra_drake.scenario.units import INCH, POUND_FORCE
+
+if TYPE_CHECKING:
+    from tetra_drake.physics.friction import FrictionLaw
 
 
 class ResetIntegrator(Section):
@@ -25,6 +33,12 @@ class ResetIntegrator(Section):
     """a_c."""
     proportional_stiction: float = quantity("N*s/m^2", ge=0)
     """sigma_0."""
+
+    def law(self) -> FrictionLaw:
+        """As kernels take it."""
+        from tetra_drake.physics.friction import FrictionLaw, ResetConstants
+
+        return FrictionLaw.reset_integrator(ResetConstants(**dict(self)))
 
 
 class Coulomb(Section):
@@ -55,10 +69,26 @@ class Coulomb(Section):
     """Factor on mu for sideways slip."""
 
     @model_validator(mode="after")
-    def _check(self) -> "Coulomb":
+    def _check(self) -> Coulomb:
         if self.kinetic > self.static:
             refuse("kinetic", f"found {self.kinetic}, expected at most static, {self.static}")
         return self
+
+    def law(self) -> FrictionLaw:
+        """As kernels take it."""
+        from tetra_drake.physics.friction import CoulombConstants, FrictionLaw
+
+        return FrictionLaw.coulomb(
+            CoulombConstants(
+                static=self.static,
+                kinetic=self.kinetic,
+                stiffness=self.stiffness,
+                damping=self.damping,
+                per_forward=1.0 / self.forward,
+                per_backward=1.0 / self.backward,
+                per_lateral=1.0 / self.lateral,
+            )
+        )
 
 
 Friction = Annotated[ResetIntegrator | Coulomb, Kinds()]

@@ -11,7 +11,6 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import TAG, Tree, tree_of
-from tetra_drake.scenario.terrain_kinds import make_grid
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 MOST_BYTES = 2**20
@@ -31,7 +30,7 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     """
     file = _file(str(name_or_file), Path())
     scenario = _load(file)
-    make_grid(scenario.terrain, ahead=0.0, source=file)
+    scenario.terrain.grid(ahead=0.0, source=file)
     return scenario
 
 

@@ -27,11 +27,39 @@ MOST_CELLS = 4_000_000
 STEEPEST = math.radians(60.0)
 
 
-class Flat(Section):
+@dataclass(frozen=True)
+class Grid:
+    """Heights on a regular grid: the control points of the surface."""
+
+    heights: np.ndarray
+    """(rows, columns), m: rows along x, columns along y."""
+    corner: tuple[float, float]
+    """x and y of heights[0, 0], m."""
+    cell: tuple[float, float]
+    """Along x and y, m."""
+
+
+class Relief(Section):
+    """A kind of terrain."""
+
+    def grid(self, *, ahead: float, source: object) -> Grid:
+        """The heights of the terrain.
+
+        Steps and obstacles without a start begin at x = `ahead` (m). Raises InputError, naming
+        `source` and the key, for more than MOST_CELLS cells, and for a height file that cannot be
+        used.
+        """
+        raise NotImplementedError
+
+
+class Flat(Relief):
     """h = 0 everywhere: the thesis's floor, and the default."""
 
+    def grid(self, *, ahead: float, source: object) -> Grid:
+        return Grid(np.zeros((3, 3)), (-ASIDE, -ASIDE), (ASIDE, ASIDE))
 
-class Incline(Section):
+
+class Incline(Relief):
     """A plane that rises along +x.
 
     Without `start`, h = tan(slope) x everywhere, and the robot starts on it, turned with it; with
@@ -41,8 +69,17 @@ class Incline(Section):
     slope: float = quantity("rad", ge=-STEEPEST, le=STEEPEST)  # 60 deg either way
     start: float | None = quantity("m", default=None)
 
+    def grid(self, *, ahead: float, source: object) -> Grid:
+        rise = math.tan(self.slope)
+        cell = 0.5 * INCH, ASIDE
+        if self.start is None:
+            cell = 2.0 * AHEAD, 2.0 * AHEAD  # three heights make a plane one cell wide
+        x, y = _axes(cell, self.start or 0.0)
+        along = x if self.start is None else np.maximum(0.0, x - self.start)
+        return _grid(x, y, rise * along, cell)
 
-class Steps(Section):
+
+class Steps(Relief):
     """Stairs across the way: h = height min(count, floor((x - start) / depth) + 1) from `start` on.
 
     The first step begins at `start`, 1 in ahead of the robot if not given. A negative height goes
@@ -55,8 +92,18 @@ class Steps(Section):
     count: int = Field(ge=1)
     start: float | None = quantity("m", default=None)
 
+    def grid(self, *, ahead: float, source: object) -> Grid:
+        start = ahead if self.start is None else self.start
+        quarter, height = 0.25 * self.depth, abs(self.height)
+        key, finest = ("height", height) if 0.0 < height < quarter else ("depth", quarter)
+        _check_size((finest, ASIDE), source, key)
+        cell = self.depth / math.ceil(self.depth / finest), ASIDE
+        x, y = _axes(cell, start + 0.5 * cell[0])  # edges midway between two heights
+        risen = np.clip(np.floor((x - start) / self.depth) + 1.0, 0.0, self.count)
+        return _grid(x, y, self.height * risen, cell)
 
-class Rough(Section):
+
+class Rough(Relief):
     """Heights drawn uniformly between -2 amplitude and 0, independent, every half wavelength.
 
     So the mean is -amplitude, and a robot that stands at 0 touches but does not sink in. Flat, at
@@ -68,8 +115,18 @@ class Rough(Section):
     seed: int = Field(ge=0, default=0)
     start: float | None = quantity("m", default=None)
 
+    def grid(self, *, ahead: float, source: object) -> Grid:
+        half = 0.5 * self.wavelength
+        _check_size((half, half), source, "wavelength")
+        x, y = _axes((half, half), 0.0)
+        generator = np.random.default_rng(self.seed)
+        heights = generator.uniform(-2.0 * self.amplitude, 0.0, (len(x), len(y)))
+        if self.start is not None:
+            heights[x < self.start + 1.5 * half] = 0.0  # how far a control point reaches
+        return _grid(x, y, heights, (half, half))
 
-class Obstacles(Section):
+
+class Obstacles(Relief):
     """Round bumps, h = height max(0, 1 - (r / radius)^2), the highest where two overlap.
 
     One stands at a random place in each square of side `spacing`, none reaches before `start`, 1 in
@@ -83,8 +140,30 @@ class Obstacles(Section):
     seed: int = Field(ge=0, default=0)
     start: float | None = quantity("m", default=None)
 
+    def grid(self, *, ahead: float, source: object) -> Grid:
+        cell, spacing = 0.5 * self.radius, self.spacing
+        _check_size((cell, cell), source, "radius")
+        _check_size((spacing, spacing), source, "spacing")
+        x, y = _axes((cell, cell), 0.0)
+        start = ahead if self.start is None else self.start
+        first = max(-BEHIND, start + self.radius + 1.5 * cell)  # a bump and its control points
+        squares = np.arange(first, AHEAD, spacing), np.arange(-ASIDE, ASIDE, spacing)
+        corners = np.stack(np.meshgrid(*squares, indexing="ij"), axis=-1).reshape(-1, 2)
+        generator = np.random.default_rng(self.seed)
+        centres = corners + spacing * generator.uniform(size=corners.shape)
+        heights = np.zeros((len(x), len(y)))
+        nearest = np.rint((centres - (x[0], y[0])) / cell).astype(int)
+        for offset in np.ndindex(5, 5):  # a bump is four cells wide
+            at = nearest + offset - np.array([2, 2])
+            inside = ((at >= 0) & (at < heights.shape)).all(axis=1)
+            at, centre = at[inside], centres[inside]
+            r_squared = (x[at[:, 0]] - centre[:, 0]) ** 2 + (y[at[:, 1]] - centre[:, 1]) ** 2
+            bumps = self.height * (1.0 - r_squared / self.radius**2)
+            np.maximum.at(heights, (at[:, 0], at[:, 1]), bumps)
+        return _grid(x, y, heights, (cell, cell))
 
-class HeightField(Section):
+
+class HeightField(Relief):
     """Heights in m from a file: rows along x, columns along y, both upward.
 
     The file is numpy's `.npy`, or text of numbers separated by blanks or commas; at least 3 x 3.
@@ -96,109 +175,23 @@ class HeightField(Section):
     corner: list[float] | None = quantity("m", default=None, min_length=2, max_length=2)
     """x and y of the first height; the grid's centre is the origin if not given."""
 
+    def grid(self, *, ahead: float, source: object) -> Grid:
+        heights = _read_heights(self.file, source)
+        if heights.ndim != 2 or min(heights.shape) < 3:
+            shape = " x ".join(map(str, heights.shape)) or "a single number"
+            problem = f"'{self.file}' holds {shape}, expected at least 3 x 3 heights"
+            raise _file_error(source, problem)
+        bad = np.argwhere(~np.isfinite(heights))
+        if len(bad):
+            row, column = bad[0]
+            found = f"{heights[row, column]} in row {row + 1}, column {column + 1}"
+            raise _file_error(source, f"'{self.file}' has {found}, expected finite heights in m")
+        middle = [-0.5 * (size - 1) * self.cell for size in heights.shape]
+        x, y = middle if self.corner is None else self.corner
+        return Grid(heights, (x, y), (self.cell, self.cell))
+
 
 Terrain = Annotated[Flat | Incline | Steps | Rough | Obstacles | HeightField, Kinds()]
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Heights on a regular grid: the control points of the surface."""
-
-    heights: np.ndarray
-    """(rows, columns), m: rows along x, columns along y."""
-    corner: tuple[float, float]
-    """x and y of heights[0, 0], m."""
-    cell: tuple[float, float]
-    """Along x and y, m."""
-
-
-def make_grid(terrain: Terrain, *, ahead: float, source: object) -> Grid:
-    """The grid of a terrain.
-
-    Steps and obstacles without a start begin at x = `ahead` (m). Raises InputError, naming `source`
-    and the key, for more than MOST_CELLS cells, and for a height file that cannot be used.
-    """
-    if isinstance(terrain, HeightField):
-        return _height_field(terrain, source)
-    if isinstance(terrain, Incline):
-        return _incline(terrain)
-    if isinstance(terrain, Steps):
-        return _steps(terrain, ahead, source)
-    if isinstance(terrain, Rough):
-        return _rough(terrain, source)
-    if isinstance(terrain, Obstacles):
-        return _obstacles(terrain, ahead, source)
-    return Grid(np.zeros((3, 3)), (-ASIDE, -ASIDE), (ASIDE, ASIDE))
-
-
-def _incline(incline: Incline) -> Grid:
-    rise = math.tan(incline.slope)
-    cell = 0.5 * INCH, ASIDE
-    if incline.start is None:
-        cell = 2.0 * AHEAD, 2.0 * AHEAD  # three heights make a plane one cell wide
-    x, y = _axes(cell, incline.start or 0.0)
-    along = x if incline.start is None else np.maximum(0.0, x - incline.start)
-    return _grid(x, y, rise * along, cell)
-
-
-def _steps(steps: Steps, ahead: float, source: object) -> Grid:
-    start = ahead if steps.start is None else steps.start
-    quarter, height = 0.25 * steps.depth, abs(steps.height)
-    key, finest = ("height", height) if 0.0 < height < quarter else ("depth", quarter)
-    _check_size((finest, ASIDE), source, key)
-    cell = steps.depth / math.ceil(steps.depth / finest), ASIDE
-    x, y = _axes(cell, start + 0.5 * cell[0])  # edges midway between two heights
-    risen = np.clip(np.floor((x - start) / steps.depth) + 1.0, 0.0, steps.count)
-    return _grid(x, y, steps.height * risen, cell)
-
-
-def _rough(rough: Rough, source: object) -> Grid:
-    half = 0.5 * rough.wavelength
-    _check_size((half, half), source, "wavelength")
-    x, y = _axes((half, half), 0.0)
-    generator = np.random.default_rng(rough.seed)
-    heights = generator.uniform(-2.0 * rough.amplitude, 0.0, (len(x), len(y)))
-    if rough.start is not None:
-        heights[x < rough.start + 1.5 * half] = 0.0  # how far a control point reaches
-    return _grid(x, y, heights, (half, half))
-
-
-def _obstacles(obstacles: Obstacles, ahead: float, source: object) -> Grid:
-    cell, spacing = 0.5 * obstacles.radius, obstacles.spacing
-    _check_size((cell, cell), source, "radius")
-    _check_size((spacing, spacing), source, "spacing")
-    x, y = _axes((cell, cell), 0.0)
-    start = ahead if obstacles.start is None else obstacles.start
-    first = max(-BEHIND, start + obstacles.radius + 1.5 * cell)  # a bump and its control points
-    squares = np.arange(first, AHEAD, spacing), np.arange(-ASIDE, ASIDE, spacing)
-    corners = np.stack(np.meshgrid(*squares, indexing="ij"), axis=-1).reshape(-1, 2)
-    generator = np.random.default_rng(obstacles.seed)
-    centres = corners + spacing * generator.uniform(size=corners.shape)
-    heights = np.zeros((len(x), len(y)))
-    nearest = np.rint((centres - (x[0], y[0])) / cell).astype(int)
-    for offset in np.ndindex(5, 5):  # a bump is four cells wide
-        at = nearest + offset - np.array([2, 2])
-        inside = ((at >= 0) & (at < heights.shape)).all(axis=1)
-        at, centre = at[inside], centres[inside]
-        r_squared = (x[at[:, 0]] - centre[:, 0]) ** 2 + (y[at[:, 1]] - centre[:, 1]) ** 2
-        bumps = obstacles.height * (1.0 - r_squared / obstacles.radius**2)
-        np.maximum.at(heights, (at[:, 0], at[:, 1]), bumps)
-    return _grid(x, y, heights, (cell, cell))
-
-
-def _height_field(field: HeightField, source: object) -> Grid:
-    heights = _read_heights(field.file, source)
-    if heights.ndim != 2 or min(heights.shape) < 3:
-        shape = " x ".join(map(str, heights.shape)) or "a single number"
-        raise _file_error(source, f"'{field.file}' holds {shape}, expected at least 3 x 3 heights")
-    bad = np.argwhere(~np.isfinite(heights))
-    if len(bad):
-        row, column = bad[0]
-        found = f"{heights[row, column]} in row {row + 1}, column {column + 1}"
-        raise _file_error(source, f"'{field.file}' has {found}, expected finite heights in m")
-    middle = [-0.5 * (size - 1) * field.cell for size in heights.shape]
-    x, y = middle if field.corner is None else field.corner
-    return Grid(heights, (x, y), (field.cell, field.cell))
 
 
 def _read_heights(file: str, source: object) -> np.ndarray:

@@ -41,7 +41,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -64,6 +64,7 @@ from numba.extending import (
 Real: TypeAlias = float
 Truth: TypeAlias = bool
 Table: TypeAlias = Any
+Record = TypeVar("Record", bound=tuple)
 
 _intrinsic: Callable[..., Any] = intrinsic
 
@@ -322,6 +323,38 @@ def _any(context: Any, mask: Mask) -> Any:
 overload(any_lane)(
     lambda mask: (lambda mask: _any(mask)) if isinstance(mask, Mask) else (lambda mask: mask)
 )
+
+
+def not_(mask: Truth) -> Truth:
+    """The opposite."""
+    return not mask
+
+
+overload(not_)(
+    lambda mask: (lambda mask: ~mask) if isinstance(mask, Mask) else (lambda mask: not mask)
+)
+
+
+def named(kind: type[Record], table: Table) -> Record:
+    """The numbers of a table as a NamedTuple of this kind, in its order."""
+    return kind(*table)
+
+
+@_intrinsic
+def _named(context: Any, kind: Any, table: Any) -> Any:
+    item = context.resolve_function_type(operator.getitem, (table, types.intp), {})
+    count = len(kind.instance_class._fields)
+    record = types.NamedUniTuple(item.return_type, count, kind.instance_class)
+
+    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
+        get = c.get_function(operator.getitem, item)
+        numbers = [get(builder, (args[1], ir.Constant(_INT, i))) for i in range(count)]
+        return c.make_tuple(builder, record, numbers)
+
+    return signature(record, kind, table), emit
+
+
+overload(named)(lambda kind, table: lambda kind, table: _named(kind, table))
 
 
 # Fields: a pointer and the lengths of all dimensions, of which the type may know some.

@@ -18,6 +18,7 @@ from pydrake.systems.framework import (
 from tetra_drake.physics.contact import (
     MODE_COLUMNS,
     STICK_POINT,
+    ground_arguments,
     ground_forces,
     modes_after_step,
 )
@@ -55,6 +56,7 @@ class GroundContact(LeafSystem):
         super().__init__()
         structure = robot.structure
         self._p_BN, self._ground = structure.p_BN, robot.ground
+        self._ground_arguments = ground_arguments(self._ground)
         bodies, count = len(structure.bodies), len(structure.contacts)
         # Room for the kernels, which write what they need of it at every call.
         self._nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
@@ -135,7 +137,7 @@ class GroundContact(LeafSystem):
             self._state.Eval(context),
             self._modes(context),
             self._p_BN,
-            *self._ground,
+            *self._ground_arguments,
             self._nodes,
             self._frames,
             self._pushes,

@@ -11,20 +11,20 @@ from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
 from tetra_drake.physics.cable import DIRECTION, add_cable_forces
 from tetra_drake.physics.contact import (
     CONTACT,
+    NORMAL,
     Ground,
-    Law,
+    NormalForce,
     add_ground_forces,
     gap,
-    law_of,
     meet_ground,
     sliding,
 )
-from tetra_drake.physics.friction import STICK, coulomb_damping
+from tetra_drake.physics.friction import friction_damping
 from tetra_drake.physics.kinematics import P_BN_W, gather_forces
 from tetra_drake.physics.model import JUNCTION_CABLES, Model
 from tetra_drake.physics.terrain import to_world
 from tetra_drake.simd.compiling import compiled, inlined, merged
-from tetra_drake.simd.lanes import Real, Table, any_lane, select
+from tetra_drake.simd.lanes import Real, Table, any_lane, named, select
 
 
 class Forces(NamedTuple):
@@ -95,7 +95,7 @@ def implicit_matrix(
     for body in range(rows.shape[0]):
         for r in range(BLOCK):
             rows[body, r, r] += inertia(robot, r)
-    law = law_of(robot.ground)
+    law = named(NormalForce, robot.ground.normal)
     for i in range(robot.ground.contacts.size):
         if any_lane(modes[i, CONTACT] != 0.0):
             add_contact(modes, forces, robot.ground, law, i, time, rows)
@@ -188,26 +188,19 @@ def product(column: tuple[Real, ...], lines: Table, c: int) -> Real:
 
 @inlined
 def add_contact(
-    modes: Table, forces: Forces, ground: Ground, law: Law, i: int, time: Real, rows: Table
+    modes: Table, forces: Forces, ground: Ground, law: NormalForce, i: int, time: Real, rows: Table
 ) -> None:
     """Adds time * damping + time² * stiffness of a contact, which acts where it touches."""
     nodes, frames = forces.nodes, forces.frames
     touches, node = modes[i, CONTACT] != 0.0, ground.contacts[i]
     depth = -gap(nodes, ground, frames, i)
     slide, _ = sliding(nodes, modes, ground, law, frames, i)
-    presses, stiction = touches & (forces.pushes[i, 2] > 0.0), time * law.stiction_damping
-    k_1 = select(touches & (slide.mode[0] == STICK), stiction, 0.0)
-    k_2 = select(touches & (slide.mode[1] == STICK), stiction, 0.0)
+    k_1, k_12, k_2 = friction_damping(slide, time, ground.friction)
+    k_1, k_2 = select(touches, k_1, 0.0), select(touches, k_2, 0.0)
+    k_12 = select(touches, k_12, 0.0)
+    presses = touches & (forces.pushes[i, NORMAL] > 0.0)
     k_n = select(presses, time * (law.damping * depth + time * law.stiffness), 0.0)
     body = node // (nodes.shape[0] // rows.shape[0])
-    if ground.flat and not ground.coulomb:
-        add_diagonal(nodes, node, body, (k_1, k_2, k_n), rows)
-        return
-    k_12 = 0.0 * k_n
-    if ground.coulomb:
-        found = coulomb_damping(slide, time, law)
-        k_1, k_12 = select(touches, found[0], 0.0), select(touches, found[1], 0.0)
-        k_2 = select(touches, found[2], 0.0)
     # The columns of the matrix in World, and from the frame's: R K, then (R K) Rᵀ.
     a = to_world(k_1, k_12, 0.0, frames, i, ground.flat)
     b = to_world(k_12, k_2, 0.0, frames, i, ground.flat)
@@ -216,7 +209,9 @@ def add_contact(
     y = to_world(a[1], b[1], c[1], frames, i, ground.flat)
     z = to_world(a[2], b[2], c[2], frames, i, ground.flat)
     add_diagonal(nodes, node, body, (x[0], y[1], z[2]), rows)
-    add_off_diagonal(nodes, node, body, (x[1], x[2], y[2]), rows)
+    xy, xz, yz = x[1], x[2], y[2]
+    if any_lane((xy != 0.0) | (xz != 0.0) | (yz != 0.0)):
+        add_off_diagonal(nodes, node, body, (xy, xz, yz), rows)
 
 
 @inlined

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from dataclasses import dataclass
@@ -26,20 +27,20 @@ from tetra_drake.engines.compiled.loop import (
     TIME,
     TRIED,
     WALKING,
-    LaneTables,
+    Constants,
     Log,
+    Walk,
     advance,
 )
 from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics.cable import PULL_COLUMNS, Cables
-from tetra_drake.physics.contact import MODE_COLUMNS, Ground, Law
-from tetra_drake.physics.feedback import Senses
+from tetra_drake.physics.contact import MODE_COLUMNS, PUSH_COLUMNS
 from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.physics.model import JUNCTION_CABLES, Body, Model
-from tetra_drake.physics.oscillator import NEURON_COLUMNS, Network, make_neurons
+from tetra_drake.physics.model import JUNCTION_CABLES
+from tetra_drake.physics.oscillator import make_neurons
 from tetra_drake.physics.tally import Tally
-from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.physics.terrain import FRAME_COLUMNS, SurfaceGrid
 from tetra_drake.results.metrics import empty_tally
 from tetra_drake.results.result import motion_times
 from tetra_drake.results.trajectory import Motion
@@ -49,7 +50,8 @@ from tetra_drake.robot.signals import sample_count
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
-_INDICES = 3  # the first fields of Senses, which lanes share
+FIRST = SurfaceGrid._fields.index("first")
+"""Where a grid has the index of its first height: those of all lanes stand in one row."""
 
 
 @dataclass(frozen=True)
@@ -99,13 +101,18 @@ class PreparedGait:
             drivers,
             self.live,
             ground.flat,
-            ground.coulomb,
+            ground.friction.kind,
         )
 
     @property
     def live(self) -> bool:
         """Whether the network is integrated with the robot."""
         return self.robot.scenario.cpg.signals == "live"
+
+    @functools.cached_property
+    def turns(self) -> np.ndarray:
+        """The turns that Robot.turns() gives; raises InputError as it does."""
+        return self.robot.turns(self.gait, self.steering)
 
     @property
     def recent_signals(self) -> int:
@@ -144,11 +151,18 @@ class LaneEngine:
     def __init__(self, first: PreparedGait, *, width: int) -> None:
         """For gaits like the first; see `accepts`. Compiles the engine where that is not done."""
         self._kind = first.kind
-        model, self._model_tables = _lane_model(first.robot.model, width)
-        self._heights = model.ground.heights.array.reshape(width, -1)
-        self._tables = _zeros(first.robot, model, width)
-        structure = first.robot.structure
+        structure, points = first.robot.structure, first.robot.ground.heights.size
         self._bodies = len(structure.bodies)
+        self._heights = np.zeros((width, points))
+        constants = in_lanes(make_constants(first), width)
+        ground = constants.robot.ground._replace(heights=FieldArray(self._heights.ravel()))
+        shape = constants.network.inhibition.shape
+        inhibition = lane_table(shape, width, any_size=True)  # compiled once for robots of any size
+        self._constants = constants._replace(
+            robot=constants.robot._replace(ground=ground),
+            network=constants.network._replace(inhibition=inhibition),
+        )
+        self._walk = in_lanes(start_walk(first), width)
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
             marks=np.full((width, 5), math.inf),
@@ -162,9 +176,9 @@ class LaneEngine:
             turns=np.zeros((width, first.turn_samples)),
         )
         log = Log(*(FieldArray(array, any_size=True) for array in self._log))
-        self._arguments = self._tables, log, first.live
+        self._arguments = self._constants, self._walk, log, first.live
         # Called without looking for the types of all these tables each time.
-        kinds = tuple(typeof(each) for each in (*self._arguments, 0))
+        kinds = tuple(typeof(argument) for argument in (*self._arguments, 0))
         self._advance = advance.compile(kinds)  # type: ignore[attr-defined]
         self._in_lane: list[PreparedGait | None] = [None] * width
         self._wall_times = [0.0] * width
@@ -191,55 +205,36 @@ class LaneEngine:
 
     def load(self, lane: int, prepared: PreparedGait) -> None:
         """Starts a gait in a lane; raises InputError if it does not fit its scenario."""
-        robot, gait = prepared.robot, prepared.gait
-        scenario, model, structure = robot.scenario, robot.model, robot.structure
-        start, modes = structure.initial_state, robot.starting_modes()
-        cpg, simulation = scenario.cpg, scenario.simulation
-        network, senses = robot.network(gait), robot.senses
-        turns = robot.turns(gait, prepared.steering)
-        engine = scenario.settings_of(Compiled)
-        numbers: dict[str, Any] = dict(engine)
-        numbers |= {"max_speed": MAX_SPEED, "max_evaluations": simulation.max_evaluations}
-        numbers |= {"gain": cpg.gain, "period": cpg.listing_step, "samples": sample_count(scenario)}
-        numbers |= {"start_up": cpg.start_up, "signals": 0.0, "modes": modes}
-        numbers["neurons"] = make_neurons(initial_neurons(cpg, scenario.oscillators))
-        numbers["external_input"] = cpg.external_input
-        numbers["gains"] = [gain for _, gain in gait.gains]
-        numbers["sides"] = np.repeat(structure.actuation.sides, 2)
-        numbers["tonic"] = robot.tonic_input(turns)[0]
-        for name, values in numbers.items():
-            getattr(self._tables, name).array[..., lane] = values
-        for table, value in zip(self._tables.tally, empty_tally(scenario), strict=True):
-            table.array[..., lane] = value
-        first, beyond, *tables = self._tables.network
-        first.array[:] = np.minimum(first.array, network.first)  # so that they hold for all lanes
-        beyond.array[:] = np.maximum(beyond.array, network.beyond)
-        tables += [*self._model_tables, *self._tables.senses[_INDICES:]]
-        constants = *network[2:], *_numbers(model), *senses[_INDICES:]
-        for table, values in zip(tables, constants, strict=True):
-            table.array[..., lane] = values
-        heights = self._heights[lane]
-        heights[: model.ground.heights.size] = model.ground.heights
-        self._tables.robot.ground.law.first.array[0, lane] = lane * heights.size
-        self._tables.step.state.array[:, lane] = start
+        constants, walk = make_constants(prepared), start_walk(prepared)
+        fill_lane(self._constants, constants, lane)
+        fill_lane(self._walk, walk, lane)
+        network, given = self._constants.network, constants.network
+        # So that they hold for all lanes.
+        network.first.array[:] = np.minimum(network.first.array, given.first)
+        network.beyond.array[:] = np.maximum(network.beyond.array, given.beyond)
+        heights = prepared.robot.ground.heights
+        self._heights[lane, : heights.size] = heights
+        self._constants.robot.ground.grid.array[FIRST, lane] = lane * self._heights.shape[1]
 
-        log, clock = self._log, self._tables.clock.array
+        log, clock = self._log, self._walk.clock.array
+        turns = prepared.turns
         log.times[lane] = log.marks[lane] = math.inf
         log.times[lane, : len(prepared.times)] = prepared.times
         log.marks[lane, : len(prepared.marks)] = prepared.marks
         log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
-        log.states[lane, 0], log.modes[lane, 0], log.signals[lane, 0] = start, modes, 0.0
+        log.states[lane, 0], log.modes[lane, 0] = walk.step.state, walk.modes
+        log.signals[lane, 0] = 0.0
         log.kept[lane], log.passed[lane] = 1, 0
-        clock[:, lane] = 0.0
-        first_step = min(engine.look_ahead, engine.max_step)
-        clock[STATUS, lane], clock[STEP, lane] = WALKING, first_step
+        engine = prepared.robot.scenario.settings_of(Compiled)
+        clock[STATUS, lane] = WALKING
+        clock[STEP, lane] = min(engine.look_ahead, engine.max_step)
         clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
         self._in_lane[lane], self._wall_times[lane] = prepared, 0.0
 
     def stop(self, lane: int) -> float:
         """Takes the gait out of a lane, wherever it is; returns what it cost, in s."""
         self._in_lane[lane] = None
-        self._tables.clock.array[STATUS, lane] = IDLE
+        self._walk.clock.array[STATUS, lane] = IDLE
         return self._wall_times[lane]
 
     def advance(self, body_steps: int) -> list[tuple[int, PreparedGait, Course]]:
@@ -253,13 +248,13 @@ class LaneEngine:
         ended = []
         for lane, prepared in busy:
             self._wall_times[lane] += share
-            if self._tables.clock.array[STATUS, lane] != WALKING:
+            if self._walk.clock.array[STATUS, lane] != WALKING:
                 ended.append((lane, prepared, self._course(lane)))
                 self.stop(lane)
         return ended
 
     def _course(self, lane: int) -> Course:
-        clock, log = self._tables.clock.array[:, lane], self._log
+        clock, log = self._walk.clock.array[:, lane], self._log
         kept = slice(log.kept[lane])
         return Course(
             status=int(clock[STATUS]),
@@ -272,7 +267,7 @@ class LaneEngine:
                 signals=log.signals[lane, kept].copy(),
                 modes=log.modes[lane, kept].copy(),
             ),
-            totals=Tally(*(t.array[..., lane].copy() for t in self._tables.tally)),
+            totals=Tally(*(table.array[..., lane].copy() for table in self._walk.tally)),
             wall_time=self._wall_times[lane],
         )
 
@@ -294,94 +289,89 @@ def processor_features() -> str:
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
 
 
-def _numbers(model: Model) -> list[np.ndarray]:
-    """The arrays of a model that differ between scenarios, in the order of its lane tables."""
-    cables = [model.cables[name] for name in Cables._fields[3:]]
-    law = [model.ground.law[name] for name in Law._fields]
-    return [model.p_BN, *cables, *law, *model.body]
-
-
-def _lane_model(model: Model, width: int) -> tuple[Model, list[FieldArray]]:
-    """The model in lanes, and those of its tables that differ between scenarios."""
-    tables = [lane_table(values.shape, width) for values in _numbers(model)]
-    rest = iter(tables)
-    p_BN = next(rest)
-    indices = [FieldArray(model.cables[name].copy()) for name in Cables._fields[:3]]
-    lanes = Model(
-        p_BN=p_BN,
-        cables=Cables(*indices, *(next(rest) for _ in Cables._fields[3:])),
-        ground=Ground(
-            contacts=FieldArray(model.ground.contacts.copy()),
-            law=Law(*(next(rest) for _ in Law._fields)),  # type: ignore[arg-type]
-            heights=FieldArray(np.zeros(width * model.ground.heights.size)),
-            flat=model.ground.flat,
-            coulomb=model.ground.coulomb,
-        ),
-        body=Body(*(next(rest) for _ in Body._fields)),
-        slack=model.slack,
+def make_constants(prepared: PreparedGait) -> Constants:
+    """The constants of one simulation, as arrays without lanes; of the ground without heights."""
+    robot, gait = prepared.robot, prepared.gait
+    scenario, model = robot.scenario, robot.model
+    cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
+    cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
+    ground = model.ground._replace(heights=None)  # of which lanes have different numbers
+    return Constants(
+        robot=model._replace(cables=cables, ground=ground),
+        network=robot.network(gait),
+        senses=robot.senses,
+        sides=np.repeat(robot.actuation.sides, 2).astype(float),
+        external_input=np.array([cpg.external_input]),
+        gains=np.array([gain for _, gain in gait.gains]),
+        gain=np.array([cpg.gain]),
+        period=np.array([cpg.listing_step]),
+        samples=np.array([sample_count(scenario)], dtype=float),
+        start_up=np.array([cpg.start_up]),
+        tolerance=np.array([engine.tolerance]),
+        max_step=np.array([engine.max_step]),
+        look_ahead=np.array([engine.look_ahead]),
+        max_speed=np.array([MAX_SPEED]),
+        max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
     )
-    return lanes, tables
 
 
-def _zeros(robot: Robot, model: Model, width: int) -> LaneTables:
-    """The tables of gaits of robots like this one, zeros, with its `model` in lanes."""
-    structure, senses = robot.structure, robot.senses
+def start_walk(prepared: PreparedGait) -> Walk:
+    """The state of one simulation at its start, and room for what is computed on the way, as arrays
+    without lanes."""
+    robot, scenario, structure = prepared.robot, prepared.robot.scenario, prepared.robot.structure
     bodies, signals = len(structure.bodies), structure.signals
-    contacts, size, neurons = len(structure.contacts), BLOCK * bodies, 2 * signals
+    contacts, cables = len(structure.contacts), len(structure.cables)
+    velocities = np.zeros(BLOCK * bodies)
+    return Walk(
+        clock=np.zeros(CLOCK_ROWS),
+        step=Step(
+            state=structure.initial_state,
+            end=np.zeros(13 * bodies),
+            force=velocities,
+            end_force=velocities,
+            change=velocities,
+            stage=velocities,
+            k1=velocities,
+            k2=velocities,
+            rows=np.zeros((bodies, BLOCK, ROW)),
+            lines=np.zeros((JUNCTION_CABLES, 9)),
+        ),
+        forces=Forces(
+            nodes=np.zeros((len(structure.node_names), NODE_COLUMNS)),
+            frames=np.zeros((contacts, FRAME_COLUMNS)),
+            pulls=np.zeros((cables, PULL_COLUMNS)),
+            pushes=np.zeros((contacts, PUSH_COLUMNS)),
+        ),
+        modes=robot.starting_modes(),
+        acceleration=velocities,
+        signals=np.zeros(signals),
+        end_signals=np.zeros(signals),
+        neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
+        output=np.zeros(signals),
+        tonic=robot.tonic_input(prepared.turns)[0],
+        inputs=np.zeros(2 * signals),
+        lengths=np.zeros(cables),
+        normal_forces=np.zeros(contacts),
+        tally=empty_tally(scenario, structure),
+    )
 
-    def table(*shape: int) -> FieldArray:
-        return lane_table(shape, width)
 
-    vectors = {name: table(size) for name in ("force", "end_force", "change", "stage", "k1", "k2")}
-    tables: dict[str, Any] = {name: table(1) for name in LaneTables._fields}
-    tables |= {name: table(signals) for name in ("output", "signals", "end_signals")}
-    tables |= {
-        "robot": model,
-        "network": Network(
-            first=FieldArray(np.full(neurons, neurons)),
-            beyond=FieldArray(np.zeros(neurons, dtype=np.int64)),
-            inhibition=lane_table((neurons, neurons), width, any_size=True),
-            per_tau_a=table(neurons),
-            per_tau_b=table(neurons),
-            self_inhibition_weight=table(neurons),
-        ),
-        "senses": Senses(
-            *(FieldArray(indices.copy()) for indices in senses[:_INDICES]),
-            *(table(len(numbers)) for numbers in senses[_INDICES:]),
-        ),
-        "neurons": table(neurons, NEURON_COLUMNS),
-        "gains": table(3),
-        "sides": table(neurons),
-        "tonic": table(neurons),
-        "inputs": table(neurons),
-        "lengths": table(len(structure.cables)),
-        "normal_forces": table(contacts),
-        "clock": table(CLOCK_ROWS),
-        "modes": table(contacts, MODE_COLUMNS),
-        "acceleration": table(size),
-        "step": Step(
-            state=table(13 * bodies),
-            end=table(13 * bodies),
-            rows=table(bodies, BLOCK, ROW),
-            lines=table(JUNCTION_CABLES, 9),
-            **vectors,
-        ),
-        "forces": Forces(
-            nodes=table(len(structure.node_names), NODE_COLUMNS),
-            frames=table(contacts, FRAME_COLUMNS),
-            pulls=table(len(structure.cables), PULL_COLUMNS),
-            pushes=table(contacts, 3),
-        ),
-        "tally": Tally(
-            begins=table(1),
-            time=table(1),
-            signals=table(signals),
-            lengths=table(len(structure.cables)),
-            work=table(1),
-            roughness=table(1),
-            lifted=table(bodies),
-            tension=table(1),
-            clearance=table(1),
-        ),
-    }
-    return LaneTables(**tables)
+def in_lanes(values: Any, width: int) -> Any:
+    """A table in lanes for each array of real numbers in NamedTuples, zeros. Arrays of indices are
+    for all lanes; what is no array stays."""
+    if isinstance(values, tuple):
+        return type(values)(*(in_lanes(value, width) for value in values))
+    if not isinstance(values, np.ndarray):
+        return values
+    return (
+        FieldArray(values.copy()) if values.dtype == np.int64 else lane_table(values.shape, width)
+    )
+
+
+def fill_lane(tables: Any, values: Any, lane: int) -> None:
+    """Writes the real numbers in NamedTuples into a lane of such tables."""
+    if isinstance(values, tuple):
+        for table, value in zip(tables, values, strict=True):
+            fill_lane(table, value, lane)
+    elif isinstance(values, np.ndarray) and values.dtype == np.float64:
+        tables.array[..., lane] = values

@@ -22,7 +22,7 @@ from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
 from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.cable import LENGTH
-from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.feedback import Senses, sense
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
@@ -37,7 +37,7 @@ from tetra_drake.physics.oscillator import (
 )
 from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.simd.compiling import compiled, inlined, merged
-from tetra_drake.simd.lanes import Real, Table, any_lane, by_lane, maximum, minimum, select
+from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, by_lane, maximum, minimum, select
 
 Array = np.ndarray
 
@@ -59,37 +59,29 @@ ROUND = 32
 """Iterations, some 40 ms of a walk, after which the distances of struts are looked at: enough to
 find the least one to within 0.1 mm."""
 
-STATUS, TIME, STEP, END, MARK, DUE, ACTIVE, SAMPLES, FLAG, TRIED, TAKEN, CLOCK_ROWS = range(12)
-"""Rows of `clock`, (CLOCK_ROWS,): status, time, length of the step tried and its end, times of the
-next mark and of the next sample to keep (s), whether signals act (0 or 1), number of samples of the
-signals that exist, a number for what comes next, steps tried, steps taken; and their number."""
+STATUS, TIME, STEP, END, MARK, DUE, ACTIVE, SAMPLES, TRIED, TAKEN = range(10)
+"""Rows of `clock`: status, time, length of the step tried and its end, times of the next mark and
+of the next sample to keep (s), whether signals act (0 or 1), number of samples of the signals that
+exist, steps tried, steps taken."""
+
+ACCEPTED, GOES, PLACE, CLOCK_ROWS = 10, 11, 12, 13
+"""Further rows, which hold for a moment what lanes are asked one by one: whether the step is
+accepted and whether the network takes a step (0 or 1), a place among the turns; and the number of
+all rows."""
 
 
-class LaneTables(NamedTuple):
-    """All that kernels need of several simulations, in lanes; constants are tables of one.
-
-    In SI units. The signals act from `start_up` on.
-    """
+class Constants(NamedTuple):
+    """What several simulations are made of, in lanes: tables of one where nothing else is said, in
+    SI units."""
 
     robot: Model
-    tolerance: Table
-    max_step: Table
-    look_ahead: Table
-    max_speed: Table
-    max_evaluations: Table
     network: Network
-    external_input: Table
+    senses: Senses
     sides: Table
     """(2n,): by neuron, see Actuation; n oscillators."""
-    tonic: Table
-    """(2n,): the input without feedback; `inputs` with it."""
-    inputs: Table
-    senses: Senses
+    external_input: Table
     gains: Table
     """(3,): of feedback."""
-    lengths: Table
-    """(cables,): what is sensed, as are `normal_forces`, (contacts,)."""
-    normal_forces: Table
     gain: Table
     """Force per unit of an oscillator's output."""
     period: Table
@@ -97,20 +89,38 @@ class LaneTables(NamedTuple):
     samples: Table
     """Number of samples of the listing's signals; the last one lasts."""
     start_up: Table
-    neurons: Table
-    """(2n, NEURON_COLUMNS)."""
-    output: Table
-    """(n,): the oscillators' latest outputs."""
+    """From when on the signals act."""
+    tolerance: Table
+    max_step: Table
+    look_ahead: Table
+    max_speed: Table
+    max_evaluations: Table
+
+
+class Walk(NamedTuple):
+    """The state of several simulations, in lanes, and what is computed on the way."""
+
     clock: Table
+    """(CLOCK_ROWS,)."""
     step: Step
+    forces: Forces
     modes: Table
     """(contacts, MODE_COLUMNS)."""
-    forces: Forces
     acceleration: Table
     """(6 bodies,)."""
     signals: Table
     """(n,), at the lane's time; `end_signals` at the end of its step."""
     end_signals: Table
+    neurons: Table
+    """(2n, NEURON_COLUMNS)."""
+    output: Table
+    """(n,): the oscillators' latest outputs."""
+    tonic: Table
+    """(2n,): the input without feedback; `inputs` with it."""
+    inputs: Table
+    lengths: Table
+    """(cables,): what is sensed, as are `normal_forces`, (contacts,)."""
+    normal_forces: Table
     tally: Tally
 
 
@@ -139,7 +149,7 @@ class Log(NamedTuple):
 
 
 @functools.partial(compiled, nogil=True)
-def advance(w: LaneTables, log: Log, live: bool, rounds: int) -> None:
+def advance(constants: Constants, walk: Walk, log: Log, live: bool, rounds: int) -> None:
     """Simulates to the end of the round in which one of the lanes ends, or for a number of rounds:
     so each simulation's begin with its own, and lanes may be filled again in between.
 
@@ -148,91 +158,118 @@ def advance(w: LaneTables, log: Log, live: bool, rounds: int) -> None:
     for _ in range(rounds):
         ended = False
         for _ in range(ROUND):
-            ended |= iterate(w, log, live)
-        move_robot(w.robot, w.step.state, w.forces)
-        look(w.tally, w.forces.nodes)
+            ended |= iterate(constants, walk, log, live)
+        move_robot(constants.robot, walk.step.state, walk.forces)
+        look(walk.tally, walk.forces.nodes)
         if ended:
             return
 
 
 @merged
-def iterate(w: LaneTables, log: Log, live: bool) -> bool:
+def iterate(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
     """Tries a step in all lanes; whether a simulation has ended."""
-    clock, robot, forces = w.clock, w.robot, w.forces
-    state, end, ended = w.step.state, w.step.end, False
+    clock, ended = walk.clock, False
     if any_lane((clock[STATUS] == WALKING) & (clock[TIME] >= clock[MARK])):
         if not live:
-            run_ahead(w, log, clock[TIME])
-        ended = pass_marks(w, log, live)
+            run_ahead(constants, walk, log, clock[TIME])
+        ended = pass_marks(constants, walk, log, live)
     walks = clock[STATUS] == WALKING
-    move_robot(robot, state, forces)
-    update_modes(state, forces.nodes, robot.ground, forces.frames, w.modes)
-    compute_forces(robot, w.modes, w.signals, True, forces, w.step.force)
-    observe(
-        w.tally,
-        robot.cables,
-        robot.ground.contacts,
-        clock[TIME],
-        w.signals,
-        forces.pulls,
-        forces.pushes,
-    )
-    step = select(walks, aim(w), 0.0)
+
+    arrive(constants, walk)
+    step = select(walks, aim(constants, walk), 0.0)
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
-    if live:
-        feel(w, log, clock[TIME], state)
-        predict_neurons(w.network, w.inputs, step, w.neurons)
-        drive(w)
-    else:
-        run_ahead(w, log, step_end)
-        for lane in range(log.kept.size):
-            interpolate(w, log, lane, by_lane(clock)[END, lane], by_lane(w.end_signals))
-    error = take_step(robot, w.step, w.modes, forces, w.end_signals, step, live)
+    foresee_signals(constants, walk, log, live)
+    error = take_step(
+        constants.robot, walk.step, walk.modes, walk.forces, walk.end_signals, step, live
+    )
 
-    accepted = walks & (error <= w.tolerance[0])
+    accepted = walks & (error <= constants.tolerance[0])
     if live:
-        feel(w, log, step_end, end)
-        correct_neurons(w.network, w.inputs, step, accepted, w.neurons)
-        drive(w)
+        feel(constants, walk, log, step_end, walk.step.end)
+        correct_neurons(constants.network, walk.inputs, step, accepted, walk.neurons)
+        drive(constants, walk)
     if any_lane(accepted & (clock[DUE] <= step_end)):
-        clock[FLAG] = select(accepted, 1.0, 0.0)
-        keep_samples(w, log, live)
-    for i in range(state.size):
-        state[i] = select(accepted, end[i], state[i])
-    for k in range(w.signals.size):
-        w.signals[k] = select(accepted, w.end_signals[k], w.signals[k])
-    clock[TIME] = select(accepted, step_end, clock[TIME])
-    clock[TRIED] += select(walks, 1.0, 0.0)
-    clock[TAKEN] += select(accepted, 1.0, 0.0)
-    clock[STEP] = next_step(error, step, w.tolerance[0], w.max_step[0])
-    status = select(walks, fate(w), clock[STATUS])
+        clock[ACCEPTED] = select(accepted, 1.0, 0.0)
+        keep_samples(constants, walk, log, live)
+    move_on(walk, walks, accepted)
+    clock[STEP] = next_step(error, step, constants.tolerance[0], constants.max_step[0])
+
+    status = select(walks, fate(constants, walk), clock[STATUS])
     ended |= any_lane(status != clock[STATUS])
     clock[STATUS] = status
     return ended
 
 
+@inlined
+def arrive(constants: Constants, walk: Walk) -> None:
+    """Brings the modes up to date with the state, computes its forces and tallies them."""
+    robot, forces, state = constants.robot, walk.forces, walk.step.state
+    move_robot(robot, state, forces)
+    update_modes(state, forces.nodes, robot.ground, forces.frames, walk.modes)
+    compute_forces(robot, walk.modes, walk.signals, True, forces, walk.step.force)
+    observe(
+        walk.tally,
+        robot.cables,
+        robot.ground.contacts,
+        walk.clock[TIME],
+        walk.signals,
+        forces.pulls,
+        forces.pushes,
+    )
+
+
+@inlined
+def foresee_signals(constants: Constants, walk: Walk, log: Log, live: bool) -> None:
+    """Writes the signals at the end of the step: the listing's, or a prediction of a live
+    network's."""
+    clock = walk.clock
+    if live:
+        feel(constants, walk, log, clock[TIME], walk.step.state)
+        predict_neurons(constants.network, walk.inputs, clock[STEP], walk.neurons)
+        drive(constants, walk)
+        return
+    run_ahead(constants, walk, log, clock[END])
+    for lane in range(log.kept.size):
+        end = by_lane(clock)[END, lane]
+        interpolate(constants, walk, log, lane, end, by_lane(walk.end_signals))
+
+
+@inlined
+def move_on(walk: Walk, walks: Truth, accepted: Truth) -> None:
+    """Makes the end of the step the state where it is accepted."""
+    clock, state = walk.clock, walk.step.state
+    for i in range(state.size):
+        state[i] = select(accepted, walk.step.end[i], state[i])
+    for k in range(walk.signals.size):
+        walk.signals[k] = select(accepted, walk.end_signals[k], walk.signals[k])
+    clock[TIME] = select(accepted, clock[END], clock[TIME])
+    clock[TRIED] += select(walks, 1.0, 0.0)
+    clock[TAKEN] += select(accepted, 1.0, 0.0)
+
+
 @merged
-def aim(w: LaneTables) -> Real:
+def aim(constants: Constants, walk: Walk) -> Real:
     """The step (s) to try: at most the planned one, to just after the next mode change if that is
     nearer, and to the next mark or half the way to it if that is near."""
-    robot, planned = w.robot, w.clock[STEP]
+    robot, clock = constants.robot, walk.clock
     per_moment, per_mass = 1.0 / robot.body.moment[0], 1.0 / robot.body.mass[0]
-    for body in range(w.acceleration.size // BLOCK):
+    for body in range(walk.acceleration.size // BLOCK):
         for j in range(BLOCK):
             i = BLOCK * body + j
-            w.acceleration[i] = w.step.force[i] * (per_moment if j < 3 else per_mass)
+            walk.acceleration[i] = walk.step.force[i] * (per_moment if j < 3 else per_mass)
+    planned = clock[STEP]
     change = time_to_mode_change(
-        w.step.state,
-        w.acceleration,
-        w.forces.nodes,
-        w.modes,
+        walk.step.state,
+        walk.acceleration,
+        walk.forces.nodes,
+        walk.modes,
         robot.ground,
-        w.forces.frames,
+        walk.forces.frames,
         planned,
     )
-    step = minimum(planned, AIM_FACTOR * change + w.look_ahead[0])
-    remaining = w.clock[MARK] - w.clock[TIME]
+    step = minimum(planned, AIM_FACTOR * change + constants.look_ahead[0])
+    remaining = clock[MARK] - clock[TIME]
     halved = select(2.0 * step > remaining, 0.5 * remaining, step)
     return select(step > remaining - LEAST_STEP, remaining, halved)
 
@@ -247,90 +284,100 @@ def next_step(error: Real, step: Real, tolerance: Real, max_step: Real) -> Real:
 
 
 @inlined
-def fate(w: LaneTables) -> Real:
+def fate(constants: Constants, walk: Walk) -> Real:
     """The status of each lane after a step, as if all were walking."""
-    state, speed = w.step.state, 0.0
+    state, speed = walk.step.state, 0.0
     bodies = state.size // 13
     for body in range(bodies):
         for k in range(3):
             speed = larger(speed, abs(state[7 * bodies + BLOCK * body + 3 + k]))
-    too_fast = (speed > w.max_speed[0]) | (speed != speed)
-    too_many = EVALUATIONS * w.clock[TRIED] > w.max_evaluations[0]
+    too_fast = (speed > constants.max_speed[0]) | (speed != speed)
+    too_many = EVALUATIONS * walk.clock[TRIED] > constants.max_evaluations[0]
     status = select(too_fast, 1.0 * TOO_FAST, 1.0 * WALKING)
-    status = select(w.clock[STEP] <= LEAST_STEP, 1.0 * STEP_TOO_SMALL, status)
+    status = select(walk.clock[STEP] <= LEAST_STEP, 1.0 * STEP_TOO_SMALL, status)
     return select(too_many, 1.0 * TOO_MANY_EVALUATIONS, status)
 
 
 @inlined
-def run_ahead(w: LaneTables, log: Log, until: Real) -> None:
+def run_ahead(constants: Constants, walk: Walk, log: Log, until: Real) -> None:
     """Lets the listing's networks run until every walking lane has the samples around a time (s).
 
     Others go along as far as there is room, so that few steps are taken for one lane alone.
     """
-    clock, period, floats = w.clock, w.period[0], by_lane(w.clock)
+    clock, period, floats = walk.clock, constants.period[0], by_lane(walk.clock)
     needed, room = until / period + 1.0, clock[TIME] / period + (log.recent.shape[1] - 1.0)
     grows = clock[STATUS] == WALKING
-    while any_lane(grows & (clock[SAMPLES] < w.samples[0]) & (clock[SAMPLES] <= needed)):
-        goes = grows & (clock[SAMPLES] < w.samples[0]) & (clock[SAMPLES] < room)
+    while any_lane(grows & (clock[SAMPLES] < constants.samples[0]) & (clock[SAMPLES] <= needed)):
+        goes = grows & (clock[SAMPLES] < constants.samples[0]) & (clock[SAMPLES] < room)
         step = select(goes, period, 0.0)
-        steer(w, log, clock[SAMPLES] + 0.5)
-        euler_step(w.network, w.tonic, step, w.neurons)
-        oscillator_output(w.neurons, w.output)
-        clock[FLAG] = select(goes, 1.0, 0.0)
+        steer(constants, walk, log, clock[SAMPLES] + 0.5)
+        euler_step(constants.network, walk.tonic, step, walk.neurons)
+        oscillator_output(walk.neurons, walk.output)
+        clock[GOES] = select(goes, 1.0, 0.0)
         for lane in range(log.kept.size):
-            if floats[FLAG, lane] != 0.0:
+            if floats[GOES, lane] != 0.0:
                 row = row_of(int(floats[SAMPLES, lane]), log)
-                for k in range(w.output.size):
-                    signal = by_lane(w.gain)[0, lane] * by_lane(w.output)[k, lane]
+                for k in range(walk.output.size):
+                    signal = by_lane(constants.gain)[0, lane] * by_lane(walk.output)[k, lane]
                     log.recent[lane, row, k] = signal
-        clock[SAMPLES] += clock[FLAG]
+        clock[SAMPLES] += clock[GOES]
 
 
 @inlined
-def feel(w: LaneTables, log: Log, time: Real, state: Table) -> None:
+def feel(constants: Constants, walk: Walk, log: Log, time: Real, state: Table) -> None:
     """Writes the inputs of a live network at a time (s), for a state and its forces."""
-    steer(w, log, time / w.period[0])
-    for i in range(w.lengths.size):
-        w.lengths[i] = w.forces.pulls[i, LENGTH]
-    for i in range(w.normal_forces.size):
-        w.normal_forces[i] = w.forces.pushes[i, 2]
-    sense(w.senses, w.gains, state, w.lengths, w.normal_forces, w.inputs)
-    for i in range(w.inputs.size):
-        w.inputs[i] += w.tonic[i]
+    steer(constants, walk, log, time / constants.period[0])
+    for i in range(walk.lengths.size):
+        walk.lengths[i] = walk.forces.pulls[i, LENGTH]
+    for i in range(walk.normal_forces.size):
+        walk.normal_forces[i] = walk.forces.pushes[i, NORMAL]
+    sense(constants.senses, constants.gains, state, walk.lengths, walk.normal_forces, walk.inputs)
+    for i in range(walk.inputs.size):
+        walk.inputs[i] += walk.tonic[i]
 
 
 @inlined
-def steer(w: LaneTables, log: Log, sample: Real) -> None:
+def steer(constants: Constants, walk: Walk, log: Log, sample: Real) -> None:
     """Writes the tonic input where the turns change; `sample` is a place between two of them."""
-    turns, floats = log.turns.shape[1], by_lane(w.clock)
+    turns, floats = log.turns.shape[1], by_lane(walk.clock)
     if turns == 1:
         return
-    w.clock[FLAG] = sample
+    walk.clock[PLACE] = sample
     for lane in range(log.kept.size):
-        i = max(0, min(int(floats[FLAG, lane]), turns - 2))
+        i = max(0, min(int(floats[PLACE, lane]), turns - 2))
         before, after = log.turns[lane, i], log.turns[lane, i + 1]
-        turn = before + (min(floats[FLAG, lane], turns - 1.0) - i) * (after - before)
-        for k in range(w.tonic.size):
-            external, side = by_lane(w.external_input)[0, lane], by_lane(w.sides)[k, lane]
-            by_lane(w.tonic)[k, lane] = steered_input(external, turn, side)
+        turn = before + (min(floats[PLACE, lane], turns - 1.0) - i) * (after - before)
+        for k in range(walk.tonic.size):
+            external, side = (
+                by_lane(constants.external_input)[0, lane],
+                by_lane(constants.sides)[k, lane],
+            )
+            by_lane(walk.tonic)[k, lane] = steered_input(external, turn, side)
 
 
 @inlined
-def drive(w: LaneTables) -> None:
+def drive(constants: Constants, walk: Walk) -> None:
     """Writes the signals at the end of the step, N, from a live network."""
-    oscillator_output(w.neurons, w.output)
-    for k in range(w.output.size):
-        w.end_signals[k] = select(w.clock[ACTIVE] != 0.0, w.gain[0] * w.output[k], 0.0)
+    oscillator_output(walk.neurons, walk.output)
+    for k in range(walk.output.size):
+        walk.end_signals[k] = select(
+            walk.clock[ACTIVE] != 0.0, constants.gain[0] * walk.output[k], 0.0
+        )
 
 
 @inlined
-def interpolate(w: LaneTables, log: Log, lane: int, time: float, signals: Table) -> None:
+def interpolate(
+    constants: Constants, walk: Walk, log: Log, lane: int, time: float, signals: Table
+) -> None:
     """Writes a lane's `signals`, (n, W) in N, at a time (s)."""
-    if by_lane(w.clock)[ACTIVE, lane] == 0.0:
+    if by_lane(walk.clock)[ACTIVE, lane] == 0.0:
         for k in range(signals.shape[0]):
             signals[k, lane] = 0.0
         return
-    place, last = time / by_lane(w.period)[0, lane], int(by_lane(w.samples)[0, lane]) - 1
+    place, last = (
+        time / by_lane(constants.period)[0, lane],
+        int(by_lane(constants.samples)[0, lane]) - 1,
+    )
     i = int(place)
     row, next_row = row_of(min(i, last), log), row_of(min(i + 1, last), log)
     for k in range(signals.shape[0]):
@@ -345,11 +392,11 @@ def row_of(sample: int, log: Log) -> int:
 
 
 @merged
-def pass_marks(w: LaneTables, log: Log, live: bool) -> bool:
+def pass_marks(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
     """Sets the next mark where one is reached, and the signals there; whether a simulation
     is done."""
-    clock, signals, done = by_lane(w.clock), by_lane(w.signals), False
-    oscillator_output(w.neurons, w.output)
+    clock, signals, done = by_lane(walk.clock), by_lane(walk.signals), False
+    oscillator_output(walk.neurons, walk.output)
     for lane in range(log.kept.size):
         if clock[STATUS, lane] != WALKING or clock[TIME, lane] < clock[MARK, lane]:
             continue
@@ -358,26 +405,31 @@ def pass_marks(w: LaneTables, log: Log, live: bool) -> bool:
         if clock[MARK, lane] == math.inf:
             clock[STATUS, lane] = DONE
             done = True
-        clock[ACTIVE, lane] = 1.0 if clock[TIME, lane] >= by_lane(w.start_up)[0, lane] else 0.0
+        clock[ACTIVE, lane] = (
+            1.0 if clock[TIME, lane] >= by_lane(constants.start_up)[0, lane] else 0.0
+        )
         if not live:
-            interpolate(w, log, lane, clock[TIME, lane], signals)
+            interpolate(constants, walk, log, lane, clock[TIME, lane], signals)
             continue
-        for k in range(w.output.size):
-            force = by_lane(w.gain)[0, lane] * by_lane(w.output)[k, lane]
+        for k in range(walk.output.size):
+            force = by_lane(constants.gain)[0, lane] * by_lane(walk.output)[k, lane]
             signals[k, lane] = clock[ACTIVE, lane] * force
     return done
 
 
 @merged
-def keep_samples(w: LaneTables, log: Log, live: bool) -> None:
-    """Keeps the samples that are due in the accepted step of each flagged lane."""
-    clock, modes, lanes = by_lane(w.clock), by_lane(w.modes), log.kept.size
-    signals = np.empty((w.signals.size, lanes))
+def keep_samples(constants: Constants, walk: Walk, log: Log, live: bool) -> None:
+    """Keeps the samples that are due in the accepted step of each lane that has one."""
+    clock, modes, lanes = by_lane(walk.clock), by_lane(walk.modes), log.kept.size
+    signals = np.empty((walk.signals.size, lanes))
     for lane in range(lanes):
-        while clock[FLAG, lane] != 0.0 and clock[DUE, lane] <= clock[END, lane]:
+        while clock[ACCEPTED, lane] != 0.0 and clock[DUE, lane] <= clock[END, lane]:
             i, due, step = log.kept[lane], clock[DUE, lane], clock[STEP, lane]
             part = 1.0 if due == clock[END, lane] else (due - clock[TIME, lane]) / step
-            before, after = column(by_lane(w.step.state), lane), column(by_lane(w.step.end), lane)
+            before, after = (
+                column(by_lane(walk.step.state), lane),
+                column(by_lane(walk.step.end), lane),
+            )
             state = interpolate_state(before, after, step, part)
             for k in range(state.size):
                 log.states[lane, i, k] = state[k]
@@ -385,9 +437,9 @@ def keep_samples(w: LaneTables, log: Log, live: bool) -> None:
                 for c in range(MODE_COLUMNS):
                     log.modes[lane, i, k, c] = modes[k, c, lane]
             if not live:
-                interpolate(w, log, lane, due, signals)
+                interpolate(constants, walk, log, lane, due, signals)
             for k in range(signals.shape[0]):
-                first, last = by_lane(w.signals)[k, lane], by_lane(w.end_signals)[k, lane]
+                first, last = by_lane(walk.signals)[k, lane], by_lane(walk.end_signals)[k, lane]
                 between = first + part * (last - first)
                 log.signals[lane, i, k] = between if live else signals[k, lane]
             log.kept[lane] = i + 1
