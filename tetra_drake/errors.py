@@ -42,7 +42,7 @@ class SimulationFailure(RuntimeError):
     """A simulation ended before its duration: `time` (s) says when, `reason` why."""
 
     wall_time = 0.0
-    """What the simulation cost, in s, where the engine says it."""
+    """Wall time of the simulation in s, if the engine says it."""
 
     def __init__(self, *, time: float, reason: str) -> None:
         self.time = time
@@ -71,4 +71,4 @@ class TimeBudgetExceeded(Exception):
     divergence."""
 
     wall_time = 0.0
-    """As of SimulationFailure."""
+    """Wall time of the simulation in s, if the engine says it."""

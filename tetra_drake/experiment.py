@@ -129,7 +129,7 @@ def evolve(
 
 
 def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
-    """What begins: scenario, size, method, and where the results will be."""
+    """Introduction of a run: scenario, size, method, and where the results will be."""
     scenario, method = manifest.scenario, manifest.method
     among = scenario.disturbances
     draws = f", each gait among {among.draws} draws of disturbances" if among else ""

@@ -1,4 +1,4 @@
-"""How well runs search: the best of their trials against what they cost, side by side.
+"""Comparison of searches: the best of their trials against their cost.
 
 Costs are numbers of simulations: an evaluation has one in each draw of disturbances.
 """
@@ -32,10 +32,10 @@ _SEARCH = ("evolution", "optimizer")
 
 @dataclass(frozen=True)
 class Compared:
-    """What compare() has found. Fitness is what all runs maximise, so it is what is compared."""
+    """Result of compare(). All runs maximise fitness, so fitness is compared."""
 
     common: int
-    """Where the run with the least cost ends."""
+    """Cost at which the cheapest run ends."""
     reach: float | None
     """The distance (m) to be reached by the fittest gait so far."""
     trials: pandas.DataFrame
@@ -52,7 +52,7 @@ class Compared:
     mean and its 95 % confidence interval); reached_low, reached and reached_high (quartiles over
     trials), share (of trials that reach it); wall_time (s, mean per evaluation)."""
     notes: list[str]
-    """What else than search differs, or is not done."""
+    """Notes on differences other than search, and on unfinished runs."""
 
 
 def compare(
@@ -106,13 +106,13 @@ def compare(
 
 @dataclass(frozen=True)
 class _Trial:
-    """What a trial had found after each of its evaluations, arrays of equal length."""
+    """Course of a trial, after each of its evaluations; arrays of equal length."""
 
     costs: npt.NDArray[np.int64]
     best: npt.NDArray[np.float64]
     """Fitness, -inf until there is one."""
     distance: npt.NDArray[np.float64]
-    """Of the fittest so far, in m."""
+    """Distance (m) of the fittest gait so far."""
     ended: bool
 
     def at(self, cost: npt.ArrayLike) -> Any:
@@ -142,12 +142,12 @@ def _trials(run: Run, cost: int) -> dict[int, _Trial]:
 
 
 def _rises(best: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-    """Where the best so far is a new one, as the first always is."""
+    """Indices at which the best gait so far is a new one, as the first always is."""
     return np.r_[True, best[1:] > best[:-1]]
 
 
 def _end(trials: Mapping[int, _Trial]) -> int:
-    """Where a run's curve ends."""
+    """Cost at which a run's curve ends."""
     going_on = [int(trial.costs[-1]) for trial in trials.values() if not trial.ended]
     return min(going_on) if going_on else max(int(t.costs[-1]) for t in trials.values())
 
@@ -165,7 +165,7 @@ def _curve(trials: Mapping[int, _Trial], end: int) -> pandas.DataFrame:
 
 
 def _quartiles(values: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float64]]:
-    """Of each column (or of one). Unlike those of numpy, of infinite values, too."""
+    """Quantiles of each column (or of one), of infinite values, too."""
     ordered = np.sort(values, axis=0)
     places = [share * (len(values) - 1) for share in QUARTILES]
     around = [(ordered[math.floor(p)], ordered[math.ceil(p)], p % 1.0) for p in places]
@@ -201,7 +201,7 @@ def _labelled(runs: Sequence[Run]) -> dict[str, Run]:
 
 
 def _differences(runs: Mapping[str, Run]) -> list[str]:
-    """What differs from the first run beside search; InputError where the objective does."""
+    """Differences from the first run beside search; InputError where the objective differs."""
     (first, base), *others = runs.items()
     notes = []
     for label, run in others:

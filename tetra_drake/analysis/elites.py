@@ -32,7 +32,7 @@ CELLS = ["cell_1", "cell_2"]
 _KEY = ["trial", "index"]
 _JUDGED = ["kept", "mean_distance"]
 _EPSILON = 1e-6
-"""What pyribs adds against rounding."""
+"""Number that pyribs adds against rounding."""
 
 
 def elites(run: Run) -> pandas.DataFrame:
@@ -56,7 +56,7 @@ def elites(run: Run) -> pandas.DataFrame:
 
 
 def cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> list[npt.NDArray[np.int64]]:
-    """For each of the two measures, the numbers of the cells of gaits, as pyribs has them."""
+    """Cell numbers of gaits along each of the two measures, as pyribs has them."""
     return [
         np.clip((count * (gaits[name] - low) + _EPSILON) / (high - low), 0, count - 1)
         .to_numpy()
@@ -101,7 +101,7 @@ def robust(gaits: pandas.DataFrame) -> pandas.DataFrame:
 
 
 def chosen(run: Run) -> dict[str, pandas.Series]:
-    """By name, the fittest of the robust elites and those nearest to the corners of the map."""
+    """Fittest of the robust elites and those nearest to the corners of the map, by name."""
     gaits, kind = robust(elites(run)), run.manifest.scenario.optimizer
     if not isinstance(kind, QualityDiversity) or gaits.empty:
         return {}
@@ -109,7 +109,7 @@ def chosen(run: Run) -> dict[str, pandas.Series]:
 
 
 def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, pandas.Series]:
-    """By the corners' names, the gaits whose cells are nearest to them."""
+    """Gaits whose cells are nearest to the corners, by the corners' names."""
     named = {}
     for corner in itertools.product((0, 1), repeat=2):
         sides = zip(corner, kind.measures, strict=True)

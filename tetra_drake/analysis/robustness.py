@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 NOTHING, ALL = "nothing", "all"
 START, TERRAIN = "displaced start", "terrain seed"
-"""What is changed, beside keys of the scenario's spreads."""
+"""Names of changes beside the keys of the scenario's spreads."""
 
 SPREAD = (
     *("robot.spacing", "friction.stiction_range", "friction.stiction_damping"),
@@ -50,7 +50,7 @@ QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
 
 @dataclass(frozen=True)
 class Judgement:
-    """What judge() has simulated.
+    """Simulations of judge().
 
     All tables have the columns gait (its key), failure (None where there is none), missed (the
     scenario's requirements that are not met), fitness and the metrics (distance ...) in SI, NaN
@@ -58,7 +58,7 @@ class Judgement:
     """
 
     scenario: Scenario
-    """With the disturbances that the draws are of."""
+    """Scenario with the disturbances of the draws."""
     seed: int
     undisturbed: pandas.DataFrame
     """A row per gait."""
@@ -77,8 +77,7 @@ class Judgement:
 
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
-    """Those that spread each key of SPREAD that the scenario has, and displace starts, by so many
-    percent."""
+    """Default disturbances: so many percent for the keys of SPREAD in the scenario, and for starts."""
     share = percent / 100.0
     return Disturbances(
         draws=1,

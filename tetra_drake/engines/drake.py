@@ -101,7 +101,7 @@ def MakeSimulator(diagram: Diagram, settings: Drake) -> Simulator:
 
 
 class _Work:
-    """What an integrator has done, including what it forgets when it is initialised again."""
+    """Work of an integrator, including what it forgets when it is initialised again."""
 
     def __init__(self, integrator: IntegratorBase) -> None:
         self._integrator = integrator

@@ -43,7 +43,7 @@ Array = np.ndarray
 INSTALL = 'pip install "mujoco>=3.13"'
 
 _IMPEDANCE = 0.5
-"""Of contacts. Nothing at rest depends on it, nor do converged distances by more than 0.01 in;
+"""Damping of contacts. Nothing at rest depends on it, nor do converged distances by over 0.01 in;
 with a smaller one friction chatters in steps beyond 0.06 ms, with a larger one errors grow."""
 
 _POINT = 1e-5  # radius (m) of the spheres that touch the floor, which acts on the nodes' centres
@@ -57,10 +57,10 @@ _OBSERVED = 8  # steps from one observation to the next: with the default step, 
 _GAITS = 8  # for each thread at a time; each takes some 10 MB, mostly for a stretch of states
 
 INTEGRATOR = "implicitfast"
-"""Of MuJoCo."""
+"""Integrator of MuJoCo."""
 
 MAX_SPEED = 1.0
-"""Of a body (m/s), less than in other engines. Too long a step throws a robot about for ever,
+"""Top speed of a body (m/s), less than in other engines. Too long a step throws a robot about,
 at times far forward; a walking robot stays below 0.2 m/s."""
 
 
@@ -125,7 +125,7 @@ def simulate_in_rollouts(
 
 
 def installed() -> bool:
-    """Whether there is a MuJoCo with rollouts."""
+    """True if a MuJoCo with rollouts is installed."""
     try:
         from mujoco.rollout import Rollout  # noqa: F401
     except ImportError:
@@ -217,7 +217,7 @@ class _Simulator:
             observer.add(step * (first + chosen[k] + 1), state, signals[at])
 
     def _failure(self, states: Array, first: int) -> Diverged | None:
-        """How the states after step `first` and the next ones tell that a simulation failed."""
+        """Failure that the states after step `first` and the next ones show, if any."""
         step = self._robot.scenario.settings_of(Mujoco).step
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
         fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= MAX_SPEED)
@@ -319,7 +319,7 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
 
 
 def _contact(robot: Robot) -> dict:
-    """How the floor acts on a node."""
+    """Contact settings of the floor."""
     ground, law = robot.scenario.ground, robot.scenario.friction
     if isinstance(law, Coulomb):
         friction, stiction_damping = law.kinetic, law.damping

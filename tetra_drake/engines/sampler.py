@@ -14,7 +14,7 @@ from tetra_drake.results.trajectory import Motion
 
 
 class Sample(NamedTuple):
-    """What the context of a diagram holds at one time (s)."""
+    """Content of a diagram's context at one time (s)."""
 
     time: float
     continuous: np.ndarray

@@ -11,7 +11,7 @@ from contextvars import ContextVar
 from tetra_drake.errors import TimeBudgetExceeded
 
 _deadline = ContextVar("deadline", default=(math.inf, math.inf))
-"""By time.perf_counter(), and what it was at first (s)."""
+"""Deadline by time.perf_counter(), and the budget (s)."""
 
 
 @contextlib.contextmanager

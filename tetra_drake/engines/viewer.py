@@ -15,7 +15,7 @@ class Viewer(Protocol):
     """Someone who watches a simulation as it runs."""
 
     def wants(self, time: float) -> bool:
-        """Whether to be shown the state at this time (s)."""
+        """True if the viewer wants the state at this time (s)."""
 
     def show(self, frame: xarray.Dataset) -> None:
         """Takes one sample of a trajectory (see results.trajectory.make_dataset)."""

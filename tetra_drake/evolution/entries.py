@@ -67,7 +67,7 @@ def read_entries(path: Path, *, checksums: bool = False) -> list[dict[str, Any]]
 
 
 def _problem(entry: dict[str, Any], kind: type[_Line]) -> str:
-    """What is wrong with the values of an entry; "" if nothing is."""
+    """Problem with the values of an entry; "" if there is none."""
     try:
         kind.model_validate(entry)
     except ValidationError as error:
@@ -127,6 +127,6 @@ class _Elite(_Line):
 
 
 _KINDS: dict[str, type[_Line]] = {ITERATIONS: _Iteration, ELITES: _Elite}
-"""By file; the lines of the other files are evaluations."""
+"""Models of lines by file; the lines of other files are evaluations."""
 _COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
 """The key that counts the lines of a file."""

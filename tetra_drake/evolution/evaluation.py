@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from tetra_drake.engines.compiled.lane_pool import LanePool
 
 Objective = Callable[[SimulationResult], float]
-"""What evolution maximises; the result has no trajectory. -inf or NaN counts as a failure."""
+"""Function of a result that evolution maximises, without trajectory. -inf or NaN is a failure."""
 
 _SEEDS_KEPT = 32
-"""Of the seeds whose draws are kept: more than there are vectors under way."""
+"""Number of seeds whose draws are kept: more than there are vectors under way."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class GaitEvaluation:
     objective: Objective | None = None
     """None for the scenario's own."""
     lanes: LanePool | None = None
-    """Where many threads that evaluate have their gaits simulated side by side."""
+    """Lane pool that simulates the gaits of many threads side by side."""
 
     def __call__(self, task: Vector | SeededVector) -> Evaluation:
         """Fitness and metrics of one vector, or the reason of a failure; of one with a seed, those
@@ -135,7 +135,7 @@ class GaitEvaluation:
     def _evaluation(
         self, scenario: Scenario, simulation: Callable[[], SimulationResult]
     ) -> Evaluation:
-        """What a simulation says of its gait."""
+        """Evaluation of a gait by its simulation."""
         try:
             result = simulation()
         except (SimulationFailure, TimeBudgetExceeded) as error:

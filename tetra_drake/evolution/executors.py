@@ -134,10 +134,10 @@ class EvaluationPool(Generic[JobT]):
         self._executor = executor(workers)
         self._queue: deque[tuple[JobT, Any]] = deque()
         self._suspects: deque[tuple[JobT, Any]] = deque()
-        """What was under way when a worker died."""
+        """Tasks that were under way when a worker died."""
         self._running: dict[Future[list[Evaluation]], list[tuple[JobT, Any]]] = {}
         self._proven = False
-        """Whether any task has succeeded."""
+        """True if any task has succeeded."""
         self._held: list[tuple[JobT, Evaluation]] = []
 
     def __enter__(self) -> EvaluationPool[JobT]:
@@ -152,7 +152,7 @@ class EvaluationPool(Generic[JobT]):
 
     @property
     def busy(self) -> bool:
-        """Whether anything is under way or waiting."""
+        """True if anything is under way or waiting."""
         return any((self._running, self._queue, self._suspects))
 
     def submit(self, job: JobT, task: object) -> None:
@@ -160,7 +160,7 @@ class EvaluationPool(Generic[JobT]):
         self._queue.append((job, task))
 
     def wait(self, timeout: float | None = None) -> list[tuple[JobT, Evaluation]]:
-        """Whatever has been evaluated, as soon as there is something or time (s) is up."""
+        """Evaluations that are done, as soon as there is one or time (s) is up."""
         if self._suspects and not self._running:
             evaluated = self._try_suspect()
         else:
@@ -207,7 +207,7 @@ class EvaluationPool(Generic[JobT]):
         return evaluated
 
     def _chunk_size(self) -> int:
-        """How many tasks the next idle worker gets: its share of those that wait, but not more than
+        """Number of tasks for the next idle worker: its share of those that wait, but not more than
         are fast side by side; 0 if none is idle."""
         idle = getattr(self._make_executor, "workers", self._workers) - len(self._running)
         if idle <= 0:
@@ -243,14 +243,14 @@ class EvaluationPool(Generic[JobT]):
 def _evaluate_chunk(
     evaluate: Callable[[Any], Evaluation], tasks: Sequence[Any]
 ) -> list[Evaluation]:
-    """What a worker does."""
+    """Task of a worker."""
     if hasattr(evaluate, "many"):
         return evaluate.many(tasks)
     return [evaluate(task) for task in tasks]
 
 
 def _is_death(error: BaseException | None) -> bool:
-    """Whether a worker died: one of Python's or MPI's, with its executor, or one of Dask's."""
+    """True if a worker died: one of Python's or MPI's, with its executor, or one of Dask's."""
     if isinstance(error, BrokenExecutor):
         return True
     dask = sys.modules.get("distributed")

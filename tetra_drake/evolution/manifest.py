@@ -77,14 +77,14 @@ class Method:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What defines a run."""
+    """Definition of a run."""
 
     scenario: Scenario
     seed: int
     versions: Mapping[str, str]
     method: Method
     thinned: bool = False
-    """Whether most genomes were left out, as in the runs recorded beside the package."""
+    """True if most genomes were left out, as in the runs recorded beside the package."""
 
     def gait(self, vector: Vector, *, trial: int, index: int) -> Gait:
         """The gait of a recorded evaluation."""
@@ -93,7 +93,7 @@ class Manifest:
         return dataclasses.replace(gait, scenario=self.scenario.name)
 
     def task(self, vector: Vector, *, trial: int, iteration: int) -> Vector | SeededVector:
-        """What the evaluation of a vector is given: the seed of its draws, too, among
+        """Task that evaluates a vector, with the seed of its draws among
         disturbances."""
         if self.scenario.disturbances is None:
             return vector
@@ -160,7 +160,7 @@ def _sha256(text: str) -> str:
 
 
 def _name(given: object) -> str:
-    """What a function, a class or an instance is called: with its module, unless that is of this
+    """Name of a function, class or instance, with its module, unless that is of this
     package, and with the fields of a user's dataclass."""
     kind: Any = given if isinstance(given, (type, types.FunctionType)) else type(given)
     module = kind.__module__ or "__main__"  # code that was executed from a text has none

@@ -68,7 +68,7 @@ def evaluate_again(
 
 
 def best_distances(run: Run) -> list[tuple[int, float, float]]:
-    """For each trial, the distances (in) of its fittest gait: recorded, and on the diagram; NaN
+    """Distances (in) of the fittest gait of each trial: recorded, and on the diagram; NaN
     where there is none."""
     key = ["trial", "index"]
     again = run.reevaluations.set_index(key)["distance_in"].to_dict()

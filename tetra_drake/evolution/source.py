@@ -1,4 +1,4 @@
-"""Where the gaits that a command simulates come from: a gait file, or the folder of a run."""
+"""Sources of gaits for commands: a gait file, or the folder of a run."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class GaitSource:
 
     scenario: Scenario
     best: Gait
-    """That of the file, or the run's best."""
+    """Gait of the file, or the run's best."""
     gaits: dict[str, Gait]
-    """By the name of the file, or by trial: the best gait of each."""
+    """Gaits by the name of the file, or the best gait of each trial."""
 
 
 def load_source(

@@ -57,7 +57,7 @@ class TrialStatus:
     best_fitness: float = -math.inf
     best_distance_in: float = math.nan
     mean_fitness: float = math.nan
-    """Of the population; NaN where the optimiser reports none."""
+    """Mean fitness of the population; NaN if the optimiser reports none."""
     initial_best_distance_in: float = math.nan
     initial_mean_fitness: float = math.nan
     stop: str | None = None
@@ -103,7 +103,7 @@ class Trial:
     ) -> None:
         self.status = TrialStatus(number, optimizer.evaluations_at_most)
         self.unevaluated: dict[int, Vector] = {}
-        """What has to be evaluated before the optimiser can go on, by number; empty at the end."""
+        """Vectors to evaluate before the optimiser can go on, by number; empty at the end."""
         self.recalled: tuple[int, Vector | SeededVector, Evaluation] | None = None
         """Number, task and evaluation of the first recorded gait with a fitness."""
         self._manifest = manifest
@@ -118,7 +118,7 @@ class Trial:
 
     @property
     def tasks(self) -> dict[int, Vector | SeededVector]:
-        """What the evaluations of `unevaluated` are given."""
+        """Tasks for the vectors of `unevaluated`."""
         return {index: self._task(vector) for index, vector in self.unevaluated.items()}
 
     def _task(self, vector: Vector) -> Vector | SeededVector:

@@ -19,10 +19,10 @@ class Evaluation:
 
     fitness: float
     metrics: Mapping[str, Any] = field(default_factory=dict)
-    """As Metrics.to_json() gives them."""
+    """Metrics in the form of Metrics.to_json()."""
     failure: str | None = None
     wall_time: float = 0.0
-    """What it cost, in s; of simulations side by side on a core, its share of that core's time."""
+    """Wall time in s; for simulations side by side on a core, its share of that core's time."""
     engine: str = ""
     draws: Mapping[str, Sequence[float]] | None = None
     """Among disturbances, fitness and distance (m) of each draw."""
@@ -40,14 +40,14 @@ pickle to run in worker processes."""
 
 @dataclass(frozen=True)
 class Iteration:
-    """What an optimiser did with the evaluations it was told."""
+    """Iteration of an optimiser: its report on the evaluations it was told."""
 
     report: Mapping[str, Any]
     """Numbers to record with the iteration, by the optimiser's own names; None where unknown."""
     stop: str | None = None
     """Why the optimisation ends here; None while it goes on."""
     placed: tuple[int | None, ...] | None = None
-    """For each vector of the batch its index in the population, None if it was dropped; None for
+    """Index in the population of each vector of the batch, None if it was dropped; None for
     an optimiser without a population."""
 
 

@@ -1,4 +1,4 @@
-"""What optimisers that go on until their evaluations are used up have in common."""
+"""Common parts of optimisers that go on until their evaluations are used up."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tetra_drake.scenario.settings import EvolutionSection
 Matrix = npt.NDArray[np.float64]
 
 MIDDLE = 0.5
-"""Of a range, in its units."""
+"""Middle of a range, in units of the range."""
 
 
 class Ranges:
@@ -71,7 +71,7 @@ class Generational:
         self._ranges = Ranges(space)
         self._left = evolution.evaluations
         self._points: Matrix = np.empty((0, self._ranges.size))
-        """Those drawn last."""
+        """Points drawn last."""
 
     @property
     def evaluations_at_most(self) -> int:
@@ -108,5 +108,5 @@ class Generational:
         """Takes the fitnesses of all points drawn last, all finite."""
 
     def _state(self) -> Mapping[str, Any]:
-        """What to report besides."""
+        """State of the search, for the report."""
         return {}

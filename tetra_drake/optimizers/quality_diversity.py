@@ -28,7 +28,7 @@ BATCH = 15
 """Vectors of each emitter in an iteration."""
 
 SIGMA = 0.5
-"""As of CMA-ES; starts are random gaits and, where one begins anew, gaits of the map."""
+"""Standard deviation at the start; starts are random gaits, later gaits of the map."""
 
 
 class QualityDiversity(Generational):
@@ -52,7 +52,7 @@ class QualityDiversity(Generational):
         super().__init__(space, evolution, generator)
         self._settings = settings = settings or kinds.QualityDiversity()
         self._roots: Matrix = np.empty((0, self._ranges.size))
-        """Those drawn last; see Ranges.from_roots()."""
+        """Roots of the points drawn last; see Ranges.from_roots()."""
         self._told: dict[str, Any] = {}
         self._added: dict[str, Any] = {}
         self._archive = GridArchive(

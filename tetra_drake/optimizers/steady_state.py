@@ -174,7 +174,7 @@ def mean_fitness(fitnesses: Fitnesses) -> float:
 
 
 def has_levelled_off(means: Sequence[float], *, rise: float, window: int, after: int) -> bool:
-    """Whether the mean fitness rose by less than `rise` in the last `window` iterations, and
+    """True if the mean fitness rose by less than `rise` in the last `window` iterations, and
     iteration `after` is over; `means` begins with iteration 0."""
     iteration = len(means) - 1
     long_enough = iteration > after and iteration >= window

@@ -44,8 +44,8 @@ def least_strut_distance(nodes: Table, least: Real) -> Real:
 
 @inlined
 def room_between(nodes: Table, first: int, second: int) -> tuple[Real, Real, Real]:
-    """How far the second tetrahedron begins behind the base, and behind all nodes, of the first
-    along the vector between their centres, times its length; and its square."""
+    """Distances along the vector between two centres, times its length, at which the second
+    tetrahedron begins behind the base, and behind all nodes, of the first; and its square."""
     u_x = u_y = u_z = 0.0
     for k in range(CORNERS):
         u_x += nodes[second + k, P_WN] - nodes[first + k, P_WN]

@@ -105,7 +105,7 @@ def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
 def sliding(
     nodes: Table, modes: Table, ground: Ground, law: NormalForce, frames: Table, i: int
 ) -> tuple[Slide, Real]:
-    """How a contact node slides, and the rate (m/s) at which its gap grows."""
+    """Sliding of a contact node, and the rate (m/s) at which its gap grows."""
     node, flat = ground.contacts[i], ground.flat
     v_x, v_y, v_z = nodes[node, V_WN], nodes[node, V_WN + 1], nodes[node, V_WN + 2]
     x = nodes[node, P_WN] - modes[i, STICK_POINT]

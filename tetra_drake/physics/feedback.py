@@ -21,7 +21,7 @@ from tetra_drake.simd.lanes import Table
 
 
 class Senses(NamedTuple):
-    """What m oscillators can sense."""
+    """Constants of what m oscillators can sense."""
 
     drivers: Table
     """(cables,): the oscillator that drives each cable, PASSIVE if none does."""

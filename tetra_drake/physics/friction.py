@@ -37,7 +37,7 @@ class Slide(NamedTuple):
     velocity: Pair
     """m/s."""
     deflection: Pair
-    """From the stick point, m."""
+    """Deflection from the stick point, m."""
     mode: Pair
     heading: Pair
     """Direction in which the node's body pointed at touchdown, a unit vector."""
@@ -126,7 +126,7 @@ class CoulombConstants(NamedTuple):
     static: Real
     kinetic: Real
     stiffness: Real
-    """Of the bristle, as is the damping."""
+    """Stiffness of the bristle."""
     damping: Real
     per_forward: Real
     per_backward: Real
@@ -134,19 +134,19 @@ class CoulombConstants(NamedTuple):
 
 
 class Pull(NamedTuple):
-    """What pulls at a node's bristle: u = c v, in stick + k x."""
+    """Pull at a node's bristle: u = c v, in stick + k x."""
 
     u: Pair
     """N."""
     size: Real
-    """Of u, N: its length where friction is the same in all directions."""
+    """Size of u, N: its length where friction is the same in all directions."""
     limit: Real
-    """Of the size, mu F_N."""
+    """Limit of the size, mu F_N."""
 
 
 @inlined
 def sticks(mode: Pair) -> Truth:
-    """Whether a mode of Coulomb friction sticks."""
+    """True if a mode of Coulomb friction sticks."""
     return (mode[0] == STICK) & (mode[1] == STICK)
 
 
@@ -283,7 +283,7 @@ def friction_damping(slide: Slide, time: Real, friction: FrictionLaw) -> tuple[R
 
 @inlined
 def stuck_along(mode: Pair, friction: FrictionLaw) -> tuple[Truth, Truth]:
-    """Whether a mode sticks along each tangent."""
+    """True along each tangent on which a mode sticks."""
     if friction.kind == COULOMB:
         return sticks(mode), sticks(mode)
     return mode[0] == STICK, mode[1] == STICK

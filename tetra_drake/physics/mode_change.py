@@ -90,7 +90,7 @@ def next_mode_change(
     frames: Array,
     horizon: float,
 ) -> tuple[bool, float]:
-    """Whether a mode is due to change in a state of the bodies, and the time (s) to the next change
+    """Mode change that is due in a state of the bodies, and the time (s) to the next change
     after that, as time_to_mode_change() predicts it.
 
     Writes `nodes` and `frames`, and brings `modes` up to date.

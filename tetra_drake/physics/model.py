@@ -12,11 +12,11 @@ JUNCTION_CABLES = 6
 
 
 class Body(NamedTuple):
-    """What all bodies have in common; SI units. Each a table of one."""
+    """Constants of all bodies; SI units. Each a table of one."""
 
     mass: Table
     moment: Table
-    """Of inertia, about any axis through the centre of mass."""
+    """Moment of inertia about any axis through the centre of mass."""
     radius: Table
     """Distance of the nodes from the centre of mass."""
     gravity: Table

@@ -32,10 +32,10 @@ GAP, N_X, N_Y, N_Z, T1_X, T1_Y, T1_Z, T2_Y, T2_Z, FRAME_COLUMNS = range(10)
 
 
 class SurfaceGrid(NamedTuple):
-    """Where the control points of a surface are; SI units."""
+    """Grid of the control points of a surface; SI units."""
 
     corner_x: Real
-    """Of the first control point, as is `corner_y`."""
+    """Position of the first control point, with `corner_y`."""
     corner_y: Real
     per_cell_x: Real
     per_cell_y: Real

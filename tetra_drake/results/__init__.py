@@ -1,1 +1,1 @@
-"""What one simulation gives: metrics, trajectory, result folder."""
+"""Results of one simulation: metrics and trajectory."""

@@ -90,7 +90,7 @@ def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
 
 
 def travelling_index(waves: np.ndarray) -> float:
-    """How far waves (samples, places) travel along the places: 0 if they stand, 1 if they travel.
+    """Travelling index of waves (samples, places): 0 if they stand, 1 if they travel.
 
     Of the strongest complex orthogonal mode, the ratio of the singular values of its real and
     imaginary parts (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Evenly sampled.

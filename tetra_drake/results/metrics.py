@@ -108,7 +108,7 @@ def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
 
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:
-    """Of each metric that is less than its required SI value, or NaN: name, value and limit, as
+    """Metrics below their required SI values, or NaN: name, value and limit, as
     "clearance is 0.05 in, less than 0.125 in"."""
     texts = []
     for name, least in require.items():

@@ -17,7 +17,7 @@ _SWAY = 2e-3
 
 @dataclass(frozen=True)
 class CentrePath:
-    """Where the robot's centre was, the mean of its bodies' origins, and where it headed."""
+    """Path of the robot's centre, the mean of its bodies' origins, and its heading."""
 
     times: np.ndarray
     """(k,): in s, ascending."""

@@ -35,7 +35,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class IntegratorWork:
-    """What the integrator was asked for and what that took."""
+    """Integrator settings and cost."""
 
     scheme: str
     accuracy: float
@@ -48,7 +48,7 @@ class IntegratorWork:
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """What simulate() returns."""
+    """Result of simulate()."""
 
     metrics: Metrics
     fitness: float
@@ -58,9 +58,9 @@ class SimulationResult:
     """Time from the start of the integration to its end, in s; building is not in it."""
     integrator: IntegratorWork
     engine: str
-    """That of the scenario."""
+    """Name of the scenario's engine."""
     path: CentrePath = field(repr=False, compare=False)
-    """Of the robot's centre from start to end, in steps of results.path.PERIOD."""
+    """Path of the robot's centre from start to end, in steps of results.path.PERIOD."""
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
     """See results.trajectory.make_dataset; None unless asked for."""
 

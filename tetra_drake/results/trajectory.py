@@ -125,7 +125,7 @@ def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
-    """By coordinate, but for the time, its dimension and its values."""
+    """Dimension and values of each coordinate but the time."""
     oscillators = structure.actuation.names
     driving = ["" if i == PASSIVE else oscillators[i] for i in structure.cables["signal"]]
     contacts = [structure.node_names[node] for node in structure.contacts]

@@ -13,7 +13,7 @@ from tetra_drake.scenario.cable_names import CABLES, SIDES, mirrored
 from tetra_drake.scenario.schema import Scenario
 
 KINDS = "extensor", "flexor"
-"""Of neurons, by their number modulo 2."""
+"""Kinds of neurons, by their number modulo 2."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Actuation:
     names: tuple[str, ...]
     """Such as "T1-T2", or "T1-T2 outer bottom_left" where a junction has several groups."""
     cables: tuple[str, ...]
-    """Those that each drives, such as "T1-T2 outer bottom_left + outer bottom_right"."""
+    """Cables of each oscillator, such as "T1-T2 outer bottom_left + outer bottom_right"."""
     drivers: np.ndarray
     """(cables,): the oscillator that drives each cable of the robot, PASSIVE if none does."""
     junctions: np.ndarray
@@ -45,7 +45,7 @@ class Actuation:
     @classmethod
     @functools.lru_cache(maxsize=8)  # as draws of disturbances leave it as it is
     def _of(cls, groups: tuple[tuple[str, ...], ...], count: int, reach: int | None) -> Self:
-        """Of so many junctions."""
+        """Oscillators of so many junctions."""
         from tetra_drake.physics.cable import PASSIVE  # numba, which no optimiser needs
 
         junctions = np.repeat(np.arange(count), len(groups))

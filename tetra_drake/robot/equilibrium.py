@@ -1,4 +1,4 @@
-"""How a robot rests on flat ground while its cables are not actuated."""
+"""Equilibrium of a robot on flat ground while its cables are not actuated."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ TOLERANCE = 1e-11
 
 ITERATIONS = 1000
 FIRST_REACH, LONGEST_REACH = 0.05, 0.2
-"""How far a step of Newton's method may take a body, as a share of its radius."""
+"""Largest step of Newton's method for a body, as a share of its radius."""
 
 OVERSHOOT = 0.9
 """A step is too long if the forces work against it at its end by more than this share of the work
 they began with."""
 
 DIFFERENCE = 1e-7
-"""Of finite differences: how far a body moves, as a share of its radius."""
+"""Displacement in finite differences, as a share of a body's radius."""
 
 LEAST_STIFFNESS = 1e-9
-"""Of a motion for it to count as stable, as a share of the ground's stiffness."""
+"""Least stiffness of a stable mode, as a share of the ground's stiffness."""
 
 LENGTH_DIGITS = 9
 """Digits of a settled length (m) behind the point. What follows depends on the processor, as the
@@ -78,7 +78,7 @@ class Resting(NamedTuple):
 
 
 def find_rest(model: Model, start: np.ndarray) -> Rest | None:
-    """Where a robot on flat ground, let go at `start` (13 n,) without actuation, comes to rest:
+    """Rest of a robot on flat ground, let go at `start` (13 n,) without actuation:
     the minimum of potential energy downhill from there; friction carries nothing. None if it is
     not found."""
     robot, state = Resting.of(model, len(start) // 13), start

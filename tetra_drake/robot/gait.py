@@ -47,18 +47,18 @@ class Gait:
 
     name: str
     weights: tuple[float, ...]
-    """In the order of Actuation.couplings, which is the listing's (B.2)."""
+    """Weights in the order of Actuation.couplings, which is the listing's (B.2)."""
     tau_a: float
     tau_b: float
-    """In s."""
+    """Time constant of self-inhibition, in s."""
     turn: float = 0.0
-    """From -1 to 1: the input of oscillators is u0 (1 + turn) on the left, u0 (1 - turn) on the
+    """Turn from -1 to 1: oscillators have the input u0 (1 + turn) on the left, u0 (1 - turn) on the
     right."""
     gains: Gains = field(default_factory=Gains)
     scenario: str = field(default="", compare=False)
     """Name of the scenario that the gait was made for; "" if that is not known."""
     weight_names: tuple[str, ...] = field(default=(), repr=False, compare=False)
-    """As "3->1 extensor": from oscillator 3 onto oscillator 1. Empty where they are not known."""
+    """Names such as "3->1 extensor": from oscillator 3 onto oscillator 1. Empty if unknown."""
 
     def __str__(self) -> str:
         """A table of the parameters; the weights as a matrix for each kind of neuron."""
@@ -105,22 +105,22 @@ class ParameterSpace:
     scenario has them, tau_A, tau_B (s)."""
 
     names: tuple[str, ...]
-    """As "weight 3->1 extensor", "gain length", "tau_A", "tau_B"."""
+    """Names such as "weight 3->1 extensor", "gain length", "tau_A", "tau_B"."""
     low: Vector
     high: Vector
     """Bounds of random gaits (Table 5)."""
     floors: Vector
     """A parameter reduced by mutation must stay above this (listing A.3.3, A.3.4)."""
     couples_tau_b: bool
-    """Whether tau_B is kept at 2 tau_A."""
+    """True if tau_B is kept at 2 tau_A."""
     weights: npt.NDArray[np.int64]
     """(weights of a gait,): the parameter that is each weight, or its mirror image."""
     weight_names: tuple[str, ...]
     """(weights of a gait,): their names in gait files."""
     pathways: tuple[str, ...]
-    """Those with a gain."""
+    """Pathways with a gain."""
     turn: float
-    """That of all gaits."""
+    """Turn of all gaits."""
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
@@ -221,7 +221,7 @@ class GaitFile(Section):
     name: str = ""
     scenario: str = ""
     weights: dict[str, Weight] | list[Weight]
-    """By Actuation.weight_names, in any order; a list, which schema 1 has, in their order."""
+    """Weights by Actuation.weight_names, in any order; a list, as in schema 1, in their order."""
     tau_a_s: float = Field(gt=0)
     tau_b_s: float | None = Field(default=None, gt=0)
     turn: float = Field(default=0.0, ge=-1, le=1)
@@ -254,7 +254,7 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
 
 
 def _read_file(path: str | Path, key: str) -> GaitFile:
-    """What a gait file holds, or a JSON file under `key`."""
+    """Content of a gait file, or of a JSON file under `key`."""
     text = read_text(path, "gait file")
     try:
         raw = json.loads(text, object_pairs_hook=_unique_keys)

@@ -28,7 +28,7 @@ from tetra_drake.scenario.terrain_kinds import Flat, Grid
 from tetra_drake.scenario.units import INCH
 
 STEP_AHEAD = 1.0 * INCH
-"""From the robot's foremost contact node to a terrain that begins ahead of it."""
+"""Distance from the robot's foremost contact node to a terrain that begins ahead of it."""
 
 START_DEPTH = 1e-6
 """Depth (m) in the ground from which on a node counts as placed there by mistake."""

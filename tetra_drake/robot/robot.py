@@ -68,7 +68,7 @@ class Robot:
 
     @functools.cached_property
     def rest(self) -> Rest:
-        """How the robot rests on flat ground without actuation, whatever the scenario's terrain and
+        """Rest of the robot on flat ground without actuation, whatever the scenario's terrain and
         offsets; raises InputError if it finds no rest."""
         undisturbed = self.scenario.robot.model_copy(update={"offsets": []})
         robot = Robot.of(self.scenario.with_sections(terrain=Flat(), robot=undisturbed))
@@ -81,7 +81,7 @@ class Robot:
 
     @functools.cached_property
     def senses(self) -> Senses:
-        """What the oscillators can sense; raises InputError if the robot finds no rest."""
+        """Constants of what the oscillators sense; raises InputError if the robot finds no rest."""
         drivers, pathways = self.actuation.drivers, self.scenario.cpg.feedback
         sizes = np.bincount(drivers[drivers != PASSIVE])[drivers]  # cables of each cable's group
         settled = self.rest.lengths if "length" in pathways else np.ones(len(drivers))

@@ -23,7 +23,7 @@ class Draw:
     """The changes of one draw."""
 
     factors: Mapping[str, float]
-    """By the keys of `disturbances.spreads`."""
+    """Factors by the keys of `disturbances.spreads`."""
     moves: np.ndarray | None = None
     """(n, 3): the displacement of each tetrahedron at t = 0, in m."""
     terrain_seed: int | None = None

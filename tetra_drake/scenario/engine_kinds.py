@@ -23,7 +23,7 @@ class Drake(Section):
     mode_changes: Literal["step_end", "witness"] = "step_end"
     """`witness` needs short steps, as of runge_kutta3."""
     look_ahead: float = quantity("s", default=2e-5, ge=0)
-    """With step_end and radau3: shortest step that ends at a predicted mode change; 0 for none."""
+    """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none."""
 
 
 class Compiled(Section):

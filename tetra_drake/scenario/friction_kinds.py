@@ -35,7 +35,7 @@ class ResetIntegrator(Section):
     """sigma_0."""
 
     def law(self) -> FrictionLaw:
-        """As kernels take it."""
+        """Law as the kernels take it."""
         from tetra_drake.physics.friction import FrictionLaw, ResetConstants
 
         return FrictionLaw.reset_integrator(ResetConstants(**dict(self)))
@@ -75,7 +75,7 @@ class Coulomb(Section):
         return self
 
     def law(self) -> FrictionLaw:
-        """As kernels take it."""
+        """Law as the kernels take it."""
         from tetra_drake.physics.friction import CoulombConstants, FrictionLaw
 
         return FrictionLaw.coulomb(

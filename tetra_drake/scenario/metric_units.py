@@ -26,7 +26,7 @@ def _metric(unit: str, definition: str, *, least: bool = False) -> Any:
 
 @dataclass(frozen=True)
 class Metrics:
-    """How a robot walked, each number in the SI unit of its field's metadata.
+    """Metrics of a simulation, each number in the SI unit of its field's metadata.
 
     x₁ and y₁ are those of T1's bottom left node, x₂ is that of its bottom right node, x₃ that of
     the lead tetrahedron's tip. The steady stretch is from `simulation.steady_from`, or from
@@ -75,11 +75,11 @@ class Metrics:
         "is overlap",
         least=True,
     )
-    """Of all times. Nothing in the model keeps struts apart."""
+    """Minimum over all times. Nothing in the model keeps struts apart."""
     tension: float = _metric(
         "N", "least tension of any cable; below 0 it would have to push", least=True
     )
-    """Of all times."""
+    """Minimum over all times."""
     travelling_index: float = _metric(
         "", "0 if the signals stand along the robot, 1 if they travel, in the steady stretch"
     )

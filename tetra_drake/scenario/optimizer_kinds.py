@@ -77,7 +77,7 @@ class QualityDiversity(Section):
     cells: list[Count] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)
-    """In the end, each gait of the map is simulated in as many draws of disturbances."""
+    """Draws of disturbances in which each gait of the map is simulated in the end."""
 
     @model_validator(mode="after")
     def _check(self) -> "QualityDiversity":

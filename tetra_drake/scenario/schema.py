@@ -62,7 +62,7 @@ class Scenario(Section):
     simulation: SimulationSection
     engine: Engine = Drake()
     objective: dict[str, float] = named_quantities({k: inverse(u) for k, u in METRICS.items()})
-    """What evolution maximises: the sum of metrics times these weights, such as `speed: 2 s/in`.
+    """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
     require: dict[str, float] = named_quantities(METRICS, default={})
     """Least values of metrics: a gait with less counts as failed. Replaced as a whole."""
@@ -82,7 +82,7 @@ class Scenario(Section):
 
     @property
     def tree(self) -> Tree:
-        """What a complete file of this scenario holds, in the units in which it was written."""
+        """Content of a complete file of this scenario, in the units in which it was written."""
         return self._tree or tree_of(self)
 
     @property

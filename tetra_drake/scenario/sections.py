@@ -69,7 +69,7 @@ class Section(BaseModel):
 
     @classmethod
     def _advice(cls, name: str) -> str:
-        """What an unknown key may have been meant for: a key of a section, or a similar one."""
+        """Advice on an unknown key: a key of a section, or a similar one."""
         sections = {key: members(field.annotation) for key, field in keys_of(cls).items()}
         keys = [
             f"'{key}.{name}'"
@@ -150,7 +150,7 @@ def members(annotation: Any) -> list[Any]:
 
 
 def is_section(kind: Any) -> bool:
-    """Whether a type is a section."""
+    """True if a type is a section."""
     return isinstance(kind, type) and issubclass(kind, Section)
 
 
@@ -282,7 +282,7 @@ def described(value: Any) -> str:
 
 
 def hint(name: Any, known: Iterable[str]) -> str:
-    """What a misspelt name may have been meant for."""
+    """Advice on a misspelt name."""
     names = list(known)
     close = difflib.get_close_matches(str(name), names, n=1)
     if close:

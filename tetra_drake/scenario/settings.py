@@ -97,7 +97,7 @@ class CpgSection(Section):
     reach: int | None = Field(default=None, ge=0)
     """Oscillators of junctions at most so far apart inhibit each other; all if not given."""
     feedback: list[Pathway] = Field(default=[])
-    """What is fed back, by gains that are parameters of the gait."""
+    """Pathways of feedback; their gains are parameters of the gait."""
 
     @model_validator(mode="after")
     def _check(self) -> CpgSection:
@@ -107,7 +107,7 @@ class CpgSection(Section):
 
 
 class GaitBounds(Section):
-    """Where random gaits are drawn from (Table 5). Equal bounds fix a parameter."""
+    """Bounds of random gaits (Table 5). Equal bounds fix a parameter."""
 
     weight_min: float = Field(ge=0)
     weight_max: float = Field(ge=0)
@@ -116,9 +116,9 @@ class GaitBounds(Section):
     turn: float = Field(default=0.0, ge=-1, le=1)
     """The turn of all gaits that are drawn or evolved."""
     mirrored: bool = False
-    """Whether weights are drawn and evolved in pairs, left and right alike."""
+    """True if weights are drawn and evolved in pairs, left and right alike."""
     independent_tau_b: bool = False
-    """Whether tau_B evolves by itself instead of staying at 2 tau_A."""
+    """True if tau_B evolves by itself instead of staying at 2 tau_A."""
 
     @model_validator(mode="after")
     def _check(self) -> GaitBounds:
@@ -132,7 +132,7 @@ class GaitBounds(Section):
 
 
 class SimulationSection(Section):
-    """How long to simulate and when to give up."""
+    """Duration of a simulation, and when to give up."""
 
     duration: float = quantity("s", gt=0, le=1e5)
     steady_from: float = quantity("s", ge=0)
@@ -151,7 +151,7 @@ class SimulationSection(Section):
 
 
 class EvolutionSection(Section):
-    """How much is evolved, by any optimiser."""
+    """Amount of evolution, for any optimiser."""
 
     trials: int = Field(ge=1, le=1000)
     evaluations: int = Field(ge=1)
@@ -173,7 +173,7 @@ class Disturbances(Section):
 
     draws: int = Field(ge=1, le=10_000)
     spreads: dict[str, Spread] = Field(default={})
-    """By scenario keys: each draw multiplies the number by 1 + up to +-spread, uniformly. Keys
+    """Spreads by scenario keys: each draw multiplies the number by 1 + up to +-spread. Keys
     joined by commas get the same factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)
     """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing, forward or

@@ -22,7 +22,7 @@ from tetra_drake.scenario.sections import Kinds, Section, quantity
 from tetra_drake.scenario.units import INCH
 
 BEHIND, AHEAD, ASIDE = 24.0 * INCH, 120.0 * INCH, 30.0 * INCH
-"""What generated grids cover at least, m from the origin."""
+"""Reach of generated grids, m from the origin at least."""
 MOST_CELLS = 4_000_000
 STEEPEST = math.radians(60.0)
 
@@ -195,7 +195,7 @@ Terrain = Annotated[Flat | Incline | Steps | Rough | Obstacles | HeightField, Ki
 
 
 def _read_heights(file: str, source: object) -> np.ndarray:
-    """What a file holds, as floats of any shape."""
+    """Content of a height file, as floats of any shape."""
     try:
         content = read_bytes(file, "height file")
         if file.endswith(".npy"):

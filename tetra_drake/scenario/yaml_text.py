@@ -12,7 +12,7 @@ from tetra_drake.scenario.sections import TAG, Tree
 
 
 def parse_yaml(content: str, source: object) -> Any:
-    """What YAML text holds; raises InputError if it is not YAML."""
+    """Content of YAML text; raises InputError if it is not YAML."""
     try:
         return yaml.load(content, _Loader)
     except yaml.MarkedYAMLError as error:

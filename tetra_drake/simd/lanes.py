@@ -86,7 +86,7 @@ class Lanes(types.Type):
         super().__init__(name=f"{type(self).__name__}({width})")
 
     def accepts(self, other: types.Type) -> bool:
-        """Whether a scalar of this type stands for the same value in every lane."""
+        """True if a scalar of this type stands for the same value in every lane."""
         return isinstance(other, (types.Float, types.Integer))
 
     def can_convert_from(self, context: Any, other: types.Type) -> Conversion | None:
@@ -101,7 +101,7 @@ class Mask(Lanes):
     scalar: Any = types.boolean
 
     def accepts(self, other: types.Type) -> bool:
-        """Whether a scalar of this type stands for the same value in every lane."""
+        """True if a scalar of this type stands for the same value in every lane."""
         return isinstance(other, types.Boolean)
 
 
@@ -307,7 +307,7 @@ overload(gather)(
 
 
 def any_lane(mask: Truth) -> bool:
-    """Whether the mask is true in any lane."""
+    """True if the mask is true in any lane."""
     return mask
 
 
@@ -452,7 +452,7 @@ def _place(context: Any, builder: Any, kind: Field, value: Any, index: Any) -> A
 
 
 def _index_kind(kind: types.Type, index: Any) -> types.Type | None:
-    """What the index is cast to; None if it is not one for a number of a field."""
+    """Type of a cast index; None if it is not one for a number of a field."""
     if not isinstance(kind, Field):
         return None
     count, is_tuple = len(kind.lengths), isinstance(index, types.BaseTuple)

@@ -11,7 +11,7 @@ from tetra_drake.robot.robot import Robot
 
 
 class Feedback(LeafSystem):
-    """What the oscillators sense of the robot (see physics.feedback); no state.
+    """Feedback that the oscillators sense (see physics.feedback); no state.
 
     | port          | shape        | unit | meaning                                          |
     |---------------|--------------|------|--------------------------------------------------|

@@ -82,7 +82,7 @@ class GroundContact(LeafSystem):
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
     ) -> tuple[bool, float]:
-        """Whether a mode will change if a step ends here, and the predicted time (s) from here to
+        """Mode change due if a step ends here, and the predicted time (s) from here to
         the next change after that, at most `horizon` (s).
 
         `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.

@@ -1,1 +1,1 @@
-"""The same robot without Drake, compiled end to end: equations of motion, integration."""
+"""Compiled engine: equations of motion and integration without Drake."""

@@ -243,7 +243,7 @@ def add_diagonal(
 def add_off_diagonal(
     nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], rows: Table
 ) -> None:
-    """The same for the symmetric matrix of k_xy, k_xz and k_yz."""
+    """Product with the symmetric matrix of k_xy, k_xz and k_yz."""
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     xy, xz, yz = k
     # The rows of [p]x K.

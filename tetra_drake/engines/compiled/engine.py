@@ -1,4 +1,4 @@
-"""From a gait to its result through the compiled engine."""
+"""Simulation of one gait on the compiled engine."""
 
 from __future__ import annotations
 

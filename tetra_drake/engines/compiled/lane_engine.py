@@ -51,7 +51,7 @@ from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
 FIRST = SurfaceGrid._fields.index("first")
-"""Where a grid has the index of its first height: those of all lanes stand in one row."""
+"""Column of a grid with the index of its first height: those of all lanes stand in one row."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class PreparedGait:
     gait: Gait
     record: bool
     steering: SteeringSignal | None
-    """In place of the gait's turn."""
+    """Steering signal, in place of the gait's turn."""
     times: np.ndarray
     """The times (s) of the samples to keep, those of motion_times()."""
     marks: np.ndarray
@@ -91,7 +91,7 @@ class PreparedGait:
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What simulations that share an engine must have in common."""
+        """Properties that simulations on one engine must share."""
         scenario, ground = self.robot.scenario, self.robot.ground
         drivers = tuple(self.robot.actuation.drivers.tolist())
         return (
@@ -106,7 +106,7 @@ class PreparedGait:
 
     @property
     def live(self) -> bool:
-        """Whether the network is integrated with the robot."""
+        """True if the network is integrated with the robot."""
         return self.robot.scenario.cpg.signals == "live"
 
     @functools.cached_property
@@ -116,7 +116,7 @@ class PreparedGait:
 
     @property
     def recent_signals(self) -> int:
-        """How many samples of the signals an engine has to hold: those within a step, and as many
+        """Number of signal samples that an engine holds: those within a step, and as many
         for lanes that run ahead; a power of two."""
         scenario = self.robot.scenario
         within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
@@ -124,7 +124,7 @@ class PreparedGait:
 
     @property
     def turn_samples(self) -> int:
-        """How many samples of the turn an engine has to hold."""
+        """Number of samples of the turn that an engine holds."""
         if self.steering is None:
             return 1
         scenario = self.robot.scenario
@@ -142,14 +142,14 @@ class Course(NamedTuple):
     motion: Motion
     totals: Tally
     wall_time: float
-    """What it cost, in s: shared with the other lanes of the same core."""
+    """Wall time in s, shared with the other lanes of the same core."""
 
 
 class LaneEngine:
     """Simulates gaits of one kind in `width` lanes."""
 
     def __init__(self, first: PreparedGait, *, width: int) -> None:
-        """For gaits like the first; see `accepts`. Compiles the engine where that is not done."""
+        """Engine for gaits like the first; see `accepts`. Compiles it if that is not done."""
         self._kind = first.kind
         structure, points = first.robot.structure, first.robot.ground.heights.size
         self._bodies = len(structure.bodies)
@@ -187,7 +187,7 @@ class LaneEngine:
             self.stop(lane)
 
     def accepts(self, prepared: PreparedGait) -> bool:
-        """Whether a gait can be simulated: one like the first in structure and kind of signals,
+        """True if a gait can be simulated: one like the first in structure and kind of signals,
         and with no more to keep."""
         log = self._log
         return (

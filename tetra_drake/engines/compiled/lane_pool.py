@@ -75,7 +75,7 @@ class LanePool:
     def simulate(
         self, *, scenario: Scenario, gait: Gait, record: bool = False, time_budget: float = math.inf
     ) -> SimulationResult:
-        """As simulate(), while other threads ask for other gaits; the numbers are the same.
+        """Result of simulate() for a gait, while other threads ask for other gaits.
 
         Also raises TimeBudgetExceeded if a simulation is not done after `time_budget` (s).
         """
@@ -102,7 +102,7 @@ class LanePool:
         return [job.future for job in jobs]
 
     def _work(self) -> None:
-        """What each thread does: fills idle lanes, simulates, hands over what has ended."""
+        """Loop of a thread: fills idle lanes, simulates, hands over results."""
         crew = _Crew(self._robots)
         while (jobs := self._take(crew)) is not None:
             for job in jobs:
@@ -137,7 +137,7 @@ class _Robots:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._latest: dict[int, Robot] = {}
-        """By the scenario's identity, the one last used at the end."""
+        """Prepared gaits by the scenario's identity, the one last used at the end."""
 
     def __call__(self, scenario: Scenario) -> Robot:
         with self._lock:
@@ -153,11 +153,11 @@ class _Crew:
 
     def __init__(self, robots: _Robots) -> None:
         self.jobs: dict[int, _Job] = {}
-        """By lane."""
+        """Jobs by lane."""
         self._robots = robots
         self._engine: LaneEngine | None = None
         self._engines: dict[int, LaneEngine] = {}
-        """By width."""
+        """Engines by width."""
 
     @property
     def room(self) -> int:

@@ -71,7 +71,7 @@ all rows."""
 
 
 class Constants(NamedTuple):
-    """What several simulations are made of, in lanes: tables of one where nothing else is said, in
+    """Constants of several simulations, in lanes: tables of one where nothing else is said, in
     SI units."""
 
     robot: Model
@@ -85,11 +85,11 @@ class Constants(NamedTuple):
     gain: Table
     """Force per unit of an oscillator's output."""
     period: Table
-    """From one sample of the listing's signals, or of the turns, to the next."""
+    """Time (s) between samples of the listing's signals, or of the turns."""
     samples: Table
     """Number of samples of the listing's signals; the last one lasts."""
     start_up: Table
-    """From when on the signals act."""
+    """Time from which the signals act."""
     tolerance: Table
     max_step: Table
     look_ahead: Table
@@ -387,7 +387,7 @@ def interpolate(
 
 @inlined
 def row_of(sample: int, log: Log) -> int:
-    """Where a sample is among the recent ones: its number modulo theirs, a power of two."""
+    """Row of a sample among the recent ones: its number modulo theirs, a power of two."""
     return sample & (log.recent.shape[1] - 1)
 
 
