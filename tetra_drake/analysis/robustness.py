@@ -77,7 +77,7 @@ class Judgement:
 
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
-    """Default disturbances: so many percent for the keys of SPREAD in the scenario, and for starts."""
+    """Default disturbances: so many percent for keys of SPREAD in the scenario, and for starts."""
     share = percent / 100.0
     return Disturbances(
         draws=1,
