@@ -14,6 +14,7 @@ from tetra_drake.analysis.elites import elites
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.progress import Progress
+from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.optimizers import quality_diversity
 from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.scenario.load import load_scenario
@@ -94,6 +95,12 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     assert progress.shown[0] == 0 and progress.shown[-1] == 8
     assert progress.stages == [(done, 5) for done in range(6)]
     assert progress.warnings == []
+    # What is missing is evaluated again on the diagram, by the fitness of the scenario.
+    path = tmp_path / "run" / "trial_00" / "reevaluations.jsonl"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+    again = reevaluate(tmp_path / "run", executor=ThreadPoolExecutor).reevaluations
+    assert again["fitness"].equals(run.reevaluations["fitness"])
+    assert again["engine"].tolist() == ["drake"] * 5
     # A run that is complete is resumed without an engine.
     for name in ("GaitEvaluation.__call__", "prepare"):
         monkeypatch.delattr(f"tetra_drake.experiment.{name}")
@@ -160,6 +167,8 @@ def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
     assert whole.reevaluations.empty and reports == []
     assert whole.iterations["note"].tolist() == ["wide", "wide"]
     assert whole.manifest.method.objective == f'{__name__}.Heaviest {{"factor": 2.0}}'
+    with refused(whole.directory, "evaluate", "Heaviest"):
+        reevaluate(whole.directory)
 
     run = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
@@ -205,7 +214,7 @@ def test_no_record_holds_fitnesses_of_two_objectives_of_the_same_name(
         assert read_record(run) == recorded
 
     with pytest.raises(KeyboardInterrupt):
-        begin = {"objective": make_objective(2.0), "executor": interrupting}
+        begin = {"objective": make_objective(2.0), "executor": interrupting, "workers": 2}
         tetra_drake.evolve(tiny, run, **begin, **quick)
     refuse_others()
     tetra_drake.evolve(None, run, resume=True, objective=make_objective(2.0), **quick)
@@ -225,7 +234,7 @@ def test_the_scenarios_optimiser_is_used_and_recorded(tiny, tmp_path, refused):
 
 
 def test_the_gaits_of_a_map_are_simulated_on_disturbed_robots(tiny, tmp_path, monkeypatch):
-    monkeypatch.setattr("tetra_drake.experiment.evaluate_again", lambda *_, **__: None)
+    monkeypatch.setattr("tetra_drake.evolution.reevaluation.reevaluate", lambda *_, **__: None)
     monkeypatch.setattr(quality_diversity, "EMITTERS", 2)
     monkeypatch.setattr(quality_diversity, "BATCH", 2)
     monkeypatch.setattr(quality_diversity, "FLOOR", -1e3)
@@ -283,7 +292,7 @@ def test_the_command_runs_the_scenario_with_its_options(evolve, tmp_path, capsys
 def test_a_switch_leaves_out_the_diagram_at_the_end(evolve, tmp_path, monkeypatch):
     again = []
     monkeypatch.setattr(
-        "tetra_drake.experiment.evaluate_again", lambda out, *_, **__: again.append(out)
+        "tetra_drake.evolution.reevaluation.reevaluate", lambda out, *_, **__: again.append(out)
     )
     for name, options in (("run", ()), ("without", ("--no-reevaluate",))):
         assert evolve(*SMALL, "--engine", "compiled", "--out", tmp_path / name, *options) == 0

@@ -9,6 +9,7 @@ from tetra_drake.analysis.elites import judge_elites
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import check_scenario, prepare
 from tetra_drake.errors import InputError, SimulationFailure
+from tetra_drake.evolution import reevaluation
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import (
     EvaluationImpossible,
@@ -20,7 +21,6 @@ from tetra_drake.evolution.executors import (
 )
 from tetra_drake.evolution.manifest import FITNESS, Manifest, Method, read_manifest
 from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.reevaluation import evaluate_again, on_diagram
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
@@ -107,9 +107,9 @@ def evolve(
             )
         if reevaluate and scenario.engine_name != "drake":
             try:
-                evaluate_again(
+                reevaluation.reevaluate(
                     out,
-                    GaitEvaluation(on_diagram(scenario), objective),
+                    GaitEvaluation(reevaluation.on_diagram(scenario), objective),
                     workers=workers,
                     executor=executor or process_executor,
                     progress=progress,

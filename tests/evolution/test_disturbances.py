@@ -22,7 +22,7 @@ from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mean
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.reevaluation import evaluate_again
+from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.robot.robot import Robot
@@ -223,7 +223,7 @@ def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
 
 def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn):
     directory, evaluate = run_drawn(), DrawnBowl()
-    run = evaluate_again(directory, evaluate, workers=1, executor=ThreadPoolExecutor)
+    run = reevaluate(directory, evaluate, workers=1, executor=ThreadPoolExecutor)
     again = run.reevaluations.set_index(["trial", "index"])
     first = run.evaluations.set_index(["trial", "index"]).loc[again.index]
     assert len(again) == 2, "the best of each trial: 5 gaits would be 15 simulations"

@@ -8,7 +8,7 @@ import pytest
 from helpers.analytic import Bowl
 
 from tetra_drake.evolution.progress import Progress
-from tetra_drake.evolution.reevaluation import best_distances, evaluate_again
+from tetra_drake.evolution.reevaluation import best_distances, reevaluate
 from tetra_drake.evolution.run import load_run
 
 
@@ -25,7 +25,7 @@ class Slope:
 
 
 def again(directory, evaluate=None, **options):
-    return evaluate_again(
+    return reevaluate(
         directory, evaluate or Slope(), workers=2, executor=ThreadPoolExecutor, **options
     )
 

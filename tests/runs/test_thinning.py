@@ -13,7 +13,7 @@ from thinning import thin
 from tetra_drake.analysis.comparison import compare
 from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.json_lines import append_lines, read_lines
-from tetra_drake.evolution.reevaluation import BEST_GAITS, evaluate_again
+from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.source import load_source
@@ -117,7 +117,7 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
 
 def test_a_thinned_run_is_reevaluated_but_not_resumed(runs, refused):
     _, thinned = runs
-    again = evaluate_again(thinned.directory, Bowl(), executor=ThreadPoolExecutor)
+    again = reevaluate(thinned.directory, Bowl(), executor=ThreadPoolExecutor)
     assert len(again.reevaluations) == 1 + 2 * BEST_GAITS
     with refused(thinned.directory, "", "thinned"):
         RunRecord.resume(thinned.directory)

@@ -8,9 +8,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import REEVALUATIONS, evaluation_entry, trial_folder
+from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import MakeExecutor, evaluate_all, process_executor
 from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
+from tetra_drake.evolution.manifest import FITNESS
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.optimizers.base import Evaluate
@@ -28,9 +31,9 @@ def on_diagram(scenario: Scenario) -> Scenario:
     return scenario.with_changes({"engine": "!Drake"})
 
 
-def evaluate_again(
-    directory: Path,
-    evaluate: Evaluate,
+def reevaluate(
+    directory: str | Path,
+    evaluate: Evaluate | None = None,
     *,
     workers: int | None = None,
     executor: MakeExecutor = process_executor,
@@ -39,10 +42,16 @@ def evaluate_again(
     """Evaluates a run's best gaits once more, adds them to its record and returns it. Gaits that
     have been evaluated so already are skipped.
 
-    `evaluate` has the run's objective, and the caller its lock.
+    evaluate: by default the fitness of the run's scenario, on the Drake diagram.
+
+    Raises InputError if `evaluate` is needed, as the run has an objective of its own.
     """
     run = load_run(directory)
-    scenario = run.manifest.scenario
+    scenario, objective = run.manifest.scenario, run.manifest.method.objective
+    if evaluate is None:
+        if objective != FITNESS:
+            raise InputError(run.directory, "evaluate", f"is needed: the objective is {objective}")
+        evaluate = GaitEvaluation(on_diagram(scenario))
     for trial in range(scenario.evolution.trials):
         repair_torn_line(trial_folder(run.directory, trial) / REEVALUATIONS)
     done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
@@ -64,7 +73,7 @@ def evaluate_again(
         entry = evaluation_entry(index, iteration, vectors[i], evaluation)
         append_lines(trial_folder(run.directory, trial) / REEVALUATIONS, [entry])
         progress.stage(_TITLE, finished, len(missing))
-    return load_run(directory)
+    return load_run(run.directory)
 
 
 def best_distances(run: Run) -> list[tuple[int, float, float]]:
