@@ -50,9 +50,9 @@ def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = DIA
     save_block_diagram(diagram, out / "robot.svg")
 
     # Contact and stiction change where a step ends, so no step may be long.
-    simulator = Simulator(diagram)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 0.001)
-    sampler = Sampler(diagram, sample_times(duration, 0.01))
+    simulator, max_step = Simulator(diagram), 0.001
+    ResetIntegratorFromFlags(simulator, "runge_kutta3", max_step)
+    sampler = Sampler(diagram, sample_times(duration, 0.01), max_step=max_step)
     simulator.set_monitor(sampler.after_step)
     simulator.AdvanceTo(duration)
 

@@ -112,8 +112,9 @@ def test_recorded_lengths_and_forces_are_those_at_the_ports_of_the_diagram(scena
         scenario.with_changes({"robot.tetrahedra": 3, "cpg.start_up": "0 s"} | changes)
     )
     diagram = MakeTensegrityDiagram(robot, seeded_gait(robot.scenario))
-    simulator = MakeSimulator(diagram, robot.scenario.engine)
-    sampler, there = Sampler(diagram, np.array([0.05, 0.1])), []
+    engine, there = robot.scenario.engine, []
+    simulator = MakeSimulator(diagram, engine)
+    sampler = Sampler(diagram, np.array([0.05, 0.1]), max_step=engine.max_step)
 
     def after_step(context: Context) -> None:
         sampler.after_step(context)

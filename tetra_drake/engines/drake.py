@@ -45,7 +45,8 @@ def simulate_drake(
     signals, observer = diagram.GetOutputPort("signals"), Observer(robot)
     work = _Work(integrator)
     aimer = _StepAimer(diagram, simulator, engine, work)
-    sampler = Sampler(diagram, motion_times(settings, record=record))
+    times = motion_times(settings, record=record)
+    sampler = Sampler(diagram, times, max_step=engine.max_step)
 
     def after_step(context: Context) -> None:
         # What is done here must not depend on whether somebody records or watches.

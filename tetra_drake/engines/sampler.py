@@ -39,17 +39,23 @@ class Sampler:
     forces and lengths for later, so recording cannot change the simulation.
     """
 
-    def __init__(self, diagram: Diagram, times: np.ndarray) -> None:
+    def __init__(self, diagram: Diagram, times: np.ndarray, *, max_step: float) -> None:
+        """Samples at ascending `times` (s), where steps are at most `max_step` (s)."""
         self._diagram, self._times = diagram, times
+        self._ahead = 2.0 * max_step  # as Drake stretches a step that nearly reaches its end
         self._bodies = slice(diagram.GetOutputPort("state").size())
         self._samples: list[Sample] = []
         self._latest: Sample | None = None
 
     def after_step(self, context: Context) -> None:
         """Takes the samples that are due in the step that ends here."""
+        due = self._times[len(self._samples) :]
+        if due.size == 0 or due[0] > context.get_time() + self._ahead:
+            self._latest = None  # no sample needs the state of this time
+            return
         after = Sample.of(context)
         before, self._latest = self._latest or after, after
-        for time in self._times[len(self._samples) :]:
+        for time in due:
             if time > after.time:
                 return
             self._samples.append(self._between(before, after, float(time)))
