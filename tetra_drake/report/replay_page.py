@@ -6,11 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.source import load_source
 from tetra_drake.files import check_folder
 from tetra_drake.report.result_folder import (
     RESULT,
-    RUN_MANIFEST,
     GaitMotion,
     load_result_folder,
     simulate_gait,
@@ -54,7 +54,7 @@ def load_or_simulate(
     """
     if source.is_dir() and scenario is not None:
         raise InputError("--scenario", "", f"is for gait files; {source} has one of its own")
-    is_run = (source / RUN_MANIFEST).exists()
+    is_run = (source / MANIFEST).exists()
     if (source / RESULT).exists() and not is_run:
         return load_result_folder(source)
     if not source.is_file() and not is_run:

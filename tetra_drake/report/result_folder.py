@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import check_folder, read_text, write_whole
 from tetra_drake.results.metrics import headline
 from tetra_drake.results.trajectory import DIMENSIONS, labels
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 SCENARIO, TRAJECTORY = "scenario.yaml", "trajectory.nc"
 REPLAY, RESULT = "replay.html", "result.json"
-RUN_MANIFEST = "manifest.json"
-"""Marks the folder of a run, which has a scenario.yaml of its own."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def simulate_gait(scenario: Scenario, gait: Gait) -> GaitMotion:
 def check_result_folder(folder: Path) -> None:
     """Raises InputError if a simulation cannot write its files to `folder`."""
     check_folder(folder)
-    if (folder / RUN_MANIFEST).exists():
+    if (folder / MANIFEST).exists():
         raise InputError(folder, "", "holds a run of `evolve`, expected another folder")
 
 

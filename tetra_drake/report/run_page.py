@@ -11,13 +11,13 @@ import pandas
 from tetra_drake.analysis.elites import chosen, distinct_gaits, elites
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
-from tetra_drake.evolution.manifest import SCENARIO
+from tetra_drake.evolution.manifest import MANIFEST, SCENARIO
 from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, fixed, render
 from tetra_drake.machine import versions
 from tetra_drake.report.book import draw_run, draw_trajectory
-from tetra_drake.report.result_folder import RESULT, RUN_MANIFEST, load_result_folder
+from tetra_drake.report.result_folder import RESULT, load_result_folder
 from tetra_drake.report.study import Study, simulate_again, study_run
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
@@ -37,7 +37,7 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
     anew, too. Raises InputError.
     """
     folder = out or source / FIGURES
-    if (source / RUN_MANIFEST).exists():
+    if (source / MANIFEST).exists():
         check_folder(folder)
         if out is None:
             return write_report(source)
@@ -47,7 +47,7 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
         stored = load_result_folder(source)
         draw_trajectory(stored.trajectory, stored.scenario, folder)
     else:
-        problem = f"holds neither {RUN_MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
+        problem = f"holds neither {MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
         raise InputError(source, "", problem)
     return [folder]
 
