@@ -15,7 +15,7 @@ import contextlib
 import io
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -86,36 +86,19 @@ def show_instant(page: Page, time: float) -> None:
     )
 
 
-def film(page: Page) -> Iterator[Image.Image]:
-    """Frames of a replay page's motion, without the traces."""
-    _strip(page, traces=False)
-    for time in np.arange(START, min(page.evaluate("viewer.animator.duration"), END), STEP):
-        yield _shot(page, float(time))
-
-
-def end(page: Page) -> Image.Image:
-    """The end of a replay page's motion, with the traces."""
-    _strip(page, traces=True)
-    return _shot(page, page.evaluate("viewer.animator.duration"))
-
-
-def _strip(page: Page, *, traces: bool) -> None:
-    """Leaves only robot and floor of a page, on white, and the traces if they are wanted."""
+def shots(page: Page, times: Iterable[float], *, traces: bool) -> list[Image.Image]:
+    """Pictures of a replay page at times (s) of the motion: the robot and its floor on white, with
+    or without the traces."""
     page.add_style_tag(content="#heading, .dg { display: none !important }")
-    shown = {"Background": False, "forces": False, "traces": traces}
-    page.evaluate(
-        """shown => {
-            for (const [name, visible] of Object.entries(shown)) {
-                viewer.set_property([name], "visible", visible);
-            }
-        }""",
-        shown,
-    )
-
-
-def _shot(page: Page, time: float) -> Image.Image:
-    show_instant(page, time)
-    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    for name, shown in {"Background": False, "forces": False, "traces": traces}.items():
+        page.evaluate(
+            "([name, shown]) => viewer.set_property([name], 'visible', shown)", [name, shown]
+        )
+    images = []
+    for time in times:
+        show_instant(page, time)
+        images.append(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+    return images
 
 
 def save(images: Sequence[Image.Image], path: Path) -> None:
@@ -154,10 +137,7 @@ def _palette(image: Image.Image, count: int) -> Image.Image:
 
 
 def make_pictures(browser: Browser, replay: Path, files: Sequence[Path]) -> None:
-    """Writes pictures of a replay page, of kinds in LIMITS. Raises InputError."""
-    for file in files:
-        if file.suffix not in LIMITS:
-            raise InputError(file, "", f"expected a file that ends in {' or '.join(LIMITS)}")
+    """Writes pictures of a replay page, of kinds in LIMITS."""
     page = browser.new_page(
         viewport={"width": WIDTHS[0], "height": round(WIDTHS[0] / ASPECT)},
         device_scale_factor=SUPERSAMPLING,
@@ -165,8 +145,13 @@ def make_pictures(browser: Browser, replay: Path, files: Sequence[Path]) -> None
     with contextlib.closing(page):
         page.goto(replay.resolve().as_uri())
         wait_until_loaded(page)
+        duration = page.evaluate("viewer.animator.duration")
         for file in files:
-            save(list(film(page)) if file.suffix == ".gif" else [end(page)], file)
+            if file.suffix == ".gif":
+                times = np.arange(START, min(duration, END), STEP).tolist()
+                save(shots(page, times, traces=False), file)
+            else:
+                save(shots(page, [duration], traces=True), file)
 
 
 def main() -> None:
@@ -175,6 +160,9 @@ def main() -> None:
     parser.add_argument("replay", metavar="REPLAY.html", type=Path)
     parser.add_argument("files", metavar="FILE.gif|FILE.png", type=Path, nargs="+")
     options = parser.parse_args()
+    for file in options.files:
+        if file.suffix not in LIMITS:
+            parser.error(f"{file}: expected a file that ends in {' or '.join(LIMITS)}")
     with launch_browser() as browser:
         make_pictures(browser, options.replay, options.files)
 

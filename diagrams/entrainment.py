@@ -48,13 +48,20 @@ DURATION, TRANSIENT = 80.0, 50.0  # s
 STARTS = {"at rest": 0.0, "20 mm off": 0.02}  # of the mass, m
 
 
-def make_diagram(*, resonance: float, feedback: float) -> Diagram:
-    """The oscillator, a mass that resonates at a frequency in Hz, and feedback in 1/m."""
+def own_frequency() -> float:
+    """Frequency in Hz of the oscillator alone, by harmonic balance."""
+    square = ((TAU_A + TAU_B) * BETA - TAU_A * WEIGHT) / (TAU_A * WEIGHT)
+    return math.sqrt(square) / (2.0 * math.pi * TAU_B)
+
+
+def make_diagram(*, ratio: float, feedback: float) -> Diagram:
+    """The oscillator, a mass with the given ratio of resonance to the oscillator's own frequency,
+    and feedback in 1/m."""
     network = Network.of(
         [[0.0, WEIGHT], [WEIGHT, 0.0]], tau_a=TAU_A, tau_b=TAU_B, self_inhibition_weight=BETA
     )
     neurons = MatsuokaCpg(network, tonic=TONIC, initial_state=[0.3, 0.3, 0.1, 0.5], gain=GAIN)
-    omega = 2.0 * math.pi * resonance
+    omega = 2.0 * math.pi * (ratio * own_frequency())
     motion = np.array([[0.0, 1.0], [-(omega**2), -2.0 * DAMPING_RATIO * omega]])
     force = np.array([[0.0], [omega**2 / STIFFNESS]])
     spring = LinearSystem(A=motion, B=force, C=np.array([[1.0, 0.0]]), D=np.zeros((1, 1)))
@@ -72,9 +79,10 @@ def make_diagram(*, resonance: float, feedback: float) -> Diagram:
     return diagram
 
 
-def simulated_frequency(*, resonance: float, feedback: float, start: float = 0.0) -> float:
-    """Frequency of the oscillator in Hz, long after a start of the mass at some x (m)."""
-    diagram = make_diagram(resonance=resonance, feedback=feedback)
+def simulated_frequency(*, ratio: float, feedback: float, start: float = 0.0) -> float:
+    """Frequency of the loop over the oscillator's own, long after a start of the mass at some x (m)
+    by simulation."""
+    diagram = make_diagram(ratio=ratio, feedback=feedback)
     simulator = Simulator(diagram)
     context = simulator.get_context()
     mass = diagram.GetSubsystemByName("mass on a spring")
@@ -83,19 +91,14 @@ def simulated_frequency(*, resonance: float, feedback: float, start: float = 0.0
     simulator.AdvanceTo(DURATION)
     log = diagram.GetSubsystemByName("log").FindLog(context)
     late = log.sample_times() > TRANSIENT
-    return dominant_frequency(log.sample_times()[late], log.data()[0, late])
+    return dominant_frequency(log.sample_times()[late], log.data()[0, late]) / own_frequency()
 
 
-def own_frequency() -> float:
-    """Frequency in Hz of the oscillator alone, by harmonic balance."""
-    square = ((TAU_A + TAU_B) * BETA - TAU_A * WEIGHT) / (TAU_A * WEIGHT)
-    return math.sqrt(square) / (2.0 * math.pi * TAU_B)
-
-
-def balanced_frequencies(*, resonance: float, feedback: float) -> np.ndarray:
-    """All frequencies in Hz at which the loop can oscillate by harmonic balance, ascending."""
-    frequency = np.linspace(0.1, 4.0, 50_001) * own_frequency()
-    s, r = 2j * math.pi * frequency, frequency / resonance
+def balanced_frequencies(*, ratio: float, feedback: float) -> np.ndarray:
+    """All frequencies, over the oscillator's own, at which the loop can oscillate by harmonic
+    balance; ascending."""
+    frequency = np.linspace(0.1, 4.0, 50_001)
+    s, r = 2j * math.pi * own_frequency() * frequency, frequency / ratio
     follows = 1.0 / (1.0 - r**2 + 2j * DAMPING_RATIO * r)
     h = 2.0 * feedback * GAIN / STIFFNESS
     per_k = (WEIGHT - BETA / (1.0 + s * TAU_B) + h * follows) / (1.0 + s * TAU_A)
@@ -108,21 +111,19 @@ Points = tuple[np.ndarray, np.ndarray]
 
 
 def simulate_all(feedback: float, start: float) -> Points:
-    """Simulated frequencies for RATIOS of resonance to own frequency."""
-    alone = own_frequency()
+    """Simulated frequencies for RATIOS."""
     frequencies = [
-        simulated_frequency(resonance=ratio * alone, feedback=feedback, start=start) / alone
-        for ratio in RATIOS
+        simulated_frequency(ratio=ratio, feedback=feedback, start=start) for ratio in RATIOS
     ]
     return RATIOS, np.array(frequencies)
 
 
 def balance_all(feedback: float) -> Points:
     """Frequencies by harmonic balance, for ratios that lie closer."""
-    alone, points = own_frequency(), []
+    points = []
     for ratio in np.geomspace(RATIOS[0], RATIOS[-1], 200):
-        balanced = balanced_frequencies(resonance=ratio * alone, feedback=feedback) / alone
-        points += [(ratio, frequency) for frequency in balanced]
+        for frequency in balanced_frequencies(ratio=ratio, feedback=feedback):
+            points.append((ratio, frequency))
     ratios, frequencies = np.array(points).T
     return ratios, frequencies
 
@@ -154,10 +155,10 @@ def draw(theory: dict[float, Points], simulated: dict[tuple[float, str], Points]
 
 def main(out: Path = Path(__file__).parent) -> None:
     """Simulates the loops and writes the pictures."""
-    alone = own_frequency()
-    save_block_diagram(make_diagram(resonance=alone, feedback=FEEDBACK), out / "entrainment.svg")
-    simulated_alone = simulated_frequency(resonance=alone, feedback=0.0)
-    print(f"Without feedback: {simulated_alone:.3f} Hz (harmonic balance {alone:.3f} Hz)")
+    save_block_diagram(make_diagram(ratio=1.0, feedback=FEEDBACK), out / "entrainment.svg")
+    balanced = own_frequency()
+    simulated_alone = simulated_frequency(ratio=1.0, feedback=0.0) * balanced
+    print(f"Without feedback: {simulated_alone:.3f} Hz (harmonic balance {balanced:.3f} Hz)")
 
     feedbacks = FEEDBACK, -FEEDBACK
     theory = {feedback: balance_all(feedback) for feedback in feedbacks}

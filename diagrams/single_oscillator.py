@@ -86,16 +86,22 @@ def linear_frequency(
     return math.sqrt(stiffness - damping**2) / (2.0 * math.pi)
 
 
+def frequency_and_swing(times: np.ndarray, signal: np.ndarray) -> tuple[float, float]:
+    """Frequency (Hz) after the transient, and swing (lbf) at the end."""
+    late, end = times > TRANSIENT, times > times[-1] - TRANSIENT
+    frequency = dominant_frequency(times[late], signal[late])
+    return frequency, float(np.ptp(signal[end])) / POUND_FORCE
+
+
 @common_style()
-def draw(signals: dict[str, tuple[np.ndarray, np.ndarray]], title: str) -> Figure:
-    """A panel per signal, with its frequency after the transient and its swing at the end."""
-    rows = len(signals)
+def draw(diagrams: dict[str, Diagram], title: str) -> Figure:
+    """A panel for the signal of each diagram."""
+    rows = len(diagrams)
     height = 0.8 + 1.5 * rows
     figure, axes = make_figure(width_in=7, height_in=height, rows=rows, sharex=True, sharey=True)
-    for panel, (label, (times, signal)) in zip(axes[:, 0], signals.items(), strict=True):
-        late = times > TRANSIENT
-        frequency = dominant_frequency(times[late], signal[late])
-        swing = np.ptp(signal[times > times[-1] - TRANSIENT]) / POUND_FORCE
+    for panel, (label, diagram) in zip(axes[:, 0], diagrams.items(), strict=True):
+        times, signal = simulate(diagram)
+        frequency, swing = frequency_and_swing(times, signal)
         panel.plot(times, signal / POUND_FORCE)
         panel.set_title(f"{label}: {frequency:.2f} Hz, in the end {swing:.2f} lbf peak to peak")
         panel.set_ylabel("signal (lbf)")
@@ -109,18 +115,13 @@ def main(out: Path = Path(__file__).parent) -> None:
     scenario = load_scenario("thesis")
     save_block_diagram(make_diagram(scenario), out / "single_oscillator.svg")
 
-    by_weight = {
-        f"$w = {weight:g}$": simulate(make_diagram(scenario, weight=weight)) for weight in WEIGHTS
-    }
-    title = "Weight between the neurons of an oscillator (thesis Fig. 10)"
-    save_figure(draw(by_weight, title), out, "single_oscillator_weights", kinds=["svg"])
+    diagrams = {f"$w = {w:g}$": make_diagram(scenario, weight=w) for w in WEIGHTS}
+    figure = draw(diagrams, "Weight between the neurons of an oscillator (thesis Fig. 10)")
+    save_figure(figure, out, "single_oscillator_weights", kinds=["svg"])
 
-    by_ratio = {
-        rf"$\tau_B = {ratio:g}\,\tau_A$": simulate(make_diagram(scenario, ratio=ratio))
-        for ratio in RATIOS
-    }
-    title = "Time constants of an oscillator (thesis Fig. 9)"
-    save_figure(draw(by_ratio, title), out, "single_oscillator_time_constants", kinds=["svg"])
+    diagrams = {rf"$\tau_B = {r:g}\,\tau_A$": make_diagram(scenario, ratio=r) for r in RATIOS}
+    figure = draw(diagrams, "Time constants of an oscillator (thesis Fig. 9)")
+    save_figure(figure, out, "single_oscillator_time_constants", kinds=["svg"])
 
     ours = linear_frequency(scenario)
     print(f"tau_A = {TAU_A:g} s gives {ours:.3f} Hz; the thesis's {THESIS_FREQUENCY:g} Hz needs")

@@ -2,19 +2,18 @@
 
 import math
 
-import numpy as np
 import pytest
-from single_oscillator import THESIS_FREQUENCY, linear_frequency, make_diagram, simulate
-
-from tetra_drake.results.measures import dominant_frequency
-from tetra_drake.scenario.units import POUND_FORCE
+from single_oscillator import (
+    THESIS_FREQUENCY,
+    frequency_and_swing,
+    linear_frequency,
+    make_diagram,
+    simulate,
+)
 
 
 def oscillation(scenario, **parameters):
-    """Frequency in Hz and swing in lbf, after the transient."""
-    times, signal = simulate(make_diagram(scenario, **parameters), duration=25.0)
-    late, end = times > 5.0, times > 20.0
-    return dominant_frequency(times[late], signal[late]), float(np.ptp(signal[end])) / POUND_FORCE
+    return frequency_and_swing(*simulate(make_diagram(scenario, **parameters), duration=25.0))
 
 
 @pytest.mark.parametrize("tau_a", [0.3, 1.0 / (2.0 * math.pi * THESIS_FREQUENCY)])
