@@ -29,6 +29,7 @@ from pathlib import Path
 
 import numpy as np
 from block_diagram import save_block_diagram
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
@@ -106,20 +107,8 @@ def balanced_frequencies(*, ratio: float, feedback: float) -> np.ndarray:
     return np.asarray(frequency[:-1][balanced])
 
 
-Points = tuple[np.ndarray, np.ndarray]
-"""Resonance and frequency of the loop, (points,) each, over the oscillator's own frequency."""
-
-
-def simulate_all(feedback: float, start: float) -> Points:
-    """Simulated frequencies for RATIOS."""
-    frequencies = [
-        simulated_frequency(ratio=ratio, feedback=feedback, start=start) for ratio in RATIOS
-    ]
-    return RATIOS, np.array(frequencies)
-
-
-def balance_all(feedback: float) -> Points:
-    """Frequencies by harmonic balance, for ratios that lie closer."""
+def balance_all(feedback: float) -> tuple[np.ndarray, np.ndarray]:
+    """(points,) each: ratios, closer than RATIOS, and all frequencies by harmonic balance."""
     points = []
     for ratio in np.geomspace(RATIOS[0], RATIOS[-1], 200):
         for frequency in balanced_frequencies(ratio=ratio, feedback=feedback):
@@ -128,26 +117,37 @@ def balance_all(feedback: float) -> Points:
     return ratios, frequencies
 
 
-def followed(points: Points) -> str:
+def followed(ratios: np.ndarray, frequencies: np.ndarray) -> str:
     """Range of ratios at which the loop is nearer the mass's resonance than the own frequency."""
-    ratios, frequencies = points
     follows = ratios[np.abs(frequencies - ratios) < np.abs(frequencies - 1.0)]
     return f"{follows.min():.2f} to {follows.max():.2f}"
 
 
+def compare(panel: Axes, feedback: float) -> None:
+    """Simulates the loop for RATIOS, draws and prints its frequencies over the mass's resonance."""
+    panel.plot(RATIOS, RATIOS, color="0.6", linewidth=0.8, label="resonance")
+    panel.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--", label="oscillator alone")
+    theory = balance_all(feedback)
+    panel.plot(*theory, ".", color="0.2", markersize=1.5, label="harmonic balance")
+    panel.set_title(f"feedback {feedback:+g}/m")
+    panel.set_xlabel("resonance of the mass / own frequency")
+    print(f"Feedback {feedback:+g}/m: follows a mass that resonates at the own frequency times")
+    for (label, start), marker in zip(STARTS.items(), "ox", strict=True):
+        frequencies = np.array(
+            [simulated_frequency(ratio=r, feedback=feedback, start=start) for r in RATIOS]
+        )
+        style = {"markersize": 5, "fillstyle": "none", "label": f"mass {label}"}
+        panel.plot(RATIOS, frequencies, marker, **style)
+        print(f"  {followed(RATIOS, frequencies)}, the mass {label} at first")
+    print(f"  {followed(*theory)} by harmonic balance")
+
+
 @common_style()
-def draw(theory: dict[float, Points], simulated: dict[tuple[float, str], Points]) -> Figure:
-    """A panel for each feedback: frequency of the loop over the mass's resonance."""
-    figure, axes = make_figure(width_in=7, height_in=3.6, columns=len(theory), sharey=True)
-    for panel, (feedback, points) in zip(axes[0], theory.items(), strict=True):
-        panel.plot(RATIOS, RATIOS, color="0.6", linewidth=0.8, label="resonance")
-        panel.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--", label="oscillator alone")
-        panel.plot(*points, ".", color="0.2", markersize=1.5, label="harmonic balance")
-        for label, marker in zip(STARTS, "ox", strict=True):
-            ends = simulated[feedback, label]
-            panel.plot(*ends, marker, markersize=5, fillstyle="none", label=f"mass {label}")
-        panel.set_title(f"feedback {feedback:+g}/m")
-        panel.set_xlabel("resonance of the mass / own frequency")
+def draw() -> Figure:
+    """A panel for each sign of the feedback."""
+    figure, axes = make_figure(width_in=7, height_in=3.6, columns=2, sharey=True)
+    for panel, feedback in zip(axes[0], (FEEDBACK, -FEEDBACK), strict=True):
+        compare(panel, feedback)
     axes[0, 0].set_ylabel("frequency of the loop / own frequency")
     axes[0, 0].legend(fontsize="small")
     return figure
@@ -157,22 +157,9 @@ def main(out: Path = Path(__file__).parent) -> None:
     """Simulates the loops and writes the pictures."""
     save_block_diagram(make_diagram(ratio=1.0, feedback=FEEDBACK), out / "entrainment.svg")
     balanced = own_frequency()
-    simulated_alone = simulated_frequency(ratio=1.0, feedback=0.0) * balanced
-    print(f"Without feedback: {simulated_alone:.3f} Hz (harmonic balance {balanced:.3f} Hz)")
-
-    feedbacks = FEEDBACK, -FEEDBACK
-    theory = {feedback: balance_all(feedback) for feedback in feedbacks}
-    simulated = {
-        (feedback, label): simulate_all(feedback, start)
-        for feedback in feedbacks
-        for label, start in STARTS.items()
-    }
-    save_figure(draw(theory, simulated), out, "entrainment_frequencies", kinds=["svg"])
-    for feedback in feedbacks:
-        print(f"Feedback {feedback:+g}/m: follows a mass that resonates at the own frequency times")
-        for label in STARTS:
-            print(f"  {followed(simulated[feedback, label])}, the mass {label} at first")
-        print(f"  {followed(theory[feedback])} by harmonic balance")
+    simulated = simulated_frequency(ratio=1.0, feedback=0.0) * balanced
+    print(f"Without feedback: {simulated:.3f} Hz (harmonic balance {balanced:.3f} Hz)")
+    save_figure(draw(), out, "entrainment_frequencies", kinds=["svg"])
 
 
 if __name__ == "__main__":

@@ -20,13 +20,9 @@ from tetrahedron_on_incline import (
     acceleration,
     creep_speed,
     deflection,
-    friction_ratio,
     on_incline,
     parts_of_weight,
-    start,
-    stopping,
-    travel,
-    velocity,
+    simulate,
 )
 
 from tetra_drake.robot.bodies import tetrahedron_inertia
@@ -73,11 +69,11 @@ def energy(motion, scenario):
 def test_below_the_coefficient_it_stays():
     # What is left after t decays with k / c: exp(-62.5 / s t), 1e-8 in 0.3 s.
     scenario = on_incline(GENTLE)
-    motion = start(scenario, duration=0.35)
+    motion = simulate(scenario, duration=0.35)
     assert not slips(motion).any()
-    assert travel(motion, scenario)[-1] == pytest.approx(-deflection(scenario), rel=1e-6)
-    assert abs(velocity(motion, scenario)[-1]) < 1e-6 * creep_speed(scenario)
-    assert friction_ratio(motion)[-1] == pytest.approx(math.tan(GENTLE), rel=1e-6)
+    assert motion.travel[-1] == pytest.approx(-deflection(scenario), rel=1e-6)
+    assert abs(motion.velocity[-1]) < 1e-6 * creep_speed(scenario)
+    assert motion.friction_ratio[-1] == pytest.approx(math.tan(GENTLE), rel=1e-6)
     # Rigid, so that the nodes move alike but for its tilt: each bears a third, whatever its load.
     np.testing.assert_allclose(
         motion.friction_forces[-1, :, 0], parts_of_weight(scenario)[0] / 3.0, rtol=2e-5
@@ -86,36 +82,36 @@ def test_below_the_coefficient_it_stays():
 
 def test_without_stiffness_it_creeps():
     scenario = on_incline(GENTLE, stiffness=0.0)
-    motion = start(scenario, duration=0.2)
-    assert velocity(motion, scenario)[-1] == pytest.approx(-creep_speed(scenario), rel=1e-6)
+    motion = simulate(scenario, duration=0.2)
+    assert motion.velocity[-1] == pytest.approx(-creep_speed(scenario), rel=1e-6)
 
 
 def test_above_the_coefficient_it_slides():
     scenario = on_incline(STEEP)
     assert math.tan(STEEP) > STATIC > KINETIC
-    motion = start(scenario, duration=0.3)
+    motion = simulate(scenario, duration=0.3)
     first = int(np.argmax(slips(motion)))
     assert motion.times[first] < 1e-3
     # A node breaks free at mu_static and slips at mu_kinetic once it is faster than mu F_N / c,
     # which is all of them a hundredth of a second later.
     late = motion.times > 0.01
-    np.testing.assert_allclose(friction_ratio(motion)[late], KINETIC, rtol=1e-12)
+    np.testing.assert_allclose(motion.friction_ratio[late], KINETIC, rtol=1e-12)
     v, t = centre_velocity(motion, scenario)[late], motion.times[late]
     a = acceleration(scenario, way=-1.0)
     gain = v[:, 0] - KINETIC * v[:, 2]
     np.testing.assert_allclose(gain - gain[0], a * (t - t[0]), atol=1e-9 * abs(gain[-1]))
     settled = motion.times > 0.2
-    slope, _ = np.polyfit(motion.times[settled], velocity(motion, scenario)[settled], 1)
+    slope, _ = np.polyfit(motion.times[settled], motion.velocity[settled], 1)
     assert slope == pytest.approx(a, rel=1e-6)
 
 
 def test_thrown_uphill_it_stops_and_stays():
     scenario = on_incline(GENTLE)
-    motion = start(scenario, speed=SPEED, duration=0.35)
+    motion = simulate(scenario, speed=SPEED, duration=0.35)
     a = acceleration(scenario, way=1.0)
-    time, way = stopping(motion, scenario)
+    time, way = motion.stopping()
     ups = slips(motion) & (motion.times < -SPEED / a - 1e-3)
-    np.testing.assert_allclose(friction_ratio(motion)[ups], -KINETIC, rtol=1e-12)
+    np.testing.assert_allclose(motion.friction_ratio[ups], -KINETIC, rtol=1e-12)
     v, t = centre_velocity(motion, scenario)[ups], motion.times[ups]
     gain = v[:, 0] + KINETIC * v[:, 2]
     np.testing.assert_allclose(gain - gain[0], a * (t - t[0]), atol=1e-9 * SPEED)
@@ -123,9 +119,9 @@ def test_thrown_uphill_it_stops_and_stays():
     assert time == pytest.approx(-SPEED / a, abs=1e-3)
     assert way == pytest.approx(-(SPEED**2) / (2.0 * a), abs=5e-3 * INCH)
     rest = motion.times > time
-    after = travel(motion, scenario)[rest]
+    after = motion.travel[rest]
     assert after.max() - after.min() < 2.0 * deflection(scenario)
-    assert abs(velocity(motion, scenario)[-1]) < 1e-3 * creep_speed(scenario)
+    assert abs(motion.velocity[-1]) < 1e-3 * creep_speed(scenario)
 
 
 FACTORS = {"forward": 1.5, "backward": 2.0, "lateral": 0.5}
@@ -168,6 +164,6 @@ def test_energy_never_rises(slope, settings, speed):
     if settings is None:
         friction = load_scenario("thesis").friction
         scenario = scenario.with_changes({"friction": friction})
-    motion = start(scenario, speed=speed, duration=0.2)
+    motion = simulate(scenario, speed=speed, duration=0.2)
     total = energy(motion, scenario)
     assert np.diff(total).max() < 1e-12 * np.ptp(total)
