@@ -68,6 +68,8 @@ def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, An
     return {**_COMPILED, "optimizer": optimizer, **sizes}
 
 
+_SHORT = _by(CmaEs(), 3, 2000)
+
 EXPERIMENTS = {
     "thesis": Experiment("the thesis's experiment, ten trials", "thesis", _COMPILED),
     "thesis-listing": Experiment(
@@ -80,27 +82,20 @@ EXPERIMENTS = {
     ),
     "cma-es": Experiment("the same by CMA-ES", "thesis", _by(CmaEs(), 10, 4000)),
     "coulomb": Experiment("the same under friction that grows with the load", "coulomb", _COMPILED),
-    "incline": Experiment("up an incline of 5°", "incline", _by(CmaEs(), 3, 2000)),
-    "steps": Experiment("up four steps of 0.25 in", "steps", _by(CmaEs(), 3, 2000)),
-    "rough": Experiment("over rough ground", "rough", _by(CmaEs(), 3, 2000)),
+    "incline": Experiment("up an incline of 5°", "incline", _SHORT),
+    "steps": Experiment("up four steps of 0.25 in", "steps", _SHORT),
+    "rough": Experiment("over rough ground", "rough", _SHORT),
     "rough-feedback": Experiment(
-        "over rough ground, with feedback to the oscillators",
-        "feedback",
-        _by(CmaEs(), 3, 2000) | _SOUND,
+        "over rough ground, with feedback to the oscillators", "feedback", _SHORT | _SOUND
     ),
     "undulation": Experiment(
         "an oscillator for each bottom cable, so that the robot can undulate",
         "undulation",
-        _by(CmaEs(), 3, 2000) | _SOUND,
+        _SHORT | _SOUND,
     ),
-    "turning": Experiment(
-        "turning on the spot, in 30 s",
-        "turning",
-        _by(CmaEs(), 3, 2000) | _SOUND,
-        film=True,
-    ),
+    "turning": Experiment("turning on the spot, in 30 s", "turning", _SHORT | _SOUND, film=True),
     "robust": Experiment("far on eight disturbed robots", "robust", _by(CmaEs(), 3, 1000)),
-    "efficient": Experiment("with little work", "efficient", _by(CmaEs(), 3, 2000)),
+    "efficient": Experiment("with little work", "efficient", _SHORT),
     "twelve": Experiment(
         "twelve tetrahedra",
         "coulomb",
@@ -114,9 +109,7 @@ EXPERIMENTS = {
         film=True,
     ),
     "map": Experiment(
-        "gaits that differ, the fittest of each kind",
-        "thesis",
-        _by(QualityDiversity(), 1, 30000),
+        "gaits that differ, the fittest of each kind", "thesis", _by(QualityDiversity(), 1, 30000)
     ),
 }
 """Experiments by the names of their folders, in the order of the gallery."""

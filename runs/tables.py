@@ -16,7 +16,6 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-import pandas
 from analyse import MUJOCO, SHOWN, TIGHT, Analysis, load_analysis
 from record import EXPERIMENTS, PICTURE
 
@@ -34,8 +33,9 @@ README = "README.md"
 APART = 0.3
 """in; where the distances on two engines differ by more, a page says so."""
 
-_BEGIN = re.compile(r"<!-- table (?P<name>\S+): made by runs/tables.py -->")
-_END = "<!-- end -->"
+_TABLE = re.compile(
+    r"(?P<begin><!-- table (?P<name>\S+): made by runs/tables.py -->)\n.*?<!-- end -->", re.DOTALL
+)
 
 
 Runs = Mapping[str, Analysis]
@@ -50,28 +50,22 @@ def load_all(directory: Path = HERE) -> dict[str, Analysis]:
 
 def gallery_table(runs: Runs) -> str:
     """All runs with the distances of their best gaits."""
+    rows = []
+    for name, run in runs.items():
+        best = run.best_trial
+        picture = f'<img src="{name}/{PICTURE}" width="240" alt="{name}">'
+        title = f"[`{name}`]({name}/{README}): {EXPERIMENTS[name].title}"
+        distances = [fixed(run.undisturbed(best)), fixed(run.again(best, TIGHT))]
+        kept = f"{100.0 * run.gaits.loc[best, 'kept']:.0f} %"
+        rows.append([picture, f"{title}<br>[page]({name}/{REPLAY})", *distances, kept])
     headings = ["", "experiment", "distance, in", "on the Drake diagram, in", "keeps"]
-    rows = [[*_introduced(name), *_best_distances(run)] for name, run in runs.items()]
     return Table(headings, rows, text_columns=(0, 1)).markdown()
-
-
-def _introduced(name: str) -> list[str]:
-    picture = f'<img src="{name}/{PICTURE}" width="240" alt="{name}">'
-    title = f"[`{name}`]({name}/{README}): {EXPERIMENTS[name].title}"
-    return [picture, f"{title}<br>[page]({name}/{REPLAY})"]
-
-
-def _best_distances(run: Analysis) -> list[str]:
-    best = run.best_trial
-    kept = f"{100.0 * run.gaits.loc[best, 'kept']:.0f} %"
-    return [fixed(run.undisturbed(best)), fixed(run.again(best, TIGHT)), kept]
 
 
 def trials_table(run: Analysis) -> str:
     """The fittest gait of each trial on all engines and on disturbed robots; below, in which trials
     the engines differ."""
     units = {name: customary(METRICS[name]) for name in SHOWN}
-    names = [name.replace("_", " ") + f", {unit}" * bool(unit) for name, (_, unit) in units.items()]
     rows, apart = [], []
     for trial, gait in run.best_gaits.iterrows():
         compiled, tight = run.undisturbed(trial), run.again(trial, TIGHT)
@@ -84,31 +78,29 @@ def trials_table(run: Analysis) -> str:
         counts = [f"{trial}", f"{gait['evaluations']:.0f}", fixed(gait["fitness"])]
         rows.append([*counts, *map(fixed, distances), kept, *map(fixed, metrics)])
     headings = ["trial", "evaluations", "fitness", "compiled, in", "diagram, in", "MuJoCo, in"]
-    table = Table([*headings, "disturbed, in", "keeps", *names], rows).markdown()
-    where = f"in trial{'s' * (len(apart) > 1)} {listed(apart)}"
-    return table + f"\n\nThe engines differ by more than {APART} in {where}." * bool(apart)
+    headings += ["disturbed, in", "keeps"]
+    for name, (_, unit) in units.items():
+        title = name.replace("_", " ")
+        headings.append(f"{title}, {unit}" if unit else title)
+    table = Table(headings, rows).markdown()
+    if not apart:
+        return table
+    trials = "trial" if len(apart) == 1 else "trials"
+    return f"{table}\n\nThe engines differ by more than {APART} in in {trials} {listed(apart)}."
 
 
 def changes_table(run: Analysis) -> str:
     """Effects of single changes on the best gaits."""
-    rows = [[row["what"], *_change_cells(row)] for _, row in run.changes.iterrows()]
+    rows = []
+    for _, row in run.changes.iterrows():
+        failed = f", {row['failed']:.0f} failed" if row["failed"] else ""
+        alone = f"{fixed(row['median'] / INCH)} ({signed(row['worst'] / INCH)}{failed})"
+        correlation = "-"
+        if math.isfinite(row["correlation"]):
+            correlation = f"{signed(row['correlation'])} ({fixed(row['correlation_size'])})"
+        rows.append([row["what"], alone, correlation])
     headings = ["changed by 5 %", "alone: median change (worst), in"]
     return Table([*headings, "rank correlation: mean (median size)"], rows).markdown()
-
-
-def _change_cells(row: pandas.Series) -> list[str]:
-    failed = f", {row['failed']:.0f} failed" if row["failed"] else ""
-    worst = f"({signed(row['worst'] / INCH)}{failed})"
-    ranks = f"{signed(row['correlation'])} ({fixed(row['correlation_size'])})"
-    scaled = math.isfinite(row["correlation"])
-    return [f"{fixed(row['median'] / INCH)} {worst}", ranks if scaled else "-"]
-
-
-RUN_TABLES: dict[str, Callable[[Analysis], str]] = {
-    "trials": trials_table,
-    "changes": changes_table,
-}
-"""Tables of the run in whose folder the page is; beside them, there is the gallery."""
 
 
 def pages(runs: Runs) -> list[Path]:
@@ -117,14 +109,16 @@ def pages(runs: Runs) -> list[Path]:
 
 
 def made_again(page: Path, runs: Runs) -> str:
-    """The text of a page with its tables made again. Raises InputError if it cannot be read."""
+    """The text of a page with its tables made again: the gallery, or the tables of the run in whose
+    folder the page is. Raises InputError if it cannot be read."""
 
-    def table(name: str) -> str:
+    def make_table(name: str) -> str:
         if name == "gallery":
             return gallery_table(runs)
-        return RUN_TABLES[name](runs[page.parent.name])
+        tables = {"trials": trials_table, "changes": changes_table}
+        return tables[name](runs[page.parent.name])
 
-    return filled(read_text(page, "page"), table)
+    return filled(read_text(page, "page"), make_table)
 
 
 def filled(text: str, make_table: Callable[[str], str]) -> str:
@@ -132,21 +126,16 @@ def filled(text: str, make_table: Callable[[str], str]) -> str:
 
     Raises KeyError for an unknown table, ValueError for one without an end.
     """
-    lines: list[str] = []
-    open_table = None
-    for line in text.split("\n"):
-        begin = _BEGIN.fullmatch(line.strip())
-        if open_table is not None and begin:
-            break
-        if begin:
-            open_table = begin["name"]
-            lines += [line, "", make_table(open_table), ""]
-        elif open_table is None or line.strip() == _END:
-            lines.append(line)
-            open_table = None
-    if open_table is not None:
-        raise ValueError(f"table {open_table} has no line {_END!r} after it")
-    return "\n".join(lines)
+
+    def remade(match: re.Match[str]) -> str:
+        if match[0].count("<!-- table ") > 1:
+            raise ValueError(f"table {match['name']} has no end before the next one")
+        return f"{match['begin']}\n\n{make_table(match['name'])}\n\n<!-- end -->"
+
+    text, tables = _TABLE.subn(remade, text)
+    if tables < text.count("<!-- table "):
+        raise ValueError("the last table has no end")
+    return text
 
 
 def main(arguments: Sequence[str]) -> None:
