@@ -72,20 +72,19 @@ def _edges(diagram: Diagram) -> list[tuple[_Port, _Port]]:
 
 def _port(system: System, index: InputPortIndex | OutputPortIndex) -> _Port:
     if isinstance(index, InputPortIndex):
-        name = system.get_input_port(index).get_name()
-        return _Port(system.get_name(), "u", int(index), name)
-    name = system.get_output_port(index).get_name()
-    return _Port(system.get_name(), "y", int(index), name)
+        side, port = "u", system.get_input_port(index)
+    else:
+        side, port = "y", system.get_output_port(index)
+    return _Port(system.get_name(), side, int(index), port.get_name())
 
 
 def _block(block: str, ports: list[_Port], *, title: str, look: str) -> str:
-    """A record of three columns: input ports, title, output ports."""
-    inputs, outputs = _cells(block, ports, "u"), _cells(block, ports, "y")
-    columns = [column for column in (inputs, title, outputs) if column]
-    return f'"{block}" [label="{{{"|".join(columns)}}}"{look}]'
-
-
-def _cells(block: str, ports: list[_Port], side: str) -> str:
-    used = [port for port in ports if (port.block, port.side) == (block, side)]
-    cells = "|".join(f"<{side}{port.number}> {port.name}" for port in used)
-    return f"{{{cells}}}" if used else ""
+    """A record of up to three columns: input ports, title, output ports."""
+    columns = {"u": "", "title": title, "y": ""}
+    for side in ("u", "y"):
+        used = [port for port in ports if (port.block, port.side) == (block, side)]
+        if used:
+            cells = "|".join(f"<{side}{port.number}> {port.name}" for port in used)
+            columns[side] = f"{{{cells}}}"
+    label = "|".join(column for column in columns.values() if column)
+    return f'"{block}" [label="{{{label}}}"{look}]'

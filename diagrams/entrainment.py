@@ -129,15 +129,14 @@ def compare(panel: Axes, feedback: float) -> None:
     panel.axhline(1.0, color="0.6", linewidth=0.8, linestyle="--", label="oscillator alone")
     theory = balance_all(feedback)
     panel.plot(*theory, ".", color="0.2", markersize=1.5, label="harmonic balance")
-    panel.set_title(f"feedback {feedback:+g}/m")
-    panel.set_xlabel("resonance of the mass / own frequency")
+    panel.set(title=f"feedback {feedback:+g}/m", xlabel="resonance of the mass / own frequency")
     print(f"Feedback {feedback:+g}/m: follows a mass that resonates at the own frequency times")
     for (label, start), marker in zip(STARTS.items(), "ox", strict=True):
         frequencies = np.array(
             [simulated_frequency(ratio=r, feedback=feedback, start=start) for r in RATIOS]
         )
-        style = {"markersize": 5, "fillstyle": "none", "label": f"mass {label}"}
-        panel.plot(RATIOS, frequencies, marker, **style)
+        (points,) = panel.plot(RATIOS, frequencies, marker, markersize=5, fillstyle="none")
+        points.set_label(f"mass {label}")
         print(f"  {followed(RATIOS, frequencies)}, the mass {label} at first")
     print(f"  {followed(*theory)} by harmonic balance")
 

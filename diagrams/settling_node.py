@@ -65,11 +65,10 @@ def draw(settling: Samples, bouncing: Samples) -> Figure:
         above.plot(milliseconds, 1e3 * motion.p_WN[:, TRAILING, 2] / INCH, label=label)
         below.plot(milliseconds, motion.normal_forces[:, TRAILING] / POUND_FORCE)
     above.axhline(0.0, color="black", linestyle="-", linewidth=0.8)
-    above.set_ylim(-1.1, 0.5)  # without weight it flies away
-    above.set_ylabel("height of the node (0.001 in)")
+    # Without weight it flies away.
+    above.set(ylim=(-1.1, 0.5), ylabel="height of the node (0.001 in)")
     above.legend(loc="upper right")
-    below.set_ylabel("normal force (lbf)")
-    below.set_xlabel("time (ms)")
+    below.set(ylabel="normal force (lbf)", xlabel="time (ms)")
     figure.suptitle("Ground contact of a settling node (thesis Fig. 5)")
     return figure
 

@@ -71,16 +71,14 @@ def draw(motion: Samples, *, stiction_range: float) -> Figure:
     for panel in axes[1]:
         panel.set_yscale("symlog", linthresh=1e-3)
         panel.set_yticks([-10.0, -0.1, -1e-3, 0.0, 1e-3, 0.1], minor=False)
-    axes[2, 0].axhline(
-        1e3 * stiction_range / INCH, color="black", linestyle=":", label="stiction range"
-    )
-    axes[2, 0].legend(handles=axes[2, 0].lines[-1:])
-    axes[2, 0].set_ylim(0.0, 2e3 * stiction_range / INCH)
+    limit = 1e3 * stiction_range / INCH
+    line = axes[2, 0].axhline(limit, color="black", linestyle=":", label="stiction range")
+    axes[2, 0].legend(handles=[line])
+    axes[2, 0].set_ylim(0.0, 2.0 * limit)
     axes[0, 1].set_ylim(-2.0, 10.0)
     for column, (title, end) in enumerate((("breaking free", 2.0), ("the whole motion", 80.0))):
         axes[0, column].set_title(title)
-        axes[2, column].set_xlim(0.0, end)
-        axes[2, column].set_xlabel("time (ms)")
+        axes[2, column].set(xlim=(0.0, end), xlabel="time (ms)")
     axes[0, 0].legend()
     figure.align_ylabels()
     figure.suptitle("Friction on the nodes of a sliding tetrahedron (thesis Fig. 6)")

@@ -124,17 +124,14 @@ def draw(*, resting: Curves, moving: Curves) -> Figure:
         panel.lines[-1].set_label("analytic")
         panel.set_xlim(0.0, times[-1])
         panel.legend(loc="lower left")
-    rest.set_ylabel("travel uphill (0.001 in)")
-    rest.set_xlabel("time (ms)")
+    rest.set(ylabel="travel uphill (0.001 in)", xlabel="time (ms)")
     way.set_ylabel("travel uphill (in)")
     for (motion, _), style in zip(moving.values(), OURS, strict=True):
         ratio.plot(motion.times, motion.friction_ratio, **style)
     for label, level in (("μ", KINETIC), ("tan 10°", math.tan(GENTLE)), ("-μ", -KINETIC)):
         ratio.axhline(level, **ANALYTIC)
         ratio.annotate(label, (1.01, level), xycoords=("axes fraction", "data"), va="center")
-    ratio.set_xlim(way.get_xlim())
-    ratio.set_ylabel("friction uphill / normal force")
-    ratio.set_xlabel("time (s)")
+    ratio.set(xlim=way.get_xlim(), xlabel="time (s)", ylabel="friction uphill / normal force")
     figure.align_ylabels()
     figure.suptitle("A tetrahedron on an incline under Coulomb friction")
     return figure

@@ -121,12 +121,13 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     Raises InputError where `scratch` holds a run of another scenario.
     """
     made, shown = scratch / name, out / name
-    if _same(made / ANALYSIS, shown / ANALYSIS):
+    analysis, copy = made / ANALYSIS, shown / ANALYSIS
+    if analysis.exists() and copy.exists() and filecmp.cmp(analysis, copy, shallow=False):
         return
     begin, resume = time.monotonic(), (made / MANIFEST).exists()
     progress = Display(sys.stdout)
     evolve(experiment.scenario(name), made, resume=resume, report=False, progress=progress)
-    if not (made / ANALYSIS).exists():
+    if not analysis.exists():
         analyse(made, workers=available_cores())
     for old in {*shown.glob("*")} - {shown / "README.md", *shown.glob("*.png")}:
         shutil.rmtree(old) if old.is_dir() else old.unlink()
@@ -134,7 +135,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     write_replay(shown, shown / REPLAY, viewer=out / VIEWER)
     films = [shown / FILM] if experiment.film else []
     take_pictures(shown / REPLAY, *films, shown / PICTURE)
-    shutil.copy(made / ANALYSIS, shown / ANALYSIS)
+    shutil.copy(analysis, copy)
     print(f"{name}: {duration(time.monotonic() - begin)}", flush=True)
 
 
@@ -142,11 +143,6 @@ def take_pictures(page: Path, *pictures: Path) -> None:
     """Draws the end of a page's motion, or films it, in a browser. Raises CalledProcessError."""
     script = HERE.parent / "diagrams" / "animation.py"
     subprocess.run([sys.executable, script, page, *pictures], check=True)
-
-
-def _same(first: Path, second: Path) -> bool:
-    """True if both files are there, and alike."""
-    return first.exists() and second.exists() and filecmp.cmp(first, second, shallow=False)
 
 
 def main(names: Sequence[str]) -> None:

@@ -40,7 +40,7 @@ def test_every_engine_and_ground_is_measured(small, tmp_path, capsys):
         assert 0.0 <= float(median) <= float(worst) < 0.05
     ((cores, *speeds),) = batches
     assert cores == "1" and len(speeds) == 2
-    assert len(grounds) == 6 and all(float(row[-1]) > 0.0 for row in grounds)
+    assert len(grounds) == 4 and all(float(row[-1]) > 0.0 for row in grounds)
 
 
 def test_an_unknown_table_is_refused(scenario, refused):

@@ -10,16 +10,10 @@ from helpers.meshcat_page import read_page
 from tetra_drake.evolution.run import load_run
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 
-TINY = record.Experiment(
-    "two tetrahedra",
-    "thesis",
-    {
-        **{"engine": "!Compiled", "simulation.duration": "0.4 s"},
-        **{"simulation.steady_from": "0.1 s", "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)},
-        **{"evolution.trials": 2, "evolution.evaluations": 8},
-    },
-    film=True,
-)
+SMALL = {"engine": "!Compiled", "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)}
+SHORT = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.1 s"}
+FEW = {"evolution.trials": 2, "evolution.evaluations": 8}
+TINY = record.Experiment("two tetrahedra", "thesis", SMALL | SHORT | FEW, film=True)
 
 
 @pytest.fixture
@@ -45,18 +39,17 @@ def analysed(monkeypatch):
 def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed):
     scratch, out = tmp_path / "scratch", tmp_path / "runs"
     (out / "tiny").mkdir(parents=True)
-    for name in ("README.md", "map.png", "figures"):
+    kept = {"README.md", "map.png"}
+    for name in (*kept, "figures"):
         (out / "tiny" / name).write_text("of an older run")
     record.record("tiny", TINY, scratch=scratch, out=out)
     run = load_run(out / "tiny")
     assert run.manifest.thinned and run.manifest.scenario == TINY.scenario("tiny")
     assert run.evaluations.groupby("trial").size().tolist() == [8, 8]
     assert run.reevaluations["engine"].unique() == ["drake"]
-    files = {file.name for file in (out / "tiny").iterdir()}
-    assert files == {
-        *("README.md", "map.png", "replay.html", "walking.png", "walking.gif", "analysis.json"),
-        *("manifest.json", "scenario.yaml", "trial_00", "trial_01"),
-    }
+    made = {"manifest.json", "scenario.yaml", "trial_00", "trial_01"}
+    shown = {"replay.html", "walking.png", "walking.gif", "analysis.json"}
+    assert {file.name for file in (out / "tiny").iterdir()} == kept | made | shown
     assert 'src="../meshcat.js"' in read_page(out / "tiny/replay.html")
     assert (out / record.VIEWER).is_file()
     (out / "tiny/manifest.json").unlink()

@@ -23,9 +23,6 @@ from tetra_drake.scenario.units import INCH
 TOLERANCE = 0.05
 """in; processors and versions of packages differ in the last digits, which a walk enlarges."""
 
-LARGEST = 20_000_000
-"""Bytes, of all files that git has in the folder."""
-
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
 """Runs of one's own may lie beside them."""
 
@@ -89,4 +86,4 @@ def test_a_run_has_its_page_replay_and_picture(name):
 
 
 def test_the_folder_is_small():
-    assert sum(file.stat().st_size for file in files_in_git() if file.exists()) < LARGEST
+    assert sum(file.stat().st_size for file in files_in_git() if file.exists()) < 20_000_000
