@@ -28,6 +28,7 @@ from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.robot.gait import Gait, ParameterSpace
+from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat
@@ -168,12 +169,8 @@ def resimulate(
 
 def settings_of(scenario: Scenario) -> dict[str, Scenario]:
     """The scenario with each setting, by names; without those that cannot simulate it."""
-    explicit = {"scheme": "runge_kutta3", "accuracy": 1e-3, "max_step": "2 ms"}
-    tight = {f"engine.{key}": value for key, value in explicit.items()}
-    changes: dict[str, dict[str, Any]] = {
-        TIGHT: {"engine": "!Drake", "engine.mode_changes": "witness"} | tight,
-        MUJOCO: {"engine": "!Mujoco"},
-    }
+    tight = Drake(scheme="runge_kutta3", accuracy=1e-3, max_step=0.002, mode_changes="witness")
+    changes: dict[str, dict[str, Any]] = {TIGHT: {"engine": tight}, MUJOCO: {"engine": "!Mujoco"}}
     if isinstance(scenario.terrain, Flat):
         for law, shipped in LAWS.items():
             other = load_scenario(shipped)
