@@ -208,7 +208,7 @@ def test_a_column_shows_the_signals_of_the_same_cables():
 def test_ground_forces_are_those_of_the_last_seconds(walk):
     panels = ground_forces(walk, FLAT, seconds=3.0).axes
     names = [f"T{i} bottom left" for i in range(1, 6)]
-    assert [panel.get_title("left") for panel in panels] == [*names, "T5 tip"]
+    assert [panel.get_title("left") for panel in panels] == names
     end = walk.sel(time=slice(6.0, None))
     normal, friction, _ = panels[0].lines
     expected = end.normal_force.sel(contact="T1 bottom_left") / POUND_FORCE
@@ -221,21 +221,15 @@ def test_ground_forces_are_those_of_the_last_seconds(walk):
 def test_flights_are_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk):
     four = walk.sel(time=slice(0.0, 4 * PERIOD)).copy(deep=True)
     four.normal_force[int(np.argmin(np.abs(four.time.values - 5.5))), 0] = 100.0 * LOAD
-    panels = ground_forces(four, FLAT, seconds=4.0).axes
-    for panel, expected, percent in (
-        (panels[0], [(4.0, 5.0), (6.0, 7.0)], 50),
-        (panels[-1], [(4.0, 8.0)], 100),
-    ):
-        spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches]
-        np.testing.assert_allclose(spans, expected, atol=0.011)
-        (shown,) = (word for word in panel.get_title(loc="right").split() if word.isdigit())
-        assert int(shown) == pytest.approx(percent, abs=1)
-    np.testing.assert_allclose(panels[0].lines[-1].get_xdata(), [5.0, 7.0], atol=0.011)
-    assert len(panels[-1].lines[-1].get_xdata()) == 0, "the tip never lands"
-    low, high = panels[0].get_ylim()
+    panel, *_ = ground_forces(four, FLAT, seconds=4.0).axes
+    spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches]
+    np.testing.assert_allclose(spans, [(4.0, 5.0), (6.0, 7.0)], atol=0.011)
+    assert panel.get_title(loc="right").split()[1] in ("49", "50", "51")
+    np.testing.assert_allclose(panel.lines[-1].get_xdata(), [5.0, 7.0], atol=0.011)
+    low, high = panel.get_ylim()
     assert low < -0.5 * LOAD / POUND_FORCE
     assert LOAD / POUND_FORCE < high < 2.0 * LOAD / POUND_FORCE
-    assert max(panels[0].lines[0].get_ydata()) > 50.0 * high
+    assert max(panel.lines[0].get_ydata()) > 50.0 * high
 
 
 def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):

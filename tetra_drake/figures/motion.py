@@ -201,15 +201,15 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
     heights = [height + 0.8, 0.7 + 1.2 * math.ceil(len(names) / _PATHS)]
     legend = 0.4
     figure = Figure(figsize=(max(2 * width + 1.2, 5.8), sum(heights) + legend))
-    above, below = figure.subfigures(2, 1, height_ratios=heights)
+    above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
     panels: Any = above.subplots(1, 2)
     for panel, view, place in zip(panels, (OVERHEAD, SIDE), ("above", "the side"), strict=True):
         _draw_rows(panel, rows, view, names, width_in=width)
         panel.set_title(f"from {place}")
     panel.tick_params(left=False, labelleft=False)
     if ground.flat:
-        for row in range(instants):
-            panel.axhline(-_pitch(rows) * row, **_GROUND)
+        for i in range(instants):
+            panel.axhline(-_pitch(rows) * i, **_GROUND)
     _draw_paths(below, step, off, ground)
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
     legend_below(figure, {**lines, "path of the bottom nodes": _PATH})

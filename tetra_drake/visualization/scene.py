@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -165,8 +165,11 @@ def set_surroundings(meshcat: Meshcat, robot: Robot, points: np.ndarray) -> None
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 0.9)
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
     _add_forward_arrow(meshcat, floor)
-    bottom = floor if ground.flat else floor * [1.0, 1.0, 0.0] + [0.0, 0.0, _bottom(floor)]
-    seen = np.vstack([part.reshape(-1, 3) for part in (points, floor, bottom)])
+    seen = np.vstack([points.reshape(-1, 3), floor.reshape(-1, 3)])
+    if not ground.flat:
+        below = floor.copy()
+        below[..., 2] = _bottom(floor)
+        seen = np.vstack([seen, below.reshape(-1, 3)])
     target = (seen.min(axis=0) + seen.max(axis=0)) / 2
     meshcat.SetCameraPose(camera_position(seen, target), target)
 
@@ -184,18 +187,19 @@ def floor_points(ground: Ground, corners: np.ndarray) -> np.ndarray:
     Rows along x, columns along y: at every inch, and between them where the ground bends, as
     finely as MOST_POINTS allows.
     """
-    low, high = corners
-    for per_inch in (1,) if ground.flat else range(FINEST, 0, -1):
-        ticks = [np.arange(a * per_inch, b * per_inch + 1) for a, b in zip(low, high, strict=True)]
-        x_y = np.stack(np.meshgrid(*(t / per_inch * INCH for t in ticks), indexing="ij"), axis=-1)
-        heights = ground_heights(x_y, ground)
-        kept = []
-        for axis, tick in enumerate(ticks):
-            bend = np.abs(np.diff(heights, 2, axis)).max(1 - axis)
-            kept.append((tick % per_inch == 0) | np.pad(bend > _BEND, 1))
-        if kept[0].sum() * kept[1].sum() <= MOST_POINTS:
+    (x_low, y_low), (x_high, y_high) = corners
+    for per_inch in range(1 if ground.flat else FINEST, 0, -1):
+        rows = np.arange(x_low * per_inch, x_high * per_inch + 1)
+        columns = np.arange(y_low * per_inch, y_high * per_inch + 1)
+        x, y = np.meshgrid(rows * INCH / per_inch, columns * INCH / per_inch, indexing="ij")
+        z = ground_heights(np.stack([x, y], axis=-1), ground)
+        bend_along = np.abs(np.diff(z, 2, axis=0)).max(axis=1)
+        bend_across = np.abs(np.diff(z, 2, axis=1)).max(axis=0)
+        rows = np.flatnonzero((rows % per_inch == 0) | np.pad(bend_along > _BEND, 1))
+        columns = np.flatnonzero((columns % per_inch == 0) | np.pad(bend_across > _BEND, 1))
+        if len(rows) * len(columns) <= MOST_POINTS:
             break
-    return np.concatenate([x_y, heights[..., np.newaxis]], axis=-1)[np.ix_(*kept)]
+    return np.stack([x, y, z], axis=-1)[np.ix_(rows, columns)]
 
 
 def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -214,8 +218,11 @@ def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 def rgba(name: str) -> Rgba:
     """Colour of this name in COLOURS, opaque."""
-    red, green, blue = (value / 255 for value in bytes.fromhex(COLOURS[name][1:]))
-    return Rgba(red, green, blue, 1.0)
+    return Rgba(*_rgb(name))
+
+
+def _rgb(name: str) -> np.ndarray:
+    return np.frombuffer(bytes.fromhex(COLOURS[name][1:]), dtype=np.uint8) / 255
 
 
 def _add_tetrahedron(meshcat: Meshcat, structure: Structure, path: str, colour: Rgba) -> None:
@@ -304,7 +311,8 @@ def _arrow_scales(sizes: np.ndarray) -> np.ndarray:
 def _add_slab(meshcat: Meshcat, floor: np.ndarray) -> None:
     """A slab whose top is the flat floor (rows, columns, 3), in m."""
     thickness = 0.002
-    (width, depth, _), middle = floor[-1, -1] - floor[0, 0], (floor[-1, -1] + floor[0, 0]) / 2
+    width, depth, _ = floor[-1, -1] - floor[0, 0]
+    middle = (floor[-1, -1] + floor[0, 0]) / 2
     meshcat.SetObject("/floor/slab", Box(width, depth, thickness), rgba("floor"))
     meshcat.SetTransform("/floor/slab", RigidTransform(middle - [0.0, 0.0, thickness / 2]))
 
@@ -317,7 +325,7 @@ def _add_relief(meshcat: Meshcat, floor: np.ndarray) -> None:
     normal = np.stack([*-slopes, np.ones_like(z)], axis=-1)
     lit = (normal @ LIGHT / np.linalg.norm(normal, axis=-1) / LIGHT[2]).clip(0.6, 1.2)
     share = (z - z.min()) / max(np.ptp(z), 0.1 * INCH)
-    low, high = (np.array([c.r(), c.g(), c.b()]) for c in map(rgba, ("low", "high")))
+    low, high = _rgb("low"), _rgb("high")
     colours = (low + share[..., np.newaxis] * (high - low)) * lit[..., np.newaxis]
     around = ((1, 1), (1, 1), (0, 0))
     walls = np.pad(np.ones_like(z), 1) == 0.0
@@ -342,35 +350,43 @@ def _bottom(floor: np.ndarray) -> float:
 
 def _add_grid(meshcat: Meshcat, floor: np.ndarray, *, inch: str) -> None:
     """Lines along and across the floor (rows, columns, 3), of colour `inch` at every inch."""
-    lift = 0.0002  # lines float a little, else the floor shows through them
-    colours = {"inch": rgba(inch), "six_inches": rgba("six_inches")}
-    lines: dict[str, list[np.ndarray]] = {"inch": [], "six_inches": []}
+    inches, six_inches = [], []
     for axis in (0, 1):
         for line in np.moveaxis(floor, axis, 0):
             place = line[0, axis] / INCH
-            if abs(place - round(place)) < 1e-6:
-                straight = np.ptp(line[:, 2]) == 0.0
-                points = line[[0, -1]] if straight else line
-                lines["six_inches" if round(place) % 6 == 0 else "inch"].append(points)
-    for rank, (kind, some) in enumerate(lines.items(), start=1):
-        raised = [line + np.array([0.0, 0.0, rank * lift]) for line in some]
-        start, end = (np.vstack([r[part] for r in raised]).T for part in (np.s_[:-1], np.s_[1:]))
-        meshcat.SetLineSegments(f"/floor/{kind}", start, end, rgba=colours[kind])
+            if abs(place - round(place)) > 1e-6:
+                continue
+            straight = np.ptp(line[:, 2]) == 0.0
+            points = line[[0, -1]] if straight else line
+            (six_inches if round(place) % 6 == 0 else inches).append(points)
+    # Lines float a little, else the floor shows through them.
+    _add_lines(meshcat, "/floor/inch", inches, lift=0.0002, colour=rgba(inch))
+    _add_lines(meshcat, "/floor/six_inches", six_inches, lift=0.0004, colour=rgba("six_inches"))
+
+
+def _add_lines(
+    meshcat: Meshcat, path: str, lines: Sequence[np.ndarray], *, lift: float, colour: Rgba
+) -> None:
+    """Lines through points (points, 3), raised by `lift`, in m."""
+    raised = [line + [0.0, 0.0, lift] for line in lines]
+    start = np.vstack([line[:-1] for line in raised])
+    end = np.vstack([line[1:] for line in raised])
+    meshcat.SetLineSegments(path, start.T, end.T, rgba=colour)
 
 
 def _add_forward_arrow(meshcat: Meshcat, floor: np.ndarray) -> None:
     """An arrow on the floor (rows, columns, 3), in the middle of its right side, along x."""
     _add_unit_arrow(meshcat, "/floor/forward", rgba("forward"))
-    (x, y, _), (X, _, _) = floor[0, 0], floor[-1, 0]
-    row = floor[:, np.abs(floor[0, :, 1] - (y + INCH)).argmin()]
-    start = (x + X - FORWARD_LENGTH) / 2
+    y = floor[0, 0, 1] + INCH
+    row = floor[:, np.abs(floor[0, :, 1] - y).argmin()]
+    start = (floor[0, 0, 0] + floor[-1, 0, 0] - FORWARD_LENGTH) / 2
     way = np.linspace(0.0, 1.0, 25)
     z = np.interp(start + way * FORWARD_LENGTH, row[:, 0], row[:, 2])
     rise = z[-1] - z[0]
     lift = (z - z[0] - way * rise).max()  # onto what is between its ends
     forward = Track(
         "/floor/forward",
-        np.array([[start, y + INCH, z[0] + lift]]),
+        np.array([[start, y, z[0] + lift]]),
         aligning_quaternions(np.array([[1.0, 0.0, rise / FORWARD_LENGTH]])),
         np.full((1, 3), FORWARD_LENGTH),
     )
