@@ -83,8 +83,8 @@ def save_replay(
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     robot = Robot.of(scenario)
     film = _add_film(meshcat, robot, trajectory)
-    shown = {cable_kind(cable) for cable in robot.structure.cables} | LEGEND.keys() - CABLE_KINDS
-    legend = {name: meaning for name, meaning in LEGEND.items() if name in shown}
+    absent = set(CABLE_KINDS) - {cable_kind(cable) for cable in robot.structure.cables}
+    legend = {name: meaning for name, meaning in LEGEND.items() if name not in absent}
     page = meshcat.StaticHtml()
     if viewer is not None:
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())

@@ -350,7 +350,8 @@ def _bottom(floor: np.ndarray) -> float:
 
 def _add_grid(meshcat: Meshcat, floor: np.ndarray, *, inch: str) -> None:
     """Lines along and across the floor (rows, columns, 3), of colour `inch` at every inch."""
-    inches, six_inches = [], []
+    inches: list[np.ndarray] = []
+    six_inches: list[np.ndarray] = []
     for axis in (0, 1):
         for line in np.moveaxis(floor, axis, 0):
             place = line[0, axis] / INCH
@@ -368,7 +369,7 @@ def _add_lines(
     meshcat: Meshcat, path: str, lines: Sequence[np.ndarray], *, lift: float, colour: Rgba
 ) -> None:
     """Lines through points (points, 3), raised by `lift`, in m."""
-    raised = [line + [0.0, 0.0, lift] for line in lines]
+    raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
     start = np.vstack([line[:-1] for line in raised])
     end = np.vstack([line[1:] for line in raised])
     meshcat.SetLineSegments(path, start.T, end.T, rgba=colour)
