@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 QUARTILES = (0.25, 0.5, 0.75)
 
+# Sections of the scenario that say how runs search, and not for what.
 _SEARCH = ("evolution", "optimizer")
-"""Sections of the scenario that say how runs search, and not for what."""
 
 
 _TRIAL_COLUMNS = ["run", "trial", "ended", "cost", "at_common", "fitness", "distance", "reached"]

@@ -31,8 +31,7 @@ LUCKY = 0.5
 CELLS = ["cell_1", "cell_2"]
 _KEY = ["trial", "index"]
 _JUDGED = ["kept", "mean_distance"]
-_EPSILON = 1e-6
-"""Number that pyribs adds against rounding."""
+_EPSILON = 1e-6  # which pyribs adds against rounding
 
 
 def elites(run: Run) -> pandas.DataFrame:

@@ -13,12 +13,8 @@ from tetra_drake.evolution.run import Run
 from tetra_drake.figures.style import OKABE_ITO, common_style, line_style, make_figure
 from tetra_drake.formatting import fixed
 
-_LEGEND_ROWS = 14
-"""Trials per column of a legend beside the axes."""
-
-_TICKS = 20
-"""Largest number of trial numbers below the axes, and of error bars."""
-
+_LEGEND_ROWS = 14  # trials per column of a legend beside the axes
+_TICKS = 20  # largest number of trial numbers below the axes, and of error bars
 _AVERAGE: Any = {"color": "0.45", "linewidth": 2.5, "elinewidth": 0.7, "capsize": 2.0}
 
 

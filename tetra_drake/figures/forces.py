@@ -23,18 +23,11 @@ _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
 _SECOND: Any = {"color": OKABE_ITO["vermillion"], "linestyle": (0, (4, 1.2))}
 _LANDING: Any = {"color": "black", "marker": "v", "markersize": 4.0, "linestyle": ""}
 
-_TOP = 0.94
-"""Height of the marks of landings, as a share of a panel's height."""
-
-_IMPACTS, _MARGIN = 0.01, 0.25
-"""Share of the samples at either end of their range that does not count for the scale of forces,
-and the margin beside the rest, as a share of it."""
-
-_ROWS, _COLUMNS = 10, 4
-"""Largest number of panels one below the other, and of columns."""
-
-_MIRRORED = 0.01
-"""Mean difference, as a share of the mean force, below which two nodes are mirror images."""
+_TOP = 0.94  # height of the marks of landings, as a share of a panel's height
+_IMPACTS = 0.01  # share of the samples at either end that does not count for the scale of forces
+_MARGIN = 0.25  # free space above and below the others, as a share of their range
+_ROWS, _COLUMNS = 10, 4  # largest number of panels one below the other, and of columns
+_MIRRORED = 0.01  # mean difference over mean force, below which two nodes are mirror images
 
 
 @common_style()

@@ -24,8 +24,7 @@ _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.
 _NUMBER: Any = {"ha": "center", "va": "center", "fontsize": 7.0, "fontweight": "bold", "zorder": 4}
 _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "black"}
 
-_LINE = 70
-"""Largest number of letters in a line below a panel."""
+_LINE = 70  # largest number of letters in a line below a panel
 
 
 @common_style()

@@ -30,29 +30,19 @@ from tetra_drake.scenario.units import INCH
 
 X, Y, Z = range(3)
 
-OVERHEAD, SIDE = Y, Z
-"""World axis that a view shows up the page; across it is X."""
+OVERHEAD, SIDE = Y, Z  # World axis that a view shows up the page; across it is X
 
-_PITCH_IN = 7.3
-"""Least distance between the rows of a time lapse, in inches of the robot's world."""
+# Inches of the robot's world.
+_PITCH_IN = 7.3  # least distance between the rows of a time lapse
+_MARGIN_IN = 0.6  # free space around a time lapse
+_PROFILE_IN = 0.05  # distance between points of the ground's profile
 
-_MARGIN_IN = 0.6
-"""Free space around a time lapse, in inches of the robot's world."""
+# Inches on paper.
+_NAME_WIDTH, _NAME_HEIGHT = 0.33, 0.2  # room for the name of a tetrahedron
+_PATH_WIDTH, _PATH_HEIGHT = 6.0, 5.0  # largest size of the path of the centre
 
-_NAME_WIDTH, _NAME_HEIGHT = 0.33, 0.2
-"""Room for the name of a tetrahedron, in inches on paper."""
-
-_PATHS = 12
-"""Largest number of panels of paths side by side."""
-
-_PROFILE_IN = 0.05
-"""Distance between points of the ground's profile, in inches."""
-
-_ARROW = 0.08
-"""Length of an arrow over that of the path."""
-
-_PATH_WIDTH, _PATH_HEIGHT = 6.0, 5.0
-"""Largest size of the path of the centre on paper, in inches."""
+_PATHS = 12  # largest number of panels of paths side by side
+_ARROW = 0.08  # length of an arrow over that of the path
 
 _ON_GROUND: Any = {"color": "0.25", "linewidth": 0.8, "linestyle": "-"}
 _LIFTED: Any = {"color": OKABE_ITO["vermillion"], "linewidth": 1.6, "linestyle": "-"}
@@ -294,10 +284,8 @@ def _size(rows: Sequence[_Row], *, width_in: float, height_in: float) -> tuple[f
 def _draw_rows(
     panel: Axes, rows: Sequence[_Row], view: int, names: Sequence[str], width_in: float
 ) -> None:
-    """Draws a time lapse, one row below the other, and names tetrahedra of the first.
-
-    On paper it is `width_in` inches wide. Where there is no room for all names, only each second,
-    or third, ... is shown."""
+    """Draws a time lapse, `width_in` inches wide on paper, and names tetrahedra of its first row,
+    only each second or third, ... where there is no room for all names."""
     pitch = _pitch(rows)
     for i, row in enumerate(rows):
         down = pitch * i

@@ -15,11 +15,8 @@ from tetra_drake.analysis.comparison import Compared, comparison_numbers
 from tetra_drake.figures.style import common_style, line_style, make_figure, save_findings
 from tetra_drake.scenario.units import shown
 
-_LEGEND_WIDTH = 60
-"""Largest number of letters in a row of the legend, per panel."""
-
-_FIRST = 10
-"""Beginning of the axes of costs, in simulations."""
+_LEGEND_WIDTH = 60  # largest number of letters in a row of the legend, per panel
+_FIRST = 10  # beginning of the axes of costs, in simulations
 
 
 def save_comparison(compared: Compared, folder: Path) -> list[str]:

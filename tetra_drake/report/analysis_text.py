@@ -13,8 +13,7 @@ from tetra_drake.scenario.units import INCH, shown
 if TYPE_CHECKING:
     import pandas
 
-_LONGEST_NAME = 12
-"""Largest number of letters of a gait's name; longer ones are cut."""
+_LONGEST_NAME = 12  # largest number of letters of a gait's name; longer ones are cut
 
 
 def robustness_text(judgement: Judgement) -> str:
