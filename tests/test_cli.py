@@ -16,7 +16,6 @@ from tetra_drake.cli import main
 from tetra_drake.formatting import fixed
 from tetra_drake.robot.gait import Gait, load_gait, save_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metric_units import METRICS
 
 SHORT = """\
 base: thesis
@@ -30,10 +29,8 @@ WEIGHTS = [1.5] * 24
 GOOD = {"schema": 1, "name": "good", "weights": WEIGHTS, "tau_a_s": 0.3}
 FILES = {
     "good.json": json.dumps(GOOD),
-    "key.json": json.dumps(GOOD | {"tau": 0.3}),
     "short.yaml": SHORT,
     "key.yaml": "base: thesis\nrobot: {tetrahedron: 4}\n",
-    "broken.yaml": "robot: [\n",
     "six.yaml": SHORT + "robot: {tetrahedra: 6}\n",
     "poor.yaml": SHORT.replace("{", "{max_evaluations: 100, "),
 }
@@ -69,8 +66,6 @@ def unchanged(work):
         # 2 n (n - 1) = 40 weights for the 5 oscillators of 6 tetrahedra.
         ("simulate --scenario six.yaml --gait good.json", "good.json", "weights 24 40"),
         ("simulate --scenario short.yaml --out good.json", "good.json", ""),
-        ("cpg --out a.csv --scenario broken.yaml", "broken.yaml", ""),
-        ("cpg --out a.csv --gait key.json", "key.json", "tau: tau_b_s"),
         ("cpg --out a.csv --scenario feedback", "gait random gait 80", "gains:"),
         ("cpg --scenario short.yaml --out good.json/a.csv", "good.json/a.csv", ""),
         ("replay --out new/a.html missing", "missing", ""),
@@ -123,19 +118,20 @@ def test_a_simulation_that_fails_says_when_and_why_with_status_1(unchanged, caps
 COMMANDS = ("simulate", "evolve", "replay", "figures", "robustness", "compare", "cpg")
 
 
-def printed(arguments, capsys) -> str:
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--version"], {"tetra-drake", tetra_drake.__version__}),
+        (["--help"], set(COMMANDS)),
+        *[([command, "--help"], {"--help"}) for command in COMMANDS],
+    ],
+)
+def test_version_and_help_are_printed(arguments, words, capsys):
     with pytest.raises(SystemExit) as caught:
         main(arguments)
     assert caught.value.code == 0
-    return capsys.readouterr().out
-
-
-def test_version_and_the_help_of_every_command_are_printed(capsys):
-    assert printed(["--version"], capsys).split() == ["tetra-drake", tetra_drake.__version__]
-    overview = printed(["--help"], capsys)
-    for command in COMMANDS:
-        assert command in overview
-        assert "--help" in printed([command, "--help"], capsys)
+    printed = capsys.readouterr().out
+    assert all(word in printed for word in words)
 
 
 @pytest.fixture(scope="module")
@@ -171,20 +167,13 @@ def test_simulate_writes_its_files_and_prints_the_distance_and_the_page(simulate
 
 
 def test_the_result_holds_what_was_asked_for_and_done(simulated, result, scenario, gait_3):
-    assert (result["schema"], result["scenario"], result["duration_s"]) == (1, "short", 0.3)
+    assert (result["scenario"], result["duration_s"]) == ("short", 0.3)
     assert load_gait(simulated[0] / "result.json", scenario, key="gait") == gait_3
     assert result["real_time_factor"] == pytest.approx(0.3 / result["wall_time_s"])
     assert result["integrator"]["scheme"] == scenario.engine.scheme
     assert result["integrator"]["accuracy"] == scenario.engine.accuracy
     assert 0 < result["integrator"]["steps"] < result["integrator"]["derivative_evaluations"]
     assert {"python", "drake", "numpy", "tetra_drake"} <= result["versions"].keys()
-    inches = {key: value for key, value in result.items() if key.endswith("_in")}
-    assert inches.pop("path_radius_in") is None  # 0.3 s are one step of the path
-    lengths = {f"{name}_in" for name, unit in METRICS.items() if unit == "m"}
-    assert inches.keys() == lengths
-    for name, length in inches.items():
-        assert length == pytest.approx(result["metrics"][name.removesuffix("_in")] / INCH)
-    assert result["path"]["time_s"] == [0.0, 0.3]
     # Eq. 10 with phi = (1, -10, 0, -1).
     expected = result["steady_distance_in"] - 10 * result["twist_in"] - result["lateral_drift_in"]
     assert result["fitness"] == pytest.approx(expected, abs=1e-12)

@@ -135,7 +135,3 @@ def test_links_lead_somewhere(page: str) -> None:
     assert links
     for link in links:
         assert link.startswith("https://") or (file.parent / link).exists(), link
-
-
-def test_the_page_fits() -> None:
-    assert len(README.splitlines()) <= 130

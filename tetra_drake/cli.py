@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
 
-FIRST_SCENARIO = "quick"
-"""The scenario that `evolve` starts without another: it ends in minutes."""
-
 _OF_GAIT = "that of the run in whose folder the gait is, else thesis"
 """The default scenario of commands that take a gait."""
 
@@ -79,9 +76,8 @@ def make_parser() -> Command:
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
     for run, add_options in _COMMANDS:
-        text = inspect.cleandoc(run.__doc__ or "")
-        what, _, description = text.partition("\n\n")
         name = run.__name__.removeprefix("_")
+        what, _, description = (inspect.getdoc(run) or "").partition("\n\n")
         command = commands.add_parser(name, help=what.rstrip("."), description=description)
         add_options(command)
         command.set_defaults(run=run, command=command)
@@ -110,8 +106,7 @@ def _simulate(options: Options) -> None:
     from tetra_drake.report.summary import result_text
 
     scenario, gait = _chosen_gait(options)
-    if options.engine:
-        scenario = scenario.with_changes({"engine": f"!{options.engine.capitalize()}"})
+    scenario = scenario.with_changes(_engine_change(options))
     if options.meshcat:
         check_can_be_watched(scenario)
     check_result_folder(options.out)
@@ -134,8 +129,7 @@ def _simulate(options: Options) -> None:
 
 
 def _evolve_options(command: Command) -> None:
-    default = f"{FIRST_SCENARIO}, which takes minutes; with --resume, the run's"
-    _add_scenario(command, default=default)
+    _add_scenario(command, default="quick, which takes minutes; with --resume, the run's")
     _add_path(command, "--out", "DIR", "the run directory, as runs/NAME", required=True)
     _add_engine(command)
     _add_count(command, "--trials", "number of independent trials, instead of the scenario's")
@@ -172,15 +166,20 @@ def _evolve(options: Options) -> None:
     from tetra_drake.experiment import evolve
     from tetra_drake.report.summary import run_text
 
+    executor: contextlib.AbstractContextManager[Any] = contextlib.nullcontext()
+    if options.dask is not None:
+        from tetra_drake.evolution.cluster import dask_cluster
+
+        executor = dask_cluster(options.dask or None, workers=options.workers)
     try:
-        with _executor(options) as executor:
+        with executor as make_executor:
             run = evolve(
                 _scenario_to_evolve(options),
                 options.out,
                 seed=options.seed,
                 workers=options.workers,
                 resume=options.resume,
-                executor=executor,
+                executor=make_executor,
                 progress=Display(sys.stdout),
                 reevaluate=options.reevaluate,
             )
@@ -191,28 +190,18 @@ def _evolve(options: Options) -> None:
     print(run_text(run))
 
 
-def _executor(options: Options) -> contextlib.AbstractContextManager[Any]:
-    """Maker of executors on a Dask cluster by --dask; None without it."""
-    if options.dask is None:
-        return contextlib.nullcontext()
-    from tetra_drake.evolution.cluster import dask_cluster
-
-    return dask_cluster(options.dask or None, workers=options.workers)
-
-
 def _scenario_to_evolve(options: Options) -> Scenario | None:
     """The scenario with the options' changes; None if they leave a run to resume as it is."""
     from tetra_drake.evolution.manifest import read_manifest
 
-    asked = {
-        "engine": options.engine and f"!{options.engine.capitalize()}",
-        "evolution.trials": options.trials,
-        "evolution.evaluations": options.evaluations,
-    }
-    changes = {key: value for key, value in asked.items() if value is not None}
+    changes = _engine_change(options)
+    if options.trials is not None:
+        changes["evolution.trials"] = options.trials
+    if options.evaluations is not None:
+        changes["evolution.evaluations"] = options.evaluations
     if options.scenario is None and options.resume:
         return read_manifest(options.out).scenario.with_changes(changes) if changes else None
-    return load_scenario(options.scenario or FIRST_SCENARIO).with_changes(changes)
+    return load_scenario(options.scenario or "quick").with_changes(changes)
 
 
 def _replay_options(command: Command) -> None:
@@ -372,6 +361,11 @@ def _add_gait(command: Command) -> None:
     group.add_argument("--gait", metavar="FILE|RUN", type=Path, help=what)
     seed = "instead, a random gait of this seed (default: one that walks)"
     group.add_argument("--seed", metavar="N", type=_integer(0), help=seed)
+
+
+def _engine_change(options: Options) -> dict[str, Any]:
+    """The change of the scenario by --engine."""
+    return {"engine": f"!{options.engine.capitalize()}"} if options.engine else {}
 
 
 def _chosen_gait(options: Options) -> tuple[Scenario, Gait]:

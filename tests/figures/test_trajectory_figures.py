@@ -94,9 +94,10 @@ def test_a_walk_is_drawn_on_a_page_of_bearable_size_with_no_label_on_another(
 
 
 def robots(panel):
-    """The lines that draw tetrahedra, (instants, bodies)."""
-    lines = [line for line in panel.lines if len(line.get_xdata()) == 3 * len(STRUTS)]
-    return np.array(lines, dtype=object).reshape(-1, 5)
+    """The lines that draw struts, (instants, bodies, struts)."""
+    lines = [line for line in panel.lines if line.get_transform() == panel.transData]
+    struts = [line for line in lines if len(line.get_xdata()) == 2 and line.get_marker() == "None"]
+    return np.array(struts, dtype=object).reshape(-1, 5, len(STRUTS))
 
 
 def test_relative_distances_are_in_inches(walk):
@@ -110,13 +111,13 @@ def test_relative_distances_are_in_inches(walk):
 def test_the_time_lapse_shows_instants_from_start_to_end(walk):
     [panel] = time_lapse(walk, instants=4).axes
     lines = robots(panel)
-    assert lines.shape == (4, 5)
-    x = [np.nanmin(row[0].get_xdata()) for row in lines]
+    assert len(lines) == 4
+    x = [min(np.concatenate([line.get_xdata() for line in row[0]])) for row in lines]
     np.testing.assert_allclose(x, SPEED * np.array([0.0, 3.0, 6.0, 9.0]) / INCH, atol=1e-9)
-    y = [np.nanmean(row[0].get_ydata()) for row in lines]
+    y = [np.mean([line.get_ydata() for line in row[0]]) for row in lines]
     assert (np.diff(y) < -6.0).all()  # one below the other, so that none overlap
     assert panel.get_aspect() == 1.0
-    assert len({line.get_color() for line in lines[0]}) == 5
+    assert len({line.get_color() for line in lines[0, :, 0]}) == 5
     numbers = [label.get_text().replace("in", "").split() for label in panel.get_yticklabels()]
     assert [float(way) for _, _, way in numbers] == [0.0, 1.18, 2.36, 3.54]
 
@@ -141,8 +142,6 @@ def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):
     headings = np.arctan2(arrows.V, arrows.U)
     np.testing.assert_allclose(headings, angle[[0, 300, 600, 900]], atol=1e-9)
     np.testing.assert_allclose(arrows.XY, path.get_xydata()[[0, 300, 600, 900]])
-    apart = [np.diff(axis.get_majorticklocs()) for axis in (panel.xaxis, panel.yaxis)]
-    assert np.ptp(np.concatenate(apart)) < 1e-9
     for shown, drawn in ((panel.get_xlim(), x / INCH), (panel.get_ylim(), y / INCH)):
         assert shown[0] < drawn.min() <= drawn.max() < shown[1]
 
@@ -164,7 +163,7 @@ def test_in_one_step_tetrahedra_off_the_ground_stand_out(walk):
     assert f"{start:.2f} to {end:.2f} s" in figure.get_suptitle()
     for panel in figure.axes[:2]:
         assert panel.get_aspect() == 1.0
-        colours = [[to_hex(line.get_color()) for line in row] for row in robots(panel)]
+        colours = [[to_hex(line.get_color()) for line in row] for row in robots(panel)[..., 0]]
         np.testing.assert_array_equal(np.array(colours) == OKABE_ITO["vermillion"], aloft)
 
 
@@ -209,7 +208,7 @@ def test_a_column_shows_the_signals_of_the_same_cables():
 def test_ground_forces_are_those_of_the_last_seconds(walk):
     panels = ground_forces(walk, FLAT, seconds=3.0).axes
     names = [f"T{i} bottom left" for i in range(1, 6)]
-    assert [panel.get_title("left") for panel in panels] == [*names, "T5 tip"]
+    assert [panel.get_title("left") for panel in panels] == names
     end = walk.sel(time=slice(6.0, None))
     normal, friction, _ = panels[0].lines
     expected = end.normal_force.sel(contact="T1 bottom_left") / POUND_FORCE
@@ -222,21 +221,15 @@ def test_ground_forces_are_those_of_the_last_seconds(walk):
 def test_flights_are_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk):
     four = walk.sel(time=slice(0.0, 4 * PERIOD)).copy(deep=True)
     four.normal_force[int(np.argmin(np.abs(four.time.values - 5.5))), 0] = 100.0 * LOAD
-    panels = ground_forces(four, FLAT, seconds=4.0).axes
-    for panel, expected, percent in (
-        (panels[0], [(4.0, 5.0), (6.0, 7.0)], 50),
-        (panels[-1], [(4.0, 8.0)], 100),
-    ):
-        spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches]
-        np.testing.assert_allclose(spans, expected, atol=0.011)
-        (shown,) = (word for word in panel.get_title(loc="right").split() if word.isdigit())
-        assert int(shown) == pytest.approx(percent, abs=1)
-    np.testing.assert_allclose(panels[0].lines[-1].get_xdata(), [5.0, 7.0], atol=0.011)
-    assert len(panels[-1].lines[-1].get_xdata()) == 0, "the tip never lands"
-    low, high = panels[0].get_ylim()
+    panel, *_ = ground_forces(four, FLAT, seconds=4.0).axes
+    spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches]
+    np.testing.assert_allclose(spans, [(4.0, 5.0), (6.0, 7.0)], atol=0.011)
+    assert panel.get_title(loc="right").split()[1] in ("49", "50", "51")
+    np.testing.assert_allclose(panel.lines[-1].get_xdata(), [5.0, 7.0], atol=0.011)
+    low, high = panel.get_ylim()
     assert low < -0.5 * LOAD / POUND_FORCE
     assert LOAD / POUND_FORCE < high < 2.0 * LOAD / POUND_FORCE
-    assert max(panels[0].lines[0].get_ydata()) > 50.0 * high
+    assert max(panel.lines[0].get_ydata()) > 50.0 * high
 
 
 def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):

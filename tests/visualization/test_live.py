@@ -27,7 +27,7 @@ class FakeTime:
     def __init__(self, look):
         self.now, self.look, self.slept = 1000.0, look, 0.0
 
-    def clock(self):
+    def monotonic(self):
         self.now += self.look
         return self.now
 
@@ -57,10 +57,11 @@ def visitor(meshcat):
 
 @pytest.mark.parametrize(("look", "slept"), [(0.0, 0.3), (1.0, 0.0)], ids=["fast", "slow"])
 def test_watching_changes_nothing_and_waits_for_real_time_only(
-    short, meshcat, visitor, look, slept
+    short, meshcat, visitor, look, slept, monkeypatch
 ):
     time = FakeTime(look)
-    view = LiveView(meshcat, short, clock=time.clock, sleep=time.sleep)
+    monkeypatch.setattr("tetra_drake.visualization.live.time", time)
+    view = LiveView(meshcat, short)
     while meshcat.GetNumActiveConnections() == 0:
         pass
     gait = seeded_gait(short)
@@ -71,8 +72,9 @@ def test_watching_changes_nothing_and_waits_for_real_time_only(
     xarray.testing.assert_identical(watched.trajectory, alone.trajectory)
 
 
-def test_shows_where_the_robot_is(short, meshcat, visitor):
-    view = Mock(wraps=LiveView(meshcat, short, sleep=lambda seconds: None))
+def test_shows_where_the_robot_is(short, meshcat, visitor, monkeypatch):
+    monkeypatch.setattr("tetra_drake.visualization.live.time", FakeTime(0.0))
+    view = Mock(wraps=LiveView(meshcat, short))
     simulate(scenario=short, gait=seeded_gait(short), viewer=view)
     shown = [call.args[0] for call in view.show.call_args_list]
     matrices = {
@@ -106,9 +108,9 @@ def test_only_this_machine_can_watch(short):
     del view
 
 
-def test_waits_for_a_browser(short, meshcat):
-    sleep = Mock(side_effect=[None, None, TimeoutError])
-    view = LiveView(meshcat, short, sleep=sleep)
+def test_waits_for_a_browser(short, meshcat, monkeypatch):
+    time = Mock(sleep=Mock(side_effect=[None, None, TimeoutError]))
+    monkeypatch.setattr("tetra_drake.visualization.live.time", time)
     with pytest.raises(TimeoutError):
-        simulate(scenario=short, gait=seeded_gait(short), viewer=view)
-    assert sleep.call_count == 3
+        simulate(scenario=short, gait=seeded_gait(short), viewer=LiveView(meshcat, short))
+    assert time.sleep.call_count == 3

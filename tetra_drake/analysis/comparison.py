@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from tetra_drake.analysis.statistics import interquartile_mean, interval
+from tetra_drake.analysis.statistics import interquartile_mean, interval, json_rows
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import FITNESS
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.files import json_number
 from tetra_drake.scenario.load import differences
 
 if TYPE_CHECKING:
@@ -26,8 +25,11 @@ if TYPE_CHECKING:
 
 QUARTILES = (0.25, 0.5, 0.75)
 
+# Sections of the scenario that say how runs search, and not for what.
 _SEARCH = ("evolution", "optimizer")
-"""Sections of the scenario that say how runs search, and not for what."""
+
+
+_TRIAL_COLUMNS = ["run", "trial", "ended", "cost", "at_common", "fitness", "distance", "reached"]
 
 
 @dataclass(frozen=True)
@@ -55,11 +57,7 @@ class Compared:
     """Notes on differences other than search, and on unfinished runs."""
 
 
-def compare(
-    directories: Sequence[str | Path],
-    *,
-    reach: float | None = None,
-) -> Compared:
+def compare(directories: Sequence[str | Path], *, reach: float | None = None) -> Compared:
     """Compares how runs of one objective search, finished or not.
 
     reach: a distance (m); the result says when it was walked.
@@ -70,106 +68,88 @@ def compare(
 
     runs = _labelled([load_run(directory) for directory in directories])
     notes = _differences(runs)
-    draws = {label: run.manifest.scenario.draws for label, run in runs.items()}
-    searches = {label: _trials(run, draws[label]) for label, run in runs.items()}
-    ends = {label: _end(trials) for label, trials in searches.items()}
-    common = min(ends.values())
-    rows = [
-        {"run": label, "trial": number, "ended": trial.ended, "cost": trial.costs[-1]}
-        | {"at_common": trial.at(common), "fitness": trial.best[-1]}
-        | {"distance": trial.distance[-1], "reached": trial.reached(reach)}
-        for label, trials in searches.items()
-        for number, trial in trials.items()
-    ]
-    table = pandas.DataFrame(rows)
-    for label, trials in searches.items():
-        if going_on := sum(not trial.ended for trial in trials.values()):
-            notes.append(f"{label}: {going_on} of {len(trials)} trials go on")
-        if failed := sum(np.isneginf(trial.best[-1]) for trial in trials.values()):
-            notes.append(f"{label}: {failed} of {len(trials)} trials have no fitness")
-    summaries = {
-        label: {"draws": draws[label]}
-        | _summary(table[table["run"] == label])
-        | {"wall_time": run.evaluations["wall_time_s"].mean()}
-        for label, run in runs.items()
-    }
-    curves = [_curve(t, ends[label]).assign(run=label) for label, t in searches.items()]
+    searches = {label: _progress(run) for label, run in runs.items()}
+    common = min(_end(progress) for progress in searches.values())
+    trials, curves, summaries = [], [], {}
+    for label, progress in searches.items():
+        rows = _trials(progress, common, reach)
+        trials.append(rows.assign(run=label))
+        curves.append(_curve(progress).assign(run=label))
+        run = runs[label]
+        summaries[label] = {
+            "draws": run.manifest.scenario.draws,
+            **_summary(rows),
+            "wall_time": run.evaluations["wall_time_s"].mean(),
+        }
+        if going_on := summaries[label]["going_on"]:
+            notes.append(f"{label}: {going_on} of {len(rows)} trials go on")
+        if failed := int(np.isneginf(rows["fitness"]).sum()):
+            notes.append(f"{label}: {failed} of {len(rows)} trials have no fitness")
     return Compared(
         common=common,
         reach=reach,
-        trials=table,
+        trials=pandas.concat(trials, ignore_index=True)[_TRIAL_COLUMNS],
         curves=pandas.concat(curves, ignore_index=True),
         runs=pandas.DataFrame.from_dict(summaries, orient="index").rename_axis("run"),
         notes=notes,
     )
 
 
-@dataclass(frozen=True)
-class _Trial:
-    """Course of a trial, after each of its evaluations; arrays of equal length."""
-
-    costs: npt.NDArray[np.int64]
-    best: npt.NDArray[np.float64]
-    """Fitness, -inf until there is one."""
-    distance: npt.NDArray[np.float64]
-    """Distance (m) of the fittest gait so far."""
-    ended: bool
-
-    def at(self, cost: npt.ArrayLike) -> Any:
-        """The best fitness at a cost; its last one from its end on."""
-        place = np.searchsorted(self.costs, cost, side="right") - 1
-        return np.where(place < 0, -math.inf, self.best[np.maximum(place, 0)])
-
-    def reached(self, distance: float | None) -> float:
-        """The cost of the first fittest so far that walks a distance; infinite if none does."""
-        there = self.costs[self.distance >= (math.inf if distance is None else distance)]
-        return float(there[0]) if len(there) else math.inf
-
-
-def _trials(run: Run, cost: int) -> dict[int, _Trial]:
-    """The trials that have begun, by their numbers; `cost`: of an evaluation."""
+def _progress(run: Run) -> pandas.DataFrame:
+    """The course of each trial, a row per evaluation: trial, ended (the trial), cost, and fitness
+    and distance (m) of the trial's fittest gait so far, -inf and NaN where there is none."""
     run.fittest()  # raises InputError if there is none
-    trials = {}
-    for number, rows in run.evaluations.groupby("trial"):
-        fitness = rows["fitness"].fillna(-math.inf).to_numpy()
-        best = np.maximum.accumulate(fitness)
-        fittest = np.maximum.accumulate(np.where(_rises(best), np.arange(len(best)), 0))
-        distance = np.where(np.isfinite(best), rows["distance"].to_numpy()[fittest], math.nan)
-        costs = cost * np.arange(1, len(best) + 1)
-        ended = run.statuses[int(number)].stop is not None
-        trials[int(number)] = _Trial(costs, best, distance, ended)
-    return trials
+    table = run.evaluations[["trial", "fitness", "distance"]].copy()
+    trial = table["trial"]
+    table["ended"] = trial.map({status.number: bool(status.stop) for status in run.statuses})
+    table["cost"] = run.manifest.scenario.draws * (table.groupby("trial").cumcount() + 1)
+    table["fitness"] = table["fitness"].fillna(-math.inf).groupby(trial).cummax()
+    is_new = table["fitness"] != table["fitness"].groupby(trial).shift()
+    table["distance"] = table["distance"].where(is_new).groupby(trial).ffill()
+    return table
 
 
-def _rises(best: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-    """Indices at which the best gait so far is a new one, as the first always is."""
-    return np.r_[True, best[1:] > best[:-1]]
-
-
-def _end(trials: Mapping[int, _Trial]) -> int:
+def _end(progress: pandas.DataFrame) -> int:
     """Cost at which a run's curve ends."""
-    going_on = [int(trial.costs[-1]) for trial in trials.values() if not trial.ended]
-    return min(going_on) if going_on else max(int(t.costs[-1]) for t in trials.values())
+    ends = progress.groupby("trial")[["cost", "ended"]].last()
+    going_on = ends[~ends["ended"]]
+    return int(ends["cost"].max() if going_on.empty else going_on["cost"].min())
 
 
-def _curve(trials: Mapping[int, _Trial], end: int) -> pandas.DataFrame:
-    """The quartiles over the trials where they rise, and at the end."""
-    import pandas
+def _trials(progress: pandas.DataFrame, common: int, reach: float | None) -> pandas.DataFrame:
+    """A run's rows of Compared.trials."""
+    table = progress.drop_duplicates("trial", keep="last").set_index("trial")
+    at_common = progress[progress["cost"] <= common].groupby("trial")["fitness"].last()
+    far = progress[progress["distance"] >= (math.inf if reach is None else reach)]
+    reached = far.groupby("trial")["cost"].first().astype(float)
+    table["at_common"] = at_common.reindex(table.index, fill_value=-math.inf)
+    table["reached"] = reached.reindex(table.index, fill_value=math.inf)
+    return table.reset_index()
 
-    rises = [trial.costs[_rises(trial.best)] for trial in trials.values()]
-    costs = np.unique(np.concatenate([*rises, [end]]))
-    costs = costs[costs <= end]
-    quartiles = _quartiles(np.array([trial.at(costs) for trial in trials.values()]))
-    values = dict(zip(("low", "median", "high"), quartiles, strict=True))
-    return pandas.DataFrame({"cost": costs} | values)
+
+def _curve(progress: pandas.DataFrame) -> pandas.DataFrame:
+    """The quartiles over the trials where one of them rises, and at the end."""
+    best = progress.pivot(index="cost", columns="trial", values="fitness").ffill()
+    best = best.loc[: _end(progress)]
+    rises = (best != best.shift()).any(axis=1)
+    rises.iloc[-1] = True
+    best = best[rises]
+    low, median, high = _quartiles(best.to_numpy().T)
+    return best.index.to_frame(index=False).assign(low=low, median=median, high=high)
 
 
-def _quartiles(values: npt.NDArray[np.float64]) -> list[npt.NDArray[np.float64]]:
-    """Quantiles of each column (or of one), of infinite values, too."""
+def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
+    """QUARTILES of each column (or of one), linear between values as numpy's, which are NaN where
+    values are infinite."""
     ordered = np.sort(values, axis=0)
-    places = [share * (len(values) - 1) for share in QUARTILES]
-    around = [(ordered[math.floor(p)], ordered[math.ceil(p)], p % 1.0) for p in places]
-    return [(1.0 - w) * low + w * high if w else low for low, high, w in around]
+    quartiles = []
+    for share in QUARTILES:
+        place = share * (len(values) - 1)
+        quartile, weight = ordered[math.floor(place)], place % 1.0
+        if weight > 0.0:
+            quartile = (1.0 - weight) * quartile + weight * ordered[math.ceil(place)]
+        quartiles.append(quartile)
+    return quartiles
 
 
 def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
@@ -178,13 +158,13 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
     row["cost"] = trials["cost"].median()
     for name in ("at_common", "fitness", "distance"):
         values = trials[name].replace(-math.inf, math.nan).dropna()
-        low, high = interval(values, interquartile_mean)
-        mean = float(interquartile_mean(values)) if len(values) else math.nan
-        row |= {name: values.median(), f"{name}_mean": mean}
-        row |= {f"{name}_low": low, f"{name}_high": high}
-    quartiles = _quartiles(trials["reached"].to_numpy())
-    row |= dict(zip(("reached_low", "reached", "reached_high"), quartiles, strict=True))
-    return row | {"share": float(np.isfinite(trials["reached"]).mean())}
+        row[name] = values.median()
+        row[f"{name}_mean"] = interquartile_mean(values) if len(values) else math.nan
+        row[f"{name}_low"], row[f"{name}_high"] = interval(values, interquartile_mean)
+    reached = trials["reached"].to_numpy()
+    row["reached_low"], row["reached"], row["reached_high"] = _quartiles(reached)
+    row["share"] = float(np.isfinite(reached).mean())
+    return row
 
 
 def _labelled(runs: Sequence[Run]) -> dict[str, Run]:
@@ -205,8 +185,7 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
     (first, base), *others = runs.items()
     notes = []
     for label, run in others:
-        ours, theirs = _objective(run), _objective(base)
-        if ours != theirs:
+        if _objective(run) != _objective(base):
             problem = f"is not that of {first}, and fitnesses of different objectives say nothing"
             raise InputError(run.directory, "objective", f"{problem} about each other")
         changed = [
@@ -228,10 +207,9 @@ def _objective(run: Run) -> tuple[str, Mapping[str, float]]:
 
 def comparison_numbers(compared: Compared) -> dict[str, Any]:
     """The content of summary.json, lengths in m; null for what is infinite or unknown."""
-    rows = compared.runs.reset_index().to_dict("records")
     return {
         "common": compared.common,
         "reach": compared.reach,
         "notes": compared.notes,
-        "runs": [{key: json_number(value) for key, value in row.items()} for row in rows],
+        "runs": json_rows(compared.runs),
     }

@@ -31,8 +31,7 @@ LUCKY = 0.5
 CELLS = ["cell_1", "cell_2"]
 _KEY = ["trial", "index"]
 _JUDGED = ["kept", "mean_distance"]
-_EPSILON = 1e-6
-"""Number that pyribs adds against rounding."""
+_EPSILON = 1e-6  # which pyribs adds against rounding
 
 
 def elites(run: Run) -> pandas.DataFrame:
@@ -47,7 +46,7 @@ def elites(run: Run) -> pandas.DataFrame:
     judged = pandas.DataFrame(read_entries(run.directory / ELITES), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > FLOOR].dropna(subset=list(kind.measures))
-        table = table.assign(**dict(zip(CELLS, cells(table, kind), strict=True)))
+        table[CELLS] = _cells(table, kind)
         table = table.sort_values(["fitness", *_KEY], ascending=[False, True, True])
         table = table.drop_duplicates(CELLS)
     else:
@@ -55,14 +54,12 @@ def elites(run: Run) -> pandas.DataFrame:
     return table.merge(judged.astype(dict.fromkeys(_JUDGED, float)), on=_KEY, how="left")
 
 
-def cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> list[npt.NDArray[np.int64]]:
-    """Cell numbers of gaits along each of the two measures, as pyribs has them."""
-    return [
-        np.clip((count * (gaits[name] - low) + _EPSILON) / (high - low), 0, count - 1)
-        .to_numpy()
-        .astype(np.int64)
-        for (name, (low, high)), count in zip(kind.measures.items(), kind.cells, strict=True)
-    ]
+def _cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> npt.NDArray[np.int64]:
+    """Cell numbers (gaits, 2) of gaits along each of the two measures, as pyribs has them."""
+    low, high = np.array(list(kind.measures.values())).T
+    count = np.array(kind.cells)
+    places = (count * (gaits[list(kind.measures)].to_numpy() - low) + _EPSILON) / (high - low)
+    return places.clip(0, count - 1).astype(np.int64)
 
 
 def judge_elites(
@@ -83,8 +80,8 @@ def judge_elites(
     if missing.empty:
         return
     say(f"simulating {len(missing)} gaits of the map in {kind.draws} draws of disturbances")
-    keys = [(int(trial), int(index)) for trial, index in missing[_KEY].to_numpy()]
-    gaits = dict(enumerate(run.gait(*key) for key in keys))
+    keys = missing[_KEY].to_numpy().tolist()
+    gaits = {i: run.gait(trial, index) for i, (trial, index) in enumerate(keys)}
     seed = run.manifest.seed
     judgement = judge(scenario, gaits, draws=kind.draws, seed=seed, alone=False, workers=workers)
     table = by_gait(judgement)
@@ -111,12 +108,12 @@ def chosen(run: Run) -> dict[str, pandas.Series]:
 def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, pandas.Series]:
     """Gaits whose cells are nearest to the corners, by the corners' names."""
     named = {}
-    for corner in itertools.product((0, 1), repeat=2):
-        sides = zip(corner, kind.measures, strict=True)
-        words = (f"{('low', 'high')[end]} {name.replace('_', ' ')}" for end, name in sides)
-        ends = np.array(corner) * (np.array(kind.cells) - 1)
-        away = (((gaits[CELLS] - ends) / np.array(kind.cells)) ** 2).sum(axis=1)
-        named[", ".join(words)] = gaits.loc[away.idxmin()]
+    count = np.array(kind.cells)
+    first, second = (name.replace("_", " ") for name in kind.measures)
+    for (i, one), (j, other) in itertools.product(enumerate(("low", "high")), repeat=2):
+        corner = np.array([i, j]) * (count - 1)
+        away = (((gaits[CELLS] - corner) / count) ** 2).sum(axis=1)
+        named[f"{one} {first}, {other} {second}"] = gaits.loc[away.idxmin()]
     return named
 
 

@@ -8,10 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tetra_drake.analysis.statistics import interval, share_interval
+from tetra_drake.analysis.statistics import interval, json_rows, share_interval
 from tetra_drake.engines.simulate import check_scenario, simulate_many
-from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import json_number
+from tetra_drake.errors import InputError
 from tetra_drake.machine import versions
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
@@ -45,6 +44,9 @@ LOSS = 0.1
 """A gait keeps a draw in which it loses at most this share of its undisturbed distance, and misses
 none of the scenario's requirements."""
 
+_Planned = tuple[dict[str, Any], Draw]
+"""A draw with its labels in Judgement's tables."""
+
 QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
 
 
@@ -52,7 +54,7 @@ QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
 class Judgement:
     """Simulations of judge().
 
-    All tables have the columns gait (its key), failure (None where there is none), missed (the
+    All tables have the columns gait (its key), failure (missing where there is none), missed (the
     scenario's requirements that are not met), fitness and the metrics (distance ...) in SI, NaN
     where the simulation failed.
     """
@@ -109,33 +111,31 @@ def judge(
 
     Raises InputError where a gait is for another robot, or percent too large for the scenario.
     """
-    changes: dict[str, Any] = {"engine": "!Compiled"}
-    if scenario.disturbances is None or percent is not None:
-        changes["disturbances"] = default_disturbances(scenario, percent or PERCENT)
-    scenario = scenario.with_changes(changes)
-    settings = scenario.disturbances
-    assert settings is not None
+    disturbances = scenario.disturbances
+    if disturbances is None or percent is not None:
+        disturbances = default_disturbances(scenario, percent or PERCENT)
+    scenario = scenario.with_changes({"engine": "!Compiled", "disturbances": disturbances})
     fresh = fresh_draws(scenario, seed, draws)
-    plan: list[tuple[dict[str, Any], Draw]] = [({"what": NOTHING}, Draw({}))]
-    plan += [({"what": ALL, "draw": i, **draw.factors}, draw) for i, draw in enumerate(fresh)]
-    plan += _alone(settings, fresh) if alone else []
-    outcomes = _outcomes(scenario, [draw for _, draw in plan], gaits, workers=workers)
-    labels = [{"gait": key} | label for label, _ in plan for key in gaits]
-    rows = [a | b for a, b in zip(labels, outcomes, strict=True)]
+    plan: list[_Planned] = [({"what": NOTHING}, Draw({}))]
+    for i, draw in enumerate(fresh):
+        plan.append(({"what": ALL, "draw": i, **draw.factors}, draw))
+    if alone:
+        plan += _alone(disturbances, fresh)
+    rows = _simulated(scenario, plan, gaits, workers)
     return Judgement(
         scenario=scenario,
         seed=seed,
         undisturbed=_table([row for row in rows if row["what"] == NOTHING]),
-        draws=_table([row for row in rows if row["what"] == ALL], "draw", *settings.spreads),
+        draws=_table([row for row in rows if row["what"] == ALL], "draw", *disturbances.spreads),
         alone=_table(
             [row for row in rows if row["what"] not in (NOTHING, ALL)], "what", "spread", "draw"
         ),
     )
 
 
-def _alone(settings: Disturbances, fresh: Sequence[Draw]) -> Iterator[tuple[dict[str, Any], Draw]]:
-    """Each change alone, with its labels."""
-    for key, size in settings.spreads.items():
+def _alone(disturbances: Disturbances, fresh: Sequence[Draw]) -> Iterator[_Planned]:
+    """Each change alone."""
+    for key, size in disturbances.spreads.items():
         for spread in (-size, size):
             yield {"what": key, "spread": spread}, Draw({key: 1.0 + spread})
     for i, draw in enumerate(fresh[:ALONE]):
@@ -145,39 +145,41 @@ def _alone(settings: Disturbances, fresh: Sequence[Draw]) -> Iterator[tuple[dict
             yield {"what": TERRAIN, "draw": i}, Draw({}, terrain_seed=draw.terrain_seed)
 
 
-def _outcomes(
-    scenario: Scenario, draws: Sequence[Draw], gaits: Mapping[Any, Gait], **options: Any
-) -> Iterator[dict[str, Any]]:
-    """The columns that simulations fill, for each draw and gait."""
+def _simulated(
+    scenario: Scenario, plan: Sequence[_Planned], gaits: Mapping[Any, Gait], workers: int | None
+) -> list[dict[str, Any]]:
+    """A row for each draw of the plan and gait: labels and what Judgement's tables have in common.
+
+    A robot that cannot start, such as one displaced into a step of the terrain, is a failure.
+    """
     check_scenario(scenario)
-    # One scenario for all gaits: the engine prepares it once.
-    changed = [disturbed(scenario, draw) for draw in draws]
-    refusals = [_refusal(scenario) for scenario in changed]
-    able = [scenario for scenario, refusal in zip(changed, refusals, strict=True) if not refusal]
-    scenarios = [scenario for scenario in able for _ in gaits]
-    walking = [*gaits.values()] * len(able)
-    results = iter(simulate_many(scenario=scenarios, gaits=walking, **options))
-    for refusal in refusals:
-        for _ in gaits:
-            yield _outcome(refusal or next(results), scenario.require)
-
-
-def _refusal(scenario: Scenario) -> InputError | None:
-    """Why a robot cannot start, such as one displaced into a step of the terrain."""
-    try:
-        check_scenario(scenario)
-    except InputError as error:
-        return error
-    return None
-
-
-def _outcome(
-    result: SimulationResult | SimulationFailure | InputError, require: Mapping[str, float]
-) -> dict[str, Any]:
-    if not isinstance(result, SimulationResult):
-        return {"failure": str(result), "missed": ""}
-    missed = ", ".join(unmet_requirements(result.metrics, require))
-    return {"missed": missed, "fitness": result.fitness} | result.metrics.to_json()
+    rows: list[dict[str, Any]] = []
+    walking: list[tuple[dict[str, Any], Scenario, Gait]] = []
+    for labels, draw in plan:
+        changed = disturbed(scenario, draw)  # one for all gaits: the engine prepares it once
+        refusal = None
+        try:
+            check_scenario(changed)
+        except InputError as error:
+            refusal = str(error)
+        for key, gait in gaits.items():
+            row = {"gait": key, **labels, "failure": refusal, "missed": ""}
+            rows.append(row)
+            if refusal is None:
+                walking.append((row, changed, gait))
+    results = simulate_many(
+        scenario=[changed for _, changed, _ in walking],
+        gaits=[gait for _, _, gait in walking],
+        workers=workers,
+    )
+    for (row, _, _), result in zip(walking, results, strict=True):
+        if isinstance(result, SimulationResult):
+            row["missed"] = ", ".join(unmet_requirements(result.metrics, scenario.require))
+            row["fitness"] = result.fitness
+            row |= result.metrics.to_json()
+        else:
+            row["failure"] = str(result)
+    return rows
 
 
 def _table(rows: list[dict[str, Any]], *labels: str) -> pandas.DataFrame:
@@ -185,7 +187,6 @@ def _table(rows: list[dict[str, Any]], *labels: str) -> pandas.DataFrame:
 
     numbers = ["fitness", *METRICS]
     table = pandas.DataFrame(rows, columns=["gait", *labels, "failure", "missed", *numbers])
-    table["failure"] = table["failure"].astype(object).where(table["failure"].notna(), None)
     return table.astype(dict.fromkeys(numbers, float))
 
 
@@ -245,19 +246,14 @@ def rank_correlations(judgement: Judgement) -> pandas.DataFrame:
 
 def robustness_numbers(judgement: Judgement) -> dict[str, Any]:
     """The content of summary.json, in SI: gaits and changes, and what they are of."""
-    tables = {"gaits": by_gait, "changes": by_change}
     return {
         "versions": versions(),
         "scenario": judgement.scenario.name,
         "disturbances": tree_of(judgement.scenario)["disturbances"],
         "draws": int(judgement.draws["draw"].nunique()),
         "seed": judgement.seed,
-    } | {
-        name: [
-            {key: json_number(value) for key, value in row.items()}
-            for row in make(judgement).reset_index().to_dict("records")
-        ]
-        for name, make in tables.items()
+        "gaits": json_rows(by_gait(judgement)),
+        "changes": json_rows(by_change(judgement)),
     }
 
 

@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from statistics import NormalDist
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+
+from tetra_drake.files import json_number
+
+if TYPE_CHECKING:
+    import pandas
 
 RESAMPLES = 2000
 
@@ -47,3 +52,9 @@ def interquartile_mean(values: npt.ArrayLike, axis: int = -1) -> Any:
     ordered = np.sort(np.asarray(values, dtype=float), axis=axis)
     count = ordered.shape[axis]
     return ordered.take(range(count // 4, count - count // 4), axis=axis).mean(axis=axis)
+
+
+def json_rows(table: pandas.DataFrame) -> list[dict[Any, Any]]:
+    """Rows of a table, its index among them, as JSON holds them: null for what is not finite."""
+    rows = table.reset_index().to_dict("records")
+    return [{key: json_number(value) for key, value in row.items()} for row in rows]

@@ -29,20 +29,29 @@ _DOTS: Any = {
     "alpha": 0.4,
     "zorder": 0,
 }
+_LINE = {"color": OKABE_ITO["blue"], "linewidth": 1.2}
 _BOX: Any = {
     "orientation": "horizontal",
     "widths": 0.6,
     "whis": (5, 95),
     "showfliers": False,
     "manage_ticks": False,
+    "boxprops": _LINE,
+    "medianprops": _LINE,
+    "whiskerprops": _LINE,
+    "capprops": _LINE,
 }
+_LOSS: Any = {"marker": "d", "linestyle": "", "color": OKABE_ITO["vermillion"]}
+_MEAN: Any = {"marker": "d", "linestyle": "", "color": OKABE_ITO["blue"]}
 
 
 def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
     """Writes draws.csv and alone.csv (all simulations, SI), summary.json and the figure to the
     folder; returns the names. Raises InputError if a file cannot be written."""
-    given = {"draws": judgement.draws, "alone": judgement.alone}
-    tables = {name: judgement.compared(table) for name, table in given.items()}
+    tables = {
+        "draws": judgement.compared(judgement.draws),
+        "alone": judgement.compared(judgement.alone),
+    }
     figure, summary = robustness(judgement), robustness_numbers(judgement)
     return save_findings(figure, folder, "robustness", tables=tables, summary=summary)
 
@@ -71,15 +80,13 @@ def robustness(judgement: Judgement) -> Figure:
 
 def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -> None:
     draws = judgement.compared(judgement.draws).dropna(subset=["distance", "undisturbed"])
-    line: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.2}
-    lines: Any = {f"{part}props": line for part in ("box", "median", "whisker", "cap")}
     for place, gait in enumerate(gaits.index):
         walks = draws[draws["gait"] == gait]
         shares = walks["distance"] / walks["undisturbed"]
         # The golden ratio spreads any number of dots evenly.
         heights = place + 0.6 * (walks["draw"] * 0.618034 % 1.0 - 0.5)
         axes.plot(shares, heights, **_DOTS)
-        axes.boxplot(shares, positions=[place], **_BOX, **lines)
+        axes.boxplot(shares, positions=[place], **_BOX)
     axes.axvline(1.0 - LOSS, **REFERENCE)
     axes.axvline(1.0, color="black", linewidth=0.8)
     margin = max(0.7, 2.5 - len(gaits) / 2)  # else the box of a single gait fills the axes
@@ -97,8 +104,7 @@ def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -
 def _draw_alone(axes: Axes, changes: pandas.DataFrame) -> None:
     places, worst = range(len(changes)), changes["worst"].clip(upper=0.0).abs() / INCH
     axes.barh(places, changes["median"] / INCH, color=OKABE_ITO["orange"], label="median change")
-    look: Any = {"marker": "d", "linestyle": "", "color": OKABE_ITO["vermillion"]}
-    axes.plot(worst, places, label="greatest loss", **look)
+    axes.plot(worst, places, label="greatest loss", **_LOSS)
     axes.set(title="one change alone", xlabel="change of distance (in)")
     _finish(axes, list(changes.index))
 
@@ -106,16 +112,15 @@ def _draw_alone(axes: Axes, changes: pandas.DataFrame) -> None:
 def _draw_correlations(axes: Axes, changes: pandas.DataFrame, noise: float) -> None:
     places = range(len(changes))
     axes.axvspan(-noise, noise, color=SHADE, zorder=0)
-    bars: Any = {"color": OKABE_ITO["sky_blue"], "label": "median size of correlation"}
-    axes.barh(places, changes["correlation_size"], **bars)
-    look: Any = {"marker": "d", "linestyle": "", "color": OKABE_ITO["blue"]}
-    axes.plot(changes["correlation"], places, label="mean correlation", **look)
+    sizes, sky_blue = changes["correlation_size"], OKABE_ITO["sky_blue"]
+    axes.barh(places, sizes, color=sky_blue, label="median size of correlation")
+    axes.plot(changes["correlation"], places, label="mean correlation", **_MEAN)
     axes.axvline(0.0, color="black", linewidth=0.8)
     axes.set(title="all changes together", xlabel="rank correlation")
     _finish(axes, [""] * len(changes))
 
 
 def _finish(axes: Axes, labels: list[str]) -> None:
-    ticks: Any = {"yticks": range(len(labels)), "yticklabels": labels}
-    axes.set(ylim=(-0.7, len(labels) - 0.3), xmargin=0.05, **ticks)
+    axes.set_yticks(range(len(labels)), labels)
+    axes.set(ylim=(-0.7, len(labels) - 0.3), xmargin=0.05)
     axes.grid(visible=False, axis="y")

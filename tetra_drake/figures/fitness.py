@@ -10,19 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.evolution.run import Run
-from tetra_drake.figures.style import (
-    OKABE_ITO,
-    common_style,
-    line_style,
-    make_figure,
-)
+from tetra_drake.figures.style import OKABE_ITO, common_style, line_style, make_figure
 from tetra_drake.formatting import fixed
 
-_LEGEND_ROWS = 14
-"""Trials per column of a legend beside the axes."""
-
-_TICKS = 20
-"""Largest number of trial numbers below the axes, and of error bars."""
+_LEGEND_ROWS = 14  # trials per column of a legend beside the axes
+_TICKS = 20  # largest number of trial numbers below the axes, and of error bars
+_AVERAGE: Any = {"color": "0.45", "linewidth": 2.5, "elinewidth": 0.7, "capsize": 2.0}
 
 
 def initial_extremes(run: Run) -> pandas.DataFrame:
@@ -87,7 +80,9 @@ def initial_fitness(run: Run, trial: int) -> Figure:
     title = f"Fitness of the initial population, trial {trial}\n"
     title += f"{fixed(100.0 * float(backward.mean()), 0)} % walk backward"
     failed = len(initial) - len(walked)
-    figure.suptitle(title + (f"; {failed} failed" if failed else ""))
+    if failed:
+        title += f"; {failed} failed"
+    figure.suptitle(title)
     return figure
 
 
@@ -122,9 +117,9 @@ def fitness_of_trials(run: Run) -> Figure:
         axes.plot(series.index, series, label=f"trial {trial}", **line_style(trial), **dot)
     if len(last) > 1:
         average = average_over_trials(run, table)
-        look: Any = {"color": "0.45", "linewidth": 2.5, "elinewidth": 0.7, "capsize": 2.0}
         every = math.ceil(len(average) / _TICKS)
-        axes.errorbar(*average.reset_index().values.T, label="average", errorevery=every, **look)
+        mean, deviation = average["mean"], average["deviation"]
+        axes.errorbar(average.index, mean, deviation, label="average", errorevery=every, **_AVERAGE)
     axes.set(xlabel="iteration", ylabel=f"{kind} fitness", xmargin=0.02)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     columns = math.ceil((len(last) + 1) / _LEGEND_ROWS)

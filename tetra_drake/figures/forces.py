@@ -23,18 +23,11 @@ _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
 _SECOND: Any = {"color": OKABE_ITO["vermillion"], "linestyle": (0, (4, 1.2))}
 _LANDING: Any = {"color": "black", "marker": "v", "markersize": 4.0, "linestyle": ""}
 
-_TOP = 0.94
-"""Height of the marks of landings, as a share of a panel's height."""
-
-_IMPACTS, _MARGIN = 0.01, 0.25
-"""Share of the samples at either end of their range that does not count for the scale of forces,
-and the margin beside the rest, as a share of it."""
-
-_ROWS, _COLUMNS = 10, 4
-"""Largest number of panels one below the other, and of columns."""
-
-_MIRRORED = 0.01
-"""Mean difference, as a share of the mean force, below which two nodes are mirror images."""
+_TOP = 0.94  # height of the marks of landings, as a share of a panel's height
+_IMPACTS = 0.01  # share of the samples at either end that does not count for the scale of forces
+_MARGIN = 0.25  # free space above and below the others, as a share of their range
+_ROWS, _COLUMNS = 10, 4  # largest number of panels one below the other, and of columns
+_MIRRORED = 0.01  # mean difference over mean force, below which two nodes are mirror images
 
 
 @common_style()
@@ -79,8 +72,8 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
     for contact, panel in panels.items():
         node, off = forces.sel(contact=contact), off_ground(end.sel(contact=contact))
         lifted = intervals(off.time.values, off.values)
-        for interval in lifted:
-            panel.axvspan(*interval, color=SHADE, linewidth=0.0)
+        for start, stop in lifted:
+            panel.axvspan(start, stop, color=SHADE, linewidth=0.0)
         panel.plot(node.time, node.normal_force, **_FIRST)
         panel.plot(node.time, node.friction_force.sel(horizontal="x"), **_SECOND)
         landings = [stop for _, stop in lifted if stop < off.time[-1]]
@@ -110,17 +103,19 @@ def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | Non
 
 
 def _contacts_to_show(trajectory: xarray.Dataset) -> list[str]:
-    """Names of the bottom left nodes, of right ones that bear something else, of the lead's tip
-    where the tips of others cannot touch, and of other nodes that touch."""
+    """Names of the bottom left nodes, of right ones that bear something else, and of other nodes
+    that touch."""
     shown, normal = [], trajectory.normal_force
-    thesis = not trajectory.contact.str.endswith(" top").any()
     for name in trajectory.contact.values:
         body, node = name.split()
         force = normal.sel(contact=name)
-        show = thesis or node == NODES[BOTTOM_LEFT] or bool((force > 0.0).any())
-        if node == NODES[BOTTOM_RIGHT]:
+        if node == NODES[BOTTOM_LEFT]:
+            show = True
+        elif node == NODES[BOTTOM_RIGHT]:
             left = normal.sel(contact=f"{body} {NODES[BOTTOM_LEFT]}")
             show = bool(abs(force - left).mean() > _MIRRORED * left.mean())
+        else:
+            show = bool((force > 0.0).any())
         if show:
             shown.append(name)
     return shown
@@ -131,8 +126,9 @@ def _panels_over_time(names: Sequence[str], *, groups: int) -> tuple[Figure, dic
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)
-    size = (7.5 if columns == 1 else 9.0), 1.1 + rows * max(min(1.4, 10.0 / rows), 0.75)
-    figure = Figure(figsize=size)
+    width = 7.5 if columns == 1 else 9.0
+    row_height = np.clip(10.0 / rows, 0.75, 1.4)
+    figure = Figure(figsize=(width, 1.1 + rows * row_height))
     panels = add_grid(figure, names, columns=columns)
     for panel in list(panels.values())[columns * (rows - 1) :]:
         panel.set_xlabel("time (s)")

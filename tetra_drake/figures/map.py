@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas
@@ -23,8 +24,7 @@ _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.
 _NUMBER: Any = {"ha": "center", "va": "center", "fontsize": 7.0, "fontweight": "bold", "zorder": 4}
 _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "black"}
 
-_LINE = 70
-"""Largest number of letters in a line below a panel."""
+_LINE = 70  # largest number of letters in a line below a panel
 
 
 @common_style()
@@ -33,16 +33,17 @@ def map_of_gaits(run: Run) -> Figure:
     the share of the draws that they keep; those that keep less than half of them are crosses.
 
     Numbers are the fittest gait and those nearest to the corners."""
-    kind = run.manifest.scenario.optimizer
-    assert isinstance(kind, QualityDiversity)
+    kind = cast(QualityDiversity, run.manifest.scenario.optimizer)
     gaits = elites(run)
     kept = robust(gaits)
     judged = bool(gaits["kept"].notna().any())
     panels = 2 if judged else 1
     width_in = 0.6 + 4.0 * panels
     figure, [row] = make_figure(width_in=width_in, height_in=4.6, columns=panels, sharey=True)
-    measures = zip(kind.measures, kind.measures.values(), kind.cells, strict=True)
-    edges = [_edges(name, limits, count) for name, limits, count in measures]
+    edges = [
+        np.linspace(low, high, count + 1) / customary(METRICS[name])[0]
+        for (name, (low, high)), count in zip(kind.measures.items(), kind.cells, strict=True)
+    ]
     _draw_cells(row[0], kept, kept["fitness"], edges, title="fitness", cmap="viridis")
     row[0].plot(*_middles(gaits[gaits["kept"] < LUCKY], edges), **_LUCKY)
     if judged:
@@ -56,11 +57,14 @@ def map_of_gaits(run: Run) -> Figure:
         axes.set(xlabel=x_label)
         for number, (_, gait) in enumerate(named, start=1):
             axes.text(*_middles(gait, edges), str(number), bbox=_DISC, **_NUMBER)
-    labels = [f"{i}  {listed(n)}: {gait_label(gait)}" for i, (n, gait) in enumerate(named, start=1)]
-    lines = [textwrap.fill(label, _LINE * panels, subsequent_indent="    ") for label in labels]
+    lines = []
+    for number, (names, gait) in enumerate(named, start=1):
+        label = f"{number}  {listed(names)}: {gait_label(gait)}"
+        lines.append(textwrap.fill(label, _LINE * panels, subsequent_indent="    "))
     figure.supxlabel("\n".join(lines), fontsize=8.5, ha="left", x=0.08)
-    share = fixed(100.0 * len(kept) / np.prod(kind.cells), 0)
-    figure.suptitle(f"Map of gaits\n{len(kept)} of {np.prod(kind.cells)} cells ({share} %)")
+    cells = math.prod(kind.cells)
+    share = fixed(100.0 * len(kept) / cells, 0)
+    figure.suptitle(f"Map of gaits\n{len(kept)} of {cells} cells ({share} %)")
     return figure
 
 
@@ -75,7 +79,8 @@ def _draw_cells(
 ) -> None:
     """Colours the cell of each gait by its value."""
     grid = np.full([len(edge) - 1 for edge in edges], np.nan)
-    grid[tuple(gaits[CELLS].to_numpy().T)] = values
+    across, up = CELLS
+    grid[gaits[across], gaits[up]] = values
     mesh = axes.pcolormesh(*edges, grid.T, rasterized=True, **look)
     axes.figure.colorbar(mesh, ax=axes, label=title)
     axes.grid(visible=False)
@@ -83,15 +88,13 @@ def _draw_cells(
 
 def _middles(gaits: Any, edges: Sequence[np.ndarray]) -> list[Any]:
     """The middles of the cells of one gait or a table of gaits, along each axis."""
-    pairs = zip(edges, CELLS, strict=True)
-    return [(edge[:-1] + edge[1:])[gaits[cell]] / 2.0 for edge, cell in pairs]
-
-
-def _edges(name: str, limits: Sequence[float], count: int) -> np.ndarray:
-    low, high = limits
-    return np.linspace(low, high, count + 1) / customary(METRICS[name])[0]
+    middles = []
+    for edge, cell in zip(edges, CELLS, strict=True):
+        middles.append((edge[:-1] + edge[1:])[gaits[cell]] / 2.0)
+    return middles
 
 
 def _label(name: str) -> str:
     unit = customary(METRICS[name])[1]
-    return name.replace("_", " ") + f" ({unit})" * bool(unit)
+    title = name.replace("_", " ")
+    return f"{title} ({unit})" if unit else title

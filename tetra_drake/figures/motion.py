@@ -12,7 +12,6 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from tetra_drake.figures.style import (
     OKABE_ITO,
@@ -31,29 +30,19 @@ from tetra_drake.scenario.units import INCH
 
 X, Y, Z = range(3)
 
-OVERHEAD, SIDE = (X, Y), (X, Z)
-"""World axes shown by a view, across and up the page."""
+OVERHEAD, SIDE = Y, Z  # World axis that a view shows up the page; across it is X
 
-_PITCH_IN = 7.3
-"""Least distance between the rows of a time lapse, in inches of the robot's world."""
+# Inches of the robot's world.
+_PITCH_IN = 7.3  # least distance between the rows of a time lapse
+_MARGIN_IN = 0.6  # free space around a time lapse
+_PROFILE_IN = 0.05  # distance between points of the ground's profile
 
-_MARGIN_IN = 0.6
-"""Free space around a time lapse, in inches of the robot's world."""
+# Inches on paper.
+_NAME_WIDTH, _NAME_HEIGHT = 0.33, 0.2  # room for the name of a tetrahedron
+_PATH_WIDTH, _PATH_HEIGHT = 6.0, 5.0  # largest size of the path of the centre
 
-_NAME_WIDTH, _NAME_HEIGHT = 0.33, 0.2
-"""Room for the name of a tetrahedron, in inches on paper."""
-
-_PATHS = 12
-"""Largest number of panels of paths side by side."""
-
-_PROFILE_IN = 0.05
-"""Distance between points of the ground's profile, in inches."""
-
-_ARROW = 0.08
-"""Length of an arrow over that of the path."""
-
-_PATH_ON_PAPER = 6.0, 5.0
-"""Largest width and height of the path of the centre on paper, in inches."""
+_PATHS = 12  # largest number of panels of paths side by side
+_ARROW = 0.08  # length of an arrow over that of the path
 
 _ON_GROUND: Any = {"color": "0.25", "linewidth": 0.8, "linestyle": "-"}
 _LIFTED: Any = {"color": OKABE_ITO["vermillion"], "linewidth": 1.6, "linestyle": "-"}
@@ -61,7 +50,15 @@ _PATH: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.1, "linestyle": "-"}
 _GROUND: Any = {"color": "0.6", "linewidth": 0.7, "linestyle": "-"}
 _START: Any = {"color": "black", "marker": "o", "linestyle": "", "markerfacecolor": "white"}
 _END: Any = {"color": "black", "marker": "s", "linestyle": ""}
-_HEADING: Any = {"color": OKABE_ITO["vermillion"], "zorder": 2.5, "units": "inches", "width": 0.02}
+_HEADING: Any = {
+    "color": OKABE_ITO["vermillion"],
+    "zorder": 2.5,
+    "units": "inches",
+    "width": 0.02,
+    "angles": "xy",
+    "scale_units": "xy",
+    "scale": 1.0,
+}
 _FOOTPRINTS: Any = {"color": "0.45", "marker": "o", "linestyle": "", "markersize": 2.5}
 
 
@@ -87,7 +84,7 @@ def relative_distances(trajectory: xarray.Dataset) -> Figure:
 @common_style()
 def before_and_after(walks: Sequence[tuple[str, xarray.Dataset]]) -> Figure:
     """Distance walked over time by a run's best gait and the best initial one of its trial."""
-    # `walks`: label and trajectory of each.
+    # `walks`: label and trajectory of the initial gait and of the best one.
     figure, [panels] = make_figure(width_in=8.0, height_in=4.0, columns=2, sharey=True)
     kinds = ("best initial gait of the trial", "best evolved gait")
     for panel, kind, (label, trajectory) in zip(panels, kinds, walks, strict=True):
@@ -110,13 +107,19 @@ def time_lapse(trajectory: xarray.Dataset, *, instants: int = 6) -> Figure:
     times = np.linspace(trajectory.time.values[0], trajectory.time.values[-1], instants)
     samples = _nearest(trajectory, times)
     inches = trajectory.p_WN.values / INCH
-    walked = measures.distance_walked(trajectory).values[samples] / INCH
+    walked = measures.distance_walked(trajectory).values / INCH
     styles = [{**line_style(i), "linestyle": "-"} for i in range(inches.shape[1])]
     rows = []
-    for time, sample, way in zip(times, samples, walked, strict=True):
+    for time, sample in zip(times, samples, strict=True):
         seconds = _nearest(trajectory, np.arange(times[0], time))
-        label = f"{time:.4g} s\n{signed(way)} in"
-        rows.append(_Row(label, inches[sample], styles, inches[seconds, 0, :TOP], _FOOTPRINTS))
+        row = _Row(
+            label=f"{time:.4g} s\n{signed(walked[sample])} in",
+            nodes=inches[sample],
+            styles=styles,
+            paths=inches[seconds, 0, :TOP],
+            path_style=_FOOTPRINTS,
+        )
+        rows.append(row)
     width, height = _size(rows, width_in=5.8, height_in=8.5)
     # Wide enough for the title.
     figure, [[panel]] = make_figure(width_in=max(width + 1.0, 4.8), height_in=height + 1.0)
@@ -134,26 +137,23 @@ def path_of_the_centre(trajectory: xarray.Dataset, *, instants: int = 9) -> Figu
     Arrows: where the robot heads, at evenly spaced instants."""
     path = measures.path_of_centre(trajectory)
     points = path.centre[:, :2] / INCH
-    span = max(*np.ptp(points, axis=0), _MARGIN_IN)
+    arrow = _ARROW * max(*np.ptp(points, axis=0), _MARGIN_IN)
     samples = _nearest(trajectory, np.linspace(path.times[0], path.times[-1], instants))
-    heading = path.heading[samples]
-    arrows = _ARROW * span * np.column_stack([np.cos(heading), np.sin(heading)])
-    drawn = np.concatenate([points, points[samples] + arrows])
-    size = np.ptp(drawn, axis=0) + 2.0 * _ARROW * span
-    middle = (drawn.min(axis=0) + drawn.max(axis=0)) / 2.0
-    width, height = size * min(_PATH_ON_PAPER / size)
+    tails, heading = points[samples], path.heading[samples]
+    heads = tails + arrow * np.column_stack([np.cos(heading), np.sin(heading)])
+    drawn = np.concatenate([points, heads])
+    left, bottom = drawn.min(axis=0) - arrow
+    right, top = drawn.max(axis=0) + arrow
+    scale = min(_PATH_WIDTH / (right - left), _PATH_HEIGHT / (top - bottom))
+    width, height = scale * (right - left), scale * (top - bottom)
     figure, [[panel]] = make_figure(width_in=max(width, 3.0) + 0.8, height_in=height + 1.5)
-    panel.plot(*points.T, **_PATH)
-    scale: Any = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
-    panel.quiver(*points[samples].T, *arrows.T, **scale, **_HEADING)
-    panel.plot(*points[0], **_START)
-    panel.plot(*points[-1], **_END)
-    (left, right), (low, high) = np.column_stack([middle - size / 2.0, middle + size / 2.0])
-    every = np.diff(MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, max(size)))[0]
-    panel.set(xlim=(left, right), ylim=(low, high), aspect="equal")
-    panel.set(xlabel=f"x (in), a tick every {every:.4g} in", ylabel="y (in)")
-    for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_locator(MultipleLocator(every))
+    panel.plot(points[:, X], points[:, Y], **_PATH)
+    ways = heads - tails
+    panel.quiver(tails[:, X], tails[:, Y], ways[:, X], ways[:, Y], **_HEADING)
+    panel.plot(points[0, X], points[0, Y], **_START)
+    panel.plot(points[-1, X], points[-1, Y], **_END)
+    panel.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+    panel.set(xlabel="x (in)", ylabel="y (in)")
     end = f"end, after {path.times[-1]:.4g} s"
     legend_below(figure, {"start": _START, end: _END})
     figure.suptitle("Path of the centre from above\narrows: heading")
@@ -177,11 +177,15 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
     inches, off, since = step.p_WN.values / INCH, measures.lifted(step), step.time - step.time[0]
     rows = []
     for sample in _nearest(step, np.linspace(start, end, instants)):
-        styles = [_LIFTED if up else _ON_GROUND for up in off.values[sample]]
-        paths = inches[: sample + 1, :, :TOP].reshape(sample + 1, -1, 3)
-        profile = None if ground.flat else _profile(inches, sample, ground)
-        time = f"{since.values[sample]:.2f} s"
-        rows.append(_Row(time, inches[sample], styles, paths, _PATH, profile))
+        row = _Row(
+            label=f"{since.values[sample]:.2f} s",
+            nodes=inches[sample],
+            styles=[_LIFTED if up else _ON_GROUND for up in off.values[sample]],
+            paths=inches[: sample + 1, :, :TOP].reshape(sample + 1, -1, 3),
+            path_style=_PATH,
+            profile=None if ground.flat else _profile(inches, sample, ground),
+        )
+        rows.append(row)
     width, height = _size(rows, width_in=3.6, height_in=6.0)
     names = step.tetrahedron.values
     heights = [height + 0.8, 0.7 + 1.2 * math.ceil(len(names) / _PATHS)]
@@ -194,8 +198,8 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
         panel.set_title(f"from {place}")
     panel.tick_params(left=False, labelleft=False)
     if ground.flat:
-        for row in range(instants):
-            panel.axhline(-_pitch(rows) * row, **_GROUND)
+        for i in range(instants):
+            panel.axhline(-_pitch(rows) * i, **_GROUND)
     _draw_paths(below, step, off, ground)
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
     legend_below(figure, {**lines, "path of the bottom nodes": _PATH})
@@ -206,10 +210,10 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
 def _profile(nodes: np.ndarray, sample: int, ground: Ground) -> np.ndarray:
     """Points (points, 3) of the ground along x, in inches, wherever nodes (samples, n, 4, 3) are,
     at their mean y in a sample."""
-    x, y = nodes[..., X], nodes[sample, ..., Y].mean()
-    along = np.arange(x.min() - _MARGIN_IN, x.max() + _MARGIN_IN, _PROFILE_IN)
-    x_y = np.column_stack([along, np.full_like(along, y)])
-    return np.column_stack([x_y, ground_heights(x_y * INCH, ground) / INCH])
+    x = np.arange(nodes[..., X].min() - _MARGIN_IN, nodes[..., X].max() + _MARGIN_IN, _PROFILE_IN)
+    y = np.full_like(x, nodes[sample, ..., Y].mean())
+    z = ground_heights(np.column_stack([x, y]) * INCH, ground) / INCH
+    return np.column_stack([x, y, z])
 
 
 def _draw_paths(
@@ -257,14 +261,16 @@ class _Row:
 
 def _heights(rows: Sequence[_Row]) -> np.ndarray:
     """All heights of nodes and ground, in inches."""
-    points = [a for row in rows for a in (row.nodes, row.profile) if a is not None]
-    return np.concatenate([a[..., Z].ravel() for a in points])
+    nodes = [row.nodes.reshape(-1, 3) for row in rows]
+    profiles = [row.profile for row in rows if row.profile is not None]
+    return np.concatenate(nodes + profiles)[:, Z]
 
 
 def _pitch(rows: Sequence[_Row]) -> float:
     """Distance in inches between rows, with room for what climbs or turns."""
-    sideways = np.ptp([row.nodes[..., Y] for row in rows])
-    return max(_PITCH_IN, float(max(np.ptp(_heights(rows)), sideways)) + _MARGIN_IN)
+    sideways = float(np.ptp([row.nodes[..., Y] for row in rows]))
+    upward = float(np.ptp(_heights(rows)))
+    return max(_PITCH_IN, upward + _MARGIN_IN, sideways + _MARGIN_IN)
 
 
 def _size(rows: Sequence[_Row], *, width_in: float, height_in: float) -> tuple[float, float]:
@@ -276,37 +282,30 @@ def _size(rows: Sequence[_Row], *, width_in: float, height_in: float) -> tuple[f
 
 
 def _draw_rows(
-    panel: Axes, rows: Sequence[_Row], view: tuple[int, int], names: Sequence[str], width_in: float
+    panel: Axes, rows: Sequence[_Row], view: int, names: Sequence[str], width_in: float
 ) -> None:
-    """Draws a time lapse, one row below the other, and names tetrahedra of the first.
-
-    On paper it is `width_in` inches wide. Where there is no room for all names, only each second,
-    or third, ... is shown."""
+    """Draws a time lapse, `width_in` inches wide on paper, and names tetrahedra of its first row,
+    only each second or third, ... where there is no room for all names."""
     pitch = _pitch(rows)
     for i, row in enumerate(rows):
-        down = [0.0, pitch * i]
+        down = pitch * i
         if row.profile is not None and view == SIDE:
-            panel.plot(*(row.profile[..., view] - down).T, **_GROUND)
-        panel.plot(*np.moveaxis(row.paths[..., view] - down, -1, 0), **row.path_style)
-        for nodes, style in zip(row.nodes[..., view] - down, row.styles, strict=True):
-            # NaN after each strut makes one line of all six.
-            ends = np.pad(nodes[np.array(STRUTS)], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
-            panel.plot(*ends.reshape(-1, 2).T, **style)
-    across, up = np.moveaxis(np.array([row.nodes[..., view] for row in rows]), -1, 0)
-    heights = _heights(rows) if view == SIDE else up
+            panel.plot(row.profile[:, X], row.profile[:, Z] - down, **_GROUND)
+        panel.plot(row.paths[..., X], row.paths[..., view] - down, **row.path_style)
+        for nodes, style in zip(row.nodes, row.styles, strict=True):
+            ends = nodes[np.array(STRUTS)]
+            panel.plot(ends[..., X].T, ends[..., view].T - down, **style)
+    nodes = np.array([row.nodes for row in rows])
+    heights = _heights(rows) if view == SIDE else nodes[..., Y]
     middle = (heights.min() + heights.max()) / 2
-    left, right = across.min() - _MARGIN_IN, across.max() + _MARGIN_IN
+    left, right = nodes[..., X].min() - _MARGIN_IN, nodes[..., X].max() + _MARGIN_IN
     per_paper_inch = (right - left) / width_in
     top = middle + pitch / 2 + _NAME_HEIGHT * per_paper_inch
-    panel.set(
-        xlabel="x (in)",
-        xlim=(left, right),
-        ylim=(middle - pitch * (len(rows) - 0.5), top),
-        aspect="equal",
-    )
+    bottom = middle - pitch * (len(rows) - 0.5)
+    panel.set(xlabel="x (in)", xlim=(left, right), ylim=(bottom, top), aspect="equal")
     panel.set_yticks(middle - pitch * np.arange(len(rows)), [row.label for row in rows])
     panel.grid(visible=False, axis="y")
-    x, y = across[0].mean(axis=1), up[0].max(axis=1)
+    x, y = nodes[0, ..., X].mean(axis=1), nodes[0, ..., view].max(axis=1)
     apart = float(np.hypot(np.diff(x), np.diff(y)).mean())
     every = math.ceil(_NAME_WIDTH * per_paper_inch / apart)
     for i in range(0, len(names), every):

@@ -12,19 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.analysis.comparison import Compared, comparison_numbers
-from tetra_drake.figures.style import (
-    common_style,
-    line_style,
-    make_figure,
-    save_findings,
-)
+from tetra_drake.figures.style import common_style, line_style, make_figure, save_findings
 from tetra_drake.scenario.units import shown
 
-_LEGEND_WIDTH = 60
-"""Largest number of letters in a row of the legend, per panel."""
-
-_FIRST = 10
-"""Beginning of the axes of costs, in simulations."""
+_LEGEND_WIDTH = 60  # largest number of letters in a row of the legend, per panel
+_FIRST = 10  # beginning of the axes of costs, in simulations
 
 
 def save_comparison(compared: Compared, folder: Path) -> list[str]:
@@ -42,19 +34,20 @@ def search(compared: Compared) -> Figure:
 
     Trials that have ended go on with their last values; a dot marks the end of a run."""
     columns = 1 if compared.reach is None else 2
-    trials = compared.runs["trials"]
-    labels = [f"{label} ({count} trial{'s' * (count > 1)})" for label, count in trials.items()]
-    across = min(len(labels), max(1, _LEGEND_WIDTH * columns // (max(map(len, labels)) + 10)))
+    labels = []
+    for label, count in compared.runs["trials"].items():
+        labels.append(f"{label} (1 trial)" if count == 1 else f"{label} ({count} trials)")
+    longest = max(len(label) for label in labels)
+    across = min(len(labels), max(1, _LEGEND_WIDTH * columns // (longest + 10)))
     height = 3.6 + 0.18 * math.ceil(len(labels) / across)
     figure, [row] = make_figure(width_in=3.0 + 3.5 * columns, height_in=height, columns=columns)
     ends = compared.curves.groupby("run", sort=False)["cost"].max()
     first = min(_FIRST, ends.min())
     for place, label in enumerate(compared.runs.index):
-        style: Any = line_style(place) | {"drawstyle": "steps-post", "marker": "o"}
-        style |= {"markevery": [-1]}
+        style = {**line_style(place), "drawstyle": "steps-post", "marker": "o", "markevery": [-1]}
         _draw_best(row[0], compared, label, first, style)
         if compared.reach is not None:
-            _draw_reached(row[1], compared, label, ends[label], style)
+            _draw_reached(row[1], compared, compared.reach, label, ends[label], style)
     for axes in row:
         axes.set(xlabel="simulations", xscale="log", xlim=(first, 1.1 * ends.max()))
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -74,10 +67,11 @@ def _draw_best(axes: Axes, compared: Compared, label: str, first: int, style: An
     axes.fill_between(curve["cost"], curve["low"], curve["high"], **band)
 
 
-def _draw_reached(axes: Axes, compared: Compared, label: str, end: int, style: Any) -> None:
-    assert compared.reach is not None
+def _draw_reached(
+    axes: Axes, compared: Compared, reach: float, label: str, end: int, style: Any
+) -> None:
     trials = compared.trials[compared.trials["run"] == label]
     there = np.sort(trials["reached"][trials["reached"] <= end])
     shares = 100.0 * np.arange(len(there) + 1) / len(trials)
     axes.plot([0.0, *there, end], [*shares, shares[-1]], **style)
-    axes.set(title=f"{shown(compared.reach, 'm')} reached", ylabel="trials (%)", ylim=(-3.0, 103.0))
+    axes.set(title=f"{shown(reach, 'm')} reached", ylabel="trials (%)", ylim=(-3.0, 103.0))

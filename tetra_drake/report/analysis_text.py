@@ -13,8 +13,7 @@ from tetra_drake.scenario.units import INCH, shown
 if TYPE_CHECKING:
     import pandas
 
-_LONGEST_NAME = 12
-"""Largest number of letters of a gait's name; longer ones are cut."""
+_LONGEST_NAME = 12  # largest number of letters of a gait's name; longer ones are cut
 
 
 def robustness_text(judgement: Judgement) -> str:
@@ -44,9 +43,11 @@ def _gaits_table(gaits: pandas.DataFrame, *, with_missed: bool) -> Table:
         if len(name) >= _LONGEST_NAME:
             name = f"{name[: _LONGEST_NAME - 1]}…"
         cells = [name, *(fixed(row[length] / INCH) for length in lengths)]
-        cells.append(ranged(*row[["mean", "mean_low", "mean_high"]] / INCH))
-        cells.append(percents(*row[["kept", "kept_low", "kept_high"]]))
-        rows.append([*cells, *(f"{row[count]:.0f}" for count in counts)])
+        inches = row / INCH
+        cells.append(ranged(inches["mean"], inches["mean_low"], inches["mean_high"]))
+        cells.append(percents(row["kept"], row["kept_low"], row["kept_high"]))
+        cells += [f"{row[count]:.0f}" for count in counts]
+        rows.append(cells)
     return Table(["gait", *lengths, "mean", "keeps", *counts], rows)
 
 
@@ -67,32 +68,33 @@ def _changes_table(changes: pandas.DataFrame) -> Table:
 
 def comparison_text(compared: Compared) -> str:
     """Tables of the fitness and the distances that runs reach, side by side."""
+    distances = (
+        "Distance of the fittest gait of each trial in inches, likewise; seconds per evaluation"
+    )
+    if compared.reach is not None:
+        distances += (
+            f";\nsimulations until the fittest so far walks {shown(compared.reach, 'm')}, "
+            "median over the trials, in brackets\nquartiles; trials in which it does"
+        )
     texts = [
         f"Fitness of the best of each trial after {compared.common} simulations, where the "
         "shortest run ends, and\nin the end: interquartile mean over trials, in brackets its 95 % "
         "confidence interval.",
         _fitness_table(compared).text(),
-        "Distance of the fittest gait of each trial in inches, likewise; seconds per evaluation",
+        f"{distances}.",
         _distance_table(compared).text(),
     ]
-    if compared.reach is not None:
-        texts[2] += (
-            f";\nsimulations until the fittest so far walks {shown(compared.reach, 'm')}, "
-            "median over the trials, in brackets\nquartiles; trials in which it does"
-        )
-    texts[2] += "."
-    return "\n\n".join([*texts, *(f"note: {note}" for note in compared.notes)])
+    texts += [f"note: {note}" for note in compared.notes]
+    return "\n\n".join(texts)
 
 
 def _fitness_table(compared: Compared) -> Table:
     rows = []
     for label, row in compared.runs.iterrows():
-        at_common, in_the_end = (
-            ranged(*row[[f"{name}_mean", f"{name}_low", f"{name}_high"]])
-            for name in ("at_common", "fitness")
-        )
-        counts = [f"{row['trials']:.0f}", f"{row['cost']:.0f}"]
-        rows.append([str(label), *counts, at_common, in_the_end])
+        cells = [str(label), f"{row['trials']:.0f}", f"{row['cost']:.0f}"]
+        cells.append(ranged(row["at_common_mean"], row["at_common_low"], row["at_common_high"]))
+        cells.append(ranged(row["fitness_mean"], row["fitness_low"], row["fitness_high"]))
+        rows.append(cells)
     headings = ["run", "trials", "simulations", f"after {compared.common}", "in the end"]
     return Table(headings, rows)
 
@@ -103,12 +105,14 @@ def _distance_table(compared: Compared) -> Table:
         headings += [f"to {shown(compared.reach, 'm')}", "trials"]
     rows = []
     for label, row in compared.runs.iterrows():
-        mean = ranged(*row[["distance_mean", "distance_low", "distance_high"]] / INCH)
+        inches = row / INCH
+        mean = ranged(inches["distance_mean"], inches["distance_low"], inches["distance_high"])
         cells = [str(label), mean, fixed(row["wall_time"], 3)]
         if compared.reach is not None:
-            low, median, high = map(_cost, row[["reached_low", "reached", "reached_high"]])
+            low, high = _cost(row["reached_low"]), _cost(row["reached_high"])
+            cells.append(f"{_cost(row['reached'])} ({low} to {high})")
             reached_by = row["share"] * row["trials"]
-            cells += [f"{median} ({low} to {high})", f"{reached_by:.0f} of {row['trials']:.0f}"]
+            cells.append(f"{reached_by:.0f} of {row['trials']:.0f}")
         rows.append(cells)
     return Table(headings, rows)
 

@@ -1,4 +1,4 @@
-"""The figures of one simulation and of a run.
+"""A run's best gaits simulated again, and the figures of a run and of one simulation.
 
 A figure's files are named after the function that draws it, whose docstring is its caption.
 """
@@ -6,26 +6,86 @@ A figure's files are named after the function that draws it, whose docstring is 
 from __future__ import annotations
 
 import inspect
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import xarray
+import pandas
 
 from tetra_drake.analysis.elites import elites
+from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.style import save_figure
-from tetra_drake.report.study import Study
+from tetra_drake.report.result_folder import GaitMotion, simulate_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.units import INCH
 
 
-def draw_trajectory(trajectory: xarray.Dataset, scenario: Scenario, folder: Path) -> dict[str, str]:
+@dataclass(frozen=True)
+class RecordedGait:
+    """A gait of a run, as recorded and simulated again.
+
+    The two differ where other versions recorded it, or among disturbances, which are not simulated
+    again.
+    """
+
+    recorded: pandas.Series
+    """Row of the run's evaluations."""
+    motion: GaitMotion
+
+    @property
+    def label(self) -> str:
+        """Trial and number of the evaluation."""
+        return gait_label(self.recorded)
+
+    @property
+    def distance_in(self) -> float:
+        """Distance (in) as simulated again."""
+        return self.motion.metrics["distance"] / INCH
+
+
+@dataclass(frozen=True)
+class Study:
+    """A run with the gaits that its report shows."""
+
+    run: Run
+    best: RecordedGait
+    """Fittest gait of the run."""
+    initial: RecordedGait
+    """Fittest gait of its trial's first iteration in which not all failed."""
+
+    @property
+    def trial(self) -> int:
+        """Trial with the fittest gait."""
+        return int(self.best.recorded["trial"])
+
+
+def study_run(run: Run) -> Study:
+    """Simulates the fittest gait of the best trial, initially and of all.
+
+    Raises InputError if no gait of the run has a fitness, and SimulationFailure if other versions
+    than the run's make such a gait fail.
+    """
+    trial, fittest = run.fittest()
+    first = run.initial_best(trial)
+    best = simulate_again(run, trial, fittest)
+    initial = best if first == fittest else simulate_again(run, trial, first)
+    return Study(run, best=best, initial=initial)
+
+
+def simulate_again(run: Run, trial: int, index: int) -> RecordedGait:
+    """A gait of a run, simulated again. Raises SimulationFailure."""
+    motion = simulate_gait(run.manifest.scenario, run.gait(trial, index))
+    return RecordedGait(run.evaluation(trial, index), motion)
+
+
+def draw_trajectory(gait: GaitMotion, folder: Path) -> dict[str, str]:
     """Writes the figures of one simulation; returns their captions by name of file, no suffix.
 
     Raises InputError if the folder cannot be written to.
     """
-    ground = Robot.of(scenario).ground
+    trajectory, ground = gait.trajectory, Robot.of(gait.scenario).ground
     return _save(
         folder,
         (motion.time_lapse, trajectory),
@@ -39,7 +99,7 @@ def draw_trajectory(trajectory: xarray.Dataset, scenario: Scenario, folder: Path
 
 def draw_run(study: Study, folder: Path) -> dict[str, str]:
     """Writes the figures of a run and of its best gait; returns captions as draw_trajectory()."""
-    run, initial, best = study.run, study.initial, study.best
+    run = study.run
     pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
     trials = fitness.initial_extremes(run).index
     if len(trials):
@@ -48,10 +108,10 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
         pictures.append((fitness.initial_fitness, run, study.trial))
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
-    walks = [(gait.label, gait.motion.trajectory) for gait in (initial, best)]
+    walks = [(gait.label, gait.motion.trajectory) for gait in (study.initial, study.best)]
     pictures.append((motion.before_and_after, walks))
-    trajectory_figures = draw_trajectory(best.motion.trajectory, run.manifest.scenario, folder)
-    return _save(folder, *pictures) | trajectory_figures
+    captions = _save(folder, *pictures)
+    return captions | draw_trajectory(study.best.motion, folder)
 
 
 def _save(folder: Path, *pictures: tuple[Any, ...]) -> dict[str, str]:

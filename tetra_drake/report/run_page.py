@@ -16,9 +16,14 @@ from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, fixed, render
 from tetra_drake.machine import versions
-from tetra_drake.report.book import draw_run, draw_trajectory
+from tetra_drake.report.book import (
+    Study,
+    draw_run,
+    draw_trajectory,
+    simulate_again,
+    study_run,
+)
 from tetra_drake.report.result_folder import RESULT, load_result_folder
-from tetra_drake.report.study import Study, simulate_again, study_run
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import ParameterSpace, save_gait
@@ -44,8 +49,7 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
         draw_run(study_run(load_run(source)), folder)
     elif (source / RESULT).exists():
         check_folder(folder)
-        stored = load_result_folder(source)
-        draw_trajectory(stored.trajectory, stored.scenario, folder)
+        draw_trajectory(load_result_folder(source), folder)
     else:
         problem = f"holds neither {MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
         raise InputError(source, "", problem)
@@ -96,12 +100,14 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
     best_gait = trial_folder(Path(), study.trial) / BEST_GAIT
     named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded}
     gaits, on_map = distinct_gaits(named), distinct_gaits(chosen(run))
-    on_map_files = {
-        name: _map_files(names, gait, study) for names, gait in on_map for name in names
-    }
+    map_files: dict[str, Path] = {}
+    map_pages: dict[str, Path] = {}
+    for names, gait in on_map:
+        gait_file, page = _map_files(names, gait, study)
+        map_files |= dict.fromkeys(names, gait_file)
+        map_pages[names[0]] = page
     space = ParameterSpace.of(manifest.scenario)
-    best_values = zip(space.names, space.vector(study.best.motion.gait), strict=True)
-    parameters = [[name, fixed(value, 4)] for name, value in best_values]
+    values = [fixed(value, 4) for value in space.vector(study.best.motion.gait)]
     again, changed = {}, {}
     for gait in (study.best, study.initial):
         again[gait.label] = gait.distance_in
@@ -128,21 +134,26 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         links={"fittest": best_gait},
         metrics=_metrics(gaits),
         map=on_map,
-        map_links={name: files[0] for name, files in on_map_files.items()},
-        map_pages={name: files[1] for name, files in on_map_files.items()},
+        map_links=map_files,
+        map_pages=map_pages,
         map_metrics=_metrics(on_map) if on_map else None,
-        parameters=Table(["", "value"], parameters),
+        parameters=Table(["", "value"], list(zip(space.names, values, strict=True))),
         pictures=[(_embedded(folder / f"{name}.svg"), captions[name]) for name in captions],
         gait=best_gait,
-        files={"scenario": SCENARIO, "replay": REPLAY, "figures": FIGURES}
-        | {"elites": Path(ELITES) / ELITES_CSV},
+        files={
+            "scenario": SCENARIO,
+            "replay": REPLAY,
+            "figures": FIGURES,
+            "elites": Path(ELITES) / ELITES_CSV,
+        },
         settings=dump_scenario(manifest.scenario),
     )
 
 
 def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str]) -> str:
     """Weights or limits of metrics as text; `unit_of` makes their unit from the metric's."""
-    return ", ".join(f"{n}: {shown(x, unit_of(METRICS[n]))}" for n, x in weights.items())
+    terms = [f"{name}: {shown(x, unit_of(METRICS[name]))}" for name, x in weights.items()]
+    return ", ".join(terms)
 
 
 def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]]) -> Table:

@@ -32,20 +32,23 @@ if TYPE_CHECKING:
 def metrics_table(gaits: Mapping[str, Mapping[str, Any] | pandas.Series]) -> Table:
     """Fitness and metrics of gaits, a column for each, given as rows of `Run.evaluations`; metrics
     that none of them has are left out."""
-    columns = [*gaits.values()]
-    rows = [["fitness", *(fixed(gait["fitness"], 3) for gait in columns)]]
+    columns = list(gaits.values())
+    cells = {"fitness": [fixed(gait["fitness"], 3) for gait in columns]}
     for name, unit in METRICS.items():
         size, read = customary(unit)
-        title = name.replace("_", " ") + (f" ({read})" if read else "")
-        rows.append([title, *(fixed(gait[name] / size, 3) for gait in columns)])
+        title = name.replace("_", " ")
+        heading = f"{title} ({read})" if read else title
+        cells[heading] = [fixed(gait[name] / size, 3) for gait in columns]
         if name == "distance":
-            worst = (gait.get("worst_distance_in", math.nan) for gait in columns)
-            rows.append(["distance, worst draw (in)", *(fixed(inches, 3) for inches in worst)])
-    kept = (gait.get("kept", math.nan) for gait in columns)
-    rows.append(["draws kept, disturbed (%)", *(fixed(100.0 * share, 0) for share in kept)])
+            worst = [gait.get("worst_distance_in", math.nan) for gait in columns]
+            cells["distance, worst draw (in)"] = [fixed(inches, 3) for inches in worst]
+    kept = [gait.get("kept", math.nan) for gait in columns]
+    cells["draws kept, disturbed (%)"] = [fixed(100.0 * share, 0) for share in kept]
     bodies = [name for name in dict(columns[0]) if name.startswith("lifted_T")]
-    lifted = [" ".join(fixed(100.0 * gait[name], 0) for name in bodies) for gait in columns]
-    rows.append([f"lifted, T1 to T{len(bodies)} (%)", *lifted])
+    cells[f"lifted, T1 to T{len(bodies)} (%)"] = [
+        " ".join(fixed(100.0 * gait[name], 0) for name in bodies) for gait in columns
+    ]
+    rows = [[heading, *values] for heading, values in cells.items()]
     with_numbers = [row for row in rows if any(value.strip("- ") for value in row[1:])]
     return Table(["", *gaits], with_numbers)
 
@@ -93,13 +96,16 @@ def ground_text(scenario: Scenario) -> str:
         return ""
     else:
         friction = "the thesis's friction"
-    sizes = _listed(tree_of(terrain, show=shown))
-    return f"{type(terrain).__name__.lower()}{f' ({sizes})' if sizes else ''}, {friction}"
+    kind, sizes = type(terrain).__name__.lower(), _listed(tree_of(terrain, show=shown))
+    return f"{kind} ({sizes}), {friction}" if sizes else f"{kind}, {friction}"
 
 
 def _listed(values: Mapping[str, Any]) -> str:
-    texts = {k: " ".join(v) if isinstance(v, list) else str(v) for k, v in values.items()}
-    return ", ".join(f"{k} {Path(v).name if k == 'file' else v}" for k, v in texts.items())
+    texts = []
+    for key, value in values.items():
+        text = " ".join(value) if isinstance(value, list) else str(value)
+        texts.append(f"{key} {Path(text).name if key == 'file' else text}")
+    return ", ".join(texts)
 
 
 def run_text(run: Run) -> str:
@@ -143,7 +149,7 @@ def trials_table(run: Run) -> Table:
     columns["evaluations"] = [f"{trial.evaluations}" for trial in trials]
     columns["failed"] = [f"{trial.failures}" for trial in trials]
     columns["state"] = [trial.stop or "not ended" for trial in trials]
-    return Table([*columns], [*zip(*columns.values(), strict=True)])
+    return Table(list(columns), list(zip(*columns.values(), strict=True)))
 
 
 def _rise(before: float, after: float) -> str:
@@ -162,7 +168,6 @@ def results(run: Run) -> list[tuple[str, str]]:
     evaluations = sum(status.evaluations for status in statuses)
     wall_time = sum(status.wall_time for status in statuses)
     iteration_time = CHILDREN * wall_time / max(evaluations, 1)
-
     return [
         ("best initial gait", f"{fixed(_finite(initial).max())} in"),
         ("best evolved gait", f"{fixed(best.best_distance_in)} in"),

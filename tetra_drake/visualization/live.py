@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 
-from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.schema import Scenario
@@ -32,30 +31,19 @@ _PATIENCE = 0.1  # s between two looks for a browser
 class LiveView:
     """Shows a simulation in Meshcat, no faster than real time (see engines.viewer.Viewer).
 
-    It begins once a browser is there. `clock` and `sleep` are in s.
+    It begins once a browser is there.
     """
 
-    def __init__(
-        self,
-        meshcat: Meshcat,
-        scenario: Scenario,
-        *,
-        clock: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
-    ) -> None:
+    def __init__(self, meshcat: Meshcat, scenario: Scenario) -> None:
         self._meshcat = meshcat
-        self._clock, self._sleep = clock, sleep
         self._robot = Robot.of(scenario)
         self._started: float | None = None
         self._due = 0.0
-        structure, ground = self._robot.structure, self._robot.ground
+        structure = self._robot.structure
         p_WN = node_positions(structure, structure.initial_state)
         room = np.array([ROOM, 0.0, 0.0])
-        points = np.stack([p_WN - room, p_WN + room])
-        rise = ground_heights(points[..., :2], ground)
-        points[..., 2] += rise - ground_heights(p_WN[:, :2], ground)
         add_robot(meshcat, structure)
-        set_surroundings(meshcat, self._robot, points)
+        set_surroundings(meshcat, self._robot, np.stack([p_WN - room, p_WN + room]))
 
     def wants(self, time: float) -> bool:
         """True if the frame before is over at this time (s)."""
@@ -63,17 +51,17 @@ class LiveView:
 
     def show(self, frame: xarray.Dataset) -> None:
         """Moves everything to where it is in a trajectory's sample, once its time has come."""
-        time = float(frame["time"].values[0])
+        now = float(frame["time"].values[0])
         if self._started is not None:
-            self._sleep(max(0.0, self._started + time - self._clock()))
+            time.sleep(max(0.0, self._started + now - time.monotonic()))
         for track in tracks(self._robot, frame):
             self._meshcat.SetTransform(track.path, track.matrix(0))
         if self._started is None:
             while self._meshcat.GetNumActiveConnections() == 0:
-                self._sleep(_PATIENCE)
-            self._started = self._clock() - time
-        self._meshcat.SetSimulationTime(time)  # for the rate it shows
-        self._due = (np.floor(time * FRAMES_PER_SECOND) + 1.0) / FRAMES_PER_SECOND
+                time.sleep(_PATIENCE)
+            self._started = time.monotonic() - now
+        self._meshcat.SetSimulationTime(now)  # for the rate it shows
+        self._due = (np.floor(now * FRAMES_PER_SECOND) + 1.0) / FRAMES_PER_SECOND
 
 
 def open_view(scenario: Scenario, *, say: Callable[[str], None]) -> LiveView:

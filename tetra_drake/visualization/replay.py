@@ -44,14 +44,9 @@ RESOLUTION = 2.0**-16
 """Step to which pages round positions and sizes (m) and quaternions; 15 s of the thesis's robot
 then take 0.2 MB, and Meshcat's script 1 MB."""
 
-TRACE_FRAMES = 5
-"""Key frames per piece of the traces, each of which becomes visible when it ends."""
-
-TICKS_PER_SECOND = 100_000
-"""Resolution of the time of key frames: Meshcat counts in integers."""
-
-REPETITIONS = 1_000_000
-"""Number of times that the motion is played before it stops."""
+_TRACE_FRAMES = 5  # key frames per piece of the traces, which becomes visible when it ends
+_TICKS_PER_SECOND = 100_000  # resolution of time: Meshcat counts in integers
+_REPETITIONS = 1_000_000  # number of times that the motion is played before it stops
 
 LEGEND = {
     "actuated": "actuated cable",
@@ -103,15 +98,15 @@ def _add_film(meshcat: Meshcat, robot: Robot, trajectory: xarray.Dataset) -> dic
     set_surroundings(meshcat, robot, trajectory["p_WN"].values)
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
     times = frames["time"].values
-    ticks = np.rint((times - times[0]) * TICKS_PER_SECOND).astype(int).tolist()
+    ticks = np.rint((times - times[0]) * _TICKS_PER_SECOND).astype(int).tolist()
     moving = list(tracks(robot, frames))
     for track in moving:
         meshcat.SetTransform(track.path, track.matrix(0))
     bottom = _rounded(frames["p_WN"].values[:, :, [BOTTOM_LEFT, BOTTOM_RIGHT]]) * RESOLUTION
     return {
-        "per_second": TICKS_PER_SECOND,
+        "per_second": _TICKS_PER_SECOND,
         "resolution": RESOLUTION,
-        "repetitions": REPETITIONS,
+        "repetitions": _REPETITIONS,
         "ticks": ticks,
         "motions": {track.path: _steps(track) for track in moving},
         "traces": _add_traces(meshcat, bottom, ticks),
@@ -122,10 +117,10 @@ def _add_traces(meshcat: Meshcat, paths: np.ndarray, ticks: list[int]) -> dict[s
     """Adds paths (frames, ..., 3) in m in pieces; returns the tick at which a piece is walked."""
     steps = np.stack([paths[:-1], paths[1:]]).reshape(2, len(paths) - 1, -1, 3)
     traces = {}
-    for first in range(0, len(paths) - 1, TRACE_FRAMES):
-        last = min(first + TRACE_FRAMES, len(paths) - 1)
+    for first in range(0, len(paths) - 1, _TRACE_FRAMES):
+        last = min(first + _TRACE_FRAMES, len(paths) - 1)
         start, end = steps[:, first:last].reshape(2, -1, 3).swapaxes(1, 2)
-        path = f"/traces/{ticks[last] / TICKS_PER_SECOND:g} s"
+        path = f"/traces/{ticks[last] / _TICKS_PER_SECOND:g} s"
         meshcat.SetLineSegments(path, start, end, rgba=rgba("trace"))
         traces[path] = ticks[last]
     return traces

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -46,38 +46,33 @@ high."""
 CABLE_KINDS = "actuated", "outer", "inner"
 """Colours of cables; outer and inner ones are those that no oscillator drives."""
 
-CABLE_RADIUS, HAIRLINE = 0.0003, 0.0001
-"""Drawn radius of a cable: m per N of tension, and the least, in m."""
+CABLE_RADIUS = 0.0003
+"""Drawn radius of a cable, in m per N of tension."""
 
 ARROW_LENGTH = 30.0 * INCH / POUND_FORCE
 """Length of a force's arrow in m per N: 6 in are 0.2 lbf."""
-
-ARROW_WIDTH = 0.06
-"""Length in m above which an arrow grows no thicker."""
 
 HIDDEN = 1e-4
 """Drawn force in N where there is none: a scale of 0, also a rounded one, would make matrices
 singular."""
 
-FORWARD_LENGTH = 6.0 * INCH
-"""Length of the arrow on the floor that shows the direction of travel."""
-
 MARGIN, UNEVEN_MARGIN = 2, 6
 """Whole inches of floor around the robot's way; more where one wants to see where it goes."""
 
+MOST_POINTS = 12_000
+"""Largest number of points of uneven ground, about: they take some 0.8 MB of a page."""
+
+_HAIRLINE = 0.0001  # m: the least drawn radius of a cable
+_ARROW_WIDTH = 0.06  # m: a length above which an arrow grows no thicker
+_FORWARD_LENGTH = 6.0 * INCH  # of the arrow on the floor that shows the direction of travel
+_FINEST = 12  # points per inch of uneven ground, at most
 _BEND = 1e-6  # m: a second difference of heights below which the ground is straight
-
-FINEST, MOST_POINTS = 12, 12_000
-"""Largest number of points per inch of uneven ground, and of all that are drawn, about: they take
-some 0.8 MB of a page."""
-
-RELIEF, WALL = 2.0, 0.25 * INCH
-"""Steepness with which slopes are shaded, over the true one; height of the lowest wall, in m."""
-
+_WALL = 0.25 * INCH  # height of the lowest wall around uneven ground
+_RELIEF = 2.0  # steepness with which slopes are shaded, over the true one
 _GAMMA = 2.2  # browsers take the colours of vertices as linear, others as sRGB
 
-LIGHT = np.array([-0.5, 0.3, 0.8]) / np.linalg.norm([-0.5, 0.3, 0.8])
-"""Direction to the light that shades uneven ground: from behind the robot and its left."""
+# Direction to the light that shades uneven ground: from behind the robot and its left.
+_LIGHT = np.array([-0.5, 0.3, 0.8]) / np.linalg.norm([-0.5, 0.3, 0.8])
 
 FIELD_OF_VIEW, ASPECT = 35.0, 1.7
 """Camera's degrees from top to bottom, and width over height of the window it is placed for."""
@@ -165,8 +160,11 @@ def set_surroundings(meshcat: Meshcat, robot: Robot, points: np.ndarray) -> None
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 0.9)
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
     _add_forward_arrow(meshcat, floor)
-    bottom = floor if ground.flat else floor * [1.0, 1.0, 0.0] + [0.0, 0.0, _bottom(floor)]
-    seen = np.vstack([part.reshape(-1, 3) for part in (points, floor, bottom)])
+    seen = np.vstack([points.reshape(-1, 3), floor.reshape(-1, 3)])
+    if not ground.flat:
+        below = floor.copy()
+        below[..., 2] = _bottom(floor)
+        seen = np.vstack([seen, below.reshape(-1, 3)])
     target = (seen.min(axis=0) + seen.max(axis=0)) / 2
     meshcat.SetCameraPose(camera_position(seen, target), target)
 
@@ -184,18 +182,19 @@ def floor_points(ground: Ground, corners: np.ndarray) -> np.ndarray:
     Rows along x, columns along y: at every inch, and between them where the ground bends, as
     finely as MOST_POINTS allows.
     """
-    low, high = corners
-    for per_inch in (1,) if ground.flat else range(FINEST, 0, -1):
-        ticks = [np.arange(a * per_inch, b * per_inch + 1) for a, b in zip(low, high, strict=True)]
-        x_y = np.stack(np.meshgrid(*(t / per_inch * INCH for t in ticks), indexing="ij"), axis=-1)
-        heights = ground_heights(x_y, ground)
-        kept = []
-        for axis, tick in enumerate(ticks):
-            bend = np.abs(np.diff(heights, 2, axis)).max(1 - axis)
-            kept.append((tick % per_inch == 0) | np.pad(bend > _BEND, 1))
-        if kept[0].sum() * kept[1].sum() <= MOST_POINTS:
+    (x_low, y_low), (x_high, y_high) = corners
+    for per_inch in range(1 if ground.flat else _FINEST, 0, -1):
+        rows = np.arange(x_low * per_inch, x_high * per_inch + 1)
+        columns = np.arange(y_low * per_inch, y_high * per_inch + 1)
+        x, y = np.meshgrid(rows / per_inch * INCH, columns / per_inch * INCH, indexing="ij")
+        z = ground_heights(np.stack([x, y], axis=-1), ground)
+        bend_along = np.abs(np.diff(z, 2, axis=0)).max(axis=1)
+        bend_across = np.abs(np.diff(z, 2, axis=1)).max(axis=0)
+        rows = np.flatnonzero((rows % per_inch == 0) | np.pad(bend_along > _BEND, 1))
+        columns = np.flatnonzero((columns % per_inch == 0) | np.pad(bend_across > _BEND, 1))
+        if len(rows) * len(columns) <= MOST_POINTS:
             break
-    return np.concatenate([x_y, heights[..., np.newaxis]], axis=-1)[np.ix_(*kept)]
+    return np.stack([x, y, z], axis=-1)[np.ix_(rows, columns)]
 
 
 def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -214,8 +213,11 @@ def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 def rgba(name: str) -> Rgba:
     """Colour of this name in COLOURS, opaque."""
-    red, green, blue = (value / 255 for value in bytes.fromhex(COLOURS[name][1:]))
-    return Rgba(red, green, blue, 1.0)
+    return Rgba(*_rgb(name))
+
+
+def _rgb(name: str) -> np.ndarray:
+    return np.frombuffer(bytes.fromhex(COLOURS[name][1:]), dtype=np.uint8) / 255
 
 
 def _add_tetrahedron(meshcat: Meshcat, structure: Structure, path: str, colour: Rgba) -> None:
@@ -262,7 +264,7 @@ def _tetrahedron_tracks(structure: Structure, frames: xarray.Dataset) -> Iterato
 def _cable_tracks(structure: Structure, frames: xarray.Dataset) -> Iterator[Track]:
     """Unit cylinders scaled to reach from node to node, with radii proportional to tension."""
     p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
-    radius = (CABLE_RADIUS * frames["tension"].values).clip(min=HAIRLINE)
+    radius = (CABLE_RADIUS * frames["tension"].values).clip(min=_HAIRLINE)
     for c, (cable, name) in enumerate(zip(structure.cables, structure.cable_names, strict=True)):
         p_WA, p_WB = p_WN[:, cable["node_a"]], p_WN[:, cable["node_b"]]
         length = np.linalg.norm(p_WB - p_WA, axis=1)
@@ -297,14 +299,15 @@ def _force_tracks(robot: Robot, frames: xarray.Dataset) -> Iterator[Track]:
 def _arrow_scales(sizes: np.ndarray) -> np.ndarray:
     """Scales (frames, 3) of the unit arrow for forces of these sizes (frames,), in N."""
     length = ARROW_LENGTH * sizes.clip(min=HIDDEN)
-    width = length.clip(max=ARROW_WIDTH)
+    width = length.clip(max=_ARROW_WIDTH)
     return np.column_stack([width, width, length])
 
 
 def _add_slab(meshcat: Meshcat, floor: np.ndarray) -> None:
     """A slab whose top is the flat floor (rows, columns, 3), in m."""
     thickness = 0.002
-    (width, depth, _), middle = floor[-1, -1] - floor[0, 0], (floor[-1, -1] + floor[0, 0]) / 2
+    width, depth, _ = floor[-1, -1] - floor[0, 0]
+    middle = (floor[-1, -1] + floor[0, 0]) / 2
     meshcat.SetObject("/floor/slab", Box(width, depth, thickness), rgba("floor"))
     meshcat.SetTransform("/floor/slab", RigidTransform(middle - [0.0, 0.0, thickness / 2]))
 
@@ -313,11 +316,11 @@ def _add_relief(meshcat: Meshcat, floor: np.ndarray) -> None:
     """The surface through the floor's points (rows, columns, 3), the lighter the higher, with
     shaded slopes, and walls around it."""
     x, y, z = np.moveaxis(floor, -1, 0)
-    slopes = RELIEF * np.array(np.gradient(z, x[:, 0], y[0]))
+    slopes = _RELIEF * np.array(np.gradient(z, x[:, 0], y[0]))
     normal = np.stack([*-slopes, np.ones_like(z)], axis=-1)
-    lit = (normal @ LIGHT / np.linalg.norm(normal, axis=-1) / LIGHT[2]).clip(0.6, 1.2)
+    lit = (normal @ _LIGHT / np.linalg.norm(normal, axis=-1) / _LIGHT[2]).clip(0.6, 1.2)
     share = (z - z.min()) / max(np.ptp(z), 0.1 * INCH)
-    low, high = (np.array([c.r(), c.g(), c.b()]) for c in map(rgba, ("low", "high")))
+    low, high = _rgb("low"), _rgb("high")
     colours = (low + share[..., np.newaxis] * (high - low)) * lit[..., np.newaxis]
     around = ((1, 1), (1, 1), (0, 0))
     walls = np.pad(np.ones_like(z), 1) == 0.0
@@ -337,41 +340,50 @@ def _add_relief(meshcat: Meshcat, floor: np.ndarray) -> None:
 
 def _bottom(floor: np.ndarray) -> float:
     """Height (m) at which the walls around uneven floor end."""
-    return float(floor[..., 2].min()) - WALL
+    return float(floor[..., 2].min()) - _WALL
 
 
 def _add_grid(meshcat: Meshcat, floor: np.ndarray, *, inch: str) -> None:
     """Lines along and across the floor (rows, columns, 3), of colour `inch` at every inch."""
-    lift = 0.0002  # lines float a little, else the floor shows through them
-    colours = {"inch": rgba(inch), "six_inches": rgba("six_inches")}
-    lines: dict[str, list[np.ndarray]] = {"inch": [], "six_inches": []}
+    inches: list[np.ndarray] = []
+    six_inches: list[np.ndarray] = []
     for axis in (0, 1):
         for line in np.moveaxis(floor, axis, 0):
             place = line[0, axis] / INCH
-            if abs(place - round(place)) < 1e-6:
-                straight = np.ptp(line[:, 2]) == 0.0
-                points = line[[0, -1]] if straight else line
-                lines["six_inches" if round(place) % 6 == 0 else "inch"].append(points)
-    for rank, (kind, some) in enumerate(lines.items(), start=1):
-        raised = [line + np.array([0.0, 0.0, rank * lift]) for line in some]
-        start, end = (np.vstack([r[part] for r in raised]).T for part in (np.s_[:-1], np.s_[1:]))
-        meshcat.SetLineSegments(f"/floor/{kind}", start, end, rgba=colours[kind])
+            if abs(place - round(place)) > 1e-6:
+                continue
+            straight = np.ptp(line[:, 2]) == 0.0
+            points = line[[0, -1]] if straight else line
+            (six_inches if round(place) % 6 == 0 else inches).append(points)
+    # Lines float a little, else the floor shows through them.
+    _add_lines(meshcat, "/floor/inch", inches, lift=0.0002, colour=rgba(inch))
+    _add_lines(meshcat, "/floor/six_inches", six_inches, lift=0.0004, colour=rgba("six_inches"))
+
+
+def _add_lines(
+    meshcat: Meshcat, path: str, lines: Sequence[np.ndarray], *, lift: float, colour: Rgba
+) -> None:
+    """Lines through points (points, 3), raised by `lift`, in m."""
+    raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
+    start = np.vstack([line[:-1] for line in raised])
+    end = np.vstack([line[1:] for line in raised])
+    meshcat.SetLineSegments(path, start.T, end.T, rgba=colour)
 
 
 def _add_forward_arrow(meshcat: Meshcat, floor: np.ndarray) -> None:
     """An arrow on the floor (rows, columns, 3), in the middle of its right side, along x."""
     _add_unit_arrow(meshcat, "/floor/forward", rgba("forward"))
-    (x, y, _), (X, _, _) = floor[0, 0], floor[-1, 0]
-    row = floor[:, np.abs(floor[0, :, 1] - (y + INCH)).argmin()]
-    start = (x + X - FORWARD_LENGTH) / 2
+    y = floor[0, 0, 1] + INCH
+    row = floor[:, np.abs(floor[0, :, 1] - y).argmin()]
+    start = (floor[0, 0, 0] + floor[-1, 0, 0] - _FORWARD_LENGTH) / 2
     way = np.linspace(0.0, 1.0, 25)
-    z = np.interp(start + way * FORWARD_LENGTH, row[:, 0], row[:, 2])
+    z = np.interp(start + way * _FORWARD_LENGTH, row[:, 0], row[:, 2])
     rise = z[-1] - z[0]
     lift = (z - z[0] - way * rise).max()  # onto what is between its ends
     forward = Track(
         "/floor/forward",
-        np.array([[start, y + INCH, z[0] + lift]]),
-        aligning_quaternions(np.array([[1.0, 0.0, rise / FORWARD_LENGTH]])),
-        np.full((1, 3), FORWARD_LENGTH),
+        np.array([[start, y, z[0] + lift]]),
+        aligning_quaternions(np.array([[1.0, 0.0, rise / _FORWARD_LENGTH]])),
+        np.full((1, 3), _FORWARD_LENGTH),
     )
     meshcat.SetTransform(forward.path, forward.matrix(0))
