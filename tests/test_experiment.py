@@ -167,8 +167,9 @@ def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
     assert whole.reevaluations.empty and reports == []
     assert whole.iterations["note"].tolist() == ["wide", "wide"]
     assert whole.manifest.method.objective == f'{__name__}.Heaviest {{"factor": 2.0}}'
-    with refused(whole.directory, "evaluate", "Heaviest"):
-        reevaluate(whole.directory)
+    for other in (None, Heaviest(3.0)):
+        with refused(whole.directory, "objective", "Heaviest"):
+            reevaluate(whole.directory, other)
 
     run = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):

@@ -221,9 +221,9 @@ def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
     assert table["worst_distance_in"].tolist() == worst
 
 
-def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn):
-    directory, evaluate = run_drawn(), DrawnBowl()
-    run = reevaluate(directory, evaluate, workers=1, executor=ThreadPoolExecutor)
+def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn, monkeypatch):
+    monkeypatch.setattr("tetra_drake.evolution.reevaluation.GaitEvaluation", lambda *_: BOWL)
+    run = reevaluate(run_drawn(), workers=1, executor=ThreadPoolExecutor)
     again = run.reevaluations.set_index(["trial", "index"])
     first = run.evaluations.set_index(["trial", "index"]).loc[again.index]
     assert len(again) == 2, "the best of each trial: 5 gaits would be 15 simulations"
