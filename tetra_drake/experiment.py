@@ -76,12 +76,11 @@ def evolve(
     make_optimizer = optimizer or optimizer_of(scenario.optimizer)
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
     in_lanes = executor is None and scenario.engine_name == "compiled"
-    executor = executor or process_executor
+    where = thread_executor if in_lanes else executor or process_executor
     if resume:
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
-        if not in_lanes:
-            check_sendable(GaitEvaluation(scenario, objective), executor)
+        check_sendable(GaitEvaluation(scenario, objective), where)
         record = RunRecord.create(out, scenario=scenario, seed=seed or 0, method=method)
     with record, progress:
         progress.say(_introduction(out, record.manifest, workers, report=report))
@@ -89,14 +88,13 @@ def evolve(
         trials = open_trials(record, optimizer=make_optimizer)
         if resume and (objective is not None or any(trial.unevaluated for trial in trials)):
             alone = GaitEvaluation(scenario, objective)
-            where = thread_executor if in_lanes else executor
             check_fitness(trials, out, evaluate=alone, executor=where)
         if in_lanes:
             _run_in_lanes(trials, scenario, objective, workers, progress)
         else:
-            _run(trials, scenario, objective, workers, executor, progress)
+            _run(trials, scenario, objective, workers, where, progress)
         if reevaluate:
-            _reevaluate(out, scenario, objective, workers, executor, progress)
+            _reevaluate(record, objective, workers, executor or process_executor, progress)
         if report:
             _report(out, progress)
     return load_run(out)
@@ -136,8 +134,7 @@ def _run(
 
 
 def _reevaluate(
-    out: Path,
-    scenario: Scenario,
+    record: RunRecord,
     objective: Objective | None,
     workers: int,
     executor: MakeExecutor,
@@ -145,15 +142,16 @@ def _reevaluate(
 ) -> None:
     """Evaluates the best gaits on the Drake diagram, unless that was the engine, and simulates
     those of a map on disturbed robots; the run is complete even if that cannot be done."""
+    directory, scenario = record.directory, record.manifest.scenario
     if scenario.engine_name != "drake":
         try:
             reevaluation.reevaluate(
-                out, objective, workers=workers, executor=executor, progress=progress
+                directory, objective, workers=workers, executor=executor, progress=progress
             )
         except EvaluationImpossible as error:
             progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
     try:
-        judge_elites(out, workers=workers)
+        judge_elites(directory, workers=workers)
     except InputError as error:
         progress.warn(f"the gaits of the map were not simulated on disturbed robots: {error}")
 

@@ -59,6 +59,11 @@ class Method:
             optimizer=_name(scenario.optimizer if optimizer is None else optimizer),
         )
 
+    @property
+    def given_from_python(self) -> list[str]:
+        """The parts that a command line cannot give: "objective", "optimizer"."""
+        return [part for part, name in vars(self).items() if "." in name]
+
     def check_same(self, other: Method, source: object) -> None:
         """Raises InputError, with the part as key, unless `other` has the same names."""
         for part, ours in vars(self).items():
@@ -66,7 +71,7 @@ class Method:
             if ours == theirs:
                 continue
             problem = f"the run was made with {ours}, not {theirs}"
-            if "." in ours:
+            if part in self.given_from_python:
                 call = f"tetra_drake.evolve(None, {str(source)!r}, resume=True, {part}=...)"
                 problem += f"; resume it from Python: {call}"
             raise InputError(source, part, problem)
