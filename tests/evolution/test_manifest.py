@@ -49,19 +49,3 @@ def test_a_method_survives_its_file_and_what_the_package_brings_has_no_module(tm
     built_in = Method.of(small_scenario())
     assert built_in == Method(objective="fitness", optimizer="SteadyState")
     assert built_in == Method.of(small_scenario(), optimizer=SteadyState)
-
-
-@pytest.mark.parametrize(
-    ("now", "key"),
-    [
-        ({"objective": Weighted(3.0), "optimizer": RuntimeError}, "objective"),
-        ({"objective": Weighted(2.0)}, "optimizer"),
-    ],
-)
-def test_another_method_is_refused_and_the_part_named(now, key, refused):
-    scenario = small_scenario()
-    given = {"objective": Weighted(2.0), "optimizer": RuntimeError}
-    method = Method.of(scenario, **given)
-    method.check_same(Method.of(scenario, **given), "runs/mine")
-    with refused("runs/mine", key, getattr(method, key)):
-        method.check_same(Method.of(scenario, **now), "runs/mine")

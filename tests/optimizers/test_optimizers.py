@@ -232,19 +232,19 @@ def cells(batches):
     """By the cells of the default map, the greatest fitness above the floor."""
     best = {}
     for vector in np.concatenate(batches):
-        found = walker(vector)
-        if len(found.metrics) == 2 and found.fitness > FLOOR:
-            x, y = found.metrics["travelling_index"], found.metrics["lifted"]
+        evaluation = walker(vector)
+        if len(evaluation.metrics) == 2 and evaluation.fitness > FLOOR:
+            x, y = evaluation.metrics["travelling_index"], evaluation.metrics["lifted"]
             cell = tuple(np.clip([int(20 * x), int(20 * (y - 0.4) / 0.2)], 0, 19).tolist())
-            best[cell] = max(found.fitness, best.get(cell, -math.inf))
+            best[cell] = max(evaluation.fitness, best.get(cell, -math.inf))
     return best
 
 
 def test_elites_are_the_cells_of_gaits_above_the_floor_that_have_not_failed(monkeypatch):
     batches, iterations = run(DIVERSE, walker)
-    found = [len(cells(batches[: i + 1])) for i in range(len(batches))]
-    assert [iteration.report["elites"] for iteration in iterations] == found
-    assert found[-1] > 30
+    elites = [len(cells(batches[: i + 1])) for i in range(len(batches))]
+    assert [iteration.report["elites"] for iteration in iterations] == elites
+    assert elites[-1] > 30
     monkeypatch.setattr(quality_diversity, "FLOOR", 0.0)  # the bowl is below it everywhere
     _, iterations = run(DIVERSE)
     assert iterations[-1].report["elites"] == 0

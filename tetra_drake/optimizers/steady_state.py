@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.base import Evaluation, Iteration
@@ -22,8 +21,6 @@ CHILDREN = 2
 
 GAIN_MUTATION = 0.2
 """Largest change of a feedback gain in one mutation."""
-
-Fitnesses = npt.NDArray[np.float64]
 
 
 @dataclass(eq=False)
@@ -43,7 +40,7 @@ class SteadyState:
         self._steps = mutation_steps(self.space, self.settings)
         self._asked: list[Vector] = []
         self._population: list[Vector] = []
-        self._fitnesses: Fitnesses = np.empty(0)
+        self._fitnesses: Vector = np.empty(0)
         self._means: list[float] = []
 
     def ask(self) -> list[Vector]:
@@ -110,13 +107,13 @@ class SteadyState:
         return place
 
 
-def select_parent(fitnesses: Fitnesses, *, tournament: int, generator: np.random.Generator) -> int:
+def select_parent(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
     """The best of a tournament; of equals the first drawn (listing A.3.2)."""
     candidates = generator.integers(0, len(fitnesses), size=tournament)
     return int(candidates[np.argmax(fitnesses[candidates])])
 
 
-def select_victim(fitnesses: Fitnesses, *, tournament: int, generator: np.random.Generator) -> int:
+def select_victim(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
     """The worst of a tournament; of equals the last drawn (listing A.3.5)."""
     candidates = generator.integers(0, len(fitnesses), size=tournament)[::-1]
     return int(candidates[np.argmin(fitnesses[candidates])])
@@ -160,7 +157,7 @@ def mutate(vector: Vector, *, mutation: Vector, floors: Vector) -> Vector:
 
 
 def find_place(
-    fitnesses: Fitnesses, child: float, *, tournament: int, generator: np.random.Generator
+    fitnesses: Vector, child: float, *, tournament: int, generator: np.random.Generator
 ) -> int | None:
     """Index of the member that a child of this fitness replaces: the worst of a tournament if the
     child is fitter, else the worst of all if it is fitter than that, else None."""
@@ -172,7 +169,7 @@ def find_place(
     return None
 
 
-def mean_fitness(fitnesses: Fitnesses) -> float:
+def mean_fitness(fitnesses: Vector) -> float:
     """Mean over the members that have not failed; NaN if all have."""
     finite = fitnesses[np.isfinite(fitnesses)]
     return float(np.mean(finite)) if finite.size else float("nan")
