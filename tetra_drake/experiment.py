@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 
 from tetra_drake.analysis.elites import judge_elites
@@ -23,7 +23,7 @@ from tetra_drake.evolution.manifest import FITNESS, Manifest, Method, read_manif
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
+from tetra_drake.evolution.trials import Trial, check_fitness, open_trials, run_trials
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import MakeOptimizer
@@ -73,59 +73,87 @@ def evolve(
     if scenario is None:
         raise InputError("scenario", "", "is needed to begin a run")
     check_scenario(scenario)  # before there is a directory
-    make = optimizer or optimizer_of(scenario.optimizer)
+    make_optimizer = optimizer or optimizer_of(scenario.optimizer)
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
-    evaluate = GaitEvaluation(scenario, objective)
     in_lanes = executor is None and scenario.engine_name == "compiled"
     where = thread_executor if in_lanes else executor or process_executor
     if resume:
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
-        check_sendable(evaluate, where)
+        check_sendable(GaitEvaluation(scenario, objective), where)
         record = RunRecord.create(out, scenario=scenario, seed=seed or 0, method=method)
     with record, progress:
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
-        trials = open_trials(record, optimizer=make)
-        unfinished = any(trial.unevaluated for trial in trials)
-        if resume and (unfinished or objective is not None):
-            check_fitness(trials, out, evaluate=evaluate, executor=where)
-        with contextlib.ExitStack() as stack:
-            at_a_time = workers
-            if in_lanes:
-                lanes = stack.enter_context(LanePool(workers))
-                evaluate = GaitEvaluation(scenario, objective, lanes)
-                at_a_time = lanes.capacity
-            elif unfinished:
-                prepare(scenario, many=True)
-            run_trials(
-                trials,
-                evaluate=evaluate,
-                workers=at_a_time,
-                executor=where,
-                show=progress.show,
-            )
-        if reevaluate and scenario.engine_name != "drake":
-            try:
-                reevaluation.reevaluate(
-                    out,
-                    GaitEvaluation(reevaluation.on_diagram(scenario), objective),
-                    workers=workers,
-                    executor=executor or process_executor,
-                    progress=progress,
-                )
-            except EvaluationImpossible as error:
-                progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
+        trials = open_trials(record, optimizer=make_optimizer)
+        if resume and (objective is not None or any(trial.unevaluated for trial in trials)):
+            alone = GaitEvaluation(scenario, objective)
+            check_fitness(trials, out, evaluate=alone, executor=where)
+        if in_lanes:
+            _run_in_lanes(trials, scenario, objective, workers, progress)
+        else:
+            _run(trials, scenario, objective, workers, where, progress)
         if reevaluate:
-            try:
-                judge_elites(out, workers=workers)
-            except InputError as error:
-                progress.warn(
-                    f"the gaits of the map were not simulated on disturbed robots: {error}"
-                )
+            _reevaluate(record, objective, workers, executor or process_executor, progress)
         if report:
             _report(out, progress)
     return load_run(out)
+
+
+def _run_in_lanes(
+    trials: Sequence[Trial],
+    scenario: Scenario,
+    objective: Objective | None,
+    workers: int,
+    progress: Progress,
+) -> None:
+    """Runs the trials to their ends, the gaits of all of them side by side on each core."""
+    with LanePool(workers) as lanes:
+        run_trials(
+            trials,
+            evaluate=GaitEvaluation(scenario, objective, lanes),
+            workers=lanes.capacity,
+            executor=thread_executor,
+            show=progress.show,
+        )
+
+
+def _run(
+    trials: Sequence[Trial],
+    scenario: Scenario,
+    objective: Objective | None,
+    workers: int,
+    executor: MakeExecutor,
+    progress: Progress,
+) -> None:
+    """Runs the trials to their ends on an executor's workers."""
+    if any(trial.unevaluated for trial in trials):
+        prepare(scenario, many=True)
+    evaluate = GaitEvaluation(scenario, objective)
+    run_trials(trials, evaluate=evaluate, workers=workers, executor=executor, show=progress.show)
+
+
+def _reevaluate(
+    record: RunRecord,
+    objective: Objective | None,
+    workers: int,
+    executor: MakeExecutor,
+    progress: Progress,
+) -> None:
+    """Evaluates the best gaits on the Drake diagram, unless that was the engine, and simulates
+    those of a map on disturbed robots; the run is complete even if that cannot be done."""
+    directory, scenario = record.directory, record.manifest.scenario
+    if scenario.engine_name != "drake":
+        try:
+            reevaluation.reevaluate(
+                directory, objective, workers=workers, executor=executor, progress=progress
+            )
+        except EvaluationImpossible as error:
+            progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
+    try:
+        judge_elites(directory, workers=workers)
+    except InputError as error:
+        progress.warn(f"the gaits of the map were not simulated on disturbed robots: {error}")
 
 
 def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:

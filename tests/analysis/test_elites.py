@@ -1,7 +1,5 @@
 """The map of a run: which gaits are on it, and which of them stay on disturbed robots."""
 
-import json
-
 import numpy as np
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
@@ -16,6 +14,7 @@ from tetra_drake.analysis.elites import (
     robust,
 )
 from tetra_drake.analysis.robustness import Judgement
+from tetra_drake.evolution.json_lines import json_line
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.quality_diversity import FLOOR
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -39,7 +38,7 @@ def run_of(tmp_path):
 def keep(run, shares):
     """Records shares of draws kept, by (trial, index)."""
     lines = [
-        json.dumps({"trial": trial, "index": index, "kept": kept, "mean_distance": None}) + "\n"
+        json_line({"trial": trial, "index": index, "kept": kept, "mean_distance": None})
         for (trial, index), kept in shares.items()
     ]
     (run.directory / "elites.jsonl").write_text("".join(lines))

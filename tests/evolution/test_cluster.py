@@ -55,9 +55,9 @@ def test_only_what_ends_its_worker_fails_and_its_chunk_does_not(cluster, vectors
     tasks = [vector for vector in vectors if not is_deadly(vector.tolist())][:14]
     tasks.insert(12, next(vector for vector in vectors if is_deadly(vector.tolist())))
     with dask_cluster(cluster) as executor:
-        found = dict(evaluate_all(Chunked(Deadly()), tasks, executor=executor))
-    assert found.pop(12).failure == "its process died"
-    assert found == {i: Bowl()(task) for i, task in enumerate(tasks) if i != 12}
+        evaluations = dict(evaluate_all(Chunked(Deadly()), tasks, executor=executor))
+    assert evaluations.pop(12).failure == "its process died"
+    assert evaluations == {i: Bowl()(task) for i, task in enumerate(tasks) if i != 12}
 
 
 def test_only_this_machine_can_reach_the_cluster(cluster):

@@ -68,21 +68,21 @@ def test_a_gait_is_simulated_in_each_of_its_draws(tiny, vector):
     results = by_hand(tiny, vector)
     fitnesses = [result.fitness for result in results]
     twists = [result.metrics.twist for result in results]
-    found = GaitEvaluation(tiny)(SeededVector(vector, SEED))
+    combined = GaitEvaluation(tiny)(SeededVector(vector, SEED))
     assert len(set(fitnesses)) == 3
-    assert found.draws["fitness"] == fitnesses
-    assert found.draws["distance"] == [result.metrics.distance for result in results]
-    assert found.fitness == approx(np.mean(fitnesses), rel=1e-14)
-    assert found.metrics["twist"] == approx(np.mean(twists), rel=1e-14)
+    assert combined.draws["fitness"] == fitnesses
+    assert combined.draws["distance"] == [result.metrics.distance for result in results]
+    assert combined.fitness == approx(np.mean(fitnesses), rel=1e-14)
+    assert combined.metrics["twist"] == approx(np.mean(twists), rel=1e-14)
     other = GaitEvaluation(tiny)(SeededVector(vector, (5, 0, 4)))
     assert other.draws["fitness"] != fitnesses
     # Another objective, and the worst half of the draws.
     half = tiny.with_changes({"disturbances.tail": 0.5})
     far = GaitEvaluation(half, lambda result: -abs(result.metrics.distance))
-    found = far(SeededVector(vector, SEED))
-    assert found.draws["fitness"] == [-abs(distance) for distance in found.draws["distance"]]
-    least, second, _ = sorted(found.draws["fitness"])
-    assert found.fitness == approx((least + second / 2) / 1.5, rel=1e-14)
+    combined = far(SeededVector(vector, SEED))
+    assert combined.draws["fitness"] == [-abs(distance) for distance in combined.draws["distance"]]
+    least, second, _ = sorted(combined.draws["fitness"])
+    assert combined.fitness == approx((least + second / 2) / 1.5, rel=1e-14)
 
 
 def test_in_lanes_each_draw_has_one_robot_for_all_gaits_of_an_iteration(tiny, monkeypatch):
@@ -100,7 +100,7 @@ def test_in_lanes_each_draw_has_one_robot_for_all_gaits_of_an_iteration(tiny, mo
         first = evaluate(tasks[0])
         with ThreadPoolExecutor(5) as executor:
             rest = list(executor.map(evaluate, tasks[1:]))
-    assert len({each.fitness for each in (first, *rest)}) == 6
+    assert len({gait.fitness for gait in (first, *rest)}) == 6
     assert len(made) == 3
 
 
@@ -117,9 +117,9 @@ def test_the_mean_over_the_worst_share_is_continuous_from_the_mean_to_the_least(
 
 def test_metrics_are_means_but_for_the_least_clearance_and_tension():
     names = ("speed", "clearance", "tension", "lifted_shares", "cost_of_transport")
-    each = [[1.0, 2.0, 3.0, [0.5, 0.0], 1.0], [3.0, 1.0, 4.0, [0.0, 1.0], None]]
-    found = combine_metrics([dict(zip(names, values, strict=True)) for values in each])
-    assert list(found.values()) == [2.0, 1.0, 3.0, [0.25, 0.5], None]
+    draws = [[1.0, 2.0, 3.0, [0.5, 0.0], 1.0], [3.0, 1.0, 4.0, [0.0, 1.0], None]]
+    combined = combine_metrics([dict(zip(names, values, strict=True)) for values in draws])
+    assert list(combined.values()) == [2.0, 1.0, 3.0, [0.25, 0.5], None]
 
 
 # Failures
@@ -171,11 +171,11 @@ def test_a_draw_that_fails_or_cannot_start_fails_its_gait_with_and_without_lanes
             for evaluate in (GaitEvaluation(scenario), GaitEvaluation(scenario, None, lanes))
         )
     assert alone == beside
-    failed = [each for each in alone if each.failure]
+    failed = [gait for gait in alone if gait.failure]
     assert failed
-    for each in failed:
-        assert re.match(rf"draw [012]: {kind}: ", each.failure)
-        assert (each.fitness, each.metrics, each.draws) == (-math.inf, {}, None)
+    for gait in failed:
+        assert re.match(rf"draw [012]: {kind}: ", gait.failure)
+        assert (gait.fitness, gait.metrics, gait.draws) == (-math.inf, {}, None)
 
 
 # Runs
@@ -221,9 +221,9 @@ def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
     assert table["worst_distance_in"].tolist() == worst
 
 
-def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn):
-    directory, evaluate = run_drawn(), DrawnBowl()
-    run = reevaluate(directory, evaluate, workers=1, executor=ThreadPoolExecutor)
+def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn, monkeypatch):
+    monkeypatch.setattr("tetra_drake.evolution.reevaluation.GaitEvaluation", lambda *_: BOWL)
+    run = reevaluate(run_drawn(), workers=1, executor=ThreadPoolExecutor)
     again = run.reevaluations.set_index(["trial", "index"])
     first = run.evaluations.set_index(["trial", "index"]).loc[again.index]
     assert len(again) == 2, "the best of each trial: 5 gaits would be 15 simulations"

@@ -43,9 +43,9 @@ def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vect
         assert there[index].engine == "drake"
         assert there[index].wall_time > 0.0
     assert here[0].fitness != here[1].fitness
-    own = GaitEvaluation(tiny, lambda result: -result.metrics.twist - 1.0)(vectors[0])
-    assert own.fitness == -here[0].metrics["twist"] - 1.0
-    assert own.metrics == here[0].metrics
+    twisting = GaitEvaluation(tiny, lambda result: -result.metrics.twist - 1.0)(vectors[0])
+    assert twisting.fitness == -here[0].metrics["twist"] - 1.0
+    assert twisting.metrics == here[0].metrics
 
 
 @pytest.mark.parametrize(
@@ -98,8 +98,8 @@ def test_many_gaits_in_lanes_are_those_gaits_one_by_one(tiny, vectors):
     ):
         evaluate = GaitEvaluation(scenario)
         assert evaluate.side_by_side > 1
-        alone, found = [evaluate(task) for task in tasks], evaluate.many(tasks)
-        for one, other in zip(alone, found, strict=True):
+        alone, together = [evaluate(task) for task in tasks], evaluate.many(tasks)
+        for one, other in zip(alone, together, strict=True):
             assert replace(one, wall_time=0.0) == replace(other, wall_time=0.0)
             assert other.wall_time > 0.0
     assert GaitEvaluation(tiny).side_by_side == 1

@@ -27,15 +27,15 @@ def test_every_task_is_evaluated_once_also_when_workers_are_recycled(
     vectors, monkeypatch, executor
 ):
     monkeypatch.setattr("tetra_drake.evolution.executors.TASKS_PER_WORKER", 4)
-    found = dict(evaluate_all(Bowl(), vectors, workers=2, executor=executor))
-    assert found == {i: Bowl()(vector) for i, vector in enumerate(vectors)}
+    evaluations = dict(evaluate_all(Bowl(), vectors, workers=2, executor=executor))
+    assert evaluations == {i: Bowl()(vector) for i, vector in enumerate(vectors)}
     assert list(evaluate_all(Bowl(), [], executor=executor)) == []
 
 
 def test_only_what_ends_its_process_fails(vectors):
-    found = dict(evaluate_all(Deadly(), vectors, workers=2))
-    assert sorted(found) == list(range(10))
-    died = [found[i].failure == "its process died" for i in range(10)]
+    evaluations = dict(evaluate_all(Deadly(), vectors, workers=2))
+    assert sorted(evaluations) == list(range(10))
+    died = [evaluations[i].failure == "its process died" for i in range(10)]
     assert died == [is_deadly(vector.tolist()) for vector in vectors]
     assert any(died)
 
@@ -48,8 +48,8 @@ def succeed_at_0(task):
 
 @pytest.mark.slow
 def test_deaths_count_once_anything_has_succeeded():
-    found = dict(evaluate_all(succeed_at_0, [1, 0, 2], workers=1))
-    assert [found[i].failure is None for i in range(3)] == [False, True, False]
+    evaluations = dict(evaluate_all(succeed_at_0, [1, 0, 2], workers=1))
+    assert [evaluations[i].failure is None for i in range(3)] == [False, True, False]
     for tasks in ([1], [1, 2, 3]):
         with pytest.raises(EvaluationImpossible):
             list(evaluate_all(succeed_at_0, tasks, workers=2))
@@ -109,8 +109,8 @@ from helpers.analytic import Chunked
 if __name__ == "__main__":
     vectors = [np.full(26, 1.0 + i / 7) for i in range(9)]
     for _ in range(2):
-        found = evaluate_all(Chunked(Bowl()), vectors, workers=2, executor=MPIPoolExecutor)
-        print([evaluation == Bowl()(vectors[i]) for i, evaluation in sorted(found)])
+        evaluations = evaluate_all(Chunked(Bowl()), vectors, workers=2, executor=MPIPoolExecutor)
+        print([evaluation == Bowl()(vectors[i]) for i, evaluation in sorted(evaluations)])
 """
 
 

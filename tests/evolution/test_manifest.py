@@ -37,9 +37,7 @@ HERE = __name__
     ],
 )
 def test_what_is_given_from_python_has_its_module_and_fields_in_its_name(objective, name):
-    method = Method.of(small_scenario(), objective=objective)
-    assert method.objective == name
-    assert method.given_from_python == ["objective"]
+    assert Method.of(small_scenario(), objective=objective).objective == name
 
 
 def test_a_method_survives_its_file_and_what_the_package_brings_has_no_module(tmp_path):
@@ -49,22 +47,5 @@ def test_a_method_survives_its_file_and_what_the_package_brings_has_no_module(tm
     write_manifest(tmp_path, manifest)
     assert read_manifest(tmp_path) == manifest
     built_in = Method.of(small_scenario())
-    assert built_in.given_from_python == []
     assert built_in == Method(objective="fitness", optimizer="SteadyState")
     assert built_in == Method.of(small_scenario(), optimizer=SteadyState)
-
-
-@pytest.mark.parametrize(
-    ("now", "key"),
-    [
-        ({"objective": Weighted(3.0), "optimizer": RuntimeError}, "objective"),
-        ({"objective": Weighted(2.0)}, "optimizer"),
-    ],
-)
-def test_another_method_is_refused_and_the_part_named(now, key, refused):
-    scenario = small_scenario()
-    given = {"objective": Weighted(2.0), "optimizer": RuntimeError}
-    method = Method.of(scenario, **given)
-    method.check_same(Method.of(scenario, **given), "runs/mine")
-    with refused("runs/mine", key, getattr(method, key)):
-        method.check_same(Method.of(scenario, **now), "runs/mine")

@@ -24,13 +24,21 @@ class Slope:
         return replace(bowl, metrics={"distance": bowl.metrics["distance"] - 0.5}, engine="drake")
 
 
-def again(directory, evaluate=None, **options):
-    return reevaluate(
-        directory, evaluate or Slope(), workers=2, executor=ThreadPoolExecutor, **options
+@pytest.fixture
+def slope(monkeypatch):
+    """Takes the place of the evaluation on the diagram."""
+    evaluate = Slope()
+    monkeypatch.setattr(
+        "tetra_drake.evolution.reevaluation.GaitEvaluation", lambda *given: evaluate
     )
+    return evaluate
 
 
-def test_the_five_best_of_each_trial_are_evaluated_again(run_small):
+def again(directory, **options):
+    return reevaluate(directory, workers=2, executor=ThreadPoolExecutor, **options)
+
+
+def test_the_five_best_of_each_trial_are_evaluated_again(run_small, slope):
     directory = run_small()
     run = load_run(directory)
     assert run.reevaluations.empty
@@ -54,14 +62,14 @@ class Stages(Progress):
         self.titles.append(title)
 
 
-def test_what_is_recorded_whole_is_not_evaluated_again(run_small):
-    directory, slope = run_small(), Slope()
+def test_what_is_recorded_whole_is_not_evaluated_again(run_small, slope):
+    directory = run_small()
     shown, not_shown = Stages(), Stages()
     again(directory, progress=shown)
-    assert len(again(directory, slope, progress=not_shown).reevaluations) == 10
-    assert (slope.asked, not_shown.titles) == (0, []) and shown.titles
+    assert len(again(directory, progress=not_shown).reevaluations) == slope.asked == 10
+    assert not_shown.titles == [] and shown.titles
     path = directory / "trial_01" / "reevaluations.jsonl"
     path.write_bytes(path.read_bytes()[:-9])
     assert len(load_run(directory).reevaluations) == 9
-    assert len(again(directory, slope).reevaluations) == 10
-    assert slope.asked == 1
+    assert len(again(directory).reevaluations) == 10
+    assert slope.asked == 11

@@ -1,7 +1,6 @@
 """A recorded run as tables: columns, best gaits, populations, states of trials."""
 
 import dataclasses
-import json
 import lzma
 import math
 
@@ -80,21 +79,6 @@ def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused)
         load_run(run)
 
 
-@pytest.mark.parametrize(
-    ("name", "entry", "key"),
-    [
-        ("iterations.jsonl", {"iteration": "first"}, "iteration"),
-        ("reevaluations.jsonl", {"index": 0, "iteration": 0, "genome": 3}, "genome"),
-    ],
-)
-def test_a_line_that_is_no_entry_is_reported(run_small, refused, name, entry, key):
-    run = run_small()
-    path = run / "trial_01" / name
-    path.write_text(json.dumps(entry) + "\n")
-    with refused(path, "line 1", key):
-        load_run(run)
-
-
 # Best gaits, populations, states of trials
 
 
@@ -124,10 +108,9 @@ def test_the_best_gait_is_saved_and_the_last_population_is_that_of_the_mean(run_
 def test_the_record_says_what_the_run_said_at_its_end(tmp_path):
     ended = record_run(tmp_path / "run", small_scenario(), evaluate=Bowl(delay=0.001))
     recorded = load_run(tmp_path / "run").statuses
-    alike = {"wall_time": 0.0, "evaluations_at_most": 0}
     for ours, theirs in zip(recorded, ended, strict=True):
         assert ours.wall_time == pytest.approx(theirs.wall_time, abs=1e-3)
-        assert dataclasses.replace(ours, **alike) == dataclasses.replace(theirs, **alike)
+        assert dataclasses.replace(ours, wall_time=theirs.wall_time) == theirs
 
 
 def test_an_unfinished_run_says_how_far_it_has_come(tmp_path):

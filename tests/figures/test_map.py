@@ -1,12 +1,11 @@
 """The figure of a run's map of gaits."""
 
-import json
-
 import numpy as np
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 from matplotlib.collections import QuadMesh
 
+from tetra_drake.evolution.json_lines import json_line
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -28,7 +27,7 @@ def draw(tmp_path):
 
     def draw(kept):
         lines = [
-            json.dumps({"trial": 0, "index": index, "kept": share, "mean_distance": 0.1}) + "\n"
+            json_line({"trial": 0, "index": index, "kept": share, "mean_distance": 0.1})
             for index, share in kept.items()
         ]
         (run / "elites.jsonl").write_text("".join(lines))

@@ -156,19 +156,19 @@ def read_record(directory: Path) -> dict[str, object]:
     return record
 
 
-def optimise(optimizer, evaluate):
-    """All vectors that an optimiser asks for, batch by batch, and its iterations."""
-    batches, iterations = [], []
-    while not iterations or iterations[-1].stop is None:
-        batches.append(optimizer.ask())
+def optimise(optimizer, evaluate, evaluations):
+    """The vectors that are evaluated for an optimiser, batch by batch, and its iterations; as many
+    evaluations as a trial has."""
+    batches, iterations, left = [], [], evaluations
+    while left and (not iterations or iterations[-1].stop is None):
+        batches.append(optimizer.ask()[:left])
         iterations.append(optimizer.tell([evaluate(vector) for vector in batches[-1]]))
+        left -= len(batches[-1])
     return batches, iterations
 
 
 class RandomSearch:
     """An optimiser: two batches of four without a population."""
-
-    evaluations_at_most = 8
 
     def __init__(self, space, settings, generator):
         self.space, self.generator, self.told = space, generator, []

@@ -174,27 +174,25 @@ def evaluate(vector):
     return Evaluation(-float(((vector[:-2] - 2.0) ** 2).sum() + abs(vector[TAU_A] - 0.25)))
 
 
-def make(scenario, seed=3):
-    generator = np.random.default_rng(seed)
-    return optimizer_of(scenario.optimizer)(
-        ParameterSpace.of(scenario), scenario.evolution, generator
-    )
+def make(scenario):
+    space, generator = ParameterSpace.of(scenario), np.random.default_rng(3)
+    return optimizer_of(scenario.optimizer)(space, scenario.evolution, generator)
 
 
-def run(optimizer):
-    return optimise(optimizer, evaluate)
+def run(scenario):
+    return optimise(make(scenario), evaluate, scenario.evolution.evaluations)
 
 
 def test_first_the_population_then_two_children_per_iteration():
-    budget = {"evolution.evaluations": 12 + 2 * 15 + 1}  # one alone is not enough for two
-    batches, iterations = run(make(small_scenario(population=12).with_changes(budget)))
-    assert [len(batch) for batch in batches] == [12] + [2] * 15
-    assert iterations[0].placed == tuple(range(12))
-    assert iterations[-1].stop == "all evaluations done"
+    budget = {"evolution.evaluations": 12 + 2 * 15 + 1}
+    batches, iterations = run(small_scenario(population=12).with_changes(budget))
+    assert [len(batch) for batch in batches] == [12] + [2] * 15 + [1]
+    assert list(iterations[0].placed) == list(range(12))
+    assert len(iterations[-1].placed) == 1
 
 
 def test_the_mean_fitness_never_falls_and_rises_much():
-    _, iterations = run(make(small_scenario(population=20, iterations=200)))
+    _, iterations = run(small_scenario(population=20, iterations=200))
     means = np.array([iteration.report["mean_fitness"] for iteration in iterations])
     assert (np.diff(means) >= -1e-12).all()
     assert means[-1] > 0.6 * means[0]
@@ -202,7 +200,7 @@ def test_the_mean_fitness_never_falls_and_rises_much():
 
 def vectors_of(changes):
     """The initial population and the children of a trial of a changed scenario."""
-    batches, _ = run(make(small_scenario(iterations=100).with_changes(changes)))
+    batches, _ = run(small_scenario(iterations=100).with_changes(changes))
     return np.array(batches[0]), np.concatenate(batches[1:])
 
 

@@ -115,9 +115,10 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     assert math.isnan(thinned.reevaluations["tau_a_s"].item())
 
 
-def test_a_thinned_run_is_reevaluated_but_not_resumed(runs, refused):
+def test_a_thinned_run_is_reevaluated_but_not_resumed(runs, refused, monkeypatch):
     _, thinned = runs
-    again = reevaluate(thinned.directory, Bowl(), executor=ThreadPoolExecutor)
+    monkeypatch.setattr("tetra_drake.evolution.reevaluation.GaitEvaluation", lambda *_: Bowl())
+    again = reevaluate(thinned.directory, executor=ThreadPoolExecutor)
     assert len(again.reevaluations) == 1 + 2 * BEST_GAITS
     with refused(thinned.directory, "", "thinned"):
         RunRecord.resume(thinned.directory)

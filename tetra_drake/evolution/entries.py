@@ -1,4 +1,4 @@
-"""The files of a record, what each of their lines holds, and the checks when they are read.
+"""The files of a record, and what their lines hold.
 
 trial_00/
   evaluations.jsonl       one line per evaluation, in the order asked; metrics in SI
@@ -11,10 +11,10 @@ elites.jsonl              of a map: its gaits on disturbed robots
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
-
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from typing import Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import REMEDY, read_lines
@@ -25,6 +25,9 @@ from tetra_drake.robot.gait import Vector
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
+
+_COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
+"""The key that counts the lines of a file."""
 
 
 def trial_folder(directory: Path, number: int) -> Path:
@@ -51,82 +54,26 @@ def evaluation_entry(
     return entry
 
 
-def read_entries(path: Path, *, checksums: bool = False) -> list[dict[str, Any]]:
-    """The lines of a file of a record; InputError, naming file and line, where one is damaged; with
-    `checksums`, also where it lacks that."""
-    kind = _KINDS.get(path.name, _Evaluation)
+def recorded_evaluation(entry: Mapping[str, Any]) -> Evaluation:
+    """The evaluation of a line of the record."""
+    return Evaluation(
+        fitness=-math.inf if entry["fitness"] is None else entry["fitness"],
+        metrics=entry["metrics"],
+        failure=entry["failure"],
+        wall_time=entry["wall_time_s"],
+        engine=entry["engine"],
+        draws=entry.get("draws"),
+    )
+
+
+def read_entries(path: Path) -> list[dict[str, Any]]:
+    """The lines of a file of a record; InputError, naming file and line, where one is damaged or
+    missing."""
+    entries = read_lines(path)
     counter = _COUNTERS.get(path.name)
-    entries = read_lines(path, checksums=checksums)
-    for row, entry in enumerate(entries):
-        problem = _problem(entry, kind)
-        if counter and not problem and entry[counter] != row:
-            problem = f"{counter} is {entry[counter]}, expected {row}"
-        if problem:
-            raise InputError(path, f"line {row + 1}", f"is damaged: {problem}; {REMEDY}")
+    if counter is not None:
+        for row, entry in enumerate(entries):
+            if entry.get(counter) != row:
+                problem = f"{counter} is {entry.get(counter)}, expected {row}"
+                raise InputError(path, f"line {row + 1}", f"is damaged: {problem}; {REMEDY}")
     return entries
-
-
-def _problem(entry: dict[str, Any], kind: type[_Line]) -> str:
-    """Problem with the values of an entry; "" if there is none."""
-    try:
-        kind.model_validate(entry)
-    except ValidationError as error:
-        return f"{error.errors()[0]['loc'][0]} is missing or invalid"
-    return ""
-
-
-Count = Annotated[int, Field(ge=0, lt=2**63)]
-Number = Annotated[float, Field(gt=-1e300, lt=1e300)]
-Numbers = Annotated[list[Number], Field(min_length=1)]
-
-
-class _Line(BaseModel):
-    """Keys that a line must have, and kinds of values of those that it may have."""
-
-    model_config = ConfigDict(strict=True, extra="allow")
-
-
-class _Metrics(_Line):
-    __pydantic_extra__: dict[str, Number | None]
-    distance: Number = 0.0
-    lifted_shares: list[Number] = []
-
-
-class _Draws(_Line):
-    fitness: Numbers
-    distance: Numbers
-
-
-class _Evaluation(_Line):
-    index: Count
-    iteration: Count
-    genome: list[Number] | None
-    metrics: _Metrics
-    fitness: Number | None
-    failure: str | None
-    wall_time_s: Number
-    engine: str
-    draws: _Draws | None = None
-    placed: Count | None = None
-
-
-class _Iteration(_Line):
-    iteration: Count
-    evaluations: Count
-    best_fitness: Number | None
-    best_evaluation: Count | None
-    stop: str | None
-    mean_fitness: Number | None = None
-
-
-class _Elite(_Line):
-    trial: Count
-    index: Count
-    kept: Number
-    mean_distance: Number | None
-
-
-_KINDS: dict[str, type[_Line]] = {ITERATIONS: _Iteration, ELITES: _Elite}
-"""Models of lines by file; the lines of other files are evaluations."""
-_COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
-"""The key that counts the lines of a file."""

@@ -12,15 +12,8 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent import futures
+from concurrent.futures import BrokenExecutor, Executor, Future
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait as wait_for_any
 from multiprocessing.context import SpawnContext, SpawnProcess
@@ -62,9 +55,9 @@ class _WorkerContext(SpawnContext):
     Process = _Worker
 
 
-def process_executor(workers: int) -> ProcessPoolExecutor:
+def process_executor(workers: int) -> futures.ProcessPoolExecutor:
     """Worker processes that start from scratch, are recycled, and end with their parent."""
-    executor = ProcessPoolExecutor(
+    executor = futures.ProcessPoolExecutor(
         workers,
         mp_context=_WorkerContext(),
         initializer=_end_with_parent,
@@ -77,7 +70,7 @@ def process_executor(workers: int) -> ProcessPoolExecutor:
     return executor
 
 
-thread_executor: MakeExecutor = ThreadPoolExecutor
+thread_executor: MakeExecutor = futures.ThreadPoolExecutor
 """Threads, for evaluations that let other threads run meanwhile, as the compiled engine."""
 
 
@@ -99,7 +92,7 @@ JobT = TypeVar("JobT")
 TaskT = TypeVar("TaskT")
 
 _HOPELESS = 3
-"""Tasks that end their workers before any other has succeeded: then no task can run."""
+"""Workers that tasks end before any task has succeeded: then no task can run."""
 
 
 class EvaluationImpossible(InputError):
@@ -113,8 +106,8 @@ class EvaluationPool(Generic[JobT]):
     fastest, gets tasks in chunks of up to that number.
 
     If a worker dies, what was under way there runs again, one at a time; a task that ends its
-    worker when alone counts as failed. Until any task has succeeded such failures are held back,
-    as the cause may be that none can run: then EvaluationImpossible is raised.
+    worker when alone counts as failed. Before any task has succeeded it waits for another try
+    instead, as the cause may be that none can run: then EvaluationImpossible is raised.
     """
 
     # The queue is kept here, and an executor never has more chunks than workers: with a backlog,
@@ -136,9 +129,8 @@ class EvaluationPool(Generic[JobT]):
         self._suspects: deque[tuple[JobT, Any]] = deque()
         """Tasks that were under way when a worker died."""
         self._running: dict[Future[list[Evaluation]], list[tuple[JobT, Any]]] = {}
-        self._proven = False
-        """True if any task has succeeded."""
-        self._held: list[tuple[JobT, Evaluation]] = []
+        self._deaths_before_success: int | None = 0
+        """Tasks that ended a worker of their own; None once any task has succeeded."""
 
     def __enter__(self) -> EvaluationPool[JobT]:
         return self
@@ -161,50 +153,21 @@ class EvaluationPool(Generic[JobT]):
 
     def wait(self, timeout: float | None = None) -> list[tuple[JobT, Evaluation]]:
         """Evaluations that are done, as soon as there is one or time (s) is up."""
-        if self._suspects and not self._running:
-            evaluated = self._try_suspect()
-        else:
-            evaluated = self._collect(timeout)
-        self._proven = self._proven or bool(evaluated)
-        if self._proven:
-            evaluated = self._held + evaluated
-            self._held = []
-        elif self._held and (len(self._held) == _HOPELESS or not self.busy):
-            raise EvaluationImpossible(_SOURCE, "", "every evaluation ends its worker process")
-        return evaluated
+        if not self._suspects:
+            self._send_chunks()
+        elif not self._running:
+            return self._try_suspect()
+        return self._collect(timeout)
 
-    def _collect(self, timeout: float | None) -> list[tuple[JobT, Evaluation]]:
-        """Keeps the workers busy, unless there are suspects; if an executor breaks, there is a
-        new one."""
-        while self._queue and not self._suspects and (size := self._chunk_size()):
-            chunk = [self._queue[i] for i in range(size)]
+    def _send_chunks(self) -> None:
+        """Keeps the workers busy."""
+        while self._queue and (size := self._chunk_size()):
+            chunk = [self._queue.popleft() for _ in range(size)]
             try:
-                future = self._send(self._executor, chunk)
+                self._running[self._send(self._executor, chunk)] = chunk
             except BrokenExecutor:
+                self._queue.extendleft(reversed(chunk))
                 self._renew()
-                continue
-            self._running[future] = chunk
-            for _ in chunk:
-                self._queue.popleft()
-        done, _ = wait(self._running, timeout=timeout, return_when=FIRST_COMPLETED)
-        evaluated: list[tuple[JobT, Evaluation]] = []
-        broken = False
-        for future in done:
-            chunk = self._running.pop(future)
-            if future.cancelled():
-                raise EvaluationImpossible("executor", "", _DROPPED)
-            if _is_death(error := future.exception()):
-                self._suspects.extend(chunk)
-                broken |= isinstance(error, BrokenExecutor)
-                continue
-            for (job, _), evaluation in zip(chunk, future.result(), strict=True):
-                evaluated.append((job, evaluation))
-        if broken:
-            for chunk in self._running.values():
-                self._suspects.extend(chunk)
-            self._running.clear()
-            self._renew()
-        return evaluated
 
     def _chunk_size(self) -> int:
         """Number of tasks for the next idle worker: its share of those that wait, but not more than
@@ -213,6 +176,30 @@ class EvaluationPool(Generic[JobT]):
         if idle <= 0:
             return 0
         return min(math.ceil(len(self._queue) / idle), getattr(self._evaluate, "side_by_side", 1))
+
+    def _collect(self, timeout: float | None) -> list[tuple[JobT, Evaluation]]:
+        """Evaluations that are done; if the executor has broken, there is a new one."""
+        done, _ = futures.wait(self._running, timeout, return_when=futures.FIRST_COMPLETED)
+        evaluated: list[tuple[JobT, Evaluation]] = []
+        broken = False
+        for future in done:
+            chunk = self._running.pop(future)
+            if future.cancelled():
+                raise EvaluationImpossible("executor", "", _DROPPED)
+            error = future.exception()
+            if _is_death(error):
+                self._suspects.extend(chunk)
+                broken = broken or isinstance(error, BrokenExecutor)
+                continue
+            self._deaths_before_success = None
+            for (job, _), evaluation in zip(chunk, future.result(), strict=True):
+                evaluated.append((job, evaluation))
+        if broken:
+            for chunk in self._running.values():
+                self._suspects.extend(chunk)
+            self._running.clear()
+            self._renew()
+        return evaluated
 
     def _try_suspect(self) -> list[tuple[JobT, Evaluation]]:
         """Evaluates a suspect in a worker of its own: if that dies, the suspect is the cause."""
@@ -223,10 +210,17 @@ class EvaluationPool(Generic[JobT]):
         except Exception as error:
             if not _is_death(error):
                 raise
-            self._held.append((job, Evaluation.failed("its process died")))
+            if self._deaths_before_success is None:
+                return [(job, Evaluation.failed("its process died"))]
+            self._deaths_before_success += 1
+            if self._deaths_before_success == _HOPELESS or not self.busy:
+                problem = "every evaluation ends its worker process"
+                raise EvaluationImpossible(_SOURCE, "", problem) from error
+            self.submit(job, task)
             return []
         finally:
             alone.shutdown(wait=False)
+        self._deaths_before_success = None
         return [(job, evaluation)]
 
     def _send(self, executor: Executor, chunk: list[tuple[JobT, Any]]) -> Future[list[Evaluation]]:
@@ -235,7 +229,7 @@ class EvaluationPool(Generic[JobT]):
     def _renew(self) -> None:
         self._executor.shutdown(wait=False)
         _terminate_workers()  # a broken pool may wait for ever for one it has not told to end
-        if not self._proven and self._make_executor is process_executor:
+        if self._deaths_before_success is not None and self._make_executor is process_executor:
             _check_worker(self._evaluate)
         self._executor = self._make_executor(self._workers)
 
@@ -301,13 +295,12 @@ def check_sendable(evaluate: object, executor: MakeExecutor) -> None:
         problem = f"cannot be sent the evaluation ({error}): define it in a module, {_INSTEAD}"
         raise EvaluationImpossible(_SOURCE, "", problem) from error
     program = sys.modules["__main__"]
-    main = getattr(program, "__file__", None)
-    problem = ""
-    if main is None and b"__main__" in pickled:
+    file = getattr(program, "__file__", None)
+    if file is None and b"__main__" in pickled:
         problem = f"cannot import what is defined interactively: use a module, {_INSTEAD}"
-    elif main is not None and program.__spec__ is None and not os.path.exists(main):
-        problem = f"have to import the program, and '{main}' is no file: save it, {_INSTEAD}"
-    if problem:
+        raise EvaluationImpossible(_SOURCE, "", problem)
+    if file is not None and program.__spec__ is None and not os.path.exists(file):
+        problem = f"have to import the program, and '{file}' is no file: save it, {_INSTEAD}"
         raise EvaluationImpossible(_SOURCE, "", problem)
 
 

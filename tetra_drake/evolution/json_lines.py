@@ -1,7 +1,8 @@
 """Append-only files of JSON objects, one per line, that survive a kill at any moment.
 
 Each line ends with a checksum, so that a damaged one is told from one that was written. Files that
-`xz` has compressed are NAME.xz; what is appended later stands in NAME.
+`xz` has compressed, and so protects by checksums of its own, are NAME.xz; what is appended later
+stands in NAME.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import re
 import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from tetra_drake.errors import InputError
 
@@ -39,34 +40,25 @@ def append_lines(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
 def repair_torn_line(path: Path) -> None:
     """Cuts off a last line that was not written to its end."""
     content = _read(path)
-    if not content.endswith(b"\n") and content:
+    if content and not content.endswith(b"\n"):
         try:
             os.truncate(path, content.rfind(b"\n") + 1)
         except OSError as error:
             raise InputError(path, "", f"cannot be written: {error.strerror}") from error
 
 
-def read_lines(path: Path, *, checksums: bool = False) -> list[dict[str, Any]]:
-    """The entries of all whole lines; none if there is no file.
+def read_lines(path: Path) -> list[dict[str, Any]]:
+    """The entries of all whole lines, compressed or not; none if there is no file.
 
-    InputError, naming file and line, where a line is not a JSON object or not as it was written;
-    with `checksums`, also where it has none.
+    InputError, naming file and line, where a line is not as it was written.
     """
-    entries = []
-    for file in (compressed(path), path):
-        content = _read(file)
-        try:
-            content = lzma.decompress(content) if content and file != path else content
-        except lzma.LZMAError as error:
-            raise InputError(file, "", f"cannot be read: {error}") from error
-        for number, line in enumerate(content.split(b"\n")[:-1], start=1):
-            try:
-                entries.append(_parse(line, checksums=checksums))
-            except (ValueError, RecursionError) as error:
-                raise InputError(
-                    file, f"line {number}", f"is damaged: {error}; {REMEDY}"
-                ) from error
-    return entries
+    packed = compressed(path)
+    try:
+        content = lzma.decompress(_read(packed)) if packed.exists() else b""
+    except lzma.LZMAError as error:
+        raise InputError(packed, "", f"cannot be read: {error}") from error
+    entries = _parse(content, packed, checksums=False)
+    return entries + _parse(_read(path), path, checksums=True)
 
 
 def compressed(path: Path) -> Path:
@@ -89,24 +81,17 @@ def _read(path: Path) -> bytes:
         raise InputError(path, "", f"cannot be read: {error.strerror}") from error
 
 
-def _parse(line: bytes, *, checksums: bool) -> dict[str, Any]:
-    """The entry of a line; ValueError if it is damaged."""
-    sealed = _CHECKSUM.fullmatch(line)
-    text = sealed[1] + b"}" if sealed else line
-    if checksums and not sealed:
-        raise ValueError("it has no checksum")
-    if sealed and zlib.crc32(sealed[1]) != int(sealed[2], 16):
-        raise ValueError("its checksum is not that of its content")
-    entry = _DECODER.decode(text.decode("utf-8"))
-    if not isinstance(entry, dict):
-        raise ValueError("expected a JSON object")
-    if "crc" in entry:
-        raise ValueError("its checksum is no such")
-    return entry
-
-
-def _refuse(constant: str) -> NoReturn:
-    raise ValueError(f"found {constant}, expected a number")
-
-
-_DECODER = json.JSONDecoder(parse_constant=_refuse)  # made once, as there are many lines
+def _parse(content: bytes, file: Path, *, checksums: bool) -> list[dict[str, Any]]:
+    """The entries of a file's whole lines, which must have checksums if so said."""
+    entries = []
+    for number, line in enumerate(content.split(b"\n")[:-1], start=1):
+        problem = ""
+        match = _CHECKSUM.fullmatch(line)
+        if match is None and checksums:
+            problem = "it has no checksum"
+        if match is not None and zlib.crc32(match[1]) != int(match[2], 16):
+            problem = "its checksum is not that of its content"
+        if problem:
+            raise InputError(file, f"line {number}", f"is damaged: {problem}; {REMEDY}")
+        entries.append(json.loads(line if match is None else match[1] + b"}"))
+    return entries

@@ -18,9 +18,9 @@ import types
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.draws import SeededVector
@@ -28,6 +28,7 @@ from tetra_drake.files import read_text, write_whole
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.sections import Section
 
 SCHEMA = 3
 MANIFEST, SCENARIO = "manifest.json", "scenario.yaml"
@@ -38,7 +39,8 @@ FITNESS = "fitness"
 
 @dataclass(frozen=True)
 class Method:
-    """The parts of a run that its scenario does not hold; those from Python have a module."""
+    """The parts of a run that its scenario does not hold, by name; those from Python have a
+    module."""
 
     objective: str
     optimizer: str
@@ -71,7 +73,7 @@ class Method:
             problem = f"the run was made with {ours}, not {theirs}"
             if part in self.given_from_python:
                 call = f"tetra_drake.evolve(None, {str(source)!r}, resume=True, {part}=...)"
-                problem += f"; resume it from Python, with its own: {call}"
+                problem += f"; resume it from Python: {call}"
             raise InputError(source, part, problem)
 
 
@@ -105,7 +107,11 @@ def read_manifest(directory: Path) -> Manifest:
     path = directory / MANIFEST
     if not path.exists():
         raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
-    file = _read_file(path)
+    try:
+        content = json.loads(read_text(path, "manifest of a run"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, "", f"cannot be read: {error}") from error
+    file = _File.from_tree(content, path)
     scenario_file = directory / SCENARIO
     scenario = load_scenario(scenario_file)
     if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):
@@ -129,30 +135,16 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
     write_whole(directory / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
-class _File(BaseModel):
+class _File(Section):
     """The content of manifest.json."""
 
-    model_config = ConfigDict(strict=True)
     version: int = Field(alias="schema", ge=SCHEMA, le=SCHEMA)
-    seed: Annotated[int, Field(ge=0)]
+    seed: int = Field(ge=0)
     versions: dict[str, str]
     scenario_sha256: str
     objective: str
     optimizer: str
     thinned: bool = False
-
-
-def _read_file(path: Path) -> _File:
-    text = read_text(path, "manifest of a run")
-    try:
-        return _File.model_validate(json.loads(text))
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = str(first["loc"][0]) if first["loc"] else ""
-        problem = f"is missing, damaged or of another version: {first['msg'].lower()}"
-        raise InputError(path, key, problem) from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, "", f"cannot be read: {error}") from error
 
 
 def _sha256(text: str) -> str:

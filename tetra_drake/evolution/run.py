@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,7 +30,10 @@ if TYPE_CHECKING:
 
 _EMPTY = ["trial", "index", "iteration", "fitness", "failure", "wall_time_s", "distance_in"]
 """Columns of an empty table."""
-_NUMBERS = [*METRICS, "distance_in"]
+_NUMBERS = {*METRICS, "distance_in", "fitness", "best_fitness", "mean_fitness"}
+"""Columns of numbers that may be missing."""
+_INDICES = {"placed", "best_evaluation"}
+"""Columns of whole numbers that may be missing."""
 
 
 @dataclass(frozen=True)
@@ -131,12 +133,16 @@ class Run:
 
     def _status(self, trial: int) -> TrialStatus:
         rows = self.evaluations[self.evaluations["trial"] == trial]
-        status = TrialStatus(trial)
-        failures, wall_time = rows["failure"].notna().sum(), rows["wall_time_s"].sum()
-        status.count(len(rows), failures=int(failures), wall_time=float(wall_time))
-        lines = self.iterations[self.iterations["trial"] == trial].drop(columns="trial")
+        status = TrialStatus(
+            trial,
+            self.manifest.scenario.evolution.evaluations,
+            evaluations=len(rows),
+            failures=int(rows["failure"].notna().sum()),
+            wall_time=float(rows["wall_time_s"].sum()),
+        )
+        lines = self.iterations[self.iterations["trial"] == trial]
         for line in lines.iloc[[0, -1]].to_dict("records") if len(lines) else ():
-            status.complete(line, best_distance_in=line.pop("best_distance_in"))
+            status.complete(line, best_distance_in=line["best_distance_in"])
         return status
 
 
@@ -155,65 +161,50 @@ def load_run(path: str | Path) -> Run:
     """
     directory = Path(path)
     manifest = read_manifest(directory)
-    files = (EVALUATIONS, ITERATIONS, REEVALUATIONS)
-    trials, columns = manifest.scenario.evolution.trials, _parameters(manifest.scenario)
-    tables = [_table(directory, trials, name, columns) for name in files]
-    evaluations, iterations, _ = tables
+    evaluations = _table(directory, manifest.scenario, EVALUATIONS)
+    iterations = _table(directory, manifest.scenario, ITERATIONS)
+    reevaluations = _table(directory, manifest.scenario, REEVALUATIONS)
     if not iterations.empty:
         distances = evaluations.set_index(["trial", "index"])["distance_in"].to_dict()
         best = zip(iterations["trial"], iterations["best_evaluation"], strict=True)
         iterations["best_distance_in"] = [distances.get(key, math.nan) for key in best]
-    return Run(directory, manifest, *tables)
+    return Run(directory, manifest, evaluations, iterations, reevaluations)
 
 
 def _parameters(scenario: Scenario) -> list[str]:
     """The columns of a gait's parameters, in the order of ParameterSpace.names."""
-    names, count = ParameterSpace.of(scenario).names, itertools.count(1)
-    taus = {"tau_A": "tau_a_s", "tau_B": "tau_b_s"}
-    return [
-        f"weight_{next(count)}"
-        if name.startswith("weight ")
-        else taus.get(name, name).replace(" ", "_")
-        for name in names
-    ]
+    space = ParameterSpace.of(scenario)
+    others = [f"gain_{name}" for name in space.pathways] + ["tau_a_s", "tau_b_s"]
+    weights = len(space.names) - len(others)
+    return [f"weight_{number}" for number in range(1, weights + 1)] + others
 
 
-def _table(directory: Path, trials: int, name: str, columns: list[str]) -> pandas.DataFrame:
+def _table(directory: Path, scenario: Scenario, name: str) -> pandas.DataFrame:
+    """The lines of a file of all trials."""
     import pandas
 
-    rows = [
-        {"trial": trial, **(_flat(entry, columns) if "genome" in entry else entry)}
-        for trial in range(trials)
-        for entry in _entries(trial_folder(directory, trial) / name, len(columns))
-    ]
+    columns = _parameters(scenario)
+    rows = []
+    for trial in range(scenario.evolution.trials):
+        for entry in read_entries(trial_folder(directory, trial) / name):
+            row = _flat(entry, columns) if "genome" in entry else entry
+            rows.append({"trial": trial, **row})
     table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
-    kinds = dict.fromkeys(("placed", "best_evaluation"), "Int64")
-    numbers = {column for column in table if column in _NUMBERS or column.endswith("fitness")}
-    kinds |= dict.fromkeys(numbers - {"draws_fitness"}, "float")
-    kinds = {column: kind for column, kind in kinds.items() if column in table}
+    kinds = dict.fromkeys(_NUMBERS.intersection(table), "float")
+    kinds |= dict.fromkeys(_INDICES.intersection(table), "Int64")
     return table.astype(kinds).copy()  # in one piece, as astype() makes one of each column
-
-
-def _entries(path: Path, parameters: int) -> list[dict[str, Any]]:
-    """The lines of a file; InputError for a genome of another number of parameters."""
-    entries = read_entries(path)
-    for line, entry in enumerate(entries, start=1):
-        genome = entry.get("genome")
-        if genome is not None and len(genome) != parameters:
-            problem = f"is damaged: the genome has {len(genome)} numbers, expected {parameters}"
-            raise InputError(path, f"line {line}", problem)
-    return entries
 
 
 def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:
     """A line of evaluations with a column for each number."""
     genome = entry.pop("genome") or [math.nan] * len(columns)
-    parameters = dict(zip(columns, genome, strict=True))
     metrics = dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
-    shares = enumerate(metrics.pop("lifted_shares", []), start=1)
-    metrics |= {f"lifted_T{number}": share for number, share in shares}
+    for number, share in enumerate(metrics.pop("lifted_shares", []), start=1):
+        metrics[f"lifted_T{number}"] = share
     metrics["distance_in"] = metrics["distance"] / INCH
-    if draws := entry.pop("draws", None):
-        metrics |= {f"draws_{name}": numbers for name, numbers in draws.items()}
+    draws = entry.pop("draws", None)
+    if draws is not None:
+        metrics["draws_fitness"] = draws["fitness"]
+        metrics["draws_distance"] = draws["distance"]
         metrics["worst_distance_in"] = min(draws["distance"]) / INCH
-    return entry | metrics | parameters
+    return entry | metrics | dict(zip(columns, genome, strict=True))

@@ -13,13 +13,11 @@ on with the same versions of the packages and on the same kind of processor only
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import fcntl
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NoReturn
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import (
@@ -28,6 +26,7 @@ from tetra_drake.evolution.entries import (
     IN_PROGRESS,
     ITERATIONS,
     read_entries,
+    recorded_evaluation,
 )
 from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
 from tetra_drake.evolution.manifest import (
@@ -116,31 +115,27 @@ class TrialRecord:
 
     def __init__(self, folder: Path) -> None:
         make_folder(folder)
-        self._folder = folder
         for name in (EVALUATIONS, ITERATIONS, IN_PROGRESS):
             repair_torn_line(folder / name)
-        self._evaluations = read_entries(folder / EVALUATIONS, checksums=True)
-        self._iterations = read_entries(folder / ITERATIONS, checksums=True)
-        in_progress = read_entries(folder / IN_PROGRESS, checksums=True)
-        self._in_progress = {entry["index"]: (i, entry) for i, entry in enumerate(in_progress)}
+        self._folder = folder
+        self._evaluations = read_entries(folder / EVALUATIONS)
+        self._iterations = read_entries(folder / ITERATIONS)
+        self._recorded: dict[int, tuple[str, int, dict[str, Any]]] = {}
+        """File, row and entry of each evaluation, by its index."""
+        for row, entry in enumerate(read_entries(folder / IN_PROGRESS)):
+            self._recorded[entry["index"]] = IN_PROGRESS, row, entry
+        for row, entry in enumerate(self._evaluations):
+            self._recorded[row] = EVALUATIONS, row, entry
 
     def recall(self, index: int, vector: Vector) -> Evaluation | None:
         """The recorded evaluation of this index, None if there is none; InputError if it is of
         another vector."""
-        name, row, entry = self._find(index)
-        if entry is None:
+        if index not in self._recorded:
             return None
+        name, row, entry = self._recorded[index]
         if entry["genome"] != vector.tolist():
             self._refuse(name, row, _NOT_REPEATED.format("the genome"))
-        fitness = -math.inf if entry["fitness"] is None else entry["fitness"]
-        rest = [entry[key] for key in ("metrics", "failure", "wall_time_s", "engine")]
-        return dataclasses.replace(Evaluation(fitness, *rest), draws=entry.get("draws"))
-
-    def _find(self, index: int) -> tuple[str, int, dict[str, Any] | None]:
-        """File, row and entry of an evaluation."""
-        if index < len(self._evaluations):
-            return EVALUATIONS, index, self._evaluations[index]
-        return IN_PROGRESS, *self._in_progress.get(index, (0, None))
+        return recorded_evaluation(entry)
 
     def keep(self, entry: dict[str, Any]) -> None:
         """Saves an evaluation whose iteration is not complete yet."""
@@ -165,14 +160,18 @@ class TrialRecord:
         (self._folder / IN_PROGRESS).unlink(missing_ok=True)
 
     def _write(self, name: str, recorded: _Lines, entries: _Lines, *, first: int) -> None:
-        for row, (there, entry) in enumerate(zip(recorded[first:], entries, strict=False), first):
-            key = next((key for key in there | entry if there.get(key) != entry.get(key)), None)
-            if key is not None:
-                self._refuse(name, row, _NOT_REPEATED.format(key))
-        if missing := entries[max(0, len(recorded) - first) :]:
+        missing = []
+        for row, entry in enumerate(entries, start=first):
+            if row >= len(recorded):
+                missing.append(entry)
+                continue
+            for key in recorded[row] | entry:
+                if recorded[row].get(key) != entry.get(key):
+                    self._refuse(name, row, _NOT_REPEATED.format(key))
+        if missing:
             append_lines(self._folder / name, missing)
 
-    def _refuse(self, name: str, row: int, problem: str) -> None:
+    def _refuse(self, name: str, row: int, problem: str) -> NoReturn:
         raise InputError(self._folder / name, f"line {row + 1}", problem)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,7 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.draws import SeededVector
-from tetra_drake.evolution.entries import (
-    evaluation_entry,
-    trial_folder,
-)
+from tetra_drake.evolution.entries import evaluation_entry, trial_folder
 from tetra_drake.evolution.executors import (
     EvaluationPool,
     MakeExecutor,
@@ -25,12 +22,7 @@ from tetra_drake.evolution.executors import (
 from tetra_drake.evolution.manifest import Manifest
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers import optimizer_of
-from tetra_drake.optimizers.base import (
-    Evaluate,
-    Evaluation,
-    MakeOptimizer,
-    Optimizer,
-)
+from tetra_drake.optimizers.base import Evaluate, Evaluation, MakeOptimizer, Optimizer
 from tetra_drake.robot.gait import ParameterSpace, Vector
 from tetra_drake.scenario.units import INCH
 
@@ -46,8 +38,8 @@ class TrialStatus:
     any."""
 
     number: int
-    evaluations_at_most: int = 0
-    """0 where only the record is known."""
+    evaluations_at_most: int
+    """Evaluations of a trial that does not end early."""
     iteration: int = -1
     """The last complete one; 0 is the initial population."""
     evaluations: int = 0
@@ -75,138 +67,155 @@ class TrialStatus:
         initial = self.initial_best_distance_in
         return 100.0 * self.gain_in / initial if initial >= LEAST_BASE else math.nan
 
-    def count(self, evaluations: int, *, failures: int, wall_time: float) -> None:
-        """Adds evaluations."""
-        self.evaluations += evaluations
-        self.failures += failures
-        self.wall_time += wall_time
-
     def complete(self, line: Mapping[str, Any], *, best_distance_in: float) -> None:
         """Takes over a line of iterations.jsonl, and the distance of its best evaluation."""
-        self.iteration = int(line["iteration"])
-        best = _number(line["best_fitness"])
-        self.best_fitness = best if math.isfinite(best) else -math.inf
-        self.best_distance_in = best_distance_in
-        self.mean_fitness = _number(line.get("mean_fitness"))
+        self.iteration = line["iteration"]
         self.stop = line["stop"] if isinstance(line["stop"], str) else None
+        self.best_fitness = _number(line["best_fitness"], missing=-math.inf)
+        self.best_distance_in = best_distance_in
+        self.mean_fitness = _number(line.get("mean_fitness"), missing=math.nan)
         if self.iteration == 0:
             self.initial_mean_fitness = self.mean_fitness
             self.initial_best_distance_in = best_distance_in
 
 
+def _number(value: float | None, *, missing: float) -> float:
+    """A number of a line, or of a table, in which NaN stands for null."""
+    return missing if value is None or math.isnan(value) else value
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """A vector and its evaluation, as a line of the record numbers them."""
+
+    index: int
+    iteration: int
+    vector: Vector
+    evaluation: Evaluation
+
+    def entry(self) -> dict[str, Any]:
+        """The line of the record."""
+        return evaluation_entry(self.index, self.iteration, self.vector, self.evaluation)
+
+
 class Trial:
-    """Gives evaluations, taken in any order, to the optimiser in the order asked. What the record
-    holds already it goes through at once."""
+    """Gives evaluations, taken in any order, to the optimiser in the order asked, until
+    `evolution.evaluations` are done or the optimiser stops. What the record holds already it goes
+    through at once."""
 
     def __init__(
         self, number: int, *, manifest: Manifest, optimizer: Optimizer, folder: Path
     ) -> None:
-        self.status = TrialStatus(number, optimizer.evaluations_at_most)
+        self.status = TrialStatus(number, manifest.scenario.evolution.evaluations)
         self.unevaluated: dict[int, Vector] = {}
-        """Vectors to evaluate before the optimiser can go on, by number; empty at the end."""
-        self.recalled: tuple[int, Vector | SeededVector, Evaluation] | None = None
-        """Number, task and evaluation of the first recorded gait with a fitness."""
+        """Vectors to evaluate before the optimiser can go on, by index; empty at the end."""
+        self.recalled: Evaluated | None = None
+        """The first recorded vector with a fitness."""
         self._manifest = manifest
         self._optimizer = optimizer
         self._record = TrialRecord(folder)
-        self._results: dict[int, Evaluation] = {}
-        """Evaluations of this iteration."""
-        self._best: tuple[int, Vector, Evaluation] | None = None
-        self._saved_best: int | None = None
-        self._course = self._iterate()
-        next(self._course, None)
+        self._results: dict[int, Evaluated] = {}
+        """The evaluated vectors of this iteration, by index."""
+        self._best: Evaluated | None = None
+        self._saved: Evaluated | None = None
+        """The one whose gait is in the record as the best."""
+        self._advance()
 
-    @property
-    def tasks(self) -> dict[int, Vector | SeededVector]:
-        """Tasks for the vectors of `unevaluated`."""
-        return {index: self._task(vector) for index, vector in self.unevaluated.items()}
-
-    def _task(self, vector: Vector) -> Vector | SeededVector:
-        iteration = self.status.iteration + 1
+    def task(self, vector: Vector, *, iteration: int | None = None) -> Vector | SeededVector:
+        """Task that evaluates a vector, by default one of the iteration under way."""
+        if iteration is None:
+            iteration = self.status.iteration + 1
         return self._manifest.task(vector, trial=self.status.number, iteration=iteration)
 
     def take(self, index: int, evaluation: Evaluation) -> bool:
         """Takes an evaluation; True if that was the last of its iteration."""
-        vector = self.unevaluated.pop(index)
-        self._add(index, evaluation)
+        self._add(index, self.unevaluated.pop(index), evaluation)
         if self.unevaluated:
-            entry = evaluation_entry(index, self.status.iteration + 1, vector, evaluation)
-            self._record.keep(entry)
+            self._record.keep(self._results[index].entry())
             return False
-        next(self._course, None)
+        self._complete()
+        self._advance()
         return True
 
-    def _iterate(self) -> Iterator[None]:
-        """Goes from iteration to iteration; yields to wait for evaluations."""
+    def _advance(self) -> None:
+        """Goes on to the next vectors that are not recorded, or to the end."""
         while self.status.stop is None:
-            batch = dict(enumerate(self._optimizer.ask(), start=self.status.evaluations))
-            self._results = {}
-            for index, vector in batch.items():
-                recorded = self._record.recall(index, vector)
-                if recorded is None:
-                    self.unevaluated[index] = vector
-                else:
-                    self._add(index, recorded)
-                    if self.recalled is None and recorded.failure is None:
-                        self.recalled = index, self._task(vector), recorded
+            self._ask()
             if self.unevaluated:
                 self._save_best()
-                yield
-            self._complete(batch)
+                return
+            self._complete()
         self._record.finish(self.status.evaluations)
         self._save_best()
 
-    def _add(self, index: int, evaluation: Evaluation) -> None:
-        self._results[index] = evaluation
-        failed = evaluation.failure is not None
-        self.status.count(1, failures=failed, wall_time=evaluation.wall_time)
+    def _ask(self) -> None:
+        """Begins an iteration: what is recorded of it is recalled, the rest is unevaluated."""
+        self._results = {}
+        first = self.status.evaluations
+        batch = self._optimizer.ask()[: self.status.evaluations_at_most - first]
+        for index, vector in enumerate(batch, start=first):
+            evaluation = self._record.recall(index, vector)
+            if evaluation is None:
+                self.unevaluated[index] = vector
+                continue
+            self._add(index, vector, evaluation)
+            if self.recalled is None and evaluation.failure is None:
+                self.recalled = self._results[index]
 
-    def _save_best(self) -> None:
-        if self._best is not None and self._best[0] != self._saved_best:
-            index, vector, _ = self._best
-            gait = self._manifest.gait(vector, trial=self.status.number, index=index)
-            self._record.save_best(gait, self._manifest.scenario)
-            self._saved_best = index
+    def _add(self, index: int, vector: Vector, evaluation: Evaluation) -> None:
+        status = self.status
+        self._results[index] = Evaluated(index, status.iteration + 1, vector, evaluation)
+        status.evaluations += 1
+        status.failures += evaluation.failure is not None
+        status.wall_time += evaluation.wall_time
 
-    def _complete(self, batch: Mapping[int, Vector]) -> None:
+    def _complete(self) -> None:
         """Tells the optimiser the results of an iteration, and records it."""
-        outcome = self._optimizer.tell([self._results[index] for index in batch])
-        number, entries = self.status.iteration + 1, []
-        for index, vector in batch.items():
-            evaluation = self._results[index]
-            if evaluation.fitness > (self._best[2].fitness if self._best else -math.inf):
-                self._best = index, vector, evaluation
-            entries.append(evaluation_entry(index, number, vector, evaluation))
-        for entry, place in zip(entries, outcome.placed or (), strict=outcome.placed is not None):
-            entry["placed"] = place
+        results = [self._results[index] for index in sorted(self._results)]
+        outcome = self._optimizer.tell([result.evaluation for result in results])
+        for result in results:
+            fitness = self._best.evaluation.fitness if self._best else -math.inf
+            if result.evaluation.fitness > fitness:
+                self._best = result
+        entries = [result.entry() for result in results]
+        if outcome.placed is not None:
+            for entry, place in zip(entries, outcome.placed, strict=True):
+                entry["placed"] = place
+        best, status = self._best, self.status
+        all_done = status.evaluations == status.evaluations_at_most
         line = {
-            "iteration": number,
-            "evaluations": self.status.evaluations,
-            "best_fitness": self._best[2].fitness if self._best else None,
-            "best_evaluation": self._best[0] if self._best else None,
-            "stop": outcome.stop,
+            "iteration": status.iteration + 1,
+            "evaluations": status.evaluations,
+            "best_fitness": best.evaluation.fitness if best else None,
+            "best_evaluation": best.index if best else None,
+            "stop": "all evaluations done" if all_done else outcome.stop,
             **outcome.report,
         }
         self._record.complete(entries, line)
-        distance = self._best[2].metrics.get("distance", math.nan) if self._best else math.nan
-        self.status.complete(line, best_distance_in=distance / INCH)
+        distance = best.evaluation.metrics.get("distance", math.nan) if best else math.nan
+        status.complete(line, best_distance_in=distance / INCH)
+
+    def _save_best(self) -> None:
+        if self._best is not None and self._best is not self._saved:
+            trial, index = self.status.number, self._best.index
+            gait = self._manifest.gait(self._best.vector, trial=trial, index=index)
+            self._record.save_best(gait, self._manifest.scenario)
+            self._saved = self._best
 
 
 def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) -> list[Trial]:
     """All trials of a record, each as far as it is recorded; by default with the scenario's
     optimiser. Trials share nothing: one more trial changes no other."""
-    scenario, seed = record.manifest.scenario, record.manifest.seed
+    scenario = record.manifest.scenario
     make = optimizer or optimizer_of(scenario.optimizer)
     space = ParameterSpace.of(scenario)
+    seeds = np.random.SeedSequence(record.manifest.seed).spawn(scenario.evolution.trials)
     trials = []
-    for number, trial_seed in enumerate(
-        np.random.SeedSequence(seed).spawn(scenario.evolution.trials)
-    ):
-        generator = np.random.default_rng(trial_seed)
+    for number, seed in enumerate(seeds):
         trial = Trial(
             number,
             manifest=record.manifest,
-            optimizer=make(space, scenario.evolution, generator),
+            optimizer=make(space, scenario.evolution, np.random.default_rng(seed)),
             folder=trial_folder(record.directory, number),
         )
         trials.append(trial)
@@ -234,8 +243,8 @@ def run_trials(
     with EvaluationPool[tuple[Trial, int]](evaluate, workers=workers, executor=executor) as pool:
         while waiting or pool.busy:
             for trial in waiting:
-                for index, task in trial.tasks.items():
-                    pool.submit((trial, index), task)
+                for index, vector in trial.unevaluated.items():
+                    pool.submit((trial, index), trial.task(vector))
             done = pool.wait(_SHOW_PERIOD)
             waiting = [trial for (trial, index), result in done if trial.take(index, result)]
             show(statuses)
@@ -247,20 +256,19 @@ def check_fitness(
 ) -> None:
     """Evaluates the first recorded gait that has a fitness once more; InputError if its fitness is
     another now, so that no record ever holds two objectives."""
-    trial = next((trial for trial in trials if trial.recalled), None)
-    if trial is None or trial.recalled is None:
-        return
-    index, task, recorded = trial.recalled
-    ((_, again),) = evaluate_all(evaluate, [task], workers=1, executor=executor)
-    if again.fitness != recorded.fitness:
+    for trial in trials:
+        recorded = trial.recalled
+        if recorded is None:
+            continue
+        task = trial.task(recorded.vector, iteration=recorded.iteration)
+        ((_, again),) = evaluate_all(evaluate, [task], workers=1, executor=executor)
+        fitness = recorded.evaluation.fitness
+        if again.fitness == fitness:
+            return
         outcome = again.failure or f"fitness {again.fitness!r}"
         problem = (
-            f"trial {trial.status.number}, evaluation {index} has fitness {recorded.fitness!r}, "
+            f"trial {trial.status.number}, evaluation {recorded.index} has fitness {fitness!r}, "
             f"and evaluated again {outcome}; resume the run with the objective, the versions of "
             "the packages and the kind of processor it was begun with"
         )
         raise InputError(directory, "objective", problem)
-
-
-def _number(value: Any) -> float:
-    return math.nan if value is None else float(value)

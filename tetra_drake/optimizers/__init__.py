@@ -14,6 +14,14 @@ from tetra_drake.optimizers.random_search import RandomSearch
 from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.scenario import optimizer_kinds as kinds
 
+OPTIMIZERS: dict[type, Any] = {
+    kinds.SteadyState: SteadyState,
+    kinds.CmaEs: CmaEs,
+    kinds.RandomSearch: RandomSearch,
+    kinds.QualityDiversity: QualityDiversity,
+}
+"""The class of each kind; its constructor takes the arguments of a MakeOptimizer and settings."""
+
 
 def optimizer_of(kind: kinds.OptimizerKind) -> MakeOptimizer:
     """The maker of the optimiser that a scenario asks for.
@@ -22,10 +30,4 @@ def optimizer_of(kind: kinds.OptimizerKind) -> MakeOptimizer:
     """
     if isinstance(kind, kinds.QualityDiversity) and importlib.util.find_spec("ribs") is None:
         raise InputError("optimizer", "", f"needs pyribs: {INSTALL}")
-    optimizers: dict[type, Any] = {
-        kinds.SteadyState: SteadyState,
-        kinds.CmaEs: CmaEs,
-        kinds.RandomSearch: RandomSearch,
-        kinds.QualityDiversity: QualityDiversity,
-    }
-    return functools.partial(optimizers[type(kind)], settings=kind)
+    return functools.partial(OPTIMIZERS[type(kind)], settings=kind)

@@ -45,25 +45,26 @@ class Iteration:
     report: Mapping[str, Any]
     """Numbers to record with the iteration, by the optimiser's own names; None where unknown."""
     stop: str | None = None
-    """Why the optimisation ends here; None while it goes on."""
-    placed: tuple[int | None, ...] | None = None
+    """Why the optimisation ends before its evaluations are used up; None while it goes on."""
+    placed: Sequence[int | None] | None = None
     """Index in the population of each vector of the batch, None if it was dropped; None for
     an optimiser without a population."""
 
 
 class Optimizer(Protocol):
     """Asks for vectors to be evaluated, batch by batch, and is told their evaluations; it depends
-    on these and its random generator only, so that a trial can be repeated from its record."""
+    on these and its random generator only, so that a trial can be repeated from its record.
 
-    @property
-    def evaluations_at_most(self) -> int:
-        """Number of evaluations of a trial that is not stopped early."""
+    The trial ends after `evolution.evaluations`, whatever the optimiser. Its last batch is cut to
+    the evaluations that are left.
+    """
 
     def ask(self) -> list[Vector]:
         """The vectors of the next iteration, to be evaluated in any order."""
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes the evaluations in the order in which the vectors were asked for."""
+        """Takes the evaluations in the order in which the vectors were asked for; of a batch that
+        was cut, those of its first vectors."""
 
 
 MakeOptimizer = Callable[[ParameterSpace, EvolutionSection, np.random.Generator], Optimizer]

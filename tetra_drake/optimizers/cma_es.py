@@ -12,15 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.optimizers.generational import (
-    MIDDLE,
-    Generational,
-    Matrix,
-    Ranges,
-)
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.optimizers.generational import MIDDLE, Generational, Matrix, Ranges
+from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
-from tetra_drake.scenario.settings import EvolutionSection
 
 TRYOUT = 350
 """Evaluations in which each search is tried out."""
@@ -36,7 +30,7 @@ GROWTH = 2.0
 """Factor on the population at each restart (IPOP)."""
 
 
-class CmaEs(Generational):
+class CmaEs(Generational[kinds.CmaEs]):
     """Several searches by CMA-ES, each for some evaluations; the one with the best point goes on.
 
     Where they end is decided early and differs much more between searches than within one. The
@@ -46,44 +40,42 @@ class CmaEs(Generational):
     of their ranges (root mean square).
     """
 
-    def __init__(
-        self,
-        space: ParameterSpace,
-        evolution: EvolutionSection,
-        generator: np.random.Generator,
-        settings: kinds.CmaEs | None = None,
-    ) -> None:
-        super().__init__(space, evolution, generator)
-        self._settings = settings = settings or kinds.CmaEs()
-        self._starts = min(settings.starts, max(1, evolution.evaluations // (2 * TRYOUT)))
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        affordable = max(1, self.evolution.evaluations // (2 * TRYOUT))
+        self._starts = min(self.settings.starts, affordable)
         self._searches: list[_Search] = []
         """Empty during the sample."""
-        if not settings.sample:
+        if not self.settings.sample:
             middle = np.full(self._ranges.size, MIDDLE)
             self._begin(np.vstack([middle, *self._random(self._starts - 1)]))
 
-    def _begin(self, starts: Matrix) -> None:
-        chosen = starts[: self._starts]
+    def _begin(self, points: Matrix) -> None:
+        """Begins the searches from the first of these points."""
+        population = self.settings.population
         self._searches = [
-            _Search(self._settings.population, self._ranges, self._generator, x) for x in chosen
+            _Search(population, self._ranges, self.generator, start)
+            for start in points[: self._starts]
         ]
 
     def _draw(self) -> Matrix:
-        return self._current.draw() if self._searches else self._random(self._settings.sample)
+        return self._current.draw() if self._searches else self._random(self.settings.sample)
 
     def _learn(self, fitnesses: Vector) -> None:
         if self._searches:
             self._current.learn(self._points, fitnesses)
-        else:
-            ranked = self._points[np.argsort(-fitnesses, kind="stable")]
-            mean = ranked[: max(1, len(ranked) // 4)].mean(axis=0)
-            self._begin(np.vstack([mean, ranked]))
+            return
+        ranked = self._points[np.argsort(-fitnesses, kind="stable")]
+        mean = ranked[: max(1, len(ranked) // 4)].mean(axis=0)
+        self._begin(np.vstack([mean, ranked]))
 
     @property
     def _current(self) -> _Search:
         """The search that draws next, or has drawn."""
-        untried = (each for each in self._searches if each.evaluations < TRYOUT)
-        return next(untried, None) or max(self._searches, key=lambda each: each.best)
+        for search in self._searches:
+            if search.evaluations < TRYOUT:
+                return search
+        return max(self._searches, key=lambda search: search.best)
 
     def _state(self) -> Mapping[str, Any]:
         if not self._searches:

@@ -1,9 +1,10 @@
-"""Common parts of optimisers that go on until their evaluations are used up."""
+"""Common parts of optimisers that draw and learn from whole batches."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -55,49 +56,45 @@ class Ranges:
         return (vector - self._space.low)[self._free] / self._width
 
 
-class Generational:
-    """An Optimizer that draws batches until the evaluations are used up; the last may be smaller.
+SettingsT = TypeVar("SettingsT")
 
-    It learns from a batch unless all of it has failed; a failure is worse than all others. Reports
-    mean_fitness, over the evaluations of the batch without failure.
+
+@dataclass(eq=False)
+class Generational(Generic[SettingsT]):
+    """An Optimizer that learns from a whole batch at once, unless all of it has failed; a failure
+    is worse than all others. Reports mean_fitness, over the evaluations without failure.
     """
 
-    def __init__(
-        self, space: ParameterSpace, evolution: EvolutionSection, generator: np.random.Generator
-    ) -> None:
-        self._space = space
-        self._evaluations = evolution.evaluations
-        self._generator = generator
-        self._ranges = Ranges(space)
-        self._left = evolution.evaluations
+    space: ParameterSpace
+    evolution: EvolutionSection
+    generator: np.random.Generator
+    settings: SettingsT
+    """The kind of optimiser in the scenario."""
+
+    def __post_init__(self) -> None:
+        self._ranges = Ranges(self.space)
         self._points: Matrix = np.empty((0, self._ranges.size))
         """Points drawn last."""
-
-    @property
-    def evaluations_at_most(self) -> int:
-        """Number of evaluations of a trial."""
-        return self._evaluations
 
     def ask(self) -> list[Vector]:
         """The next batch."""
         self._points = self._draw()
-        return [self._ranges.vector(point) for point in self._points[: self._left]]
+        return [self._ranges.vector(point) for point in self._points]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes the evaluations of a batch."""
-        self._left -= len(evaluations)
-        fitnesses = np.array([each.fitness for each in evaluations])
-        known = fitnesses[np.isfinite(fitnesses)]
-        mean = float(np.mean(known)) if known.size else None
+        fitnesses = np.array([evaluation.fitness for evaluation in evaluations])
+        is_finite = np.isfinite(fitnesses)
+        mean = float(np.mean(fitnesses[is_finite])) if is_finite.any() else None
         report = {"mean_fitness": mean, "population": len(self._points), **self._state()}
-        if self._left and known.size:
-            failed = np.min(known) - abs(np.min(known)) - 1.0
-            self._learn(np.where(np.isfinite(fitnesses), fitnesses, failed))
-        return Iteration(report=report, stop=None if self._left else "all evaluations done")
+        if is_finite.any() and len(evaluations) == len(self._points):
+            least = np.min(fitnesses[is_finite])
+            self._learn(np.where(is_finite, fitnesses, least - abs(least) - 1.0))
+        return Iteration(report)
 
     def _random(self, count: int) -> Matrix:
         """The points of random vectors."""
-        drawn = [self._space.random(self._generator) for _ in range(count)]
+        drawn = [self.space.random(self.generator) for _ in range(count)]
         return np.array([self._ranges.point(vector) for vector in drawn])
 
     def _draw(self) -> Matrix:

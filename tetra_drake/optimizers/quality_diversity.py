@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.optimizers.generational import Generational, Matrix
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
-from tetra_drake.scenario.settings import EvolutionSection
 
 INSTALL = 'pip install "tetra_drake[qd]"'
 
@@ -31,7 +31,7 @@ SIGMA = 0.5
 """Standard deviation at the start; starts are random gaits, later gaits of the map."""
 
 
-class QualityDiversity(Generational):
+class QualityDiversity(Generational[kinds.QualityDiversity]):
     """Emitters that draw a part of each batch each, and an archive that says how far each vector is
     above the level of its cell.
 
@@ -39,26 +39,21 @@ class QualityDiversity(Generational):
     all others. Reports besides elites, the number of cells with a gait.
     """
 
-    def __init__(
-        self,
-        space: ParameterSpace,
-        evolution: EvolutionSection,
-        generator: np.random.Generator,
-        settings: kinds.QualityDiversity | None = None,
-    ) -> None:
+    def __post_init__(self) -> None:
         from ribs.archives import GridArchive
         from ribs.emitters import EvolutionStrategyEmitter
 
-        super().__init__(space, evolution, generator)
-        self._settings = settings = settings or kinds.QualityDiversity()
+        super().__post_init__()
         self._roots: Matrix = np.empty((0, self._ranges.size))
         """Roots of the points drawn last; see Ranges.from_roots()."""
-        self._told: dict[str, Any] = {}
-        self._added: dict[str, Any] = {}
+        self._told: dict[str, npt.NDArray[Any]] = {}
+        """What the emitters are told: roots as `solution`, fitnesses as `objective`, `measures`."""
+        self._added: dict[str, npt.NDArray[Any]] = {}
+        """The archive's `status` and `value` of each."""
         self._archive = GridArchive(
             solution_dim=self._ranges.size,
-            dims=settings.cells,
-            ranges=[(low, high) for low, high in settings.measures.values()],
+            dims=self.settings.cells,
+            ranges=[(low, high) for low, high in self.settings.measures.values()],
             threshold_min=FLOOR,
             learning_rate=LEARNING_RATE,
             seed=self._seed(),
@@ -78,7 +73,7 @@ class QualityDiversity(Generational):
         ]
 
     def _seed(self) -> int:
-        return int(self._generator.integers(2**63))
+        return int(self.generator.integers(2**63))
 
     def _draw(self) -> Matrix:
         self._roots = np.concatenate([emitter.ask() for emitter in self._emitters])
@@ -86,33 +81,37 @@ class QualityDiversity(Generational):
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
         """Takes a batch."""
-        names = self._settings.measures
-        wanted = np.array(
-            [[each.fitness, *map(each.metrics.get, names)] for each in evaluations], dtype=float
-        )
-        known = np.isfinite(wanted).all(axis=1)
-        self._told = dict(
-            zip(("objective", "measures"), (wanted[:, 0], wanted[:, 1:]), strict=True)
-        )
-        self._added = {"status": np.zeros(len(known), np.int32), "value": np.zeros(len(known))}
-        if known.any():
-            chosen = {key: values[known] for key, values in self._told.items()}
-            added = self._archive.add(solution=self._roots[: len(known)][known], **chosen)
-            for key, values in added.items():
-                self._added[key][known] = values
-            self._added["value"][~known] = np.min(added["value"]) - 1.0
-            self._told["objective"][~known] = np.min(chosen["objective"])
-            self._told["measures"][~known] = chosen["measures"][0]  # no emitter looks at them
+        count = len(evaluations)
+        objective, status, value = np.empty(count), np.zeros(count, np.int32), np.zeros(count)
+        measures = np.empty((count, len(self.settings.measures)))
+        for i, evaluation in enumerate(evaluations):
+            objective[i] = evaluation.fitness
+            for j, name in enumerate(self.settings.measures):
+                number = evaluation.metrics.get(name)
+                measures[i, j] = np.nan if number is None else number
+        enters = np.isfinite(objective) & np.isfinite(measures).all(axis=1)
+        if enters.any():
+            added = self._archive.add(
+                solution=self._roots[:count][enters],
+                objective=objective[enters],
+                measures=measures[enters],
+            )
+            status[enters], value[enters] = added["status"], added["value"]
+            value[~enters] = np.min(added["value"]) - 1.0
+            objective[~enters] = np.min(objective[enters])
+            measures[~enters] = measures[enters][0]  # no emitter looks at them
+        self._told = {"solution": self._roots, "objective": objective, "measures": measures}
+        self._added = {"status": status, "value": value}
         return super().tell(evaluations)
 
     def _learn(self, fitnesses: Vector) -> None:
         if self._archive.empty:
             return
-        told = {"solution": self._roots, **self._told}
         for i, emitter in enumerate(self._emitters):
-            own = slice(i * BATCH, (i + 1) * BATCH)
-            added = {key: values[own] for key, values in self._added.items()}
-            emitter.tell(**{key: values[own] for key, values in told.items()}, add_info=added)
+            batch = slice(i * BATCH, (i + 1) * BATCH)
+            told = {key: values[batch] for key, values in self._told.items()}
+            added = {key: values[batch] for key, values in self._added.items()}
+            emitter.tell(**told, add_info=added)
 
     def _state(self) -> Mapping[str, Any]:
         return {"elites": len(self._archive)}

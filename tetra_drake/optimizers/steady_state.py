@@ -7,9 +7,9 @@ The comparisons are the listing's: an event of probability p happens if a number
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from tetra_drake.files import json_number
 from tetra_drake.optimizers.base import Evaluation, Iteration
@@ -22,9 +22,8 @@ CHILDREN = 2
 GAIN_MUTATION = 0.2
 """Largest change of a feedback gain in one mutation."""
 
-Fitnesses = npt.NDArray[np.float64]
 
-
+@dataclass(eq=False)
 class SteadyState:
     """An Optimizer: first the random population, then two children per iteration.
 
@@ -32,33 +31,23 @@ class SteadyState:
     placed, so they can be evaluated at once. Reports mean_fitness, over members without failure.
     """
 
-    def __init__(
-        self,
-        space: ParameterSpace,
-        evolution: EvolutionSection,
-        generator: np.random.Generator,
-        settings: kinds.SteadyState | None = None,
-    ) -> None:
-        self._space = space
-        self._evaluations = evolution.evaluations
-        self._settings = settings or kinds.SteadyState()
-        self._steps = mutation_steps(space, self._settings)
-        self._generator = generator
+    space: ParameterSpace
+    evolution: EvolutionSection
+    generator: np.random.Generator
+    settings: kinds.SteadyState
+
+    def __post_init__(self) -> None:
+        self._steps = mutation_steps(self.space, self.settings)
         self._asked: list[Vector] = []
         self._population: list[Vector] = []
-        self._fitnesses: Fitnesses = np.empty(0)
+        self._fitnesses: Vector = np.empty(0)
         self._means: list[float] = []
-
-    @property
-    def evaluations_at_most(self) -> int:
-        """Number of evaluations of a trial that is not stopped early."""
-        return self._evaluations
 
     def ask(self) -> list[Vector]:
         """The initial population, then two children at a time."""
         if not self._population:
-            count = self._settings.population
-            self._asked = [self._space.random(self._generator) for _ in range(count)]
+            count = self.settings.population
+            self._asked = [self.space.random(self.generator) for _ in range(count)]
         else:
             self._asked = self._breed()
         return [vector.copy() for vector in self._asked]
@@ -67,54 +56,64 @@ class SteadyState:
         """Takes the initial population, or places the children one after the other."""
         if not self._population:
             self._population = self._asked
-            self._fitnesses = np.array([each.fitness for each in evaluations], dtype=float)
-            placed: tuple[int | None, ...] = tuple(range(len(evaluations)))
+            self._fitnesses = np.array([e.fitness for e in evaluations], dtype=float)
+            placed: list[int | None] = list(range(len(evaluations)))
         else:
-            placed = tuple(map(self._place, self._asked, evaluations))
+            children = zip(self._asked, evaluations, strict=False)  # the last batch may be cut
+            placed = [self._place(vector, evaluation) for vector, evaluation in children]
         mean = mean_fitness(self._fitnesses)
         self._means.append(mean)
-        report = {"mean_fitness": json_number(mean)}
-        return Iteration(report=report, placed=placed, stop=self._stop())
+        settings = self.settings
+        levelled_off = has_levelled_off(
+            self._means,
+            rise=settings.stop_rise,
+            window=settings.stop_window,
+            after=settings.stop_after,
+        )
+        return Iteration(
+            report={"mean_fitness": json_number(mean)},
+            placed=placed,
+            stop="mean fitness levelled off" if levelled_off else None,
+        )
 
     def _breed(self) -> list[Vector]:
-        settings, generator, space = self._settings, self._generator, self._space
-        chosen = (
-            select_parent(self._fitnesses, tournament=settings.tournament, generator=generator)
-            for _ in range(2)
+        settings, generator = self.settings, self.generator
+        first, second = cross_over(
+            self._select_parent(),
+            self._select_parent(),
+            probability=settings.crossover_probability,
+            generator=generator,
         )
-        parents, probability = [self._population[i] for i in chosen], settings.crossover_probability
-        crossed = cross_over(*parents, probability=probability, generator=generator)
         mutation = draw_mutation(
             self._steps, probability=settings.mutation_probability, generator=generator
         )
-        return [space.repair(mutate(c, mutation=mutation, floors=space.floors)) for c in crossed]
+        children = []
+        for crossed in (first, second):
+            child = mutate(crossed, mutation=mutation, floors=self.space.floors)
+            children.append(self.space.repair(child))
+        return children
+
+    def _select_parent(self) -> Vector:
+        tournament, generator = self.settings.tournament, self.generator
+        chosen = select_parent(self._fitnesses, tournament=tournament, generator=generator)
+        return self._population[chosen]
 
     def _place(self, vector: Vector, evaluation: Evaluation) -> int | None:
-        tournament, generator = self._settings.tournament, self._generator
+        tournament, generator = self.settings.tournament, self.generator
         fitness = evaluation.fitness
         place = find_place(self._fitnesses, fitness, tournament=tournament, generator=generator)
         if place is not None:
             self._population[place], self._fitnesses[place] = vector, fitness
         return place
 
-    def _stop(self) -> str | None:
-        settings = self._settings
-        iteration = len(self._means) - 1
-        evaluations = settings.population + CHILDREN * iteration
-        if evaluations + CHILDREN > self._evaluations:
-            return "all evaluations done"
-        rise, window, after = settings.stop_rise, settings.stop_window, settings.stop_after
-        levelled_off = has_levelled_off(self._means, rise=rise, window=window, after=after)
-        return "mean fitness levelled off" if levelled_off else None
 
-
-def select_parent(fitnesses: Fitnesses, *, tournament: int, generator: np.random.Generator) -> int:
+def select_parent(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
     """The best of a tournament; of equals the first drawn (listing A.3.2)."""
     candidates = generator.integers(0, len(fitnesses), size=tournament)
     return int(candidates[np.argmax(fitnesses[candidates])])
 
 
-def select_victim(fitnesses: Fitnesses, *, tournament: int, generator: np.random.Generator) -> int:
+def select_victim(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
     """The worst of a tournament; of equals the last drawn (listing A.3.5)."""
     candidates = generator.integers(0, len(fitnesses), size=tournament)[::-1]
     return int(candidates[np.argmin(fitnesses[candidates])])
@@ -129,17 +128,16 @@ def cross_over(
 
 
 def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector:
-    """Largest change of each parameter in one mutation (Table 6); 0 where it does not mutate.
+    """Largest change of each parameter in one mutation (Table 6); 0 where its bounds are equal.
 
-    With `tau_mutation: listing` tau_A does not: the listing's index 26 is that of tau_B.
+    With `tau_mutation: listing`, tau_A does not mutate: the listing's index 26 is that of tau_B.
     """
     is_gain = np.array([name.startswith("gain ") for name in space.names])
     steps = np.where(is_gain, GAIN_MUTATION, settings.weight_mutation)
-    is_fixed = space.low[TAU_A] == space.high[TAU_A]
-    step = 0.0 if is_fixed else settings.tau_mutation_range
+    step = settings.tau_mutation_range
     steps[TAU_A] = 0.0 if settings.tau_mutation == "listing" else step
     steps[TAU_B] = TAU_B_PER_TAU_A * step
-    return steps
+    return np.where(space.low == space.high, 0.0, steps)
 
 
 def draw_mutation(steps: Vector, *, probability: float, generator: np.random.Generator) -> Vector:
@@ -159,15 +157,19 @@ def mutate(vector: Vector, *, mutation: Vector, floors: Vector) -> Vector:
 
 
 def find_place(
-    fitnesses: Fitnesses, child: float, *, tournament: int, generator: np.random.Generator
+    fitnesses: Vector, child: float, *, tournament: int, generator: np.random.Generator
 ) -> int | None:
     """Index of the member that a child of this fitness replaces: the worst of a tournament if the
     child is fitter, else the worst of all if it is fitter than that, else None."""
     victim = select_victim(fitnesses, tournament=tournament, generator=generator)
-    return next((m for m in (victim, int(np.argmin(fitnesses))) if child > fitnesses[m]), None)
+    worst = int(np.argmin(fitnesses))
+    for member in (victim, worst):
+        if child > fitnesses[member]:
+            return member
+    return None
 
 
-def mean_fitness(fitnesses: Fitnesses) -> float:
+def mean_fitness(fitnesses: Vector) -> float:
     """Mean over the members that have not failed; NaN if all have."""
     finite = fitnesses[np.isfinite(fitnesses)]
     return float(np.mean(finite)) if finite.size else float("nan")
