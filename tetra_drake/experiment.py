@@ -6,7 +6,7 @@ import contextlib
 from pathlib import Path
 
 from tetra_drake.analysis.elites import judge_elites
-from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.simulate import check_scenario, prepare
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution import reevaluation
@@ -76,8 +76,8 @@ def evolve(
     make = optimizer or optimizer_of(scenario.optimizer)
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
     evaluate = GaitEvaluation(scenario, objective)
-    in_lanes = executor is None and scenario.engine_name == "compiled"
-    where = thread_executor if in_lanes else executor or process_executor
+    lane_pool = engine_of(scenario).lane_pool if executor is None else None
+    where = thread_executor if lane_pool else executor or process_executor
     if resume:
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
@@ -92,8 +92,8 @@ def evolve(
             check_fitness(trials, out, evaluate=evaluate, executor=where)
         with contextlib.ExitStack() as stack:
             at_a_time = workers
-            if in_lanes:
-                lanes = stack.enter_context(LanePool(workers))
+            if lane_pool:
+                lanes = stack.enter_context(lane_pool(workers))
                 evaluate = GaitEvaluation(scenario, objective, lanes)
                 at_a_time = lanes.capacity
             elif unfinished:
@@ -149,7 +149,7 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
 
 
 def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
-    then, now = manifest.versions, versions(manifest.scenario.engine_name)
+    then, now = manifest.versions, versions(manifest.scenario.engine.packages)
     changed = [f"{name} {then.get(name)}" for name in now if then.get(name) != now[name]]
     if changed:
         progress.warn(

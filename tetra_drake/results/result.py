@@ -13,10 +13,7 @@ import numpy as np
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.machine import versions
 from tetra_drake.physics.tally import Tally
-from tetra_drake.results.metrics import (
-    compute_fitness,
-    compute_metrics,
-)
+from tetra_drake.results.metrics import compute_fitness, compute_metrics
 from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
@@ -98,15 +95,13 @@ def make_result(
     ends = motion.at(np.array([0.0, simulation.steady_from, simulation.duration]))
     start, steady, end = (node_positions(structure, state) for state in ends.states)
     metrics = compute_metrics(
-        structure,
+        robot,
         start=start,
         steady=steady,
         end=end,
         path=path,
-        steady_from=simulation.steady_from,
         totals=totals,
         signals=way.signals[instants >= simulation.steady_from],
-        weight=robot.weight,
     )
     samples = sample_times(simulation.duration, simulation.sample_period)
     return SimulationResult(
@@ -137,7 +132,7 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
         "real_time_factor": result.duration / result.wall_time,
         "engine": result.engine,
         "integrator": dataclasses.asdict(result.integrator),
-        "versions": versions(result.engine),
+        "versions": versions(scenario.engine.packages),
         "gait": gait.to_json(scenario),
         "path": {
             "time_s": way.times.tolist(),

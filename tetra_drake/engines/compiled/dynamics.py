@@ -5,13 +5,16 @@ Vectors over bodies hold 6 numbers per body, rotation before translation, in Wor
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
+
+import numpy as np
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
-from tetra_drake.physics.cable import DIRECTION, add_cable_forces
+from tetra_drake.physics.cable import DIRECTION, PULL_COLUMNS, add_cable_forces
 from tetra_drake.physics.contact import (
     CONTACT,
     NORMAL,
+    PUSH_COLUMNS,
     Ground,
     NormalForce,
     add_ground_forces,
@@ -20,10 +23,10 @@ from tetra_drake.physics.contact import (
     sliding,
 )
 from tetra_drake.physics.friction import friction_damping
-from tetra_drake.physics.kinematics import P_BN_W, gather_forces
+from tetra_drake.physics.kinematics import NODE_COLUMNS, P_BN_W, gather_forces
 from tetra_drake.physics.model import JUNCTION_CABLES, Model
-from tetra_drake.physics.terrain import to_world
-from tetra_drake.simd.compiling import compiled, inlined, merged
+from tetra_drake.physics.terrain import FRAME_COLUMNS, to_world
+from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, any_lane, named, select
 
 
@@ -37,7 +40,19 @@ class Forces(NamedTuple):
     pulls: Table
     """(cables, PULL_COLUMNS): of the cables."""
     pushes: Table
-    """(contacts, 3): of the ground."""
+    """(contacts, PUSH_COLUMNS): of the ground."""
+
+    @classmethod
+    def of(cls, robot: Model) -> Self:
+        """Room for the forces on a robot."""
+        cables, contacts = robot.cables.size, robot.ground.contacts.size
+        bodies = cables // JUNCTION_CABLES + 1
+        return cls(
+            nodes=np.zeros((bodies * len(robot.p_BN), NODE_COLUMNS)),
+            frames=np.zeros((contacts, FRAME_COLUMNS)),
+            pulls=np.zeros((cables, PULL_COLUMNS)),
+            pushes=np.zeros((contacts, PUSH_COLUMNS)),
+        )
 
 
 @inlined
@@ -60,15 +75,6 @@ def compute_forces(
     weight = robot.body.mass[0] * robot.body.gravity[0]
     for body in range(generalized.size // BLOCK):
         generalized[BLOCK * body + 5] -= weight
-
-
-@compiled
-def forces_at(
-    robot: Model, state: Table, modes: Table, signals: Table, forces: Forces, generalized: Table
-) -> None:
-    """Writes the `forces` and the generalized force at a state of the bodies, in its modes."""
-    move_robot(robot, state, forces)
-    compute_forces(robot, modes, signals, True, forces, generalized)
 
 
 @inlined

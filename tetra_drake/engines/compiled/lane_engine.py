@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import time
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import typeof
 from numba.core import registry
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
+from tetra_drake.engines.compiled.course import Course, PreparedGait
 from tetra_drake.engines.compiled.dynamics import Forces
 from tetra_drake.engines.compiled.loop import (
+    ASKED_ROWS,
     CLOCK_ROWS,
     DUE,
     EVALUATIONS,
     IDLE,
     MARK,
+    PLANNED,
     ROUND,
     STATUS,
-    STEP,
     TAKEN,
     TIME,
     TRIED,
@@ -33,116 +33,21 @@ from tetra_drake.engines.compiled.loop import (
     advance,
 )
 from tetra_drake.engines.compiled.rosenbrock import Step
-from tetra_drake.errors import MAX_SPEED
-from tetra_drake.physics.cable import PULL_COLUMNS, Cables
-from tetra_drake.physics.contact import MODE_COLUMNS, PUSH_COLUMNS
-from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.cable import Cables
+from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.model import JUNCTION_CABLES
 from tetra_drake.physics.oscillator import make_neurons
 from tetra_drake.physics.tally import Tally
-from tetra_drake.physics.terrain import FRAME_COLUMNS, SurfaceGrid
+from tetra_drake.physics.terrain import SurfaceGrid
 from tetra_drake.results.metrics import empty_tally
-from tetra_drake.results.result import motion_times
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
+from tetra_drake.robot.robot import initial_neurons
 from tetra_drake.robot.signals import sample_count
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
 FIRST = SurfaceGrid._fields.index("first")
 """Column of a grid with the index of its first height: those of all lanes stand in one row."""
-
-
-@dataclass(frozen=True)
-class PreparedGait:
-    """A gait on a scenario, prepared for a lane."""
-
-    robot: Robot
-    gait: Gait
-    record: bool
-    steering: SteeringSignal | None
-    """Steering signal, in place of the gait's turn."""
-    times: np.ndarray
-    """The times (s) of the samples to keep, those of motion_times()."""
-    marks: np.ndarray
-    """The times (s) at which steps end."""
-
-    @classmethod
-    def of(
-        cls,
-        robot: Robot,
-        gait: Gait,
-        *,
-        record: bool,
-        steering: SteeringSignal | None = None,
-    ) -> PreparedGait:
-        """Prepares a gait."""
-        simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
-        ends = 0.0, simulation.steady_from, simulation.duration
-        return cls(
-            robot,
-            gait,
-            record,
-            steering,
-            times=motion_times(simulation, record=record),
-            marks=np.unique([*ends, *([start_up] if start_up <= simulation.duration else [])]),
-        )
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """Properties that simulations on one engine must share."""
-        scenario, ground = self.robot.scenario, self.robot.ground
-        drivers = tuple(self.robot.actuation.drivers.tolist())
-        return (
-            scenario.robot.tetrahedra,
-            len(ground.contacts),
-            scenario.cables.slack,
-            drivers,
-            self.live,
-            ground.flat,
-            ground.friction.kind,
-        )
-
-    @property
-    def live(self) -> bool:
-        """True if the network is integrated with the robot."""
-        return self.robot.scenario.cpg.signals == "live"
-
-    @functools.cached_property
-    def turns(self) -> np.ndarray:
-        """The turns that Robot.turns() gives; raises InputError as it does."""
-        return self.robot.turns(self.gait, self.steering)
-
-    @property
-    def recent_signals(self) -> int:
-        """Number of signal samples that an engine holds: those within a step, and as many
-        for lanes that run ahead; a power of two."""
-        scenario = self.robot.scenario
-        within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
-        return 1 << math.ceil(math.log2(2.0 * within + 32.0))
-
-    @property
-    def turn_samples(self) -> int:
-        """Number of samples of the turn that an engine holds."""
-        if self.steering is None:
-            return 1
-        scenario = self.robot.scenario
-        return round(scenario.simulation.duration / scenario.cpg.listing_step) + 1
-
-
-class Course(NamedTuple):
-    """The course of a simulation."""
-
-    status: int
-    time: float
-    """When it ended, in s."""
-    steps: int
-    evaluations: int
-    motion: Motion
-    totals: Tally
-    wall_time: float
-    """Wall time in s, shared with the other lanes of the same core."""
 
 
 class LaneEngine:
@@ -227,7 +132,7 @@ class LaneEngine:
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)
         clock[STATUS, lane] = WALKING
-        clock[STEP, lane] = min(engine.look_ahead, engine.max_step)
+        clock[PLANNED, lane] = min(engine.look_ahead, engine.max_step)
         clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
         self._in_lane[lane], self._wall_times[lane] = prepared, 0.0
 
@@ -310,7 +215,6 @@ def make_constants(prepared: PreparedGait) -> Constants:
         tolerance=np.array([engine.tolerance]),
         max_step=np.array([engine.max_step]),
         look_ahead=np.array([engine.look_ahead]),
-        max_speed=np.array([MAX_SPEED]),
         max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
     )
 
@@ -324,6 +228,7 @@ def start_walk(prepared: PreparedGait) -> Walk:
     velocities = np.zeros(BLOCK * bodies)
     return Walk(
         clock=np.zeros(CLOCK_ROWS),
+        asked=np.zeros(ASKED_ROWS),
         step=Step(
             state=structure.initial_state,
             end=np.zeros(13 * bodies),
@@ -336,12 +241,7 @@ def start_walk(prepared: PreparedGait) -> Walk:
             rows=np.zeros((bodies, BLOCK, ROW)),
             lines=np.zeros((JUNCTION_CABLES, 9)),
         ),
-        forces=Forces(
-            nodes=np.zeros((len(structure.node_names), NODE_COLUMNS)),
-            frames=np.zeros((contacts, FRAME_COLUMNS)),
-            pulls=np.zeros((cables, PULL_COLUMNS)),
-            pushes=np.zeros((contacts, PUSH_COLUMNS)),
-        ),
+        forces=Forces.of(robot.model),
         modes=robot.starting_modes(),
         acceleration=velocities,
         signals=np.zeros(signals),
@@ -352,7 +252,7 @@ def start_walk(prepared: PreparedGait) -> Walk:
         inputs=np.zeros(2 * signals),
         lengths=np.zeros(cables),
         normal_forces=np.zeros(contacts),
-        tally=empty_tally(scenario, structure),
+        tally=empty_tally(robot),
     )
 
 

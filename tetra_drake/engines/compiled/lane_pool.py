@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
-from tetra_drake.engines.compiled.engine import make_outcome
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, PreparedGait, lanes_for
-from tetra_drake.errors import InputError, SimulationFailure, TimeBudgetExceeded
+from tetra_drake.engines.compiled.course import Course, PreparedGait, make_outcome
+from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
+from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
@@ -58,7 +58,12 @@ class LanePool:
     @property
     def capacity(self) -> int:
         """The number of gaits that are simulated at a time."""
-        return len(self._threads) * lanes_for(math.inf)
+        return len(self._threads) * self.most_lanes()
+
+    @staticmethod
+    def most_lanes() -> int:
+        """The number of gaits that one thread simulates at a time."""
+        return lanes_for(math.inf)
 
     def __enter__(self) -> LanePool:
         return self
@@ -209,20 +214,3 @@ class _Crew:
         if engine is None or not engine.accepts(prepared):
             engine = self._engines[width] = LaneEngine(prepared, width=width)
         return engine
-
-
-def simulate_in_lanes(
-    gaits: Sequence[tuple[Scenario, Gait]],
-    *,
-    record: bool,
-    threads: int,
-) -> list[SimulationResult | SimulationFailure]:
-    """The results of many gaits, each with its scenario, or their failures."""
-    found: list[SimulationResult | SimulationFailure] = []
-    with LanePool(threads) as pool:
-        for future in pool.submit(gaits, record=record):
-            try:
-                found.append(pool.result(future))
-            except SimulationFailure as failure:
-                found.append(failure)
-    return found
