@@ -10,7 +10,8 @@ import pytest
 import xarray
 from helpers.widths import WIDTHS
 
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, PreparedGait
+from tetra_drake.engines.compiled.course import Course, PreparedGait
+from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.loop import DONE, ROUND, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
 from tetra_drake.engines.simulate import simulate, simulate_many
