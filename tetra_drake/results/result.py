@@ -64,13 +64,11 @@ class SimulationResult:
 
 def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
     """The times (s), ascending, at which make_result() needs the motion of a simulation."""
-    samples = sample_times(simulation.duration, simulation.sample_period) if record else ()
-    ends = 0.0, simulation.steady_from, simulation.duration
-    return np.unique([*ends, *_path_times(simulation), *samples])
-
-
-def _path_times(simulation: SimulationSection) -> np.ndarray:
-    return sample_times(simulation.duration, PERIOD)
+    times = [np.array([0.0, simulation.steady_from, simulation.duration])]
+    times.append(sample_times(simulation.duration, PERIOD))
+    if record:
+        times.append(sample_times(simulation.duration, simulation.sample_period))
+    return np.unique(np.concatenate(times))
 
 
 def make_result(
@@ -88,11 +86,11 @@ def make_result(
     `wall_time` is in s.
     """
     simulation, structure = robot.scenario.simulation, robot.structure
-    instants = _path_times(simulation)
+    instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
+    ends = motion.at(np.array([0.0, simulation.steady_from, simulation.duration]))
     poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
     path = follow(instants, poses)
-    ends = motion.at(np.array([0.0, simulation.steady_from, simulation.duration]))
     start, steady, end = (node_positions(structure, state) for state in ends.states)
     metrics = compute_metrics(
         robot,
@@ -103,7 +101,10 @@ def make_result(
         totals=totals,
         signals=way.signals[instants >= simulation.steady_from],
     )
-    samples = sample_times(simulation.duration, simulation.sample_period)
+    trajectory = None
+    if record:
+        samples = sample_times(simulation.duration, simulation.sample_period)
+        trajectory = make_dataset(robot, motion.at(samples))
     return SimulationResult(
         metrics=metrics,
         fitness=compute_fitness(metrics, robot.scenario.objective),
@@ -112,7 +113,7 @@ def make_result(
         integrator=work,
         engine=robot.scenario.engine_name,
         path=path,
-        trajectory=make_dataset(robot, motion.at(samples)) if record else None,
+        trajectory=trajectory,
     )
 
 

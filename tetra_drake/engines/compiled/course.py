@@ -9,13 +9,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.compiled.loop import DONE, STEP_TOO_SMALL, TOO_FAST, TOO_MANY_EVALUATIONS
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
+from tetra_drake.engines.compiled.dynamics import Forces
+from tetra_drake.engines.compiled.loop import (
+    ASKED_ROWS,
+    CLOCK_ROWS,
+    DONE,
+    STEP_TOO_SMALL,
+    TOO_FAST,
+    TOO_MANY_EVALUATIONS,
+    Constants,
+    Walk,
+)
+from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.physics.cable import Cables
+from tetra_drake.physics.model import JUNCTION_CABLES
+from tetra_drake.physics.oscillator import make_neurons
 from tetra_drake.physics.tally import Tally
+from tetra_drake.results.metrics import empty_tally
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, SteeringSignal
+from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
+from tetra_drake.robot.signals import sample_count
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.schema import Scenario
 
@@ -45,15 +62,9 @@ class PreparedGait:
     ) -> PreparedGait:
         """Prepares a gait."""
         simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
-        ends = 0.0, simulation.steady_from, simulation.duration
-        return cls(
-            robot,
-            gait,
-            record,
-            steering,
-            times=motion_times(simulation, record=record),
-            marks=np.unique([*ends, *([start_up] if start_up <= simulation.duration else [])]),
-        )
+        times = motion_times(simulation, record=record)
+        marks = np.unique([0.0, simulation.steady_from, simulation.duration, start_up])
+        return cls(robot, gait, record, steering, times, marks[marks <= simulation.duration])
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -88,13 +99,64 @@ class PreparedGait:
         within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
         return 1 << math.ceil(math.log2(2.0 * within + 32.0))
 
-    @property
-    def turn_samples(self) -> int:
-        """Number of samples of the turn that an engine holds."""
-        if self.steering is None:
-            return 1
-        scenario = self.robot.scenario
-        return round(scenario.simulation.duration / scenario.cpg.listing_step) + 1
+    def constants(self) -> Constants:
+        """Constants as arrays without lanes; of the ground without heights."""
+        robot, gait = self.robot, self.gait
+        scenario, model = robot.scenario, robot.model
+        cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
+        cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
+        ground = model.ground._replace(heights=None)  # of which lanes have different numbers
+        return Constants(
+            robot=model._replace(cables=cables, ground=ground),
+            network=robot.network(gait),
+            senses=robot.senses,
+            sides=np.repeat(robot.actuation.sides, 2).astype(float),
+            external_input=np.array([cpg.external_input]),
+            gains=np.array([gain for _, gain in gait.gains]),
+            gain=np.array([cpg.gain]),
+            period=np.array([cpg.listing_step]),
+            samples=np.array([sample_count(scenario)], dtype=float),
+            start_up=np.array([cpg.start_up]),
+            tolerance=np.array([engine.tolerance]),
+            max_step=np.array([engine.max_step]),
+            look_ahead=np.array([engine.look_ahead]),
+            max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
+        )
+
+    def start(self) -> Walk:
+        """State at t = 0, and room for what is computed on the way, as arrays without lanes."""
+        robot, scenario, structure = self.robot, self.robot.scenario, self.robot.structure
+        bodies, signals = len(structure.bodies), structure.signals
+        contacts, cables = len(structure.contacts), len(structure.cables)
+        velocities = np.zeros(BLOCK * bodies)
+        return Walk(
+            clock=np.zeros(CLOCK_ROWS),
+            asked=np.zeros(ASKED_ROWS),
+            step=Step(
+                state=structure.initial_state,
+                end=np.zeros(13 * bodies),
+                force=velocities,
+                end_force=velocities,
+                change=velocities,
+                stage=velocities,
+                k1=velocities,
+                k2=velocities,
+                rows=np.zeros((bodies, BLOCK, ROW)),
+                lines=np.zeros((JUNCTION_CABLES, 9)),
+            ),
+            forces=Forces.of(robot.model),
+            modes=robot.starting_modes(),
+            acceleration=velocities,
+            signals=np.zeros(signals),
+            end_signals=np.zeros(signals),
+            neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
+            output=np.zeros(signals),
+            tonic=robot.tonic_input(self.turns)[0],
+            inputs=np.zeros(2 * signals),
+            lengths=np.zeros(cables),
+            normal_forces=np.zeros(contacts),
+            tally=empty_tally(robot),
+        )
 
 
 class Course(NamedTuple):

@@ -10,12 +10,8 @@ import numpy as np
 from numba import typeof
 from numba.core import registry
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
 from tetra_drake.engines.compiled.course import Course, PreparedGait
-from tetra_drake.engines.compiled.dynamics import Forces
 from tetra_drake.engines.compiled.loop import (
-    ASKED_ROWS,
-    CLOCK_ROWS,
     DUE,
     EVALUATIONS,
     IDLE,
@@ -27,22 +23,13 @@ from tetra_drake.engines.compiled.loop import (
     TIME,
     TRIED,
     WALKING,
-    Constants,
     Log,
-    Walk,
     advance,
 )
-from tetra_drake.engines.compiled.rosenbrock import Step
-from tetra_drake.physics.cable import Cables
 from tetra_drake.physics.contact import MODE_COLUMNS
-from tetra_drake.physics.model import JUNCTION_CABLES
-from tetra_drake.physics.oscillator import make_neurons
 from tetra_drake.physics.tally import Tally
 from tetra_drake.physics.terrain import SurfaceGrid
-from tetra_drake.results.metrics import empty_tally
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.robot import initial_neurons
-from tetra_drake.robot.signals import sample_count
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
@@ -59,7 +46,7 @@ class LaneEngine:
         structure, points = first.robot.structure, first.robot.ground.heights.size
         self._bodies = len(structure.bodies)
         self._heights = np.zeros((width, points))
-        constants = in_lanes(make_constants(first), width)
+        constants = in_lanes(first.constants(), width)
         ground = constants.robot.ground._replace(heights=FieldArray(self._heights.ravel()))
         shape = constants.network.inhibition.shape
         inhibition = lane_table(shape, width, any_size=True)  # compiled once for robots of any size
@@ -67,7 +54,7 @@ class LaneEngine:
             robot=constants.robot._replace(ground=ground),
             network=constants.network._replace(inhibition=inhibition),
         )
-        self._walk = in_lanes(start_walk(first), width)
+        self._walk = in_lanes(first.start(), width)
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
             marks=np.full((width, 5), math.inf),
@@ -78,7 +65,7 @@ class LaneEngine:
             modes=np.zeros((*shape, len(structure.contacts), MODE_COLUMNS)),
             signals=np.zeros((*shape, signals)),
             recent=np.zeros((width, first.recent_signals, signals)),
-            turns=np.zeros((width, first.turn_samples)),
+            turns=np.zeros((width, len(first.turns))),
         )
         log = Log(*(FieldArray(array, any_size=True) for array in self._log))
         self._arguments = self._constants, self._walk, log, first.live
@@ -99,7 +86,7 @@ class LaneEngine:
             prepared.kind == self._kind
             and len(prepared.times) < log.times.shape[1]
             and prepared.recent_signals <= log.recent.shape[1]
-            and prepared.turn_samples <= log.turns.shape[1]
+            and len(prepared.turns) <= log.turns.shape[1]
             and prepared.robot.ground.heights.size <= self._heights.shape[1]
         )
 
@@ -110,7 +97,7 @@ class LaneEngine:
 
     def load(self, lane: int, prepared: PreparedGait) -> None:
         """Starts a gait in a lane; raises InputError if it does not fit its scenario."""
-        constants, walk = make_constants(prepared), start_walk(prepared)
+        constants, walk = prepared.constants(), prepared.start()
         fill_lane(self._constants, constants, lane)
         fill_lane(self._walk, walk, lane)
         network, given = self._constants.network, constants.network
@@ -194,68 +181,6 @@ def processor_features() -> str:
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
 
 
-def make_constants(prepared: PreparedGait) -> Constants:
-    """The constants of one simulation, as arrays without lanes; of the ground without heights."""
-    robot, gait = prepared.robot, prepared.gait
-    scenario, model = robot.scenario, robot.model
-    cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
-    cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
-    ground = model.ground._replace(heights=None)  # of which lanes have different numbers
-    return Constants(
-        robot=model._replace(cables=cables, ground=ground),
-        network=robot.network(gait),
-        senses=robot.senses,
-        sides=np.repeat(robot.actuation.sides, 2).astype(float),
-        external_input=np.array([cpg.external_input]),
-        gains=np.array([gain for _, gain in gait.gains]),
-        gain=np.array([cpg.gain]),
-        period=np.array([cpg.listing_step]),
-        samples=np.array([sample_count(scenario)], dtype=float),
-        start_up=np.array([cpg.start_up]),
-        tolerance=np.array([engine.tolerance]),
-        max_step=np.array([engine.max_step]),
-        look_ahead=np.array([engine.look_ahead]),
-        max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
-    )
-
-
-def start_walk(prepared: PreparedGait) -> Walk:
-    """The state of one simulation at its start, and room for what is computed on the way, as arrays
-    without lanes."""
-    robot, scenario, structure = prepared.robot, prepared.robot.scenario, prepared.robot.structure
-    bodies, signals = len(structure.bodies), structure.signals
-    contacts, cables = len(structure.contacts), len(structure.cables)
-    velocities = np.zeros(BLOCK * bodies)
-    return Walk(
-        clock=np.zeros(CLOCK_ROWS),
-        asked=np.zeros(ASKED_ROWS),
-        step=Step(
-            state=structure.initial_state,
-            end=np.zeros(13 * bodies),
-            force=velocities,
-            end_force=velocities,
-            change=velocities,
-            stage=velocities,
-            k1=velocities,
-            k2=velocities,
-            rows=np.zeros((bodies, BLOCK, ROW)),
-            lines=np.zeros((JUNCTION_CABLES, 9)),
-        ),
-        forces=Forces.of(robot.model),
-        modes=robot.starting_modes(),
-        acceleration=velocities,
-        signals=np.zeros(signals),
-        end_signals=np.zeros(signals),
-        neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
-        output=np.zeros(signals),
-        tonic=robot.tonic_input(prepared.turns)[0],
-        inputs=np.zeros(2 * signals),
-        lengths=np.zeros(cables),
-        normal_forces=np.zeros(contacts),
-        tally=empty_tally(robot),
-    )
-
-
 def in_lanes(values: Any, width: int) -> Any:
     """A table in lanes for each array of real numbers in NamedTuples, zeros. Arrays of indices are
     for all lanes; what is no array stays."""
@@ -263,9 +188,9 @@ def in_lanes(values: Any, width: int) -> Any:
         return type(values)(*(in_lanes(value, width) for value in values))
     if not isinstance(values, np.ndarray):
         return values
-    return (
-        FieldArray(values.copy()) if values.dtype == np.int64 else lane_table(values.shape, width)
-    )
+    if values.dtype == np.int64:
+        return FieldArray(values.copy())
+    return lane_table(values.shape, width)
 
 
 def fill_lane(tables: Any, values: Any, lane: int) -> None:

@@ -77,16 +77,6 @@ class LanePool:
         for job in self._waiting:
             job.future.set_exception(CancelledError())
 
-    def simulate(
-        self, *, scenario: Scenario, gait: Gait, record: bool = False, time_budget: float = math.inf
-    ) -> SimulationResult:
-        """Result of simulate() for a gait, while other threads ask for other gaits.
-
-        Also raises TimeBudgetExceeded if a simulation is not done after `time_budget` (s).
-        """
-        (future,) = self.submit([(scenario, gait)], record=record, time_budget=time_budget)
-        return self.result(future)
-
     @staticmethod
     def result(future: Future[tuple[PreparedGait, Course]]) -> SimulationResult:
         """Waits for a gait of submit(); raises as simulate() does."""
@@ -99,7 +89,10 @@ class LanePool:
         record: bool = False,
         time_budget: float = math.inf,
     ) -> list[Future[tuple[PreparedGait, Course]]]:
-        """Puts gaits, each with its scenario, in the queue; result() waits for one."""
+        """Puts gaits, each with its scenario, in the queue; result() waits for one.
+
+        A gait that is not done after `time_budget` (s) fails with TimeBudgetExceeded.
+        """
         jobs = [_Job(scenario, gait, record, time_budget) for scenario, gait in gaits]
         with self._changed:
             self._waiting.extend(jobs)
@@ -142,7 +135,7 @@ class _Robots:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._latest: dict[int, Robot] = {}
-        """Prepared gaits by the scenario's identity, the one last used at the end."""
+        """Robots by the identity of their scenario, the one last used at the end."""
 
     def __call__(self, scenario: Scenario) -> Robot:
         with self._lock:
