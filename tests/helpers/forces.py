@@ -1,6 +1,6 @@
 """The forces of the compiled engine at a state."""
 
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
+from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import compiled
 from tetra_drake.simd.lanes import Table

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.tally import Tally, look, observe
 from tetra_drake.results.metrics import empty_tally

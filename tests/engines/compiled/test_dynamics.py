@@ -6,8 +6,9 @@ from helpers.forces import forces_at
 from helpers.states import disturbed
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.dynamics import Forces, implicit_matrix
+from tetra_drake.engines.compiled.dynamics import implicit_matrix
 from tetra_drake.physics.contact import MODE_COLUMNS, modes_after_step
+from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.kinematics import move_bodies
 from tetra_drake.physics.model import JUNCTION_CABLES, Model
 from tetra_drake.robot.gait import seeded_gait

@@ -5,9 +5,9 @@ import pytest
 from helpers.forces import forces_at
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.dynamics import Forces
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
+from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.model import JUNCTION_CABLES
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions

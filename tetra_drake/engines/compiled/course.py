@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.dynamics import Forces
 from tetra_drake.engines.compiled.loop import (
     ASKED_ROWS,
     CLOCK_ROWS,
@@ -24,6 +23,7 @@ from tetra_drake.engines.compiled.loop import (
 from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import Cables
+from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.model import JUNCTION_CABLES
 from tetra_drake.physics.oscillator import make_neurons
 from tetra_drake.physics.tally import Tally

@@ -19,12 +19,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics.cable import LENGTH
 from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.feedback import Senses, sense
+from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.model import Model
