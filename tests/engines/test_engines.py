@@ -1,6 +1,7 @@
 """What holds on every engine: recording changes nothing, and failures are reported."""
 
 import pickle
+import typing
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from unittest.mock import Mock
@@ -8,12 +9,14 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+from tetra_drake.engines import ENGINES
 from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import prepare, simulate, simulate_many
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.results.measures import path_of_centre
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.scenario import engine_kinds
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
@@ -121,3 +124,11 @@ def test_scenarios_of_many_gaits_may_name_several_engines(scenario):
     for short, gait, result in zip(scenarios, gaits, found, strict=True):
         alone = simulate(scenario=short, gait=gait)
         assert (result.engine, result.metrics) == (alone.engine, alone.metrics)
+
+
+def test_each_kind_of_engine_in_a_scenario_has_its_engine(scenario):
+    union, _ = typing.get_args(engine_kinds.Engine)
+    kinds = [kind.__name__ for kind in typing.get_args(union)]
+    assert [name.lower() for name in kinds] == list(ENGINES)
+    engines = [engine_of(scenario.with_changes({"engine": f"!{name}"})) for name in kinds]
+    assert [type(engine).__name__ for engine in engines] == [f"{name}Engine" for name in kinds]

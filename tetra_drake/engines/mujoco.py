@@ -179,7 +179,7 @@ class _Simulator:
         state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
         self._mujoco.mj_getState(self._model, data, state, kind)
         kept = np.tile(state, (len(steps_kept), 1))
-        observer.add(0.0, self.states(state[np.newaxis])[0], signals[0])
+        observer.add(0.0, self.body_states(state[np.newaxis])[0], signals[0])
         with Rollout(nthread=0) as rollout:
             for first in range(0, len(signals), _STRETCH):
                 check_time()
@@ -198,7 +198,7 @@ class _Simulator:
         if not chosen.size:
             return
         steps: list[int] = (first + chosen + 1).tolist()
-        for step, state in zip(steps, self.states(states[chosen]), strict=True):
+        for step, state in zip(steps, self.body_states(states[chosen]), strict=True):
             observer.add(self._step * step, state, signals[min(step, len(signals) - 1)])
 
     def _check(self, states: Array, first: int) -> None:
@@ -215,7 +215,7 @@ class _Simulator:
             reason = "MuJoCo warns of instability"
             raise Diverged(time=float(times[warned.argmax()]), reason=reason)
 
-    def states(self, states: Array) -> Array:
+    def body_states(self, states: Array) -> Array:
         """[q; v] (rows, 13 bodies) of MuJoCo's states, where w is given in the body's frame."""
         rows, end = len(states), 1 + self._model.nq
         pose = states[:, 1:end].reshape(rows, -1, 7)
@@ -233,7 +233,7 @@ class _Simulator:
         pushes = np.array([self._ground_forces(data, *row) for row in rows])
         modes = np.zeros((*pushes.shape[:2], MODE_COLUMNS))  # of friction: 0, as there are none
         modes[:, :, CONTACT] = pushes[:, :, 2] > 0.0
-        return Motion(times, self.states(states), signals, modes, pushes)
+        return Motion(times, self.body_states(states), signals, modes, pushes)
 
     def _ground_forces(self, data: Any, state: Array, signals: Array) -> Array:
         """(contacts, 3): MuJoCo's contact forces on the nodes along t1, t2 and n, in N."""

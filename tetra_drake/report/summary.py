@@ -67,6 +67,9 @@ def result_text(scenario: Scenario, gait: Gait, result: SimulationResult) -> str
     return "\n".join(lines)
 
 
+THESIS_GROUND = "flat, the thesis's friction"
+
+
 def ground_text(scenario: Scenario) -> str:
     """Terrain and friction in a line; empty for the thesis's flat ground and friction.
 
@@ -74,7 +77,7 @@ def ground_text(scenario: Scenario) -> str:
     """
     friction = scenario.engine.friction_text(scenario.friction)
     ground = f"{scenario.terrain.text}, {friction}"
-    return "" if ground == "flat, the thesis's friction" else ground
+    return "" if ground == THESIS_GROUND else ground
 
 
 def run_text(run: Run) -> str:
