@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from tetra_drake import __version__
+from tetra_drake.engines import ENGINES
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder
-from tetra_drake.scenario.engine_kinds import ENGINES
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import hint
@@ -100,8 +100,8 @@ def _simulate(options: Options) -> None:
     (the numbers), trajectory.nc (motion and forces over time, for xarray), replay.html (open it
     in a browser) and scenario.yaml (the scenario in full).
     """
+    from tetra_drake.engines.interface import check_can_be_watched
     from tetra_drake.engines.simulate import prepare, simulate
-    from tetra_drake.engines.viewer import check_can_be_watched
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
 

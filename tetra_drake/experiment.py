@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tetra_drake.analysis.elites import judge_elites
-from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.simulate import check_scenario, prepare
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution import reevaluation
@@ -29,6 +30,9 @@ from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
+
+if TYPE_CHECKING:
+    from tetra_drake.engines.compiled.lane_pool import LanePool
 
 
 def evolve(
@@ -75,8 +79,8 @@ def evolve(
     check_scenario(scenario)  # before there is a directory
     make_optimizer = optimizer or optimizer_of(scenario.optimizer)
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
-    in_lanes = executor is None and scenario.engine_name == "compiled"
-    where = thread_executor if in_lanes else executor or process_executor
+    lane_pool = engine_of(scenario).lane_pool if executor is None else None
+    where = thread_executor if lane_pool else executor or process_executor
     if resume:
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
@@ -89,8 +93,9 @@ def evolve(
         if resume and (objective is not None or any(trial.unevaluated for trial in trials)):
             alone = GaitEvaluation(scenario, objective)
             check_fitness(trials, out, evaluate=alone, executor=where)
-        if in_lanes:
-            _run_in_lanes(trials, scenario, objective, workers, progress)
+        if lane_pool:
+            with lane_pool(workers) as lanes:
+                _run_in_lanes(trials, scenario, objective, lanes, progress)
         else:
             _run(trials, scenario, objective, workers, where, progress)
         if reevaluate:
@@ -104,18 +109,17 @@ def _run_in_lanes(
     trials: Sequence[Trial],
     scenario: Scenario,
     objective: Objective | None,
-    workers: int,
+    lanes: LanePool,
     progress: Progress,
 ) -> None:
     """Runs the trials to their ends, the gaits of all of them side by side on each core."""
-    with LanePool(workers) as lanes:
-        run_trials(
-            trials,
-            evaluate=GaitEvaluation(scenario, objective, lanes),
-            workers=lanes.capacity,
-            executor=thread_executor,
-            show=progress.show,
-        )
+    run_trials(
+        trials,
+        evaluate=GaitEvaluation(scenario, objective, lanes),
+        workers=lanes.capacity,
+        executor=thread_executor,
+        show=progress.show,
+    )
 
 
 def _run(
@@ -177,7 +181,7 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
 
 
 def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
-    then, now = manifest.versions, versions(manifest.scenario.engine_name)
+    then, now = manifest.versions, versions(manifest.scenario.engine.packages)
     changed = [f"{name} {then.get(name)}" for name in now if then.get(name) != now[name]]
     if changed:
         progress.warn(

@@ -1,6 +1,7 @@
 """What holds on every engine: recording changes nothing, and failures are reported."""
 
 import pickle
+import typing
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from unittest.mock import Mock
@@ -8,11 +9,14 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+from tetra_drake.engines import ENGINES
+from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.mujoco import INSTALL, installed
-from tetra_drake.engines.simulate import prepare, simulate
+from tetra_drake.engines.simulate import prepare, simulate, simulate_many
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.results.measures import path_of_centre
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.scenario import engine_kinds
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
@@ -79,18 +83,15 @@ FALLING = {"robot.gravity": "1000 m/s^2", "robot.offsets": [["0 m", "0 m", "9 m"
 
 
 @pytest.mark.parametrize(
-    ("engine", "changes", "kind"),
+    ("changes", "kind"),
     [
-        ("drake", FALLING, Diverged),
-        ("drake", {"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, Diverged),  # steps below the least
-        ("drake", {"simulation.max_evaluations": 1000}, StepBudgetExceeded),
-        ("compiled", FALLING, Diverged),
-        ("compiled", {"cpg.gain": "4e9 N"}, Diverged),  # a pull that grows without bound
-        ("compiled", {"simulation.max_evaluations": 100}, StepBudgetExceeded),
+        (FALLING, Diverged),
+        ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, Diverged),  # steps below the least
+        ({"simulation.max_evaluations": 1000}, StepBudgetExceeded),
     ],
 )
-def test_a_failed_simulation_says_when_and_why(scenario, engine, changes, kind):
-    failing = shortly(scenario, engine).with_changes(changes)
+def test_a_simulation_that_fails_on_the_diagram_says_when_and_why(scenario, changes, kind):
+    failing = shortly(scenario, "drake").with_changes(changes)
     with pytest.raises(kind) as caught:
         simulate(scenario=failing, gait=seeded_gait(failing))
     assert 0.0 <= caught.value.time < failing.simulation.duration
@@ -106,9 +107,28 @@ def test_failures_cross_process_borders(kind):
 
 @pytest.mark.parametrize("changes", [{}, {"cpg.gain": "4e9 N", "cpg.start_up": 0.0}])
 def test_an_engine_is_prepared_by_a_moment_of_simulation(scenario, monkeypatch, changes):
-    simulated = Mock(wraps=simulate)
-    monkeypatch.setattr("tetra_drake.engines.simulate.simulate", simulated)
+    engine = engine_of(scenario)
+    simulated = Mock(wraps=engine.simulate)
+    monkeypatch.setattr(engine, "simulate", simulated)
     prepare(scenario.with_changes({"robot.tetrahedra": 2} | changes))
     (call,) = simulated.call_args_list
-    assert call.kwargs["scenario"].simulation.duration < 0.1
-    assert call.kwargs["scenario"].engine_name == scenario.engine_name == "drake"
+    robot = call.args[0]
+    assert robot.scenario.simulation.duration < 0.1
+    assert robot.scenario.engine_name == scenario.engine_name == "drake"
+
+
+def test_scenarios_of_many_gaits_may_name_several_engines(scenario):
+    scenarios = [shortly(scenario, engine) for engine in ("compiled", "drake", "compiled")]
+    gaits = [seeded_gait(scenario, seed) for seed in range(3)]
+    found = simulate_many(scenario=scenarios, gaits=gaits)
+    for short, gait, result in zip(scenarios, gaits, found, strict=True):
+        alone = simulate(scenario=short, gait=gait)
+        assert (result.engine, result.metrics) == (alone.engine, alone.metrics)
+
+
+def test_each_kind_of_engine_in_a_scenario_has_its_engine(scenario):
+    union, _ = typing.get_args(engine_kinds.Engine)
+    kinds = [kind.__name__ for kind in typing.get_args(union)]
+    assert [name.lower() for name in kinds] == list(ENGINES)
+    engines = [engine_of(scenario.with_changes({"engine": f"!{name}"})) for name in kinds]
+    assert [type(engine).__name__ for engine in engines] == [f"{name}Engine" for name in kinds]

@@ -129,14 +129,6 @@ def test_engines_agree_on_a_steering_signal(signals):
     assert np.abs(left - right)[-1] > 0.01
 
 
-@BOTH
-@pytest.mark.parametrize("signals", ["listing", "live"])
-def test_a_turn_beyond_1_is_refused_on_both_engines(engine, signals, refused):
-    scenario = shortly(load_scenario("turning"), 0.2, cpg__signals=signals)
-    with refused("steering", "at 0.1 s", "1.5"):
-        walk(scenario, seeded_gait(scenario), engine, lambda t: 1.5 if t > 0.0999 else 0.0)
-
-
 def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
     scenario = load_scenario("turning")
     short = shortly(scenario, 0.2)
@@ -210,11 +202,6 @@ def test_lanes_with_other_gains_and_turns_keep_their_numbers(scenario):
 def test_feedback_is_refused_where_signals_are_computed_beforehand(scenario, refused):
     with refused("scenario thesis", "cpg.signals", "live"):
         scenario.with_changes({"cpg.signals": "listing", "cpg.feedback": ["load"]})
-    live = {"cpg.signals": "live", "cpg.feedback": ["load"]}
-    on_mujoco = scenario.with_changes({**live, "engine": "!Mujoco"})
-    pytest.importorskip("mujoco")
-    with refused("thesis", "cpg.feedback", "load"):
-        simulate(scenario=on_mujoco, gait=seeded_gait(on_mujoco))
 
 
 @pytest.mark.slow

@@ -17,7 +17,8 @@ from tetra_drake.results.metrics import (
     unmet_requirements,
 )
 from tetra_drake.results.path import CentrePath
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario import schema
 from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
@@ -32,26 +33,31 @@ CIRCLE = CentrePath(
 """To the left, with a radius of 1 m, but turning to the right."""
 
 
-STEADY = {"totals": make_totals(), "signals": np.zeros((49, 4)), "weight": 0.5}
+STEADY = {"totals": make_totals(), "signals": np.zeros((49, 4))}
 
 
-def metrics_of(structure: Structure, path: CentrePath, steady_from: float) -> Metrics:
+def steady_after(robot: Robot, time: float) -> Robot:
+    """The robot in a simulation that counts as steady from a time (s) on."""
+    scenario = robot.scenario.with_numbers({"simulation.steady_from": time})
+    return dataclasses.replace(robot, scenario=scenario)
+
+
+def metrics_of(robot: Robot, path: CentrePath, steady_from: float) -> Metrics:
     """Those of a robot whose feet are at their start all the time."""
-    nodes = node_positions(structure, structure.initial_state)
-    kwargs = {"path": path, "steady_from": steady_from, **STEADY}
-    return compute_metrics(structure, start=nodes, steady=nodes, end=nodes, **kwargs)
+    nodes = node_positions(robot.structure, robot.structure.initial_state)
+    robot = steady_after(robot, steady_from)
+    return compute_metrics(robot, start=nodes, steady=nodes, end=nodes, path=path, **STEADY)
 
 
-def test_metrics_are_the_displacements_of_figure_13(structure: Structure) -> None:
-    start = node_positions(structure, structure.initial_state)
+def test_metrics_are_the_displacements_of_figure_13(robot: Robot) -> None:
+    start = node_positions(robot.structure, robot.structure.initial_state)
     steady, end = start.copy(), start.copy()
     steady[0, 0] += 0.1  # x1 after the transients
     end[0] += [0.5, -0.025, 0.0]  # x1, y1 at the end
     end[1, 0] += 0.45  # x2
     end[19, 0] += 0.6  # x3, the tip of T5
-    metrics = compute_metrics(
-        structure, start=start, steady=steady, end=end, path=CIRCLE, steady_from=0.0, **STEADY
-    )
+    robot = steady_after(robot, 0.0)
+    metrics = compute_metrics(robot, start=start, steady=steady, end=end, path=CIRCLE, **STEADY)
     assert metrics.distance == pytest.approx(0.5)
     assert metrics.steady_distance == pytest.approx(0.4)
     assert metrics.twist == pytest.approx(0.05)
@@ -63,8 +69,8 @@ def test_metrics_are_the_displacements_of_figure_13(structure: Structure) -> Non
     assert metrics.in_inches()["twist_in"] == pytest.approx(0.05 / INCH)
 
 
-def test_turning_and_bending_count_from_their_instants(structure: Structure) -> None:
-    metrics = metrics_of(structure, CIRCLE, 2.0)
+def test_turning_and_bending_count_from_their_instants(robot: Robot) -> None:
+    metrics = metrics_of(robot, CIRCLE, 2.0)
     assert metrics.heading_change == pytest.approx(-4.0)
     assert metrics.path_curvature == pytest.approx(1.0, rel=1e-6)
     assert metrics.path_radius == pytest.approx(1.0, rel=1e-6)
@@ -72,25 +78,25 @@ def test_turning_and_bending_count_from_their_instants(structure: Structure) -> 
     late = CIRCLE.times > 4.0 - 1e-9
     straight = np.where(late[:, None], CIRCLE.centre, CIRCLE.times[:, None] * [1.0, 2.0, 0.0])
     partly = dataclasses.replace(CIRCLE, centre=straight)
-    assert metrics_of(structure, partly, 4.0).path_radius == pytest.approx(1.0, rel=1e-6)
+    assert metrics_of(robot, partly, 4.0).path_radius == pytest.approx(1.0, rel=1e-6)
     line = dataclasses.replace(CIRCLE, centre=CIRCLE.times[:, None] * np.array([1.0, 2.0, 0.0]))
-    assert metrics_of(structure, line, 0.0).path_radius == math.inf
+    assert metrics_of(robot, line, 0.0).path_radius == math.inf
 
 
-def walked(structure: Structure, way: float, **given: Any) -> Metrics:
+def walked(robot: Robot, way: float, **given: Any) -> Metrics:
     """Those of a robot all of whose nodes have moved forward by a way (m) in 12 steady seconds."""
-    start = node_positions(structure, structure.initial_state)
+    start = node_positions(robot.structure, robot.structure.initial_state)
     end = start + np.array([way, 0.0, 0.0])
     path = CentrePath(np.linspace(0.0, 15.0, 61), np.zeros((61, 3)), np.zeros(61))
-    kwargs = {"path": path, "steady_from": 3.0} | STEADY | given
-    return compute_metrics(structure, start=start, steady=start, end=end, **kwargs)
+    robot = steady_after(robot, 3.0)
+    return compute_metrics(robot, start=start, steady=start, end=end, path=path, **STEADY | given)
 
 
-def test_totals_become_metrics(structure: Structure) -> None:
-    metrics = walked(structure, 0.24)
+def test_totals_become_metrics(robot: Robot) -> None:
+    metrics = walked(robot, 0.24)
     assert metrics.speed == pytest.approx(0.24 / 12.0)
     assert metrics.actuator_work == 0.3
-    assert metrics.cost_of_transport == pytest.approx(0.3 / (0.5 * 0.24))
+    assert metrics.cost_of_transport == pytest.approx(0.3 / (robot.weight * 0.24))
     # Four signals: the mean square is 48 N²/s in 12 s and four signals, 1 N²/s².
     assert metrics.signal_rate == pytest.approx(1.0)
     assert metrics.lifted_shares == pytest.approx(np.arange(5) / 12.0)
@@ -98,23 +104,24 @@ def test_totals_become_metrics(structure: Structure) -> None:
     assert (metrics.clearance, metrics.tension) == (0.01, 1.0)
     assert metrics.travelling_index == 0.0
     phases = 0.5 * np.pi * (np.arange(48)[:, None] / 4.0 - np.arange(4.0))
-    travelling = walked(structure, 0.24, signals=np.sin(phases))
+    travelling = walked(robot, 0.24, signals=np.sin(phases))
     assert travelling.travelling_index == pytest.approx(1.0)
 
 
-def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(structure: Structure) -> None:
-    backward, standing = walked(structure, -0.24), walked(structure, 0.0)
-    assert backward.cost_of_transport == pytest.approx(0.3 / (0.5 * 0.24))
-    assert standing.cost_of_transport == pytest.approx(0.3 / (0.5 * LEAST_WAY))
-    weightless = walked(structure, 0.24, weight=0.0)
+def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(robot: Robot) -> None:
+    backward, standing = walked(robot, -0.24), walked(robot, 0.0)
+    assert backward.cost_of_transport == pytest.approx(0.3 / (robot.weight * 0.24))
+    assert standing.cost_of_transport == pytest.approx(0.3 / (robot.weight * LEAST_WAY))
+    floating = Robot.of(robot.scenario.with_numbers({"robot.gravity": 0.0}))
+    weightless = walked(floating, 0.24)
     assert weightless.cost_of_transport == math.inf
     assert weightless.to_json()["cost_of_transport"] is None
     assert weightless.to_json()["actuator_work"] == 0.3
 
 
-def test_only_lengths_are_given_in_inches(structure: Structure) -> None:
+def test_only_lengths_are_given_in_inches(robot: Robot) -> None:
     lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift", "clearance"}
-    inches = metrics_of(structure, CIRCLE, 0.0).in_inches()
+    inches = metrics_of(robot, CIRCLE, 0.0).in_inches()
     assert inches.keys() == {f"{name}_in" for name in lengths}
 
 
@@ -161,7 +168,7 @@ def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text)
     ],
 )
 def test_a_metric_below_its_least_value_or_nan_is_unmet(
-    structure: Structure, twist: float, texts: list[str]
+    robot: Robot, twist: float, texts: list[str]
 ) -> None:
-    metrics = dataclasses.replace(metrics_of(structure, CIRCLE, 0.0), twist=twist)
+    metrics = dataclasses.replace(metrics_of(robot, CIRCLE, 0.0), twist=twist)
     assert unmet_requirements(metrics, {"twist": 0.5 * INCH, "distance": 0.0}) == texts

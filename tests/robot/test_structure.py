@@ -12,9 +12,6 @@ from pydrake.multibody.tree import FixedOffsetFrame
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.robot.bodies import (
     AddTetrahedra,
-    node_inertia,
-    strut_inertia,
-    strut_pose,
     tetrahedron_inertia,
 )
 from tetra_drake.robot.structure import (
@@ -81,31 +78,6 @@ def test_mass_and_inertia_are_those_of_six_cylinders_and_four_spheres(structure)
     assert inertia.get_com() == pytest.approx(np.zeros(3), abs=0)
     assert matrix == pytest.approx(moment * np.eye(3), rel=1e-14, abs=0)
     assert moment == pytest.approx(6.74e-5, abs=0.005e-5)
-
-
-def test_ten_bodies_welded_together_have_the_inertia_of_the_tetrahedron(structure):
-    # As the thesis built it (appendix C.2): every part is welded to the first strut.
-    parts = [(f"strut{s}", strut_inertia(structure, s), strut_pose(structure, s)) for s in STRUTS]
-    nodes = zip(NODES, structure.p_BN, strict=True)
-    parts += [(name, node_inertia(structure), RigidTransform(p_BNi)) for name, p_BNi in nodes]
-    plant = MultibodyPlant(time_step=0.0)
-    bodies = [plant.AddRigidBody(name, inertia) for name, inertia, _ in parts]
-    X_BF = parts[0][2]
-    frame_B = plant.AddFrame(FixedOffsetFrame("B", bodies[0].body_frame(), X_BF.inverse()))
-    for body, (_, _, X_BPart) in zip(bodies[1:], parts[1:], strict=True):
-        plant.WeldFrames(frame_B, body.body_frame(), X_BPart)
-    plant.Finalize()
-    assert plant.num_velocities() == 6
-
-    welded = plant.CalcSpatialInertia(
-        plant.CreateDefaultContext(), frame_B, [body.index() for body in bodies]
-    )
-    one = tetrahedron_inertia(structure)
-    I_welded = welded.CalcRotationalInertia().CopyToFullMatrix3()
-    I_one = one.CalcRotationalInertia().CopyToFullMatrix3()
-    assert one.get_mass() == pytest.approx(welded.get_mass(), rel=1e-12)
-    assert welded.get_com() == pytest.approx(one.get_com(), abs=1e-12 * 6 * IN)
-    assert I_one == pytest.approx(I_welded, rel=1e-12, abs=1e-12 * I_welded[0, 0])
 
 
 # Any number of tetrahedra

@@ -8,10 +8,10 @@ import numpy as np
 from pydrake.systems.analysis import IntegratorBase, ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram
 
+from tetra_drake.engines.interface import Engine, Viewer
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.sampler import Sample, Sampler, motion_of
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.engines.viewer import Viewer
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import make_dataset
@@ -29,65 +29,70 @@ _FIRST_STEP, _GROWTH = 3e-4, 3.0  # s, and factor per step: how steps begin agai
 _RENEW_FROM = 8e-4  # s: shorter steps converge with any Jacobian, most often
 
 
-def simulate_drake(
-    robot: Robot,
-    gait: Gait,
-    *,
-    record: bool = False,
-    viewer: Viewer | None = None,
-    steering: SteeringSignal | None = None,
-) -> SimulationResult:
-    """Simulates a gait as simulate() does, on the Drake diagram."""
-    settings, engine = robot.scenario.simulation, robot.scenario.settings_of(Drake)
-    diagram = MakeTensegrityDiagram(robot, gait, steering=steering)
-    simulator = MakeSimulator(diagram, engine)
-    integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
-    signals, observer = diagram.GetOutputPort("signals"), Observer(robot)
-    work = _Work(integrator)
-    aimer = _StepAimer(diagram, simulator, engine, work)
-    times = motion_times(settings, record=record)
-    sampler = Sampler(diagram, times, max_step=engine.max_step)
+class DrakeEngine(Engine):
+    """The Drake diagram, one gait at a time."""
 
-    def after_step(context: Context) -> None:
-        # What is done here must not depend on whether somebody records or watches.
-        check_time()
-        bodies, now = state.Eval(context), context.get_time()
-        velocities = bodies[7 * len(robot.structure.bodies) :]
-        _check(settings, now, velocities, work)
-        aimer.aim(context, velocities)
-        sampler.after_step(context)
-        observer.add(now, bodies, signals.Eval(context))
-        if viewer is not None and viewer.wants(now):
-            viewer.show(make_dataset(robot, motion_of(diagram, [Sample.of(context)])))
+    can_be_watched = True
 
-    simulator.set_monitor(after_step)
-    started = time.perf_counter()
-    try:
-        for instant in (0.0, settings.steady_from, settings.duration):
-            simulator.AdvanceTo(instant)
-    except SimulationFailure:
-        raise
-    except RuntimeError as error:
-        # Drake's own reasons: a step below the least, a state that is not finite.
-        now, reason = simulator.get_context().get_time(), str(error).strip()
-        raise Diverged(time=now, reason=reason.splitlines()[0]) from error
-    wall_time = time.perf_counter() - started
+    def simulate(
+        self,
+        robot: Robot,
+        gait: Gait,
+        *,
+        record: bool = False,
+        viewer: Viewer | None = None,
+        steering: SteeringSignal | None = None,
+    ) -> SimulationResult:
+        settings, engine = robot.scenario.simulation, robot.scenario.settings_of(Drake)
+        diagram = MakeTensegrityDiagram(robot, gait, steering=steering)
+        simulator = MakeSimulator(diagram, engine)
+        integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
+        signals, observer = diagram.GetOutputPort("signals"), Observer(robot)
+        work = _Work(integrator)
+        aimer = _StepAimer(diagram, simulator, engine, work)
+        times = motion_times(settings, record=record)
+        sampler = Sampler(diagram, times, max_step=engine.max_step)
 
-    steps, derivative_evaluations, jacobian_evaluations = work.total()
-    return make_result(
-        robot,
-        sampler.motion(),
-        totals=observer.totals(),
-        work=IntegratorWork(
-            scheme=engine.scheme,
-            accuracy=engine.accuracy,
-            steps=steps,
-            derivative_evaluations=derivative_evaluations,
-            jacobian_evaluations=jacobian_evaluations,
-        ),
-        wall_time=wall_time,
-        record=record,
-    )
+        def after_step(context: Context) -> None:
+            # What is done here must not depend on whether somebody records or watches.
+            check_time()
+            bodies, now = state.Eval(context), context.get_time()
+            velocities = bodies[7 * len(robot.structure.bodies) :]
+            _check(settings, now, velocities, work)
+            aimer.aim(context, velocities)
+            sampler.after_step(context)
+            observer.add(now, bodies, signals.Eval(context))
+            if viewer is not None and viewer.wants(now):
+                viewer.show(make_dataset(robot, motion_of(diagram, [Sample.of(context)])))
+
+        simulator.set_monitor(after_step)
+        started = time.perf_counter()
+        try:
+            for instant in (0.0, settings.steady_from, settings.duration):
+                simulator.AdvanceTo(instant)
+        except SimulationFailure:
+            raise
+        except RuntimeError as error:
+            # Drake's own reasons: a step below the least, a state that is not finite.
+            now, reason = simulator.get_context().get_time(), str(error).strip()
+            raise Diverged(time=now, reason=reason.splitlines()[0]) from error
+        wall_time = time.perf_counter() - started
+
+        steps, derivative_evaluations, jacobian_evaluations = work.total()
+        return make_result(
+            robot,
+            sampler.motion(),
+            totals=observer.totals(),
+            work=IntegratorWork(
+                scheme=engine.scheme,
+                accuracy=engine.accuracy,
+                steps=steps,
+                derivative_evaluations=derivative_evaluations,
+                jacobian_evaluations=jacobian_evaluations,
+            ),
+            wall_time=wall_time,
+            record=record,
+        )
 
 
 def MakeSimulator(diagram: Diagram, settings: Drake) -> Simulator:
@@ -206,3 +211,6 @@ class _StepAimer:
         self._integrator.set_maximum_step_size(self._settings.max_step)
         self._integrator.Initialize()
         self._jacobian_is_old = False
+
+
+ENGINE = DrakeEngine()

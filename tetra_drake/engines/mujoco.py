@@ -16,14 +16,16 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
+from tetra_drake.engines.interface import Engine, Outcome, Viewer
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
+from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
@@ -33,10 +35,8 @@ from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.engine_kinds import MUJOCO_FRICTION, Mujoco
-from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat, Incline, Terrain
 
 Array = np.ndarray
 
@@ -54,8 +54,6 @@ _STRETCH = 5000  # steps between two checks of whether a simulation is still sta
 
 _OBSERVED = 8  # steps from one observation to the next: with the default step, 1 ms
 
-_GAITS = 8  # for each thread at a time; each takes some 10 MB, mostly for a stretch of states
-
 INTEGRATOR = "implicitfast"
 """Integrator of MuJoCo."""
 
@@ -64,64 +62,67 @@ MAX_SPEED = 1.0
 at times far forward; a walking robot stays below 0.2 m/s."""
 
 
-def simulate_mujoco(
-    robot: Robot, gait: Gait, *, record: bool, steering: SteeringSignal | None = None
-) -> SimulationResult:
-    """Simulates a gait as simulate() does, in MuJoCo, in steps of `engine.step`.
+class MujocoEngine(Engine):
+    """MuJoCo, in steps of `engine.step`. Other Python threads run while it simulates.
 
-    Instants asked for, as of samples, are those of the nearest steps. Other threads run meanwhile.
-    Raises InputError, too, if MuJoCo is missing or cannot do it.
+    Instants asked for, as of samples, are those of the nearest steps.
     """
-    (outcome,) = simulate_in_rollouts(robot, [gait], record=record, threads=1, steering=steering)
-    if isinstance(outcome, SimulationFailure):
-        raise outcome
-    return outcome
 
+    def check(self, scenario: Scenario) -> None:
+        if not installed():
+            raise InputError(scenario.name, "engine", f"mujoco is not installed: {INSTALL}")
+        if scenario.cpg.feedback:
+            problem = f"found {scenario.cpg.feedback}; mujoco computes signals beforehand"
+            raise InputError(scenario.name, "cpg.feedback", problem)
+        if scenario.terrain.plane_slope is None:
+            kind = type(scenario.terrain).__name__
+            problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline without start"
+            raise InputError(scenario.name, "terrain", problem)
+        if scenario.cables.slack:
+            problem = "found true, which mujoco cannot simulate"
+            raise InputError(scenario.name, "cables.slack", problem)
+        scenario.friction.cone(scenario.name)
 
-def simulate_in_rollouts(
-    robot: Robot,
-    gaits: Sequence[Gait],
-    *,
-    record: bool,
-    threads: int,
-    steering: SteeringSignal | None = None,
-) -> list[SimulationResult | SimulationFailure]:
-    """Simulates gaits as simulate_mujoco() does, on so many threads of MuJoCo's `Rollout`: the
-    same numbers, bit for bit; for a gait that fails its Diverged or StepBudgetExceeded."""
-    scenario = robot.scenario
-    check_mujoco(scenario)
-    simulation, step = scenario.simulation, scenario.settings_of(Mujoco).step
-    steps = max(1, round(simulation.duration / step))
-    if steps > simulation.max_evaluations:
-        reason = f"{steps} steps exceed the budget of {simulation.max_evaluations}"
-        return [StepBudgetExceeded(time=0.0, reason=reason) for _ in gaits]
-    times, starts = motion_times(simulation, record=record), step * np.arange(steps)
-    simulator = _Simulator(robot)
-    outcomes: list[SimulationResult | SimulationFailure] = []
-    for first in range(0, len(gaits), threads * _GAITS):
-        group = gaits[first : first + threads * _GAITS]
-        signals = [signals_at(robot, gait, starts, steering=steering) for gait in group]
-        observers = [Observer(robot) for _ in group]
+    def simulate(
+        self,
+        robot: Robot,
+        gait: Gait,
+        *,
+        record: bool = False,
+        viewer: Viewer | None = None,
+        steering: SteeringSignal | None = None,
+    ) -> SimulationResult:
+        self.check(robot.scenario)
+        simulation, step = robot.scenario.simulation, robot.scenario.settings_of(Mujoco).step
+        steps = max(1, round(simulation.duration / step))
+        if steps > simulation.max_evaluations:
+            reason = f"{steps} steps exceed the budget of {simulation.max_evaluations}"
+            raise StepBudgetExceeded(time=0.0, reason=reason)
+        times = motion_times(simulation, record=record)
+        steps_kept = np.rint(times / step).astype(int)
+        signals = signals_at(robot, gait, step * np.arange(steps), steering=steering)
+        simulator, observer = _Simulator(robot), Observer(robot)
         started = time.perf_counter()
-        wanted = np.rint(times / step).astype(int)
-        courses = simulator.simulate(signals, wanted, observers, threads=threads)
-        wall_time = (time.perf_counter() - started) * min(threads, len(group)) / len(group)
-        for gait, course, observer in zip(group, courses, observers, strict=True):
-            if isinstance(course, Diverged):
-                course.wall_time = wall_time
-                outcomes.append(course)
-                continue
-            driving = signals_at(robot, gait, times, steering=steering)
-            result = make_result(
-                robot,
-                simulator.motion(times, course, driving),
-                totals=observer.totals(),
-                work=IntegratorWork(INTEGRATOR, step, steps, steps),
-                wall_time=wall_time,
-                record=record,
-            )
-            outcomes.append(result)
-    return outcomes
+        states = simulator.run(signals, steps_kept, observer)
+        wall_time = time.perf_counter() - started
+        signals_kept = signals_at(robot, gait, times, steering=steering)
+        return make_result(
+            robot,
+            simulator.motion(times, states, signals_kept),
+            totals=observer.totals(),
+            work=IntegratorWork(INTEGRATOR, step, steps, steps),
+            wall_time=wall_time,
+            record=record,
+        )
+
+    def simulate_many(
+        self, walks: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
+    ) -> list[Outcome]:
+        def outcome(walk: tuple[Scenario, Gait]) -> Outcome:
+            return self.outcome(*walk, record=record)
+
+        with ThreadPoolExecutor(threads) as pool:
+            return list(pool.map(outcome, walks))
 
 
 def installed() -> bool:
@@ -164,97 +165,80 @@ class _Simulator:
         except ValueError as error:
             problem = f"mujoco refuses the robot: {' '.join(str(error).split())}"
             raise InputError(robot.scenario.name, "robot", problem) from error
+        self._step = robot.scenario.settings_of(Mujoco).step
         driven = robot.structure.cables["signal"]
         self._motors = driven[driven != PASSIVE]  # the signal of each motor
 
-    def simulate(
-        self,
-        signals: Sequence[Array],
-        wanted: Array,
-        observers: Sequence[Observer],
-        *,
-        threads: int,
-    ) -> list[Array | Diverged]:
-        """Simulates gaits by their signals (steps, n); MuJoCo's states (time, qpos, qvel) after
-        each of the `wanted` steps, or how a gait failed. Each gait has its observer."""
+    def run(self, signals: Array, steps_kept: Array, observer: Observer) -> Array:
+        """MuJoCo's states (time, qpos, qvel) after each of the `steps_kept`, ascending, of a gait
+        with these signals (steps, n), of which an observer is shown all. Raises Diverged."""
         from mujoco.rollout import Rollout
 
-        data = [self._mujoco.MjData(self._model) for _ in range(threads)]
+        data = self._mujoco.MjData(self._model)
         kind = self._mujoco.mjtState.mjSTATE_FULLPHYSICS
-        start = np.empty(self._mujoco.mj_stateSize(self._model, kind))
-        self._mujoco.mj_getState(self._model, data[0], start, kind)
-        found = np.tile(start, (len(signals), len(wanted), 1))
-        for own, observer in zip(signals, observers, strict=True):
-            observer.add(0.0, self.states(start[np.newaxis])[0], own[0])
-        latest = dict.fromkeys(range(len(signals)), start)  # of gaits that have not failed
-        failures: dict[int, Diverged] = {}
-        with Rollout(nthread=threads if threads > 1 else 0) as rollout:
-            for first in range(0, len(signals[0]), _STRETCH):
-                chosen = [signals[i][first : first + _STRETCH, self._motors] for i in latest]
-                if not chosen:
-                    break
+        state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
+        self._mujoco.mj_getState(self._model, data, state, kind)
+        kept = np.tile(state, (len(steps_kept), 1))
+        observer.add(0.0, self.body_states(state[np.newaxis])[0], signals[0])
+        with Rollout(nthread=0) as rollout:
+            for first in range(0, len(signals), _STRETCH):
                 check_time()
-                initial = np.array(list(latest.values()))
-                stretches, _ = rollout.rollout(self._model, data, initial, np.array(chosen))
-                here = (first < wanted) & (wanted <= first + len(chosen[0]))
-                for i, states in zip(list(latest), stretches, strict=True):
-                    found[i, here] = states[wanted[here] - first - 1]
-                    latest[i] = states[-1]
-                    self._observe(observers[i], states, signals[i], first)
-                    if failure := self._failure(states, first):
-                        failures[i] = failure
-                        del latest[i]
-        return [failures.get(i, states) for i, states in enumerate(found)]
+                forces = signals[first : first + _STRETCH, self._motors]
+                (states,), _ = rollout.rollout(self._model, [data], state, forces)
+                here = (first < steps_kept) & (steps_kept <= first + len(states))
+                kept[here] = states[steps_kept[here] - first - 1]
+                state = states[-1]
+                self._observe(observer, states, signals, first)
+                self._check(states, first)
+        return kept
 
     def _observe(self, observer: Observer, states: Array, signals: Array, first: int) -> None:
         """Shows an observer every _OBSERVED-th of the states after step `first` and the next."""
         chosen = np.arange(_OBSERVED - 1, len(states), _OBSERVED)
         if not chosen.size:
             return
-        steps = np.minimum(first + chosen + 1, len(signals) - 1)
-        step = self._robot.scenario.settings_of(Mujoco).step
-        for k, (at, state) in enumerate(zip(steps, self.states(states[chosen]), strict=True)):
-            observer.add(step * (first + chosen[k] + 1), state, signals[at])
+        steps: list[int] = (first + chosen + 1).tolist()
+        for step, state in zip(steps, self.body_states(states[chosen]), strict=True):
+            observer.add(self._step * step, state, signals[min(step, len(signals) - 1)])
 
-    def _failure(self, states: Array, first: int) -> Diverged | None:
-        """Failure that the states after step `first` and the next ones show, if any."""
-        step = self._robot.scenario.settings_of(Mujoco).step
+    def _check(self, states: Array, first: int) -> None:
+        """Raises Diverged if the states after step `first` and the next ones show a failure."""
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
         fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= MAX_SPEED)
         if fast.any():
             reason = f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s"
-            return Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
+            raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
         # Where MuJoCo warns of instability, it starts again from time 0, or stops.
-        times = step * (first + 1.0 + np.arange(len(states)))
-        warned = np.abs(states[:, 0] - times) > 0.5 * step
+        times = self._step * (first + 1.0 + np.arange(len(states)))
+        warned = np.abs(states[:, 0] - times) > 0.5 * self._step
         if warned.any():
             reason = "MuJoCo warns of instability"
-            return Diverged(time=float(times[warned.argmax()]), reason=reason)
-        return None
+            raise Diverged(time=float(times[warned.argmax()]), reason=reason)
 
-    def states(self, found: Array) -> Array:
+    def body_states(self, states: Array) -> Array:
         """[q; v] (rows, 13 bodies) of MuJoCo's states, where w is given in the body's frame."""
-        rows, nq = len(found), 1 + self._model.nq
-        pose, velocity = found[:, 1:nq].reshape(rows, -1, 7), found[:, nq:].reshape(rows, -1, 6)
+        rows, end = len(states), 1 + self._model.nq
+        pose = states[:, 1:end].reshape(rows, -1, 7)
+        velocity = states[:, end:].reshape(rows, -1, 6)
         scalar, vector, w_WB_B = pose[..., 3:4], pose[..., 4:], velocity[..., 3:]
         turn = 2.0 * np.cross(vector, w_WB_B)
         w_WB = w_WB_B + scalar * turn + np.cross(vector, turn)
         parts = (pose[..., 3:], pose[..., :3]), (w_WB, velocity[..., :3])
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
-    def motion(self, times: Array, found: Array, signals: Array) -> Motion:
+    def motion(self, times: Array, states: Array, signals: Array) -> Motion:
         """The motion in MuJoCo's states at `times` (s), driven by the signals."""
         data = self._mujoco.MjData(self._model)
-        rows = zip(found, signals, strict=True)
+        rows = zip(states, signals, strict=True)
         pushes = np.array([self._ground_forces(data, *row) for row in rows])
         modes = np.zeros((*pushes.shape[:2], MODE_COLUMNS))  # of friction: 0, as there are none
         modes[:, :, CONTACT] = pushes[:, :, 2] > 0.0
-        return Motion(times, self.states(found), signals, modes, pushes)
+        return Motion(times, self.body_states(states), signals, modes, pushes)
 
-    def _ground_forces(self, data: Any, found: Array, signals: Array) -> Array:
+    def _ground_forces(self, data: Any, state: Array, signals: Array) -> Array:
         """(contacts, 3): MuJoCo's contact forces on the nodes along t1, t2 and n, in N."""
         mujoco, model = self._mujoco, self._model
-        mujoco.mj_setState(model, data, found, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         data.ctrl[:] = signals[self._motors]
         mujoco.mj_forward(model, data)
         forces, wrench = np.zeros((len(self._robot.structure.contacts), 3)), np.zeros(6)
@@ -267,35 +251,9 @@ class _Simulator:
         return (axes @ forces[:, :, None])[:, :, 0]
 
 
-def check_mujoco(scenario: Scenario) -> None:
-    """Raises InputError if MuJoCo cannot simulate the scenario."""
-    if not installed():
-        raise InputError(scenario.name, "engine", f"mujoco is not installed: {INSTALL}")
-    if scenario.cpg.feedback:
-        problem = f"found {scenario.cpg.feedback}; mujoco computes signals beforehand"
-        raise InputError(scenario.name, "cpg.feedback", problem)
-    if not _is_plane(scenario.terrain):
-        kind = type(scenario.terrain).__name__
-        problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline without start"
-        raise InputError(scenario.name, "terrain", problem)
-    if scenario.cables.slack:
-        raise InputError(scenario.name, "cables.slack", "found true, which mujoco cannot simulate")
-    if isinstance(law := scenario.friction, Coulomb):
-        possible = {"static": law.kinetic, "stiffness": 0.0}
-        possible |= {"forward": 1.0, "backward": 1.0, "lateral": 1.0}
-        for name, value in possible.items():
-            if (found := getattr(law, name)) != value:
-                problem = f"found {found:g}, but mujoco can simulate only {value:g}"
-                raise InputError(scenario.name, f"friction.{name}", problem)
-
-
-def _is_plane(terrain: Terrain) -> bool:
-    return isinstance(terrain, Flat) or (isinstance(terrain, Incline) and terrain.start is None)
-
-
 def _add_floor(world: Element, robot: Robot) -> None:
     """The floor, a plane, which is geom 0."""
-    slope = getattr(robot.scenario.terrain, "slope", 0.0)
+    slope = robot.scenario.terrain.plane_slope or 0.0
     pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
     turned = {"pos": pos, "quat": robot.structure.q_WB}
     _add(world, "geom", name="floor", type="plane", size="0 0 1", **turned, **_ALONE)
@@ -320,11 +278,8 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
 
 def _contact(robot: Robot) -> dict:
     """Contact settings of the floor."""
-    ground, law = robot.scenario.ground, robot.scenario.friction
-    if isinstance(law, Coulomb):
-        friction, stiction_damping = law.kinetic, law.damping
-    else:
-        friction, stiction_damping = MUJOCO_FRICTION, law.stiction_damping
+    ground = robot.scenario.ground
+    cone = robot.scenario.friction.cone(robot.scenario.name)
     mass, bodies = robot.model.body.mass[0], len(robot.structure.bodies)
     borne = robot.weight / (2 * bodies + 1)  # by a foot of the thesis's
     rest_damping = ground.damping * borne / ground.stiffness
@@ -333,9 +288,9 @@ def _contact(robot: Robot) -> dict:
     per_mass = -(1.0 - _IMPEDANCE) / mass
     return {
         "condim": "3",
-        "friction": [friction, friction, 0, 0, 0],
+        "friction": [cone.coefficient, cone.coefficient, 0, 0, 0],
         "solref": [ground.stiffness * per_mass, rest_damping * per_mass],
-        "solreffriction": [ground.stiffness * per_mass, stiction_damping * per_mass],
+        "solreffriction": [ground.stiffness * per_mass, cone.damping * per_mass],
         "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
     }
 
@@ -359,3 +314,6 @@ def _add(parent: Element, tag: str, **attributes: Any) -> Element:
         for name, value in attributes.items()
     }
     return SubElement(parent, tag, text)
+
+
+ENGINE = MujocoEngine()

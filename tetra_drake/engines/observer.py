@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
-from tetra_drake.physics.cable import PULL_COLUMNS
-from tetra_drake.physics.contact import MODE_COLUMNS, PUSH_COLUMNS, update_modes
-from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.tally import Tally, look, observe
-from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.results.metrics import empty_tally
 from tetra_drake.robot.robot import Robot
 from tetra_drake.simd.compiling import compiled
@@ -26,16 +23,9 @@ class Observer:
     """
 
     def __init__(self, robot: Robot) -> None:
-        structure = robot.structure
-        cables, contacts = len(structure.cables), len(structure.contacts)
-        self._model, self._tally = robot.model, empty_tally(robot.scenario, structure)
-        self._modes = np.zeros((contacts, MODE_COLUMNS))
-        self._forces = Forces(
-            nodes=np.empty((len(structure.node_names), NODE_COLUMNS)),
-            frames=np.empty((contacts, FRAME_COLUMNS)),
-            pulls=np.empty((cables, PULL_COLUMNS)),
-            pushes=np.empty((contacts, PUSH_COLUMNS)),
-        )
+        self._model, self._tally = robot.model, empty_tally(robot)
+        self._modes = np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
+        self._forces = Forces.of(robot.model)
         self._waiting: list[tuple[float, np.ndarray, np.ndarray]] = []
 
     def add(self, time: float, state: np.ndarray, signals: np.ndarray) -> None:
@@ -50,10 +40,11 @@ class Observer:
         return self._tally
 
     def _flush(self) -> None:
-        if self._waiting:
-            columns = (np.array(column) for column in zip(*self._waiting, strict=True))
-            observe_states(self._model, self._tally, self._forces, self._modes, *columns)
-            self._waiting = []
+        if not self._waiting:
+            return
+        times, states, signals = (np.array(column) for column in zip(*self._waiting, strict=True))
+        observe_states(self._model, self._tally, self._forces, self._modes, times, states, signals)
+        self._waiting = []
 
 
 @compiled
@@ -74,6 +65,6 @@ def observe_states(
         move_robot(robot, states[k], forces)
         update_modes(states[k], forces.nodes, robot.ground, forces.frames, modes)
         compute_forces(robot, modes, signals[k], True, forces, generalized)
-        known = robot.cables, robot.ground.contacts, times[k], signals[k]
-        observe(tally, *known, forces.pulls, forces.pushes)
+        cables, contacts = robot.cables, robot.ground.contacts
+        observe(tally, cables, contacts, times[k], signals[k], forces.pulls, forces.pushes)
         look(tally, forces.nodes)

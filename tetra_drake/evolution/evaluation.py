@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tetra_drake.engines.interface import engine_of
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
 from tetra_drake.errors import (
@@ -68,19 +69,15 @@ class GaitEvaluation:
     @property
     def side_by_side(self) -> int:
         """The number of vectors, or a multiple, for which many() takes least time each."""
-        if self.lanes is not None or self.scenario.engine_name != "compiled":
-            return 1
-        from tetra_drake.engines.compiled.lane_engine import lanes_for
-
-        return lanes_for(math.inf)
+        lane_pool = engine_of(self.scenario).lane_pool
+        return lane_pool.most_lanes() if lane_pool and self.lanes is None else 1
 
     def many(self, tasks: Sequence[Vector | SeededVector]) -> list[Evaluation]:
         """The evaluations of several vectors: in lanes on one core, if that is faster."""
-        if len(tasks) == 1 or self.side_by_side == 1:
+        lane_pool = engine_of(self.scenario).lane_pool
+        if len(tasks) == 1 or self.lanes is not None or lane_pool is None:
             return [self(task) for task in tasks]
-        from tetra_drake.engines.compiled.lane_pool import LanePool
-
-        with LanePool(1) as lanes:
+        with lane_pool(1) as lanes:
             return self._evaluate_in(lanes, tasks)
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -62,7 +62,7 @@ class RunRecord:
         cls, directory: Path, *, scenario: Scenario, seed: int, method: Method | None = None
     ) -> RunRecord:
         """Begins a run in a directory that does not exist or is empty."""
-        now = versions(scenario.engine_name)
+        now = versions(scenario.engine.packages)
         manifest = Manifest(scenario, seed, now, method or Method.of(scenario))
         check_folder(directory)
         _refuse_a_used(directory)

@@ -23,7 +23,8 @@ from tetra_drake.files import check_folder, read_text, write_whole
 from tetra_drake.results.metrics import headline
 from tetra_drake.results.trajectory import DIMENSIONS, labels
 from tetra_drake.robot.gait import Gait, load_gait
-from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
@@ -113,11 +114,10 @@ def load_result_folder(folder: Path) -> GaitMotion:
             problem = f"holds no {name}, so it was not written by `simulate`"
             raise InputError(folder, name, problem)
     scenario = load_scenario(folder / SCENARIO)
-    structure = MakeStructure(scenario)
     return GaitMotion(
         scenario=scenario,
         gait=load_gait(folder / RESULT, scenario, key="gait"),
-        trajectory=_load_trajectory(folder / TRAJECTORY, structure),
+        trajectory=_load_trajectory(folder / TRAJECTORY, Robot.of(scenario).structure),
         metrics=_load_metrics(folder / RESULT),
     )
 

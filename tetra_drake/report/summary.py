@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,13 +16,9 @@ from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
-from tetra_drake.scenario.engine_kinds import MUJOCO_FRICTION
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import tree_of
-from tetra_drake.scenario.terrain_kinds import Flat
-from tetra_drake.scenario.units import customary, shown
+from tetra_drake.scenario.units import customary
 
 if TYPE_CHECKING:
     import pandas
@@ -66,46 +61,26 @@ def result_text(scenario: Scenario, gait: Gait, result: SimulationResult) -> str
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]
     seconds, speed = fixed(result.wall_time, 1), fixed(result.duration / result.wall_time, 1)
-    lines.append(f"simulated in {seconds} s, {speed} times real time: {_work_text(result)}")
+    work = result.integrator
+    lines.append(
+        f"simulated in {seconds} s, {speed} times real time: {work.scheme}, "
+        f"{scenario.engine.precision}, {work.steps} steps, "
+        f"{work.derivative_evaluations} derivative evaluations"
+    )
     return "\n".join(lines)
 
 
-def _work_text(result: SimulationResult) -> str:
-    """Scheme, tolerance and steps of a simulation's integrator."""
-    work = result.integrator
-    if result.engine == "mujoco":
-        return f"{work.scheme}, {work.steps} steps of {1e3 * work.accuracy:g} ms"
-    asked = "accuracy {:g}" if result.engine == "drake" else "tolerance {:g} m/s"
-    evaluations = f"{work.derivative_evaluations} derivative evaluations"
-    return f"{work.scheme}, {asked.format(work.accuracy)}, {work.steps} steps, {evaluations}"
+THESIS_GROUND = "flat, the thesis's friction"
 
 
 def ground_text(scenario: Scenario) -> str:
     """Terrain and friction in a line; empty for the thesis's flat ground and friction.
 
-    For example, "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)". Lengths are
-    in inches; values that are their defaults are left out, but for the coefficients of friction.
+    For example, "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)".
     """
-    terrain, law = scenario.terrain, scenario.friction
-    if isinstance(law, Coulomb):
-        numbers = {"static": law.static, "kinetic": law.kinetic}
-        friction = f"Coulomb friction ({_listed(numbers | tree_of(law, show=shown))})"
-    elif scenario.engine_name == "mujoco":
-        friction = f"MuJoCo's friction (coefficient {MUJOCO_FRICTION:g})"
-    elif isinstance(terrain, Flat):
-        return ""
-    else:
-        friction = "the thesis's friction"
-    kind, sizes = type(terrain).__name__.lower(), _listed(tree_of(terrain, show=shown))
-    return f"{kind} ({sizes}), {friction}" if sizes else f"{kind}, {friction}"
-
-
-def _listed(values: Mapping[str, Any]) -> str:
-    texts = []
-    for key, value in values.items():
-        text = " ".join(value) if isinstance(value, list) else str(value)
-        texts.append(f"{key} {Path(text).name if key == 'file' else text}")
-    return ", ".join(texts)
+    friction = scenario.engine.friction_text(scenario.friction)
+    ground = f"{scenario.terrain.text}, {friction}"
+    return "" if ground == THESIS_GROUND else ground
 
 
 def run_text(run: Run) -> str:

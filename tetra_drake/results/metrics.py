@@ -11,14 +11,16 @@ from tetra_drake.formatting import fixed
 from tetra_drake.physics.tally import Tally
 from tetra_drake.results.measures import travelling_index
 from tetra_drake.results.path import CentrePath, curvature
-from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, Structure
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP
 from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
 
 
-def empty_tally(scenario: Scenario, structure: Structure) -> Tally:
+def empty_tally(robot: Robot) -> Tally:
     """The tally of a walk that begins."""
+    scenario, structure = robot.scenario, robot.structure
     return Tally(
         begins=np.array([max(scenario.simulation.steady_from, scenario.cpg.start_up)]),
         time=np.zeros(1),
@@ -33,26 +35,29 @@ def empty_tally(scenario: Scenario, structure: Structure) -> Tally:
 
 
 def compute_metrics(
-    structure: Structure,
+    robot: Robot,
     *,
     start: np.ndarray,
     steady: np.ndarray,
     end: np.ndarray,
     path: CentrePath,
-    steady_from: float,
     totals: Tally,
     signals: np.ndarray,
-    weight: float,
 ) -> Metrics:
-    """The metrics from node positions p_WN (nodes, 3) in m at three instants, from the path of the
-    centre, the tally of the whole walk as plain arrays, and the signals (k, m) in N at evenly
-    spaced times of the steady stretch, which begins at `steady_from` (s); `weight` in N."""
+    """The metrics of a walk.
+
+    `start`, `steady` and `end` are node positions p_WN (nodes, 3) in m at 0, at
+    `simulation.steady_from` and at the end. `path` is that of the centre. `totals` is the tally of
+    the whole walk, as plain arrays. `signals` (k, m) in N are those at evenly spaced times of the
+    steady stretch.
+    """
+    structure, steady_from = robot.structure, robot.scenario.simulation.steady_from
     tip = 4 * (len(structure.bodies) - 1) + TIP
     x1, x2, x3 = end[BOTTOM_LEFT, 0], end[BOTTOM_RIGHT, 0], end[tip, 0]
     x_way, y_way, _ = (end.mean(axis=0) - steady.mean(axis=0)).tolist()  # of the centre
     steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
     work = float(totals.work[0])
-    carried = weight * max(math.hypot(x_way, y_way), LEAST_WAY)
+    carried = robot.weight * max(math.hypot(x_way, y_way), LEAST_WAY)
     steady_time = max(0.0, totals.time[0] - totals.begins[0])
     per_time = 1.0 / (steady_time or 1)
     lifted = (per_time * totals.lifted).tolist()

@@ -13,10 +13,7 @@ import numpy as np
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.machine import versions
 from tetra_drake.physics.tally import Tally
-from tetra_drake.results.metrics import (
-    compute_fitness,
-    compute_metrics,
-)
+from tetra_drake.results.metrics import compute_fitness, compute_metrics
 from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
@@ -67,13 +64,11 @@ class SimulationResult:
 
 def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
     """The times (s), ascending, at which make_result() needs the motion of a simulation."""
-    samples = sample_times(simulation.duration, simulation.sample_period) if record else ()
-    ends = 0.0, simulation.steady_from, simulation.duration
-    return np.unique([*ends, *_path_times(simulation), *samples])
-
-
-def _path_times(simulation: SimulationSection) -> np.ndarray:
-    return sample_times(simulation.duration, PERIOD)
+    times = [np.array([0.0, simulation.steady_from, simulation.duration])]
+    times.append(sample_times(simulation.duration, PERIOD))
+    if record:
+        times.append(sample_times(simulation.duration, simulation.sample_period))
+    return np.unique(np.concatenate(times))
 
 
 def make_result(
@@ -91,24 +86,25 @@ def make_result(
     `wall_time` is in s.
     """
     simulation, structure = robot.scenario.simulation, robot.structure
-    instants = _path_times(simulation)
+    instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
+    ends = motion.at(np.array([0.0, simulation.steady_from, simulation.duration]))
     poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
     path = follow(instants, poses)
-    ends = motion.at(np.array([0.0, simulation.steady_from, simulation.duration]))
     start, steady, end = (node_positions(structure, state) for state in ends.states)
     metrics = compute_metrics(
-        structure,
+        robot,
         start=start,
         steady=steady,
         end=end,
         path=path,
-        steady_from=simulation.steady_from,
         totals=totals,
         signals=way.signals[instants >= simulation.steady_from],
-        weight=robot.weight,
     )
-    samples = sample_times(simulation.duration, simulation.sample_period)
+    trajectory = None
+    if record:
+        samples = sample_times(simulation.duration, simulation.sample_period)
+        trajectory = make_dataset(robot, motion.at(samples))
     return SimulationResult(
         metrics=metrics,
         fitness=compute_fitness(metrics, robot.scenario.objective),
@@ -117,7 +113,7 @@ def make_result(
         integrator=work,
         engine=robot.scenario.engine_name,
         path=path,
-        trajectory=make_dataset(robot, motion.at(samples)) if record else None,
+        trajectory=trajectory,
     )
 
 
@@ -137,7 +133,7 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
         "real_time_factor": result.duration / result.wall_time,
         "engine": result.engine,
         "integrator": dataclasses.asdict(result.integrator),
-        "versions": versions(result.engine),
+        "versions": versions(scenario.engine.packages),
         "gait": gait.to_json(scenario),
         "path": {
             "time_s": way.times.tolist(),

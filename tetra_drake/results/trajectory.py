@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetra_drake.files import write_whole
-from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, cable_forces
-from tetra_drake.physics.contact import STICK_POINT, ground_arguments, ground_forces
+from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION
+from tetra_drake.physics.contact import PUSH_COLUMNS, STICK_POINT
+from tetra_drake.physics.forces import Forces, forces_along
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN
-from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import NODES, Structure, moved_nodes
 
@@ -112,15 +112,11 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
 
 def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """The cables' `pulls` (k, cables, PULL_COLUMNS) and the ground's `pushes` (k, contacts, 3)."""
-    model, (count, contacts, _) = robot.model, motion.modes.shape
-    nodes = np.empty((len(robot.structure.node_names), NODE_COLUMNS))
-    frames = np.empty((contacts, FRAME_COLUMNS))
-    pulls = np.empty((count, len(model.cables), PULL_COLUMNS))
-    pushes = np.empty((count, contacts, 3))
-    force, ground = np.empty(6 * len(robot.structure.bodies)), ground_arguments(model.ground)
-    for k, (state, signals) in enumerate(zip(motion.states, motion.signals, strict=True)):
-        cable_forces(state, signals, model.p_BN, model.cables, model.slack, nodes, pulls[k], force)
-        ground_forces(state, motion.modes[k], model.p_BN, *ground, nodes, frames, pushes[k], force)
+    model, samples = robot.model, len(motion.times)
+    pulls = np.empty((samples, len(model.cables), PULL_COLUMNS))
+    pushes = np.empty((samples, len(model.ground.contacts), PUSH_COLUMNS))
+    forces = Forces.of(model)
+    forces_along(model, motion.states, motion.modes, motion.signals, forces, pulls, pushes)
     return pulls, pushes if motion.pushes is None else motion.pushes
 
 

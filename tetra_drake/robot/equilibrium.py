@@ -7,17 +7,11 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, add_cable_forces
-from tetra_drake.physics.contact import (
-    MODE_COLUMNS,
-    NormalForce,
-    add_ground_forces,
-    meet_ground,
-    update_modes,
-)
-from tetra_drake.physics.kinematics import NODE_COLUMNS, gather_forces, move_bodies
+from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION
+from tetra_drake.physics.contact import MODE_COLUMNS, NormalForce, update_modes
+from tetra_drake.physics.forces import Forces, compute_forces, move_robot
+from tetra_drake.physics.kinematics import move_bodies
 from tetra_drake.physics.model import Model
-from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.simd.compiling import compiled
 from tetra_drake.simd.lanes import Table
 
@@ -56,39 +50,29 @@ class Resting(NamedTuple):
     """A robot whose forces are sought, without actuation, and room to compute them in."""
 
     model: Model
-    nodes: Table
-    frames: Table
-    pulls: Table
-    """(cables, PULL_COLUMNS), of the state that was last computed; so are `pushes`."""
-    pushes: Table
-    """(contacts, 3)."""
+    forces: Forces
+    """Those at the state that was last computed."""
 
     @classmethod
-    def of(cls, model: Model, bodies: int) -> Self:
+    def of(cls, model: Model) -> Self:
         """The robot of a model, no signal driving its cables."""
-        cables, contacts = model.cables.copy(), len(model.ground.contacts)
+        cables = model.cables.copy()
         cables["signal"] = PASSIVE
-        return cls(
-            model._replace(cables=cables),
-            nodes=np.empty((len(model.p_BN) * bodies, NODE_COLUMNS)),
-            frames=np.empty((contacts, FRAME_COLUMNS)),
-            pulls=np.empty((len(cables), PULL_COLUMNS)),
-            pushes=np.empty((contacts, 3)),
-        )
+        return cls(model._replace(cables=cables), Forces.of(model))
 
 
 def find_rest(model: Model, start: np.ndarray) -> Rest | None:
     """Rest of a robot on flat ground, let go at `start` (13 n,) without actuation:
     the minimum of potential energy downhill from there; friction carries nothing. None if it is
     not found."""
-    robot, state = Resting.of(model, len(start) // 13), start
+    robot, state = Resting.of(model), start
     weight, radius = model.body.mass[0] * model.body.gravity[0], model.body.radius[0]
     reach = FIRST_REACH * radius
     for _ in range(ITERATIONS):
         force = force_at_rest(robot, state)
-        greatest = max(np.abs(robot.pulls[:, TENSION]).max(), weight * force.size / 6)
+        greatest = max(np.abs(robot.forces.pulls[:, TENSION]).max(), weight * force.size / 6)
         if np.abs(force).max() <= TOLERANCE * greatest:
-            return Rest(state, np.round(robot.pulls[:, LENGTH], LENGTH_DIGITS))
+            return Rest(state, np.round(robot.forces.pulls[:, LENGTH], LENGTH_DIGITS))
         step = _newton_step(robot, state, force)
         step *= min(1.0, reach / np.abs(step).max())
         moved = displaced(robot, state, step)
@@ -127,18 +111,15 @@ def _free_motions(robot: Resting, state: np.ndarray) -> np.ndarray:
 @compiled
 def force_at_rest(robot: Resting, state: Table) -> Table:
     """(6 n,): [t_W / radius; f_W] of all forces at each Bo; contact nodes stick where they are."""
-    model, nodes, frames = robot.model, robot.nodes, robot.frames
-    ground, weight = model.ground, model.body.mass[0] * model.body.gravity[0]
-    modes, force = np.zeros((robot.pushes.shape[0], MODE_COLUMNS)), np.empty(state.size // 13 * 6)
-    meet_ground(state, model.p_BN, ground, nodes, frames)
-    update_modes(state, nodes, ground, frames, modes)
-    add_cable_forces(nodes, np.zeros(1), model.cables, model.slack, True, robot.pulls)
-    add_ground_forces(nodes, modes, ground, frames, True, robot.pushes)
-    gather_forces(nodes, force)
-    for body in range(force.size // 6):
-        force[6 * body + 5] -= weight
-        force[6 * body : 6 * body + 3] /= robot.model.body.radius[0]
-    return force
+    model, forces = robot.model, robot.forces
+    modes = np.zeros((forces.pushes.shape[0], MODE_COLUMNS))
+    generalized = np.empty(6 * (state.size // 13))
+    move_robot(model, state, forces)
+    update_modes(state, forces.nodes, model.ground, forces.frames, modes)
+    compute_forces(model, modes, np.zeros(1), True, forces, generalized)
+    for body in range(generalized.size // 6):
+        generalized[6 * body : 6 * body + 3] /= model.body.radius[0]
+    return generalized
 
 
 @compiled

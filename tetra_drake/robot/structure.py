@@ -12,7 +12,6 @@ from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN, move_nodes
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.scenario.cable_names import CABLES
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.terrain_kinds import Incline
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
 """The nodes of a tetrahedron; the first three form the base triangle."""
@@ -86,9 +85,7 @@ def MakeStructure(scenario: Scenario) -> Structure:
     p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
     if robot.offsets:
         p_WB += np.array(robot.offsets)
-    terrain, slope = scenario.terrain, 0.0
-    if isinstance(terrain, Incline) and terrain.start is None:
-        slope = terrain.slope
+    slope = scenario.terrain.plane_slope or 0.0
     # Written out, as a product of matrices is rounded differently on different processors.
     s, c = math.sin(slope), math.cos(slope)
     forward, left, up = p_WB.T

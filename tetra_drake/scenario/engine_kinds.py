@@ -1,16 +1,33 @@
 """Kinds of engines: how finely they simulate."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from tetra_drake.scenario.friction_kinds import FrictionKind
 from tetra_drake.scenario.sections import Kinds, Section, quantity
 
 SHORTEST_STEP = 1e-9
 """Lower limit (s) of the steps of !Compiled."""
 
 
-class Drake(Section):
+class EngineSettings(Section):
+    """A kind of engine."""
+
+    packages: ClassVar[tuple[str, ...]] = ()
+    """Packages that only this engine needs."""
+
+    @property
+    def precision(self) -> str:
+        """How finely the engine simulates, as "accuracy 0.005"."""
+        raise NotImplementedError
+
+    def friction_text(self, friction: FrictionKind) -> str:
+        """The friction that the engine simulates, in words."""
+        return friction.text
+
+
+class Drake(EngineSettings):
     """The Drake diagram with an error-controlled integrator.
 
     Contact and stiction (modes) change at the end of steps, or are localised by a witness function.
@@ -25,8 +42,12 @@ class Drake(Section):
     look_ahead: float = quantity("s", default=2e-5, ge=0)
     """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none."""
 
+    @property
+    def precision(self) -> str:
+        return f"accuracy {self.accuracy:g}"
 
-class Compiled(Section):
+
+class Compiled(EngineSettings):
     """The compiled engine: a Rosenbrock method in machine code, many gaits side by side."""
 
     tolerance: float = quantity("m/s", default=1e-4, gt=0)
@@ -35,22 +56,25 @@ class Compiled(Section):
     look_ahead: float = quantity("s", default=2e-5, gt=SHORTEST_STEP, le=1)
     """Time from a predicted mode change to the end of the step that aims at it."""
 
+    @property
+    def precision(self) -> str:
+        return f"tolerance {self.tolerance:g} m/s"
 
-class Mujoco(Section):
+
+class Mujoco(EngineSettings):
     """MuJoCo with its own contact, on planes."""
 
     step: float = quantity("s", default=0.125e-3, ge=1e-7, le=1)
 
+    packages: ClassVar[tuple[str, ...]] = ("mujoco",)
 
-MUJOCO_FRICTION = 0.5
-"""Coefficient of MuJoCo's friction, as of metal on a floor, in place of the thesis's law."""
+    @property
+    def precision(self) -> str:
+        return f"step {1e3 * self.step:g} ms"
 
-ENGINES: dict[str, type[Drake] | type[Compiled] | type[Mujoco]] = {
-    "drake": Drake,
-    "compiled": Compiled,
-    "mujoco": Mujoco,
-}
-"""The kinds of engines by their names on the command line and in records."""
+    def friction_text(self, friction: FrictionKind) -> str:
+        return friction.cone_text
+
 
 Engine = Annotated[Drake | Compiled | Mujoco, Kinds()]
 """The tagged kinds of engines; without a tag it is the first."""

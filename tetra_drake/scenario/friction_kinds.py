@@ -5,10 +5,13 @@ The kernels of each, which need numba, are imported only where a law is asked fo
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.kind_text import settings_text
 from tetra_drake.scenario.sections import Kinds, Section, quantity, refuse
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
@@ -16,7 +19,43 @@ if TYPE_CHECKING:
     from tetra_drake.physics.friction import FrictionLaw
 
 
-class ResetIntegrator(Section):
+MUJOCO_FRICTION = 0.5
+"""Coefficient of MuJoCo's friction, as of metal on a floor, in place of the thesis's law."""
+
+
+@dataclass(frozen=True)
+class Cone:
+    """MuJoCo's friction: against the velocity, and at most `coefficient` times the load."""
+
+    coefficient: float
+    damping: float
+    """Force per velocity below the limit, N s/m."""
+
+
+class FrictionKind(Section):
+    """A kind of friction."""
+
+    def law(self) -> FrictionLaw:
+        """Law as the kernels take it."""
+        raise NotImplementedError
+
+    @property
+    def text(self) -> str:
+        """The law in words."""
+        raise NotImplementedError
+
+    def cone(self, source: object) -> Cone:
+        """What MuJoCo simulates for it; raises InputError, naming `source` and key, if nothing."""
+        problem = f"found !{type(self).__name__}, which mujoco cannot simulate"
+        raise InputError(source, "friction", problem)
+
+    @property
+    def cone_text(self) -> str:
+        """What MuJoCo simulates for it, in words."""
+        return self.text
+
+
+class ResetIntegrator(FrictionKind):
     """The friction of the thesis (Table 2, Eq. 3-5), which does not know the load.
 
     For each contact and each of two tangents of the ground, with x the deflection from the stick
@@ -35,13 +74,23 @@ class ResetIntegrator(Section):
     """sigma_0."""
 
     def law(self) -> FrictionLaw:
-        """Law as the kernels take it."""
         from tetra_drake.physics.friction import FrictionLaw, ResetConstants
 
         return FrictionLaw.reset_integrator(ResetConstants(**dict(self)))
 
+    @property
+    def text(self) -> str:
+        return "the thesis's friction"
 
-class Coulomb(Section):
+    def cone(self, source: object) -> Cone:
+        return Cone(MUJOCO_FRICTION, self.stiction_damping)
+
+    @property
+    def cone_text(self) -> str:
+        return f"MuJoCo's friction (coefficient {MUJOCO_FRICTION:g})"
+
+
+class Coulomb(FrictionKind):
     """Friction that grows with the load F_N, and may depend on the direction of travel.
 
     In the tangent plane u = c v + k x, with x the deflection from the stick point (in stick only)
@@ -75,7 +124,6 @@ class Coulomb(Section):
         return self
 
     def law(self) -> FrictionLaw:
-        """Law as the kernels take it."""
         from tetra_drake.physics.friction import CoulombConstants, FrictionLaw
 
         return FrictionLaw.coulomb(
@@ -89,6 +137,20 @@ class Coulomb(Section):
                 per_lateral=1.0 / self.lateral,
             )
         )
+
+    @property
+    def text(self) -> str:
+        return f"Coulomb friction{settings_text(self, always=('static', 'kinetic'))}"
+
+    def cone(self, source: object) -> Cone:
+        possible = {"static": self.kinetic, "stiffness": 0.0}
+        possible |= {"forward": 1.0, "backward": 1.0, "lateral": 1.0}
+        for name, expected in possible.items():
+            value = getattr(self, name)
+            if value != expected:
+                problem = f"found {value:g}, but mujoco can simulate only {expected:g}"
+                raise InputError(source, f"friction.{name}", problem)
+        return Cone(self.kinetic, self.damping)
 
 
 Friction = Annotated[ResetIntegrator | Coulomb, Kinds()]

@@ -10,7 +10,7 @@ from pydantic import PrivateAttr
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.cable_names import SIDES, mirrored
-from tetra_drake.scenario.engine_kinds import ENGINES, Compiled, Drake, Engine, Mujoco
+from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
@@ -92,8 +92,8 @@ class Scenario(Section):
 
     @property
     def engine_name(self) -> str:
-        """Name of the engine, one of ENGINES."""
-        return next(name for name, kind in ENGINES.items() if isinstance(self.engine, kind))
+        """Name of the engine: that of its kind, in lower case."""
+        return type(self.engine).__name__.lower()
 
     def settings_of(self, engine: type[EngineKind]) -> EngineKind:
         """The settings of the scenario's engine, which must be of this kind."""

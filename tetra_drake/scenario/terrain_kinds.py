@@ -18,6 +18,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes
+from tetra_drake.scenario.kind_text import settings_text
 from tetra_drake.scenario.sections import Kinds, Section, quantity
 from tetra_drake.scenario.units import INCH
 
@@ -42,6 +43,16 @@ class Grid:
 class Relief(Section):
     """A kind of terrain."""
 
+    @property
+    def plane_slope(self) -> float | None:
+        """Slope (rad) along +x of a plane through the origin; None for what is no such plane."""
+        return None
+
+    @property
+    def text(self) -> str:
+        """The terrain in words, as "incline (slope 5 deg)"."""
+        return type(self).__name__.lower() + settings_text(self)
+
     def grid(self, *, ahead: float, source: object) -> Grid:
         """The heights of the terrain.
 
@@ -54,6 +65,10 @@ class Relief(Section):
 
 class Flat(Relief):
     """h = 0 everywhere: the thesis's floor, and the default."""
+
+    @property
+    def plane_slope(self) -> float:
+        return 0.0
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         return Grid(np.zeros((3, 3)), (-ASIDE, -ASIDE), (ASIDE, ASIDE))
@@ -68,6 +83,10 @@ class Incline(Relief):
 
     slope: float = quantity("rad", ge=-STEEPEST, le=STEEPEST)  # 60 deg either way
     start: float | None = quantity("m", default=None)
+
+    @property
+    def plane_slope(self) -> float | None:
+        return self.slope if self.start is None else None
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         rise = math.tan(self.slope)

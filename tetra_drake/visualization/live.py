@@ -29,7 +29,7 @@ _PATIENCE = 0.1  # s between two looks for a browser
 
 
 class LiveView:
-    """Shows a simulation in Meshcat, no faster than real time (see engines.viewer.Viewer).
+    """Shows a simulation in Meshcat, no faster than real time (see engines.interface.Viewer).
 
     It begins once a browser is there.
     """

@@ -2,19 +2,15 @@
 
 import numpy as np
 import pytest
+from helpers.forces import forces_at
 from helpers.states import disturbed
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.dynamics import (
-    Forces,
-    forces_at,
-    implicit_matrix,
-)
-from tetra_drake.physics.cable import PULL_COLUMNS
+from tetra_drake.engines.compiled.dynamics import implicit_matrix
 from tetra_drake.physics.contact import MODE_COLUMNS, modes_after_step
-from tetra_drake.physics.kinematics import NODE_COLUMNS, move_bodies
+from tetra_drake.physics.forces import Forces
+from tetra_drake.physics.kinematics import move_bodies
 from tetra_drake.physics.model import JUNCTION_CABLES, Model
-from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
@@ -23,18 +19,10 @@ from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
-def tables_of(robot: Model, bodies: int) -> Forces:
-    """Tables of forces."""
-    contacts = len(robot.ground.contacts)
-    nodes, frames = np.empty((4 * bodies, NODE_COLUMNS)), np.empty((contacts, FRAME_COLUMNS))
-    pulls, pushes = np.empty((len(robot.cables), PULL_COLUMNS)), np.empty((contacts, 3))
-    return Forces(nodes, frames, pulls, pushes)
-
-
 def forces_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Forces, np.ndarray]:
     """All forces without actuation, and as forces on the bodies."""
     bodies = len(state) // 13
-    forces, generalized = tables_of(robot, bodies), np.empty(6 * bodies)
+    forces, generalized = Forces.of(robot), np.empty(6 * bodies)
     forces_at(robot, state, modes, np.zeros(bodies - 1), forces, generalized)
     return forces, generalized
 
@@ -50,7 +38,7 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
     robot, structure = whole.model, whole.structure
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
-    forces = tables_of(robot, len(structure.bodies))
+    forces = Forces.of(robot)
     modes_after_step(state, robot.p_BN, robot.ground, forces.nodes, forces.frames, modes)
     assert np.count_nonzero(modes[:, 0]) > 0, "some nodes touch the ground"
     return robot, state, modes

@@ -10,7 +10,8 @@ import pytest
 import xarray
 from helpers.widths import WIDTHS
 
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, PreparedGait
+from tetra_drake.engines.compiled.course import Course, PreparedGait
+from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.loop import DONE, ROUND, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -201,8 +202,8 @@ def test_a_gait_that_takes_too_long_leaves_its_lane_to_others(short):
     gait, endless = seeded_gait(short), short.with_changes({"simulation.duration": "1 h"})
     with LanePool(1) as pool:
         with pytest.raises(TimeBudgetExceeded):
-            pool.simulate(scenario=endless, gait=gait, time_budget=0.05)
-        found = pool.simulate(scenario=short, gait=gait)
+            pool.result(*pool.submit([(endless, gait)], time_budget=0.05))
+        found = pool.result(*pool.submit([(short, gait)]))
     assert found.metrics == simulate(scenario=short, gait=gait).metrics
 
 
@@ -228,7 +229,8 @@ def test_an_error_of_the_engine_reaches_those_who_wait(short, monkeypatch):
             patch.setattr(LaneEngine, "advance", fail)
             futures = pool.submit([(short, gait)] * 12)
             assert all(isinstance(future.exception(), MemoryError) for future in futures)
-        assert pool.simulate(scenario=short, gait=gait).metrics.distance != 0.0
+        (future,) = pool.submit([(short, gait)])
+        assert pool.result(future).metrics.distance != 0.0
 
 
 def test_the_end_of_a_pool_cancels_what_is_under_way(short):

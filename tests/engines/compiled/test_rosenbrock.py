@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
+from helpers.forces import forces_at
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.dynamics import Forces, forces_at
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
-from tetra_drake.physics.cable import PULL_COLUMNS
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
-from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.model import JUNCTION_CABLES
-from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.schema import Scenario
@@ -41,12 +39,7 @@ class Stepper:
             rows=np.empty((bodies, BLOCK, ROW)),
             lines=np.empty((JUNCTION_CABLES, 9)),
         )
-        self.forces = Forces(
-            np.empty((4 * bodies, NODE_COLUMNS)),
-            np.empty((len(contacts), FRAME_COLUMNS)),
-            np.empty((len(self.robot.cables), PULL_COLUMNS)),
-            np.empty((len(contacts), 3)),
-        )
+        self.forces = Forces.of(self.robot)
 
     def start(self) -> np.ndarray:
         """A state half a millimetre in the ground, all bodies sliding to one side and turning."""

@@ -5,70 +5,23 @@ Vectors over bodies hold 6 numbers per body, rotation before translation, in Wor
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
-from tetra_drake.physics.cable import DIRECTION, add_cable_forces
+from tetra_drake.physics.cable import DIRECTION
 from tetra_drake.physics.contact import (
     CONTACT,
     NORMAL,
     Ground,
     NormalForce,
-    add_ground_forces,
     gap,
-    meet_ground,
     sliding,
 )
+from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.friction import friction_damping
-from tetra_drake.physics.kinematics import P_BN_W, gather_forces
+from tetra_drake.physics.kinematics import P_BN_W
 from tetra_drake.physics.model import JUNCTION_CABLES, Model
 from tetra_drake.physics.terrain import to_world
-from tetra_drake.simd.compiling import compiled, inlined, merged
+from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, any_lane, named, select
-
-
-class Forces(NamedTuple):
-    """The forces at a state, as in `physics`, which kernels write."""
-
-    nodes: Table
-    """(nodes, NODE_COLUMNS)."""
-    frames: Table
-    """(contacts, FRAME_COLUMNS): where the nodes meet the ground."""
-    pulls: Table
-    """(cables, PULL_COLUMNS): of the cables."""
-    pushes: Table
-    """(contacts, 3): of the ground."""
-
-
-@inlined
-def move_robot(robot: Model, state: Table, forces: Forces) -> None:
-    """Moves the nodes to where a state (13 bodies,) has them; no forces act on them yet."""
-    meet_ground(state, robot.p_BN, robot.ground, forces.nodes, forces.frames)
-
-
-@inlined
-def compute_forces(
-    robot: Model, modes: Table, signals: Table, keep: bool, forces: Forces, generalized: Table
-) -> None:
-    """Writes all forces on nodes that have just been moved, with gravity, as (6 bodies,).
-
-    With `keep`, those of the cables and the ground by themselves, too.
-    """
-    add_cable_forces(forces.nodes, signals, robot.cables, robot.slack, keep, forces.pulls)
-    add_ground_forces(forces.nodes, modes, robot.ground, forces.frames, keep, forces.pushes)
-    gather_forces(forces.nodes, generalized)
-    weight = robot.body.mass[0] * robot.body.gravity[0]
-    for body in range(generalized.size // BLOCK):
-        generalized[BLOCK * body + 5] -= weight
-
-
-@compiled
-def forces_at(
-    robot: Model, state: Table, modes: Table, signals: Table, forces: Forces, generalized: Table
-) -> None:
-    """Writes the `forces` and the generalized force at a state of the bodies, in its modes."""
-    move_robot(robot, state, forces)
-    compute_forces(robot, modes, signals, True, forces, generalized)
 
 
 @inlined

@@ -2,147 +2,39 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import time
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import typeof
 from numba.core import registry
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.dynamics import Forces
+from tetra_drake.engines.compiled.course import Course, PreparedGait
 from tetra_drake.engines.compiled.loop import (
-    CLOCK_ROWS,
     DUE,
     EVALUATIONS,
     IDLE,
     MARK,
+    PLANNED,
     ROUND,
     STATUS,
-    STEP,
     TAKEN,
     TIME,
     TRIED,
     WALKING,
-    Constants,
     Log,
-    Walk,
     advance,
 )
-from tetra_drake.engines.compiled.rosenbrock import Step
-from tetra_drake.errors import MAX_SPEED
-from tetra_drake.physics.cable import PULL_COLUMNS, Cables
-from tetra_drake.physics.contact import MODE_COLUMNS, PUSH_COLUMNS
-from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.physics.model import JUNCTION_CABLES
-from tetra_drake.physics.oscillator import make_neurons
+from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.tally import Tally
-from tetra_drake.physics.terrain import FRAME_COLUMNS, SurfaceGrid
-from tetra_drake.results.metrics import empty_tally
-from tetra_drake.results.result import motion_times
+from tetra_drake.physics.terrain import SurfaceGrid
 from tetra_drake.results.trajectory import Motion
-from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
-from tetra_drake.robot.signals import sample_count
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
 FIRST = SurfaceGrid._fields.index("first")
 """Column of a grid with the index of its first height: those of all lanes stand in one row."""
-
-
-@dataclass(frozen=True)
-class PreparedGait:
-    """A gait on a scenario, prepared for a lane."""
-
-    robot: Robot
-    gait: Gait
-    record: bool
-    steering: SteeringSignal | None
-    """Steering signal, in place of the gait's turn."""
-    times: np.ndarray
-    """The times (s) of the samples to keep, those of motion_times()."""
-    marks: np.ndarray
-    """The times (s) at which steps end."""
-
-    @classmethod
-    def of(
-        cls,
-        robot: Robot,
-        gait: Gait,
-        *,
-        record: bool,
-        steering: SteeringSignal | None = None,
-    ) -> PreparedGait:
-        """Prepares a gait."""
-        simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
-        ends = 0.0, simulation.steady_from, simulation.duration
-        return cls(
-            robot,
-            gait,
-            record,
-            steering,
-            times=motion_times(simulation, record=record),
-            marks=np.unique([*ends, *([start_up] if start_up <= simulation.duration else [])]),
-        )
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """Properties that simulations on one engine must share."""
-        scenario, ground = self.robot.scenario, self.robot.ground
-        drivers = tuple(self.robot.actuation.drivers.tolist())
-        return (
-            scenario.robot.tetrahedra,
-            len(ground.contacts),
-            scenario.cables.slack,
-            drivers,
-            self.live,
-            ground.flat,
-            ground.friction.kind,
-        )
-
-    @property
-    def live(self) -> bool:
-        """True if the network is integrated with the robot."""
-        return self.robot.scenario.cpg.signals == "live"
-
-    @functools.cached_property
-    def turns(self) -> np.ndarray:
-        """The turns that Robot.turns() gives; raises InputError as it does."""
-        return self.robot.turns(self.gait, self.steering)
-
-    @property
-    def recent_signals(self) -> int:
-        """Number of signal samples that an engine holds: those within a step, and as many
-        for lanes that run ahead; a power of two."""
-        scenario = self.robot.scenario
-        within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
-        return 1 << math.ceil(math.log2(2.0 * within + 32.0))
-
-    @property
-    def turn_samples(self) -> int:
-        """Number of samples of the turn that an engine holds."""
-        if self.steering is None:
-            return 1
-        scenario = self.robot.scenario
-        return round(scenario.simulation.duration / scenario.cpg.listing_step) + 1
-
-
-class Course(NamedTuple):
-    """The course of a simulation."""
-
-    status: int
-    time: float
-    """When it ended, in s."""
-    steps: int
-    evaluations: int
-    motion: Motion
-    totals: Tally
-    wall_time: float
-    """Wall time in s, shared with the other lanes of the same core."""
 
 
 class LaneEngine:
@@ -154,7 +46,7 @@ class LaneEngine:
         structure, points = first.robot.structure, first.robot.ground.heights.size
         self._bodies = len(structure.bodies)
         self._heights = np.zeros((width, points))
-        constants = in_lanes(make_constants(first), width)
+        constants = in_lanes(first.constants(), width)
         ground = constants.robot.ground._replace(heights=FieldArray(self._heights.ravel()))
         shape = constants.network.inhibition.shape
         inhibition = lane_table(shape, width, any_size=True)  # compiled once for robots of any size
@@ -162,7 +54,7 @@ class LaneEngine:
             robot=constants.robot._replace(ground=ground),
             network=constants.network._replace(inhibition=inhibition),
         )
-        self._walk = in_lanes(start_walk(first), width)
+        self._walk = in_lanes(first.start(), width)
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
             marks=np.full((width, 5), math.inf),
@@ -173,7 +65,7 @@ class LaneEngine:
             modes=np.zeros((*shape, len(structure.contacts), MODE_COLUMNS)),
             signals=np.zeros((*shape, signals)),
             recent=np.zeros((width, first.recent_signals, signals)),
-            turns=np.zeros((width, first.turn_samples)),
+            turns=np.zeros((width, len(first.turns))),
         )
         log = Log(*(FieldArray(array, any_size=True) for array in self._log))
         self._arguments = self._constants, self._walk, log, first.live
@@ -194,7 +86,7 @@ class LaneEngine:
             prepared.kind == self._kind
             and len(prepared.times) < log.times.shape[1]
             and prepared.recent_signals <= log.recent.shape[1]
-            and prepared.turn_samples <= log.turns.shape[1]
+            and len(prepared.turns) <= log.turns.shape[1]
             and prepared.robot.ground.heights.size <= self._heights.shape[1]
         )
 
@@ -205,7 +97,7 @@ class LaneEngine:
 
     def load(self, lane: int, prepared: PreparedGait) -> None:
         """Starts a gait in a lane; raises InputError if it does not fit its scenario."""
-        constants, walk = make_constants(prepared), start_walk(prepared)
+        constants, walk = prepared.constants(), prepared.start()
         fill_lane(self._constants, constants, lane)
         fill_lane(self._walk, walk, lane)
         network, given = self._constants.network, constants.network
@@ -227,7 +119,7 @@ class LaneEngine:
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)
         clock[STATUS, lane] = WALKING
-        clock[STEP, lane] = min(engine.look_ahead, engine.max_step)
+        clock[PLANNED, lane] = min(engine.look_ahead, engine.max_step)
         clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
         self._in_lane[lane], self._wall_times[lane] = prepared, 0.0
 
@@ -289,73 +181,6 @@ def processor_features() -> str:
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
 
 
-def make_constants(prepared: PreparedGait) -> Constants:
-    """The constants of one simulation, as arrays without lanes; of the ground without heights."""
-    robot, gait = prepared.robot, prepared.gait
-    scenario, model = robot.scenario, robot.model
-    cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
-    cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
-    ground = model.ground._replace(heights=None)  # of which lanes have different numbers
-    return Constants(
-        robot=model._replace(cables=cables, ground=ground),
-        network=robot.network(gait),
-        senses=robot.senses,
-        sides=np.repeat(robot.actuation.sides, 2).astype(float),
-        external_input=np.array([cpg.external_input]),
-        gains=np.array([gain for _, gain in gait.gains]),
-        gain=np.array([cpg.gain]),
-        period=np.array([cpg.listing_step]),
-        samples=np.array([sample_count(scenario)], dtype=float),
-        start_up=np.array([cpg.start_up]),
-        tolerance=np.array([engine.tolerance]),
-        max_step=np.array([engine.max_step]),
-        look_ahead=np.array([engine.look_ahead]),
-        max_speed=np.array([MAX_SPEED]),
-        max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
-    )
-
-
-def start_walk(prepared: PreparedGait) -> Walk:
-    """The state of one simulation at its start, and room for what is computed on the way, as arrays
-    without lanes."""
-    robot, scenario, structure = prepared.robot, prepared.robot.scenario, prepared.robot.structure
-    bodies, signals = len(structure.bodies), structure.signals
-    contacts, cables = len(structure.contacts), len(structure.cables)
-    velocities = np.zeros(BLOCK * bodies)
-    return Walk(
-        clock=np.zeros(CLOCK_ROWS),
-        step=Step(
-            state=structure.initial_state,
-            end=np.zeros(13 * bodies),
-            force=velocities,
-            end_force=velocities,
-            change=velocities,
-            stage=velocities,
-            k1=velocities,
-            k2=velocities,
-            rows=np.zeros((bodies, BLOCK, ROW)),
-            lines=np.zeros((JUNCTION_CABLES, 9)),
-        ),
-        forces=Forces(
-            nodes=np.zeros((len(structure.node_names), NODE_COLUMNS)),
-            frames=np.zeros((contacts, FRAME_COLUMNS)),
-            pulls=np.zeros((cables, PULL_COLUMNS)),
-            pushes=np.zeros((contacts, PUSH_COLUMNS)),
-        ),
-        modes=robot.starting_modes(),
-        acceleration=velocities,
-        signals=np.zeros(signals),
-        end_signals=np.zeros(signals),
-        neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
-        output=np.zeros(signals),
-        tonic=robot.tonic_input(prepared.turns)[0],
-        inputs=np.zeros(2 * signals),
-        lengths=np.zeros(cables),
-        normal_forces=np.zeros(contacts),
-        tally=empty_tally(scenario, structure),
-    )
-
-
 def in_lanes(values: Any, width: int) -> Any:
     """A table in lanes for each array of real numbers in NamedTuples, zeros. Arrays of indices are
     for all lanes; what is no array stays."""
@@ -363,9 +188,9 @@ def in_lanes(values: Any, width: int) -> Any:
         return type(values)(*(in_lanes(value, width) for value in values))
     if not isinstance(values, np.ndarray):
         return values
-    return (
-        FieldArray(values.copy()) if values.dtype == np.int64 else lane_table(values.shape, width)
-    )
+    if values.dtype == np.int64:
+        return FieldArray(values.copy())
+    return lane_table(values.shape, width)
 
 
 def fill_lane(tables: Any, values: Any, lane: int) -> None:

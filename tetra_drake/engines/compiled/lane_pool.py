@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
-from tetra_drake.engines.compiled.engine import make_outcome
-from tetra_drake.engines.compiled.lane_engine import Course, LaneEngine, PreparedGait, lanes_for
-from tetra_drake.errors import InputError, SimulationFailure, TimeBudgetExceeded
+from tetra_drake.engines.compiled.course import Course, PreparedGait, make_outcome
+from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
+from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
@@ -58,7 +58,12 @@ class LanePool:
     @property
     def capacity(self) -> int:
         """The number of gaits that are simulated at a time."""
-        return len(self._threads) * lanes_for(math.inf)
+        return len(self._threads) * self.most_lanes()
+
+    @staticmethod
+    def most_lanes() -> int:
+        """The number of gaits that one thread simulates at a time."""
+        return lanes_for(math.inf)
 
     def __enter__(self) -> LanePool:
         return self
@@ -72,16 +77,6 @@ class LanePool:
         for job in self._waiting:
             job.future.set_exception(CancelledError())
 
-    def simulate(
-        self, *, scenario: Scenario, gait: Gait, record: bool = False, time_budget: float = math.inf
-    ) -> SimulationResult:
-        """Result of simulate() for a gait, while other threads ask for other gaits.
-
-        Also raises TimeBudgetExceeded if a simulation is not done after `time_budget` (s).
-        """
-        (future,) = self.submit([(scenario, gait)], record=record, time_budget=time_budget)
-        return self.result(future)
-
     @staticmethod
     def result(future: Future[tuple[PreparedGait, Course]]) -> SimulationResult:
         """Waits for a gait of submit(); raises as simulate() does."""
@@ -94,7 +89,10 @@ class LanePool:
         record: bool = False,
         time_budget: float = math.inf,
     ) -> list[Future[tuple[PreparedGait, Course]]]:
-        """Puts gaits, each with its scenario, in the queue; result() waits for one."""
+        """Puts gaits, each with its scenario, in the queue; result() waits for one.
+
+        A gait that is not done after `time_budget` (s) fails with TimeBudgetExceeded.
+        """
         jobs = [_Job(scenario, gait, record, time_budget) for scenario, gait in gaits]
         with self._changed:
             self._waiting.extend(jobs)
@@ -137,7 +135,7 @@ class _Robots:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._latest: dict[int, Robot] = {}
-        """Prepared gaits by the scenario's identity, the one last used at the end."""
+        """Robots by the identity of their scenario, the one last used at the end."""
 
     def __call__(self, scenario: Scenario) -> Robot:
         with self._lock:
@@ -209,20 +207,3 @@ class _Crew:
         if engine is None or not engine.accepts(prepared):
             engine = self._engines[width] = LaneEngine(prepared, width=width)
         return engine
-
-
-def simulate_in_lanes(
-    gaits: Sequence[tuple[Scenario, Gait]],
-    *,
-    record: bool,
-    threads: int,
-) -> list[SimulationResult | SimulationFailure]:
-    """The results of many gaits, each with its scenario, or their failures."""
-    found: list[SimulationResult | SimulationFailure] = []
-    with LanePool(threads) as pool:
-        for future in pool.submit(gaits, record=record):
-            try:
-                found.append(pool.result(future))
-            except SimulationFailure as failure:
-                found.append(failure)
-    return found

@@ -19,11 +19,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
-from tetra_drake.engines.compiled.dynamics import Forces, compute_forces, move_robot
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
+from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics.cable import LENGTH
 from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.feedback import Senses, sense
+from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.model import Model
@@ -59,15 +60,18 @@ ROUND = 32
 """Iterations, some 40 ms of a walk, after which the distances of struts are looked at: enough to
 find the least one to within 0.1 mm."""
 
-STATUS, TIME, STEP, END, MARK, DUE, ACTIVE, SAMPLES, TRIED, TAKEN = range(10)
-"""Rows of `clock`: status, time, length of the step tried and its end, times of the next mark and
-of the next sample to keep (s), whether signals act (0 or 1), number of samples of the signals that
-exist, steps tried, steps taken."""
+STATUS, TIME, PLANNED, STEP, END, MARK, DUE, ACTIVE, SAMPLES, TRIED, TAKEN = range(11)
+"""Rows of `clock`: status, time, length of the step planned next, length of the one tried and its
+end, times of the next mark and of the next sample to keep (s), whether signals act (0 or 1), number
+of samples of the signals that exist, steps tried, steps taken."""
 
-ACCEPTED, GOES, PLACE, CLOCK_ROWS = 10, 11, 12, 13
-"""Further rows, which hold for a moment what lanes are asked one by one: whether the step is
-accepted and whether the network takes a step (0 or 1), a place among the turns; and the number of
-all rows."""
+CLOCK_ROWS = 11
+
+ACCEPTED, GOES, PLACE = range(3)
+"""Rows of `asked`: whether the step is accepted, whether the network takes a step (0 or 1), and a
+place among the turns."""
+
+ASKED_ROWS = 3
 
 
 class Constants(NamedTuple):
@@ -93,7 +97,6 @@ class Constants(NamedTuple):
     tolerance: Table
     max_step: Table
     look_ahead: Table
-    max_speed: Table
     max_evaluations: Table
 
 
@@ -102,6 +105,8 @@ class Walk(NamedTuple):
 
     clock: Table
     """(CLOCK_ROWS,)."""
+    asked: Table
+    """(ASKED_ROWS,): what has just been computed for all lanes, and is then read lane by lane."""
     step: Step
     forces: Forces
     modes: Table
@@ -190,10 +195,10 @@ def iterate(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
         correct_neurons(constants.network, walk.inputs, step, accepted, walk.neurons)
         drive(constants, walk)
     if any_lane(accepted & (clock[DUE] <= step_end)):
-        clock[ACCEPTED] = select(accepted, 1.0, 0.0)
+        walk.asked[ACCEPTED] = select(accepted, 1.0, 0.0)
         keep_samples(constants, walk, log, live)
     move_on(walk, walks, accepted)
-    clock[STEP] = next_step(error, step, constants.tolerance[0], constants.max_step[0])
+    clock[PLANNED] = next_step(error, step, constants.tolerance[0], constants.max_step[0])
 
     status = select(walks, fate(constants, walk), clock[STATUS])
     ended |= any_lane(status != clock[STATUS])
@@ -258,7 +263,7 @@ def aim(constants: Constants, walk: Walk) -> Real:
         for j in range(BLOCK):
             i = BLOCK * body + j
             walk.acceleration[i] = walk.step.force[i] * (per_moment if j < 3 else per_mass)
-    planned = clock[STEP]
+    planned = clock[PLANNED]
     change = time_to_mode_change(
         walk.step.state,
         walk.acceleration,
@@ -291,10 +296,10 @@ def fate(constants: Constants, walk: Walk) -> Real:
     for body in range(bodies):
         for k in range(3):
             speed = larger(speed, abs(state[7 * bodies + BLOCK * body + 3 + k]))
-    too_fast = (speed > constants.max_speed[0]) | (speed != speed)
+    too_fast = (speed > MAX_SPEED) | (speed != speed)
     too_many = EVALUATIONS * walk.clock[TRIED] > constants.max_evaluations[0]
     status = select(too_fast, 1.0 * TOO_FAST, 1.0 * WALKING)
-    status = select(walk.clock[STEP] <= LEAST_STEP, 1.0 * STEP_TOO_SMALL, status)
+    status = select(walk.clock[PLANNED] <= LEAST_STEP, 1.0 * STEP_TOO_SMALL, status)
     return select(too_many, 1.0 * TOO_MANY_EVALUATIONS, status)
 
 
@@ -304,7 +309,8 @@ def run_ahead(constants: Constants, walk: Walk, log: Log, until: Real) -> None:
 
     Others go along as far as there is room, so that few steps are taken for one lane alone.
     """
-    clock, period, floats = walk.clock, constants.period[0], by_lane(walk.clock)
+    clock, period = walk.clock, constants.period[0]
+    gain, output, asked = by_lane(constants.gain), by_lane(walk.output), by_lane(walk.asked)
     needed, room = until / period + 1.0, clock[TIME] / period + (log.recent.shape[1] - 1.0)
     grows = clock[STATUS] == WALKING
     while any_lane(grows & (clock[SAMPLES] < constants.samples[0]) & (clock[SAMPLES] <= needed)):
@@ -313,14 +319,13 @@ def run_ahead(constants: Constants, walk: Walk, log: Log, until: Real) -> None:
         steer(constants, walk, log, clock[SAMPLES] + 0.5)
         euler_step(constants.network, walk.tonic, step, walk.neurons)
         oscillator_output(walk.neurons, walk.output)
-        clock[GOES] = select(goes, 1.0, 0.0)
+        walk.asked[GOES] = select(goes, 1.0, 0.0)
         for lane in range(log.kept.size):
-            if floats[GOES, lane] != 0.0:
-                row = row_of(int(floats[SAMPLES, lane]), log)
+            if asked[GOES, lane] != 0.0:
+                row = row_of(int(by_lane(clock)[SAMPLES, lane]), log)
                 for k in range(walk.output.size):
-                    signal = by_lane(constants.gain)[0, lane] * by_lane(walk.output)[k, lane]
-                    log.recent[lane, row, k] = signal
-        clock[SAMPLES] += clock[GOES]
+                    log.recent[lane, row, k] = gain[0, lane] * output[k, lane]
+        clock[SAMPLES] += walk.asked[GOES]
 
 
 @inlined
@@ -339,30 +344,27 @@ def feel(constants: Constants, walk: Walk, log: Log, time: Real, state: Table) -
 @inlined
 def steer(constants: Constants, walk: Walk, log: Log, sample: Real) -> None:
     """Writes the tonic input where the turns change; `sample` is a place between two of them."""
-    turns, floats = log.turns.shape[1], by_lane(walk.clock)
+    turns = log.turns.shape[1]
     if turns == 1:
         return
-    walk.clock[PLACE] = sample
+    walk.asked[PLACE] = sample
+    places, sides, tonic = by_lane(walk.asked), by_lane(constants.sides), by_lane(walk.tonic)
     for lane in range(log.kept.size):
-        i = max(0, min(int(floats[PLACE, lane]), turns - 2))
+        place, external = places[PLACE, lane], by_lane(constants.external_input)[0, lane]
+        i = max(0, min(int(place), turns - 2))
         before, after = log.turns[lane, i], log.turns[lane, i + 1]
-        turn = before + (min(floats[PLACE, lane], turns - 1.0) - i) * (after - before)
+        turn = before + (min(place, turns - 1.0) - i) * (after - before)
         for k in range(walk.tonic.size):
-            external, side = (
-                by_lane(constants.external_input)[0, lane],
-                by_lane(constants.sides)[k, lane],
-            )
-            by_lane(walk.tonic)[k, lane] = steered_input(external, turn, side)
+            tonic[k, lane] = steered_input(external, turn, sides[k, lane])
 
 
 @inlined
 def drive(constants: Constants, walk: Walk) -> None:
     """Writes the signals at the end of the step, N, from a live network."""
     oscillator_output(walk.neurons, walk.output)
+    active, gain = walk.clock[ACTIVE] != 0.0, constants.gain[0]
     for k in range(walk.output.size):
-        walk.end_signals[k] = select(
-            walk.clock[ACTIVE] != 0.0, constants.gain[0] * walk.output[k], 0.0
-        )
+        walk.end_signals[k] = select(active, gain * walk.output[k], 0.0)
 
 
 @inlined
@@ -374,10 +376,8 @@ def interpolate(
         for k in range(signals.shape[0]):
             signals[k, lane] = 0.0
         return
-    place, last = (
-        time / by_lane(constants.period)[0, lane],
-        int(by_lane(constants.samples)[0, lane]) - 1,
-    )
+    place = time / by_lane(constants.period)[0, lane]
+    last = int(by_lane(constants.samples)[0, lane]) - 1
     i = int(place)
     row, next_row = row_of(min(i, last), log), row_of(min(i + 1, last), log)
     for k in range(signals.shape[0]):
@@ -405,9 +405,8 @@ def pass_marks(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
         if clock[MARK, lane] == math.inf:
             clock[STATUS, lane] = DONE
             done = True
-        clock[ACTIVE, lane] = (
-            1.0 if clock[TIME, lane] >= by_lane(constants.start_up)[0, lane] else 0.0
-        )
+        start_up = by_lane(constants.start_up)[0, lane]
+        clock[ACTIVE, lane] = 1.0 if clock[TIME, lane] >= start_up else 0.0
         if not live:
             interpolate(constants, walk, log, lane, clock[TIME, lane], signals)
             continue
@@ -420,16 +419,14 @@ def pass_marks(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
 @merged
 def keep_samples(constants: Constants, walk: Walk, log: Log, live: bool) -> None:
     """Keeps the samples that are due in the accepted step of each lane that has one."""
-    clock, modes, lanes = by_lane(walk.clock), by_lane(walk.modes), log.kept.size
-    signals = np.empty((walk.signals.size, lanes))
-    for lane in range(lanes):
-        while clock[ACCEPTED, lane] != 0.0 and clock[DUE, lane] <= clock[END, lane]:
+    clock, modes, accepted = by_lane(walk.clock), by_lane(walk.modes), by_lane(walk.asked)
+    signals = np.empty((walk.signals.size, log.kept.size))
+    for lane in range(log.kept.size):
+        while accepted[ACCEPTED, lane] != 0.0 and clock[DUE, lane] <= clock[END, lane]:
             i, due, step = log.kept[lane], clock[DUE, lane], clock[STEP, lane]
             part = 1.0 if due == clock[END, lane] else (due - clock[TIME, lane]) / step
-            before, after = (
-                column(by_lane(walk.step.state), lane),
-                column(by_lane(walk.step.end), lane),
-            )
+            before = column(by_lane(walk.step.state), lane)
+            after = column(by_lane(walk.step.end), lane)
             state = interpolate_state(before, after, step, part)
             for k in range(state.size):
                 log.states[lane, i, k] = state[k]

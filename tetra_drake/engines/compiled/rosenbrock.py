@@ -21,13 +21,8 @@ import math
 from typing import NamedTuple
 
 from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, factorise, solve
-from tetra_drake.engines.compiled.dynamics import (
-    Forces,
-    compute_forces,
-    implicit_matrix,
-    inertia,
-    move_robot,
-)
+from tetra_drake.engines.compiled.dynamics import implicit_matrix, inertia
+from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import move_bodies
 from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import inlined, merged

@@ -1,0 +1,202 @@
+"""What goes into a lane of the compiled engine, a prepared gait, and what comes out, its course."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
+from tetra_drake.engines.compiled.loop import (
+    ASKED_ROWS,
+    CLOCK_ROWS,
+    DONE,
+    STEP_TOO_SMALL,
+    TOO_FAST,
+    TOO_MANY_EVALUATIONS,
+    Constants,
+    Walk,
+)
+from tetra_drake.engines.compiled.rosenbrock import Step
+from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.physics.cable import Cables
+from tetra_drake.physics.forces import Forces
+from tetra_drake.physics.model import JUNCTION_CABLES
+from tetra_drake.physics.oscillator import make_neurons
+from tetra_drake.physics.tally import Tally
+from tetra_drake.results.metrics import empty_tally
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
+from tetra_drake.results.trajectory import Motion
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
+from tetra_drake.robot.signals import sample_count
+from tetra_drake.scenario.engine_kinds import Compiled
+from tetra_drake.scenario.schema import Scenario
+
+
+@dataclass(frozen=True)
+class PreparedGait:
+    """A gait on a scenario, prepared for a lane."""
+
+    robot: Robot
+    gait: Gait
+    record: bool
+    steering: SteeringSignal | None
+    """Steering signal, in place of the gait's turn."""
+    times: np.ndarray
+    """The times (s) of the samples to keep, those of motion_times()."""
+    marks: np.ndarray
+    """The times (s) at which steps end."""
+
+    @classmethod
+    def of(
+        cls,
+        robot: Robot,
+        gait: Gait,
+        *,
+        record: bool,
+        steering: SteeringSignal | None = None,
+    ) -> PreparedGait:
+        """Prepares a gait."""
+        simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
+        times = motion_times(simulation, record=record)
+        marks = np.unique([0.0, simulation.steady_from, simulation.duration, start_up])
+        return cls(robot, gait, record, steering, times, marks[marks <= simulation.duration])
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """Properties that simulations on one engine must share."""
+        scenario, ground = self.robot.scenario, self.robot.ground
+        drivers = tuple(self.robot.actuation.drivers.tolist())
+        return (
+            scenario.robot.tetrahedra,
+            len(ground.contacts),
+            scenario.cables.slack,
+            drivers,
+            self.live,
+            ground.flat,
+            ground.friction.kind,
+        )
+
+    @property
+    def live(self) -> bool:
+        """True if the network is integrated with the robot."""
+        return self.robot.scenario.cpg.signals == "live"
+
+    @functools.cached_property
+    def turns(self) -> np.ndarray:
+        """The turns that Robot.turns() gives; raises InputError as it does."""
+        return self.robot.turns(self.gait, self.steering)
+
+    @property
+    def recent_signals(self) -> int:
+        """Number of signal samples that an engine holds: those within a step, and as many
+        for lanes that run ahead; a power of two."""
+        scenario = self.robot.scenario
+        within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
+        return 1 << math.ceil(math.log2(2.0 * within + 32.0))
+
+    def constants(self) -> Constants:
+        """Constants as arrays without lanes; of the ground without heights."""
+        robot, gait = self.robot, self.gait
+        scenario, model = robot.scenario, robot.model
+        cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
+        cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
+        ground = model.ground._replace(heights=None)  # of which lanes have different numbers
+        return Constants(
+            robot=model._replace(cables=cables, ground=ground),
+            network=robot.network(gait),
+            senses=robot.senses,
+            sides=np.repeat(robot.actuation.sides, 2).astype(float),
+            external_input=np.array([cpg.external_input]),
+            gains=np.array([gain for _, gain in gait.gains]),
+            gain=np.array([cpg.gain]),
+            period=np.array([cpg.listing_step]),
+            samples=np.array([sample_count(scenario)], dtype=float),
+            start_up=np.array([cpg.start_up]),
+            tolerance=np.array([engine.tolerance]),
+            max_step=np.array([engine.max_step]),
+            look_ahead=np.array([engine.look_ahead]),
+            max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
+        )
+
+    def start(self) -> Walk:
+        """State at t = 0, and room for what is computed on the way, as arrays without lanes."""
+        robot, scenario, structure = self.robot, self.robot.scenario, self.robot.structure
+        bodies, signals = len(structure.bodies), structure.signals
+        contacts, cables = len(structure.contacts), len(structure.cables)
+        velocities = np.zeros(BLOCK * bodies)
+        return Walk(
+            clock=np.zeros(CLOCK_ROWS),
+            asked=np.zeros(ASKED_ROWS),
+            step=Step(
+                state=structure.initial_state,
+                end=np.zeros(13 * bodies),
+                force=velocities,
+                end_force=velocities,
+                change=velocities,
+                stage=velocities,
+                k1=velocities,
+                k2=velocities,
+                rows=np.zeros((bodies, BLOCK, ROW)),
+                lines=np.zeros((JUNCTION_CABLES, 9)),
+            ),
+            forces=Forces.of(robot.model),
+            modes=robot.starting_modes(),
+            acceleration=velocities,
+            signals=np.zeros(signals),
+            end_signals=np.zeros(signals),
+            neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
+            output=np.zeros(signals),
+            tonic=robot.tonic_input(self.turns)[0],
+            inputs=np.zeros(2 * signals),
+            lengths=np.zeros(cables),
+            normal_forces=np.zeros(contacts),
+            tally=empty_tally(robot),
+        )
+
+
+class Course(NamedTuple):
+    """The course of a simulation."""
+
+    status: int
+    time: float
+    """When it ended, in s."""
+    steps: int
+    evaluations: int
+    motion: Motion
+    totals: Tally
+    wall_time: float
+    """Wall time in s, shared with the other lanes of the same core."""
+
+
+def make_outcome(prepared: PreparedGait, course: Course) -> SimulationResult:
+    """The result of a simulation; raises Diverged or StepBudgetExceeded if it failed."""
+    scenario = prepared.robot.scenario
+    if course.status != DONE:
+        raise _failure(course, scenario)
+    tolerance = scenario.settings_of(Compiled).tolerance
+    return make_result(
+        prepared.robot,
+        course.motion,
+        totals=course.totals,
+        work=IntegratorWork("ros2", tolerance, course.steps, course.evaluations),
+        wall_time=course.wall_time,
+        record=prepared.record,
+    )
+
+
+def _failure(course: Course, scenario: Scenario) -> SimulationFailure:
+    settings = scenario.simulation
+    reasons = {
+        TOO_FAST: f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s",
+        STEP_TOO_SMALL: "no step is small enough for the tolerance",
+        TOO_MANY_EVALUATIONS: f"force evaluations exceed the budget of {settings.max_evaluations}",
+    }
+    kind = StepBudgetExceeded if course.status == TOO_MANY_EVALUATIONS else Diverged
+    failure = kind(time=course.time, reason=reasons[course.status])
+    failure.wall_time = course.wall_time
+    return failure

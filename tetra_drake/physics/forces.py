@@ -1,0 +1,82 @@
+"""All forces on a robot, by cables, ground and gravity, at a state of its bodies."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from tetra_drake.physics.cable import PULL_COLUMNS, add_cable_forces
+from tetra_drake.physics.contact import PUSH_COLUMNS, add_ground_forces, meet_ground
+from tetra_drake.physics.kinematics import NODE_COLUMNS, gather_forces
+from tetra_drake.physics.model import JUNCTION_CABLES, Model
+from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.simd.compiling import compiled, inlined
+from tetra_drake.simd.lanes import Table
+
+
+class Forces(NamedTuple):
+    """The forces at a state, as in `physics`, which kernels write."""
+
+    nodes: Table
+    """(nodes, NODE_COLUMNS)."""
+    frames: Table
+    """(contacts, FRAME_COLUMNS): where the nodes meet the ground."""
+    pulls: Table
+    """(cables, PULL_COLUMNS): of the cables."""
+    pushes: Table
+    """(contacts, PUSH_COLUMNS): of the ground."""
+
+    @classmethod
+    def of(cls, robot: Model) -> Self:
+        """Room for the forces on a robot."""
+        cables, contacts = robot.cables.size, robot.ground.contacts.size
+        bodies = cables // JUNCTION_CABLES + 1
+        return cls(
+            nodes=np.zeros((bodies * len(robot.p_BN), NODE_COLUMNS)),
+            frames=np.zeros((contacts, FRAME_COLUMNS)),
+            pulls=np.zeros((cables, PULL_COLUMNS)),
+            pushes=np.zeros((contacts, PUSH_COLUMNS)),
+        )
+
+
+@inlined
+def move_robot(robot: Model, state: Table, forces: Forces) -> None:
+    """Moves the nodes to where a state (13 bodies,) has them; no forces act on them yet."""
+    meet_ground(state, robot.p_BN, robot.ground, forces.nodes, forces.frames)
+
+
+@inlined
+def compute_forces(
+    robot: Model, modes: Table, signals: Table, keep: bool, forces: Forces, generalized: Table
+) -> None:
+    """Writes all forces on nodes that have just been moved, with gravity, as (6 bodies,).
+
+    With `keep`, those of the cables and the ground by themselves, too.
+    """
+    add_cable_forces(forces.nodes, signals, robot.cables, robot.slack, keep, forces.pulls)
+    add_ground_forces(forces.nodes, modes, robot.ground, forces.frames, keep, forces.pushes)
+    gather_forces(forces.nodes, generalized)
+    weight = robot.body.mass[0] * robot.body.gravity[0]
+    for body in range(generalized.size // 6):
+        generalized[6 * body + 5] -= weight
+
+
+@compiled
+def forces_along(
+    robot: Model,
+    states: Table,
+    modes: Table,
+    signals: Table,
+    forces: Forces,
+    pulls: Table,
+    pushes: Table,
+) -> None:
+    """Writes the `pulls` (k, cables, PULL_COLUMNS) and `pushes` (k, contacts, PUSH_COLUMNS) at
+    states (k, 13 bodies) with modes (k, contacts, MODE_COLUMNS) and signals (k, m) in N."""
+    generalized = np.empty(6 * (states.shape[1] // 13))
+    for k in range(states.shape[0]):
+        move_robot(robot, states[k], forces)
+        compute_forces(robot, modes[k], signals[k], True, forces, generalized)
+        pulls[k] = forces.pulls
+        pushes[k] = forces.pushes

@@ -1,0 +1,25 @@
+"""Texts of the settings of a kind, such as a kind of terrain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from tetra_drake.scenario.sections import Section, tree_of
+from tetra_drake.scenario.units import shown
+
+
+def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
+    """Settings in brackets after a blank, as " (slope 5 deg)"; empty if there are none.
+
+    Lengths are in inches. Defaults are left out, but for the numbers that are `always` given.
+    """
+    settings = {name: getattr(kind, name) for name in always} | tree_of(kind, show=shown)
+    texts = []
+    for name, value in settings.items():
+        if name == "file":
+            value = Path(value).name
+        elif isinstance(value, list):
+            value = " ".join(value)
+        texts.append(f"{name} {value}")
+    return f" ({', '.join(texts)})" if texts else ""
