@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, get_args
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from tetra_drake.scenario.cable_names import Cable
 from tetra_drake.scenario.sections import Section, quantity, refuse
@@ -26,7 +26,7 @@ class RobotSection(Section):
     strut_diameter: float = quantity("m", gt=0)
     node_diameter: float = quantity("m", gt=0)
     density: float = quantity("kg/m^3", gt=0)
-    spacing: float = quantity("m", ge=0, words={"balanced": 0.0})
+    spacing: float = quantity("m", ge=0)
     """Distance of base triangles at t = 0. `balanced`, or 0, is the one at which outer and inner
     cables balance. A file that changes strut length or the cables' stiffness or free length of its
     base, but no spacing, gets it, too."""
@@ -41,6 +41,11 @@ class RobotSection(Section):
     ground leaves the others untouched."""
     actuation: list[list[Cable]] = Field(default=[["outer bottom_left", "outer bottom_right"]])
     """Groups of a junction's cables that share an oscillator, the same for every junction."""
+
+    @field_validator("spacing", mode="before")
+    @classmethod
+    def _read_spacing(cls, value: object) -> object:
+        return 0.0 if value == "balanced" else value
 
     @model_validator(mode="after")
     def _check(self) -> RobotSection:
