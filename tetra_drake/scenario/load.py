@@ -84,7 +84,7 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
     base_file = _file(base, file.parent)
     if not os.path.exists(base_file):
         raise InputError(file, "base", f"'{base}': no such {expected}")
-    return _load(base_file, (*seen, file.resolve())).based_on_this(given, file)
+    return _load(base_file, (*seen, file.resolve())).with_file(given, file)
 
 
 def _resolve_height_file(terrain: object, file: Path) -> None:

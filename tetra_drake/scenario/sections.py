@@ -297,7 +297,7 @@ def merge(base: Any, changes: Any) -> Any:
         return changes
     merged = dict(base)
     for name, value in changes.items():
-        merged[name] = merge(base[name], value) if name in base else value
+        merged[name] = merge(base.get(name), value)
     return merged
 
 
