@@ -10,7 +10,6 @@ from tetra_drake.scenario.sections import (
     Kinds,
     Section,
     merge,
-    named_quantities,
     quantity,
     tree_of,
 )
@@ -45,7 +44,7 @@ class Settings(Section):
     size: float = quantity("m", default=1.0)
     terrain: Annotated[Flat | Incline | Cells, Kinds()] = Flat()
     weights: dict[str, float] = Field(default={"distance": 1.0})
-    limits: dict[str, float] = named_quantities({"a": "N", "share": ""}, default={})
+    limits: dict[str, float] = quantity({"a": "N", "share": ""}, default={})
     probes: list[Probe] = Field(default=[])
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
     probe: Probe | None = None

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.sections import Kinds, Section, named_quantities, quantity, refuse
+from tetra_drake.scenario.sections import Kinds, Section, quantity, refuse
 
 MOST_GAITS = 100_000
 """Upper limit of a population."""
@@ -69,7 +69,7 @@ class QualityDiversity(Section):
     gaits slowly (CMA-MAE by pyribs, Fontaine and Nikolaidis, arXiv 2205.10752).
     """
 
-    measures: dict[str, Range] = named_quantities(
+    measures: dict[str, Range] = quantity(
         METRICS, default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
     )
     """Two metrics with their ranges on the map. What lies outside counts to the cells at the

@@ -20,7 +20,7 @@ from tetra_drake.scenario.sections import (
     Whole,
     hint,
     merge,
-    named_quantities,
+    quantity,
     tree_of,
     tree_of_changes,
 )
@@ -61,10 +61,10 @@ class Scenario(Section):
     gait_bounds: GaitBounds
     simulation: SimulationSection
     engine: Engine = Drake()
-    objective: dict[str, float] = named_quantities({k: inverse(u) for k, u in METRICS.items()})
+    objective: dict[str, float] = quantity({k: inverse(u) for k, u in METRICS.items()})
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
-    require: dict[str, float] = named_quantities(METRICS, default={})
+    require: dict[str, float] = quantity(METRICS, default={})
     """Least values of metrics: a gait with less counts as failed. Replaced as a whole."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection

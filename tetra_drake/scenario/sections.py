@@ -27,17 +27,13 @@ FROM_FILE = {"units": True}
 """Context of a validation in which quantities need units. Without it, numbers are SI."""
 
 
-def quantity(unit: str, **settings: Any) -> Any:
+def quantity(unit: str | Mapping[str, str], **settings: Any) -> Any:
     """A field of numbers in the SI unit `unit`, which files hold as texts with units.
 
+    unit: units by name for a mapping of numbers; "" for a number without one.
     settings: those of pydantic.Field (default, gt, ge, le).
     """
-    return Field(json_schema_extra={"unit": unit}, **settings)
-
-
-def named_quantities(units: Mapping[str, str], **settings: Any) -> Any:
-    """A field of numbers by name, each in the SI unit of its name; "" for a number without one."""
-    return Field(json_schema_extra={"units": dict(units)}, **settings)
+    return Field(json_schema_extra={"unit": unit}, **settings)  # type: ignore[dict-item]
 
 
 def refuse(key: str, problem: str) -> NoReturn:
@@ -175,9 +171,7 @@ def _is_section(kind: Any) -> bool:
 def _unit(field: FieldInfo) -> Any:
     """The unit of a field's numbers, units by name, or ""."""
     extra = field.json_schema_extra
-    if not isinstance(extra, dict):
-        return ""
-    return extra.get("units") or extra.get("unit", "")
+    return extra.get("unit", "") if isinstance(extra, dict) else ""
 
 
 def python_value(value: Any) -> Any:
@@ -199,9 +193,7 @@ def _each_number(
     if isinstance(unit, str):
         return change(value, unit, key) if unit else value
     if isinstance(value, dict):
-        return {
-            name: _each_number(item, unit[name], change, name) for name, item in value.items()
-        }
+        return {name: _each_number(item, unit[name], change, name) for name, item in value.items()}
     return value
 
 
