@@ -159,12 +159,15 @@ def test_mirrored_weights_are_one_parameter_for_left_and_right():
     assert sorted(weights) == sorted([*vector[:32], *vector[:32]])
 
 
-def test_gains_have_bounds_and_no_floor():
+def test_parameters_have_the_bounds_and_floors_of_the_thesis_and_gains_no_floor():
     space = ParameterSpace.of(load_scenario("feedback"))
     columns = zip(space.low, space.high, space.floors, strict=True)
     rows = dict(zip(space.names, columns, strict=True))
     assert space.names[24:] == ("gain length", "gain load", "gain pitch", "tau_A", "tau_B")
-    # A gain may become negative by mutation.
+    # Table 5 and listing A.3; a gain may become negative by mutation.
+    assert rows["weight 2->1 extensor"] == (1.0, 3.4, 0.0)
+    assert rows["tau_A"] == (0.2, 0.5, 0.2)
+    assert rows["tau_B"] == (0.4, 1.0, 0.4)
     assert rows["gain load"] == (-1.0, 1.0, -math.inf)
     gait = space.gait(np.arange(29.0), name="any")
     assert gait.gains == Gains(length=24.0, load=25.0, pitch=26.0)
@@ -180,12 +183,6 @@ def test_a_turn_is_that_of_the_scenario_and_no_parameter(tmp_path):
     # A gait's own turn counts when it is loaded, whatever those are that the scenario evolves.
     content = dataclasses.replace(gait, turn=0.25).to_json(half)
     assert load_gait(write(tmp_path, content), half).turn == 0.25
-
-
-def test_floors_are_the_thesis_s(scenario):
-    space = ParameterSpace.of(scenario)
-    assert space.floors[0] == 0.0
-    np.testing.assert_allclose(space.floors[[TAU_A, TAU_B]], [0.2, 0.4])
 
 
 def test_repair_couples_tau_b_unless_it_is_independent(scenario):

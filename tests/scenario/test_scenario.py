@@ -17,7 +17,7 @@ from tetra_drake.scenario.load import (
     shipped_scenarios,
 )
 
-# Exact by definition.
+# Exact by definition
 IN = 0.0254
 LBF = 4.4482216152605
 
@@ -199,8 +199,6 @@ BAD = [
     ("robot: {offsets: [[0 m, 0 m, 0 m]]}", "robot.offsets", "1 items"),
     ("gait_bounds: {tau_a_min: 0.6 s}", "gait_bounds.tau_a_min", "0.6"),
     ("friction: !Coulomb {static: 0.4}", "friction.kinetic", "0.5"),
-    ("friction: !Coulomb {stiction_range: 1 in}", "friction.stiction_range", "!ResetIntegrator"),
-    ("friction: {stiction_rage: 1 in}", "friction.stiction_rage", "'stiction_range'"),
     ("robot: {contacts: some}", "robot.contacts", "'thesis' or 'all'"),
     ("cables: {free_length: 1 km}", "robot.spacing", "balance"),
 ]

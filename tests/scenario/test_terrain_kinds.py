@@ -223,7 +223,6 @@ def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, mon
     ("text", "key", "found"),
     [
         ("!HeightField {file: none.csv, cell: 1 in}", "file", "none.csv"),
-        ("!Steps {height: 1 in, depth: 0 in, count: 1}", "depth", "'0 in'"),
         ("!Rough {amplitude: 1 in, wavelength: 1 um}", "wavelength", "5e-07 m"),
     ],
 )
