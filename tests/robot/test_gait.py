@@ -217,13 +217,6 @@ def test_random_gaits_are_uniform_within_the_bounds(scenario):
     np.testing.assert_array_equal(vectors[:, TAU_B], 2.0 * taus)
 
 
-def test_the_seed_alone_decides_the_draw(scenario):
-    first = draw(scenario, seed=8, count=3)
-    np.testing.assert_array_equal(first, draw(scenario, seed=8, count=3))
-    assert not np.any(first[0] == draw(scenario, seed=9, count=1)[0])
-    assert not np.any(first[0] == first[1])
-
-
 # Printing
 
 

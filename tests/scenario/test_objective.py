@@ -70,35 +70,3 @@ def test_every_draw_has_another_terrain(load_text):
     seeds = {disturbed(scenario, draw_disturbances(scenario, (k,))).terrain.seed for k in range(9)}
     assert len(seeds) == 9
     assert scenario.terrain.seed == 0
-
-
-BAD = [
-    ("objective: {}", "objective", "no metric"),
-    ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
-    (
-        "disturbances: {draws: 2, spreads: {cables.dampin: 0.1}}",
-        *("disturbances.spreads.cables.dampin", "'cables.damping'"),
-    ),
-    (
-        "disturbances: {draws: 2, spreads: {robot.tetrahedra: 0.1}}",
-        *("disturbances.spreads.robot.tetrahedra", "no number"),
-    ),
-    (
-        "disturbances: {draws: 2, spreads: {cables.damping: 0.7}}",
-        *("disturbances.spreads.cables.damping", "0.7"),
-    ),
-    (
-        "disturbances: {draws: 2, spreads: {optimizer.mutation_probability: 0.5}}",
-        *("disturbances.spreads.optimizer.mutation_probability", "at most 1"),
-    ),
-    (
-        "friction: !Coulomb\ndisturbances: {draws: 2, spreads: {friction.kinetic: 0.1}}",
-        *("disturbances.spreads.friction.kinetic", "at most static"),
-    ),
-]
-
-
-@pytest.mark.parametrize(("text", "key", "found"), BAD)
-def test_what_cannot_be_asked_for_is_refused(load_text, tmp_path, text, key, found, refused):
-    with refused(tmp_path / "mine.yaml", key, found):
-        load_text(text)

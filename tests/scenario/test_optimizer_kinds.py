@@ -32,20 +32,3 @@ def test_a_file_chooses_the_optimiser_and_its_budget(load_text, tmp_path, text, 
     (tmp_path / "dumped.yaml").write_text(dump_scenario(loaded))
     assert load_scenario(tmp_path / "dumped.yaml") == loaded
     assert load_scenario().with_changes({"optimizer": kind}).optimizer == kind
-
-
-@pytest.mark.parametrize(
-    ("text", "key", "found"),
-    [
-        ("!CmaEs {population: 3}", "population", "3"),
-        ("!QualityDiversity {measures: {lifted: [0, 1]}}", "measures", "1 metrics"),
-        (
-            "!QualityDiversity {measures: {lifted: [0, 1], tension: [1 lbf, 0 lbf]}}",
-            *("measures.tension", "4.4"),
-        ),
-        ("!QualityDiversity {cells: [9, 1]}", "cells[1]", "1"),
-    ],
-)
-def test_a_wrong_one_is_refused(load_text, tmp_path, text, key, found, refused):
-    with refused(tmp_path / "mine.yaml", f"optimizer.{key}", found):
-        load_text(MINE + text)

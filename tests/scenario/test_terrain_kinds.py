@@ -217,16 +217,3 @@ def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, mon
     assert load_scenario(file.relative_to(tmp_path)).terrain == absolute
     based = scenario_file(tmp_path / "mine", "terrain: !HeightField {cell: 1 m}", base=str(file))
     assert load_scenario(based).terrain == HeightField(file=absolute.file, cell=1.0)
-
-
-@pytest.mark.parametrize(
-    ("text", "key", "found"),
-    [
-        ("!HeightField {file: none.csv, cell: 1 in}", "file", "none.csv"),
-        ("!Rough {amplitude: 1 in, wavelength: 1 um}", "wavelength", "5e-07 m"),
-    ],
-)
-def test_a_bad_terrain_is_refused_when_its_file_is_loaded(tmp_path, text, key, found, refused):
-    file = scenario_file(tmp_path, f"terrain: {text}")
-    with refused(file, f"terrain.{key}", found):
-        load_scenario(file)
