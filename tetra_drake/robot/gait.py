@@ -18,8 +18,6 @@ from tetra_drake.robot.actuation import KINDS, Actuation
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import Section
 
-SCHEMA = 2
-
 LARGEST_GAIN = 1.0
 """Greatest absolute value of a feedback gain of random gaits."""
 
@@ -52,8 +50,7 @@ class Gait:
     tau_b: float
     """Time constant of self-inhibition, in s."""
     turn: float = 0.0
-    """Turn from -1 to 1: oscillators have the input u0 (1 + turn) on the left, u0 (1 - turn) on the
-    right."""
+    """From -1 to 1. Left oscillators have the input u0 (1 + turn), right ones u0 (1 - turn)."""
     gains: Gains = field(default_factory=Gains)
     scenario: str = field(default="", compare=False)
     """Name of the scenario that the gait was made for; "" if that is not known."""
@@ -85,7 +82,7 @@ class Gait:
         """The content of a gait file; `scenario` is one that the gait fits, and was made for unless
         it says another."""
         names = Actuation.of(scenario).weight_names
-        content: dict[str, Any] = {"schema": SCHEMA, "name": self.name}
+        content: dict[str, Any] = {"schema": 2, "name": self.name}
         content["scenario"] = self.scenario or scenario.name
         content["weights"] = dict(zip(names, self.weights, strict=True))
         content["tau_a_s"] = self.tau_a
@@ -110,13 +107,13 @@ class ParameterSpace:
     high: Vector
     """Bounds of random gaits (Table 5)."""
     floors: Vector
-    """A parameter reduced by mutation must stay above this (listing A.3.3, A.3.4)."""
+    """Mutation keeps each parameter above its floor (listing A.3.3, A.3.4)."""
     couples_tau_b: bool
     """True if tau_B is kept at 2 tau_A."""
     weights: npt.NDArray[np.int64]
-    """(weights of a gait,): the parameter that is each weight, or its mirror image."""
+    """(weights of a gait,): index of the parameter that gives each weight."""
     weight_names: tuple[str, ...]
-    """(weights of a gait,): their names in gait files."""
+    """(weights of a gait,): names of the weights in gait files."""
     pathways: tuple[str, ...]
     """Pathways with a gain."""
     turn: float
@@ -126,7 +123,7 @@ class ParameterSpace:
     def of(cls, scenario: Scenario) -> Self:
         """The space of a scenario.
 
-        With equal bounds a parameter is fixed. An independent tau_B has twice tau_A's numbers.
+        Equal bounds fix a parameter. The bounds of tau_B are twice those of tau_A.
         """
         actuation, bounds = Actuation.of(scenario), scenario.gait_bounds
         images = np.arange(len(actuation.images))

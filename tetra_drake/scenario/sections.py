@@ -102,9 +102,10 @@ class Section(BaseModel):
         """Advice on an unknown key: a key of a section, or a similar one."""
         keys = []
         for key, field in keys_of(cls).items():
-            sections = [kind for kind in _union(field.annotation) if _is_section(kind)]
-            if any(name in keys_of(section) for section in sections):
-                keys.append(f"'{key}.{name}'")
+            for kind in _union(field.annotation):
+                if isinstance(kind, type) and issubclass(kind, Section) and name in keys_of(kind):
+                    keys.append(f"'{key}.{name}'")
+                    break
         return f"did you mean {' or '.join(keys)}?" if keys else hint(name, keys_of(cls))
 
     @classmethod
@@ -162,10 +163,6 @@ def _kind(value: Any, kinds: Mapping[str, type[Section]]) -> type[Section]:
 def _union(annotation: Any) -> tuple[Any, ...]:
     """The members of a union type; a type without members alone."""
     return typing.get_args(annotation) or (annotation,)
-
-
-def _is_section(kind: Any) -> bool:
-    return isinstance(kind, type) and issubclass(kind, Section)
 
 
 def _unit(field: FieldInfo) -> Any:
