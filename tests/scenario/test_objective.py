@@ -7,7 +7,7 @@ from pytest import approx
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 
-IN, LBF = 0.0254, 4.4482216152605
+IN = 0.0254
 
 
 @pytest.mark.parametrize(
