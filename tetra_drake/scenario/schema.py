@@ -41,8 +41,8 @@ from tetra_drake.scenario.yaml_text import dump_yaml
 
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
 
-MOST_SIGNALS = 20_000_000
-"""Upper limit of the values of all signals in one simulation: some 3 GB in Drake."""
+MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
+"""Upper limits of the values of all signals in one simulation: some 3 GB."""
 
 MOST_SAMPLES = 2_000_000
 """Upper limit of the recorded poses of all tetrahedra in one simulation: some 2 GB."""
@@ -211,7 +211,9 @@ def check_relations(scenario: Scenario, source: object) -> None:
 def _check_memory(scenario: Scenario, source: object) -> None:
     """Raises InputError for what does not fit in memory."""
     simulation = scenario.simulation
-    least_step = simulation.duration * scenario.oscillators / MOST_SIGNALS
+    is_drake = isinstance(scenario.engine, Drake)
+    most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
+    least_step = simulation.duration * scenario.oscillators / most_signals
     least_sample = simulation.duration * scenario.robot.tetrahedra / MOST_SAMPLES
     periods = [
         ("cpg.listing_step", scenario.cpg.listing_step, least_step),
