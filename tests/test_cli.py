@@ -25,8 +25,7 @@ simulation: {duration: 0.3 s, steady_from: 0.1 s, sample_period: 70 ms}
 """The sample period does not divide the duration."""
 
 INCH = 0.0254
-WEIGHTS = [1.5] * 24
-GOOD = {"schema": 1, "name": "good", "weights": WEIGHTS, "tau_a_s": 0.3}
+GOOD = seeded_gait(load_scenario()).to_json(load_scenario()) | {"name": "good"}
 FILES = {
     "good.json": json.dumps(GOOD),
     "short.yaml": SHORT,

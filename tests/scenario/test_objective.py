@@ -4,16 +4,10 @@ import numpy as np
 import pytest
 from pytest import approx
 
-from tetra_drake.errors import InputError
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 
-IN, LBF = 0.0254, 4.4482216152605
-
-
-def loaded(tmp_path, text, name="mine.yaml"):
-    (tmp_path / name).write_text(f"base: thesis\n{text}\n")
-    return load_scenario(tmp_path / name)
+IN = 0.0254
 
 
 @pytest.mark.parametrize(
@@ -28,9 +22,9 @@ def loaded(tmp_path, text, name="mine.yaml"):
     ],
 )
 def test_objective_and_requirements_have_units_and_replace_the_base(
-    tmp_path, text, objective, require
+    load_text, tmp_path, text, objective, require
 ):
-    scenario = loaded(tmp_path, text)
+    scenario = load_text(text)
     assert scenario.objective == approx(objective, rel=1e-14)
     assert scenario.require == approx(require, rel=1e-14)
     (tmp_path / "full.yaml").write_text(dump_scenario(scenario))
@@ -45,8 +39,8 @@ disturbances:
 """
 
 
-def test_a_draw_changes_what_it_names_within_its_spread(tmp_path):
-    scenario = loaded(tmp_path, SPREADS)
+def test_a_draw_changes_what_it_names_within_its_spread(load_text):
+    scenario = load_text(SPREADS)
     draws = [draw_disturbances(scenario, (7, k)) for k in range(200)]
     joined = "friction.stiction_range, friction.stiction_damping"
     for key, spread in (("cables.damping", 0.1), (joined, 0.05)):
@@ -70,45 +64,9 @@ def test_a_draw_changes_what_it_names_within_its_spread(tmp_path):
     assert changed.disturbances is None
 
 
-def test_every_draw_has_another_terrain(tmp_path):
+def test_every_draw_has_another_terrain(load_text):
     text = "terrain: !Rough {amplitude: 0.1 in, wavelength: 2 in}\ndisturbances: {draws: 2}"
-    scenario = loaded(tmp_path, text)
+    scenario = load_text(text)
     seeds = {disturbed(scenario, draw_disturbances(scenario, (k,))).terrain.seed for k in range(9)}
     assert len(seeds) == 9
     assert scenario.terrain.seed == 0
-
-
-BAD = [
-    ("objective: {sped: 1 s/in}", "objective.sped", "'speed'"),
-    ("objective: {}", "objective", "no metric"),
-    ("require: {twits: 1 in}", "require.twits", "'twist'"),
-    ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
-    (
-        "disturbances: {draws: 2, spreads: {cables.dampin: 0.1}}",
-        *("disturbances.spreads.cables.dampin", "'cables.damping'"),
-    ),
-    (
-        "disturbances: {draws: 2, spreads: {robot.tetrahedra: 0.1}}",
-        *("disturbances.spreads.robot.tetrahedra", "no number"),
-    ),
-    (
-        "disturbances: {draws: 2, spreads: {cables.damping: 0.7}}",
-        *("disturbances.spreads.cables.damping", "0.7"),
-    ),
-    (
-        "disturbances: {draws: 2, spreads: {optimizer.mutation_probability: 0.5}}",
-        *("disturbances.spreads.optimizer.mutation_probability", "at most 1"),
-    ),
-    (
-        "friction: !Coulomb\ndisturbances: {draws: 2, spreads: {friction.kinetic: 0.1}}",
-        *("disturbances.spreads.friction.kinetic", "at most static"),
-    ),
-]
-
-
-@pytest.mark.parametrize(("text", "key", "found"), BAD)
-def test_what_cannot_be_asked_for_is_refused(tmp_path, text, key, found):
-    with pytest.raises(InputError) as refusal:
-        loaded(tmp_path, text)
-    assert refusal.value.key == key
-    assert found in refusal.value.problem

@@ -17,7 +17,7 @@ from tetra_drake.scenario.load import (
     shipped_scenarios,
 )
 
-# Exact by definition.
+# Exact by definition
 IN = 0.0254
 LBF = 4.4482216152605
 
@@ -75,31 +75,24 @@ def test_a_shipped_scenario_has_the_name_of_its_file(name):
 
 
 LEFT = ["outer bottom_left"]
-
-
-@pytest.mark.parametrize(
-    ("changes", "key", "found"),
-    [
-        ({"robot.actuation": []}, "robot.actuation", "[]"),
-        ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
-        ({"robot.actuation": [["outer left"]]}, "robot.actuation[0][0]", "'outer left'"),
-        ({"robot.actuation": [LEFT], "gait_bounds.mirrored": True}, "gait_bounds.mirrored", "true"),
-        ({"cpg.feedback": ["load"]}, "cpg.signals", "'listing'"),
-        (
-            {"cpg.feedback": ["load"], "cpg.signals": "live", "robot.gravity": 0.0},
-            *("robot.gravity", "0 m/s^2"),
-        ),
-        ({"cpg.listing_step": "16 s"}, "cpg.listing_step", "16.0 s"),
-        ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
-    ],
-    ids=itertools.count(),
-)
-def test_a_network_that_cannot_be_is_refused(scenario, refused, changes, key, found):
-    with refused("scenario thesis", key, found):
-        scenario.with_changes(changes)
-
-
-TOO_LARGE = [
+LOAD = {"cpg.feedback": ["load"]}
+BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
+    ({"robot.spacing.x": "1 m"}, "robot.spacing", "a mapping"),
+    ({"robot.offsets": np.ones((5, 3))}, "robot.offsets[0][0]", "1.0 without a unit"),
+    ({"accuracy": 0.1}, "accuracy", "'engine.accuracy'"),
+    ({"engine": "compiled"}, "engine", "!Compiled"),
+    ({"robot": {"tetrahedra": 7}, "robot.tetrahedra": 7}, "robot.tetrahedra", "twice"),
+    ({"simulation.duration": "2.0 s"}, "simulation.steady_from", "3.0 s"),
+    # Networks that cannot be
+    ({"robot.actuation": []}, "robot.actuation", "[]"),
+    ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
+    ({"robot.actuation": [["outer left"]]}, "robot.actuation[0][0]", "'outer left'"),
+    ({"robot.actuation": [LEFT], "gait_bounds.mirrored": True}, "gait_bounds.mirrored", "true"),
+    (LOAD, "cpg.signals", "'listing'"),
+    (LOAD | {"cpg.signals": "live", "robot.gravity": 0.0}, "robot.gravity", "0 m/s^2"),
+    ({"cpg.listing_step": "16 s"}, "cpg.listing_step", "16.0 s"),
+    ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
+    # What no memory holds
     ({"robot.tetrahedra": 100_000}, "robot.tetrahedra", "100000"),
     ({"cpg.listing_step": "1e-6 s", "simulation.duration": "100 s"}, "cpg.listing_step", "1e-06 s"),
     ({"simulation.sample_period": "1e-9 s"}, "simulation.sample_period", "1e-09 s"),
@@ -109,8 +102,8 @@ TOO_LARGE = [
 ]
 
 
-@pytest.mark.parametrize(("changes", "key", "found"), TOO_LARGE, ids=itertools.count())
-def test_what_no_memory_holds_is_refused(scenario, refused, changes, key, found):
+@pytest.mark.parametrize(("changes", "key", "found"), BAD_CHANGES, ids=itertools.count())
+def test_bad_changes_are_refused(scenario, refused, changes, key, found):
     with refused("scenario thesis", key, found):
         scenario.with_changes(changes)
 
@@ -199,10 +192,20 @@ BAD = [
     ("robot: {offsets: [[0 m, 0 m, 0 m]]}", "robot.offsets", "1 items"),
     ("gait_bounds: {tau_a_min: 0.6 s}", "gait_bounds.tau_a_min", "0.6"),
     ("friction: !Coulomb {static: 0.4}", "friction.kinetic", "0.5"),
-    ("friction: !Coulomb {stiction_range: 1 in}", "friction.stiction_range", "!ResetIntegrator"),
-    ("friction: {stiction_rage: 1 in}", "friction.stiction_rage", "'stiction_range'"),
     ("robot: {contacts: some}", "robot.contacts", "'thesis' or 'all'"),
     ("cables: {free_length: 1 km}", "robot.spacing", "balance"),
+    ("terrain: !HeightField {file: none.csv, cell: 1 in}", "terrain.file", "none.csv"),
+    ("terrain: !Rough {amplitude: 1 in, wavelength: 1 um}", "terrain.wavelength", "5e-07 m"),
+    ("objective: {}", "objective", "no metric"),
+    ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
+    ("optimizer: !CmaEs {population: 3}", "optimizer.population", "3"),
+    ("optimizer: !QualityDiversity {cells: [9, 1]}", "optimizer.cells[1]", "1"),
+    ("optimizer: !QualityDiversity {measures: {twist: [0 m, 1 m]}}", "optimizer.measures", "1"),
+    (
+        "optimizer: !QualityDiversity {measures: {lifted: [0, 1], tension: [1 lbf, 0 lbf]}}",
+        "optimizer.measures.tension",
+        "4.4",
+    ),
 ]
 BAD_FILES = [
     ("name: mine", "robot", "missing"),
@@ -225,6 +228,22 @@ def test_a_bad_file_is_refused(tmp_path, text, key, found, refused):
     file = write(tmp_path, text)
     with refused(file, key, found):
         load_scenario(file)
+
+
+@pytest.mark.parametrize(
+    ("key", "spread", "found"),
+    [
+        ("cables.dampin", 0.1, "'cables.damping'"),
+        ("robot.tetrahedra", 0.1, "no number"),
+        ("cables.damping", 0.7, "0.7"),
+        ("optimizer.mutation_probability", 0.5, "at most 1"),
+        ("friction.kinetic", 0.1, "at most static"),
+    ],
+)
+def test_a_spread_that_leads_astray_is_refused(load_text, tmp_path, key, spread, found, refused):
+    friction = "friction: !Coulomb\n" if "kinetic" in key else ""
+    with refused(tmp_path / "mine.yaml", f"disturbances.spreads.{key}", found):
+        load_text(f"{friction}disturbances: {{draws: 2, spreads: {{{key}: {spread}}}}}")
 
 
 def test_scenarios_based_on_each_other_are_refused(tmp_path, refused):

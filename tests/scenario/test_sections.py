@@ -41,10 +41,10 @@ class Probe(Section):
 class Settings(Section):
     count: int = Field(ge=2)
     name: str = ""
-    size: float = quantity("m", default=1.0, words={"automatic": 2.5})
+    size: float = quantity("m", default=1.0)
     terrain: Annotated[Flat | Incline | Cells, Kinds()] = Flat()
     weights: dict[str, float] = Field(default={"distance": 1.0})
-    limits: dict[str, float] = quantity("N", default={})
+    limits: dict[str, float] = quantity({"a": "N", "share": ""}, default={})
     probes: list[Probe] = Field(default=[])
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
     probe: Probe | None = None
@@ -67,12 +67,11 @@ GOOD: list[tuple[str, str, Any]] = [
         "terrain",
         Cells(cells=[1.0, 0.5], grid=[[1.0, 2.0], [0.3, 4.0]]),
     ),
-    ("limits: {a: 1 kN}", "limits", {"a": 1000.0}),
+    ("limits: {a: 1 kN, share: 0.5}", "limits", {"a": 1000.0, "share": 0.5}),
     ("ramps: [!Flat , !Incline {slope: 1 rad}]", "ramps", [Flat(), Incline(slope=1.0)]),
     ("ramps: [{slope: 1 rad}]", "ramps", [Incline(slope=1.0)]),  # without a tag, the first kind
     ("probe: {at: [0 m, 0 m, 0 m], active: false}", "probe", Probe(at=[0.0] * 3, active=False)),
     ("probe:", "probe", None),
-    ("size: automatic", "size", 2.5),
     ("", "terrain", Flat()),
 ]
 
@@ -125,6 +124,8 @@ BAD = [
     ("terrain: !Cells {cells: [], grid: [[1, 2], [1]]}", "terrain.grid[1]", "2 items"),
     ("weights: {twist: ten}", "weights.twist", "'ten'"),
     ("limits: {a: 1}", "limits.a", "1 without a unit"),
+    ("limits: {b: 1}", "limits.b", "of a, share"),
+    ("limits: 5", "limits", "5"),
 ]
 
 

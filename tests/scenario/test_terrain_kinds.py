@@ -10,7 +10,6 @@ from tetra_drake.scenario.terrain_kinds import (
     Grid,
     HeightField,
     Incline,
-    Obstacles,
     Rough,
     Steps,
     Terrain,
@@ -24,7 +23,6 @@ KINDS: list[Terrain] = [
     Incline(slope=-0.2, start=0.5),
     Steps(height=0.25 * IN, depth=12 * IN, count=4),
     Rough(amplitude=0.25 * IN, wavelength=6 * IN),
-    Obstacles(height=0.01, radius=0.02, spacing=0.2),
 ]
 
 
@@ -136,18 +134,6 @@ def test_rough_ground_is_flat_before_its_start(across):
     assert (heights[x > 0.833] != 0.0).mean() > 0.5
 
 
-def test_as_many_bumps_stand_as_there_are_squares():
-    # A paraboloid's volume is half its cylinder's; bumps this small seldom overlap.
-    height, radius, spacing, start = 0.1, 0.01, 0.127, 0.0
-    grid = grid_of(Obstacles(height=height, radius=radius, spacing=spacing, start=start))
-    assert 0.99 * height < grid.heights.max() <= height
-    first = start + radius + 0.75 * radius
-    rows, columns = np.ceil((120 * IN - first) / spacing), 60 * IN / spacing
-    volume = grid.heights.sum() * np.prod(grid.cell)
-    one = 0.5 * np.pi * radius**2 * height
-    assert volume == pytest.approx(rows * columns * one, rel=0.02)
-
-
 @pytest.mark.parametrize(
     ("terrain", "key"),
     [
@@ -231,17 +217,3 @@ def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, mon
     assert load_scenario(file.relative_to(tmp_path)).terrain == absolute
     based = scenario_file(tmp_path / "mine", "terrain: !HeightField {cell: 1 m}", base=str(file))
     assert load_scenario(based).terrain == HeightField(file=absolute.file, cell=1.0)
-
-
-@pytest.mark.parametrize(
-    ("text", "key", "found"),
-    [
-        ("!HeightField {file: none.csv, cell: 1 in}", "file", "none.csv"),
-        ("!Steps {height: 1 in, depth: 0 in, count: 1}", "depth", "'0 in'"),
-        ("!Rough {amplitude: 1 in, wavelength: 1 um}", "wavelength", "5e-07 m"),
-    ],
-)
-def test_a_bad_terrain_is_refused_when_its_file_is_loaded(tmp_path, text, key, found, refused):
-    file = scenario_file(tmp_path, f"terrain: {text}")
-    with refused(file, f"terrain.{key}", found):
-        load_scenario(file)

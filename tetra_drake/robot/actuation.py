@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
-from tetra_drake.scenario.cable_names import CABLES, SIDES, mirrored
+from tetra_drake.scenario.cable_names import CABLES, mirrored, side_of
 from tetra_drake.scenario.schema import Scenario
 
 KINDS = "extensor", "flexor"
 """Kinds of neurons, by their number modulo 2."""
+
+SIGNS = {"left": 1.0, "right": -1.0, "": 0.0}
+"""Signs of the sides of the robot."""
 
 
 @dataclass(frozen=True)
@@ -49,26 +51,21 @@ class Actuation:
         from tetra_drake.physics.cable import PASSIVE  # numba, which no optimiser needs
 
         junctions = np.repeat(np.arange(count), len(groups))
-        place = {cable: k for k, group in enumerate(groups) for cable in group}
-        own = np.array([place.get(cable, PASSIVE) for cable in CABLES])
-        drivers = [np.where(own == PASSIVE, own, own + len(groups) * i) for i in range(count)]
         couplings = couplings_within(junctions, reach)
-        sets = [set(group) for group in groups]
-        others = [set(mirrored(group)) for group in groups]
-        opposite = [sets.index(o) if o in sets else k for k, o in enumerate(others)]
-        oscillators = np.tile(opposite, count) + len(groups) * junctions
-        neurons = (2 * oscillators[:, np.newaxis] + [0, 1]).ravel()
-        index = {pair: i for i, pair in enumerate(map(tuple, couplings.tolist()))}
-        pairs = map(tuple, neurons[couplings].tolist())
-        cables = tuple(f"T{i + 1}-T{i + 2} {' + '.join(g)}" for i in range(count) for g in groups)
+        cables = [f"T{i + 1}-T{i + 2} {' + '.join(g)}" for i in range(count) for g in groups]
+        names = cables if len(groups) > 1 else [name.split()[0] for name in cables]
+        group_of = {cable: k for k, group in enumerate(groups) for cable in group}
+        driving = np.array([group_of.get(cable, PASSIVE) for cable in CABLES])
+        is_driven = np.tile(driving != PASSIVE, count)
+        first = np.repeat(len(groups) * np.arange(count), len(CABLES))
         return cls(
-            names=cables if len(groups) > 1 else tuple(name.split()[0] for name in cables),
-            cables=cables,
-            drivers=np.concatenate(drivers),
+            names=tuple(names),
+            cables=tuple(cables),
+            drivers=np.where(is_driven, np.tile(driving, count) + first, PASSIVE),
             junctions=junctions,
-            sides=np.tile([_side(group) for group in groups], count),
+            sides=np.tile([SIGNS[side_of(group)] for group in groups], count),
             couplings=couplings,
-            images=np.array([index.get(pair, i) for i, pair in enumerate(pairs)], dtype=int),
+            images=_images(couplings, groups, junctions),
         )
 
     @property
@@ -86,8 +83,18 @@ def couplings_within(junctions: np.ndarray, reach: int | None) -> np.ndarray:
     return np.argwhere(coupled if reach is None else coupled & (far <= reach))
 
 
-def _side(group: Sequence[str]) -> float:
-    for side, name in zip((1.0, -1.0), SIDES, strict=True):
-        if all(cable.endswith(name) for cable in group):
-            return side
-    return 0.0
+def _images(
+    couplings: np.ndarray, groups: tuple[tuple[str, ...], ...], junctions: np.ndarray
+) -> np.ndarray:
+    """The `images` of these couplings: groups of cables change places with their mirror images."""
+    sets = [set(group) for group in groups]
+    opposite = []
+    for k, group in enumerate(groups):
+        image = set(mirrored(group))
+        opposite.append(sets.index(image) if image in sets else k)
+    count = len(junctions) // len(groups)
+    oscillators = np.tile(opposite, count) + len(groups) * junctions
+    neurons = (2 * oscillators[:, np.newaxis] + [0, 1]).ravel()
+    place = {(i, j): weight for weight, (i, j) in enumerate(couplings.tolist())}
+    images = [place.get((i, j), w) for w, (i, j) in enumerate(neurons[couplings].tolist())]
+    return np.array(images, dtype=int)

@@ -1,11 +1,11 @@
 """A gait, its file, and the space of parameters that evolution searches."""
 
-import difflib
 import json
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,6 @@ from tetra_drake.formatting import Table
 from tetra_drake.robot.actuation import KINDS, Actuation
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import Section
-
-SCHEMA = 2
 
 LARGEST_GAIN = 1.0
 """Greatest absolute value of a feedback gain of random gaits."""
@@ -52,8 +50,7 @@ class Gait:
     tau_b: float
     """Time constant of self-inhibition, in s."""
     turn: float = 0.0
-    """Turn from -1 to 1: oscillators have the input u0 (1 + turn) on the left, u0 (1 - turn) on the
-    right."""
+    """From -1 to 1. Left oscillators have the input u0 (1 + turn), right ones u0 (1 - turn)."""
     gains: Gains = field(default_factory=Gains)
     scenario: str = field(default="", compare=False)
     """Name of the scenario that the gait was made for; "" if that is not known."""
@@ -66,26 +63,26 @@ class Gait:
         if self.turn:
             lines.append(f"turn {self.turn:.4g}")
         lines += [f"gain of {name} {gain:.4g}" for name, gain in self.gains if gain]
-        if not self.weights or len(self.weight_names) != len(self.weights):
+        if not self.weight_names:
             weights = [f"{weight:.4g}" for weight in self.weights]
             return "\n".join([*lines, f"weights {' '.join(weights) or 'none'}"])
-        by_name = dict(zip(self.weight_names, self.weights, strict=True))
-        numbers = {int(n) for name in by_name for n in name.split()[0].split("->")}
-        oscillators = range(1, max(numbers) + 1)
+        texts = {n: f"{w:.2f}" for n, w in zip(self.weight_names, self.weights, strict=True)}
+        count = max(int(name.split("->")[0]) for name in texts)
+        oscillators = [str(i + 1) for i in range(count)]
         for kind in KINDS:
             rows = []
             for onto in oscillators:
-                cells = [by_name.get(f"{source}->{onto} {kind}") for source in oscillators]
-                rows.append([str(onto), *("-" if w is None else f"{w:.2f}" for w in cells)])
+                row = [texts.get(f"{source}->{onto} {kind}", "-") for source in oscillators]
+                rows.append([onto, *row])
             lines += ["", f"weights of the {kind}s, a column for each oscillator they come from"]
-            lines.append(Table(["onto", *map(str, oscillators)], rows).text())
+            lines.append(Table(["onto", *oscillators], rows).text())
         return "\n".join(lines)
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """The content of a gait file; `scenario` is one that the gait fits, and was made for unless
         it says another."""
         names = Actuation.of(scenario).weight_names
-        content: dict[str, Any] = {"schema": SCHEMA, "name": self.name}
+        content: dict[str, Any] = {"schema": 2, "name": self.name}
         content["scenario"] = self.scenario or scenario.name
         content["weights"] = dict(zip(names, self.weights, strict=True))
         content["tau_a_s"] = self.tau_a
@@ -110,13 +107,13 @@ class ParameterSpace:
     high: Vector
     """Bounds of random gaits (Table 5)."""
     floors: Vector
-    """A parameter reduced by mutation must stay above this (listing A.3.3, A.3.4)."""
+    """Mutation keeps each parameter above its floor (listing A.3.3, A.3.4)."""
     couples_tau_b: bool
     """True if tau_B is kept at 2 tau_A."""
     weights: npt.NDArray[np.int64]
-    """(weights of a gait,): the parameter that is each weight, or its mirror image."""
+    """(weights of a gait,): index of the parameter that gives each weight."""
     weight_names: tuple[str, ...]
-    """(weights of a gait,): their names in gait files."""
+    """(weights of a gait,): names of the weights in gait files."""
     pathways: tuple[str, ...]
     """Pathways with a gain."""
     turn: float
@@ -126,47 +123,53 @@ class ParameterSpace:
     def of(cls, scenario: Scenario) -> Self:
         """The space of a scenario.
 
-        With equal bounds a parameter is fixed. An independent tau_B has twice tau_A's numbers.
+        Equal bounds fix a parameter. The bounds of tau_B are twice those of tau_A.
         """
-        actuation = Actuation.of(scenario)
+        actuation, bounds = Actuation.of(scenario), scenario.gait_bounds
         images = np.arange(len(actuation.images))
-        if scenario.gait_bounds.mirrored:
+        if bounds.mirrored:
             images = np.minimum(images, actuation.images)
-        chosen, places = np.unique(images, return_inverse=True)
-        weight_names = actuation.weight_names
-        weights = [weight_names[i] for i in chosen]
-        names, low, high, floors = zip(*_parameters(scenario, weights), strict=True)
+        chosen, parameters = np.unique(images, return_inverse=True)
+        weight_names, pathways = actuation.weight_names, tuple(scenario.cpg.feedback)
+        names = [f"weight {weight_names[i]}" for i in chosen]
+        names += [f"gain {name}" for name in pathways]
+
+        def numbers(*, weight: float, gain: float, tau_a: float) -> Vector:
+            taus = [tau_a, TAU_B_PER_TAU_A * tau_a]
+            return np.array([weight] * len(chosen) + [gain] * len(pathways) + taus)
+
         return cls(
-            names=names,
-            low=np.array(low),
-            high=np.array(high),
-            floors=np.array(floors),
-            couples_tau_b=not scenario.gait_bounds.independent_tau_b,
-            weights=places,
+            names=(*names, "tau_A", "tau_B"),
+            low=numbers(weight=bounds.weight_min, gain=-LARGEST_GAIN, tau_a=bounds.tau_a_min),
+            high=numbers(weight=bounds.weight_max, gain=LARGEST_GAIN, tau_a=bounds.tau_a_max),
+            floors=numbers(weight=0.0, gain=-math.inf, tau_a=bounds.tau_a_min),
+            couples_tau_b=not bounds.independent_tau_b,
+            weights=parameters,
             weight_names=weight_names,
-            pathways=tuple(scenario.cpg.feedback),
-            turn=scenario.gait_bounds.turn,
+            pathways=pathways,
+            turn=bounds.turn,
         )
 
     def gait(self, vector: Vector, *, name: str) -> Gait:
         """The gait of a vector."""
-        gains = vector[len(vector) + TAU_A - len(self.pathways) : TAU_A].tolist()
+        first_gain = len(self.names) - 2 - len(self.pathways)
+        gains = dict(zip(self.pathways, vector[first_gain:].tolist(), strict=False))
         return Gait(
             name=name,
             weights=tuple(vector[self.weights].tolist()),
             tau_a=float(vector[TAU_A]),
             tau_b=float(vector[TAU_B]),
             turn=self.turn,
-            gains=Gains(**dict(zip(self.pathways, gains, strict=True))),
+            gains=Gains(**gains),
             weight_names=self.weight_names,
         )
 
     def vector(self, gait: Gait) -> Vector:
         """The vector of a gait; of mirrored weights, the first ones count."""
         _, first = np.unique(self.weights, return_index=True)
+        weights = np.array(gait.weights)[first]
         gains = [getattr(gait.gains, name) for name in self.pathways]
-        taus = gait.tau_a, gait.tau_b
-        return np.array([*np.array(gait.weights)[first], *gains, *taus])
+        return np.concatenate([weights, gains, [gait.tau_a, gait.tau_b]])
 
     def random(self, generator: np.random.Generator) -> Vector:
         """A vector drawn uniformly within the bounds, with tau_B = 2 tau_A."""
@@ -179,21 +182,6 @@ class ParameterSpace:
         if self.couples_tau_b:
             repaired[TAU_B] = TAU_B_PER_TAU_A * vector[TAU_A]
         return repaired
-
-
-def _parameters(scenario: Scenario, weights: list[str]) -> list[tuple[str, *tuple[float, ...]]]:
-    """Name, lower and upper bound and floor of each parameter."""
-    bounds = scenario.gait_bounds
-    weight = bounds.weight_min, bounds.weight_max, 0.0
-    gain = -LARGEST_GAIN, LARGEST_GAIN, -math.inf
-    tau_a = bounds.tau_a_min, bounds.tau_a_max, bounds.tau_a_min
-    tau_b = (TAU_B_PER_TAU_A * number for number in tau_a)
-    return [
-        *((f"weight {name}", *weight) for name in weights),
-        *((f"gain {name}", *gain) for name in scenario.cpg.feedback),
-        ("tau_A", *tau_a),
-        ("tau_B", *tau_b),
-    ]
 
 
 WALKING_SEED = 80
@@ -217,11 +205,11 @@ Weight = Annotated[float, Field(ge=0)]
 class GaitFile(Section):
     """The content of a gait file; see Gait."""
 
-    version: int = Field(alias="schema", ge=1, le=SCHEMA)
+    version: Literal[2] = Field(alias="schema")
     name: str = ""
     scenario: str = ""
-    weights: dict[str, Weight] | list[Weight]
-    """Weights by Actuation.weight_names, in any order; a list, as in schema 1, in their order."""
+    weights: dict[str, Weight]
+    """Weights by Actuation.weight_names, in any order."""
     tau_a_s: float = Field(gt=0)
     tau_b_s: float | None = Field(default=None, gt=0)
     turn: float = Field(default=0.0, ge=-1, le=1)
@@ -235,13 +223,11 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     """
     file = _read_file(path, key)
     actuation = Actuation.of(scenario)
-    names, weights = actuation.weight_names, file.weights
-    if isinstance(weights, dict):
-        _check_names(tuple(weights), names, path, f"{key}.weights".strip("."))
-        weights = [weights[name] for name in names]
+    names = actuation.weight_names
+    _check_names(file.weights, names, path, f"{key}.weights".strip("."))
     gait = Gait(
         name=file.name or Path(path).stem,
-        weights=tuple(weights),
+        weights=tuple(file.weights[name] for name in names),
         tau_a=file.tau_a_s,
         tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
         turn=file.turn,
@@ -270,35 +256,33 @@ def check_gait(
 ) -> None:
     """Raises InputError, naming source and key, for what does not fit the scenario."""
 
-    def refuse(name: str, problem: str) -> NoReturn:
-        raise InputError(source, f"{key}.{name}".strip("."), problem)
-
+    prefix = f"{key}." if key else ""
     count, expected = len(gait.weights), len(actuation.couplings)
     if count != expected:
         problem = f"found {count} numbers, expected {expected}"
-        refuse("weights", f"{problem} for {len(actuation.names)} oscillators")
+        problem += f" for {len(actuation.names)} oscillators"
+        raise InputError(source, f"{prefix}weights", problem)
     for name, gain in gait.gains:
         if gain and name not in scenario.cpg.feedback:
             problem = f"found {gain}, expected 0, as cpg.feedback is {scenario.cpg.feedback}"
-            refuse(f"gains.{name}", problem)
+            raise InputError(source, f"{prefix}gains.{name}", problem)
     if gait.turn and not actuation.sides.any():
-        refuse("turn", f"found {gait.turn}, expected 0, as no oscillator has a side")
+        problem = f"found {gait.turn}, expected 0, as no oscillator has a side"
+        raise InputError(source, f"{prefix}turn", problem)
 
 
-def _check_names(found: tuple[str, ...], wanted: tuple[str, ...], source: object, key: str) -> None:
-    given, known = set(found), set(wanted)
+def _check_names(given: Collection[str], wanted: tuple[str, ...], source: object, key: str) -> None:
+    """Raises InputError unless these are the names of a scenario's weights."""
     missing = [name for name in wanted if name not in given]
-    unknown = [name for name in found if name not in known]
-    close = difflib.get_close_matches(unknown[0], missing, n=1) if unknown else []
-    hint = f"; did you mean '{close[0]}'?" if close else ""
-    parts = [
-        f"{what} {len(some)} ('{some[0]}'{' ...' * (len(some) > 1)})"
-        for what, some in (("misses", missing), ("has in excess", unknown))
-        if some
-    ]
-    if parts:
-        problem = f"of the {len(wanted)} weights of the scenario it {' and '.join(parts)}{hint}"
-        raise InputError(source, key, problem)
+    unknown = [name for name in given if name not in wanted]
+    problems = []
+    if missing:
+        problems.append(f"misses {len(missing)}, as '{missing[0]}'")
+    if unknown:
+        problems.append(f"has {len(unknown)} others, as '{unknown[0]}'")
+    if problems:
+        problem = f"found {len(given)}, expected the {len(wanted)} of the scenario"
+        raise InputError(source, key, f"{problem}; {' and '.join(problems)}")
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

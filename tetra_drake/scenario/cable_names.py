@@ -20,7 +20,21 @@ SIDES = ("left", "right")
 """Endings of the names of cables on one side of the robot."""
 
 
+def side_of(cables: Sequence[str]) -> str:
+    """The side of the robot, of SIDES, on which all cables of a group are; "" if there is none."""
+    for side in SIDES:
+        if all(cable.endswith(side) for cable in cables):
+            return side
+    return ""
+
+
 def mirrored(cables: Sequence[str]) -> list[str]:
     """The cables of a junction on the other side of the robot, by their names."""
-    swap = dict(zip(SIDES, reversed(SIDES), strict=True))
-    return ["_".join(swap.get(part, part) for part in cable.split("_")) for cable in cables]
+    left, right = SIDES
+    images = []
+    for cable in cables:
+        if cable.endswith(left):
+            images.append(cable.replace(left, right))
+        else:
+            images.append(cable.replace(right, left))
+    return images

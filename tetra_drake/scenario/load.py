@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 from tetra_drake.errors import InputError
@@ -41,22 +40,25 @@ def dump_scenario(scenario: Scenario) -> str:
 
 def differences(scenario: Scenario, base: Scenario) -> list[tuple[str, str]]:
     """(key, value as text) of what a scenario has other than `base`, the name aside."""
-    ours, theirs = dict(_texts(scenario)), dict(_texts(base))
-    return [(key, text) for key, text in ours.items() if theirs.get(key) != text]
+    ours, theirs = _texts(scenario), _texts(base)
+    return [(key, text) for key, text in ours.items() if theirs.get(key) != text and key != "name"]
 
 
-def _texts(scenario: Scenario) -> Iterator[tuple[str, str]]:
-    """The keys of a scenario with their values as texts."""
+def _texts(scenario: Scenario) -> dict[str, str]:
+    """The values of a scenario as texts, by their keys."""
+    texts = {}
 
-    def texts(tree: Tree, prefix: str) -> Iterator[tuple[str, str]]:
+    def add(tree: Tree, prefix: str) -> None:
         for name, value in tree.items():
+            key = f"{prefix}.{name}".strip(".")
             if isinstance(value, dict):
-                yield from texts(value, f"{prefix}{name}.")
-            elif name != "name" or prefix:
+                add(value, key)
+            else:
                 text = f"{value:.6g}" if isinstance(value, float) else json.dumps(value)
-                yield (prefix + name).removesuffix(f".{TAG}"), text.replace('"', "")
+                texts[key.removesuffix(f".{TAG}")] = text.replace('"', "")
 
-    yield from texts(tree_of(scenario, show="{:.6g} {}".format, sparse=False), "")
+    add(tree_of(scenario, show="{:.6g} {}".format, sparse=False), "")
+    return texts
 
 
 def _file(name: str, folder: Path) -> Path:
@@ -84,7 +86,7 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
     base_file = _file(base, file.parent)
     if not os.path.exists(base_file):
         raise InputError(file, "base", f"'{base}': no such {expected}")
-    return _load(base_file, (*seen, file.resolve())).based_on_this(given, file)
+    return _load(base_file, (*seen, file.resolve())).with_file(given, file)
 
 
 def _resolve_height_file(terrain: object, file: Path) -> None:

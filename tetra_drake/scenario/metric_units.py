@@ -18,10 +18,12 @@ LEAST_WAY = 1e-3
 """m: a robot that goes less far counts as gone so far in its cost of transport."""
 
 
-def _metric(unit: str, definition: str, *, least: bool = False) -> Any:
-    """A field of Metrics in the SI unit `unit`, "" for none; `least` for a least value, of which
-    the least of several simulations is recorded in place of their mean."""
-    return field(metadata={"unit": unit, "definition": definition, "least": least})
+def _metric(unit: str, *, least: bool = False) -> Any:
+    """A field of Metrics in the SI unit `unit`, "" for none.
+
+    least: True if of several simulations the least value is recorded, in place of the mean.
+    """
+    return field(metadata={"unit": unit, "least": least})
 
 
 @dataclass(frozen=True)
@@ -31,59 +33,47 @@ class Metrics:
     x₁ and y₁ are those of T1's bottom left node, x₂ is that of its bottom right node, x₃ that of
     the lead tetrahedron's tip. The steady stretch is from `simulation.steady_from`, or from
     `cpg.start_up` where that is later, to the end. The centre is the mean of the bodies' origins.
-    Values come from results.metrics; definitions are also the table of scenario/README.md.
+    Values come from results.metrics.
     """
 
-    distance: float = _metric("m", "way along x of T1's bottom left node, x₁")
-    steady_distance: float = _metric(
-        "m", "the same from `simulation.steady_from` on: Δx₁ of Eq. 10"
-    )
-    speed: float = _metric("m/s", "mean speed of the robot's centre along x in the steady stretch")
-    """The stretch begins at `simulation.steady_from` here."""
-    twist: float = _metric("m", "abs(x₁ - x₂) at the end, x₂ of T1's bottom right node")
-    lead: float = _metric("m", "x₃ - x₁ at the end, x₃ of the lead's tip")
-    lateral_drift: float = _metric("m", "abs(y₁), sideways way of T1's bottom left node")
-    heading_change: float = _metric(
-        "rad", "angle by which the robot has turned to the left at the end; whole turns count"
-    )
-    """See results.path."""
-    path_curvature: float = _metric(
-        "1/m", "of the centre's path in the steady stretch, positive to the left; 0 if straight"
-    )
-    """Left of the direction in which the centre moves, be that backward. The stretch begins at
-    `simulation.steady_from` here. See results.path."""
-    actuator_work: float = _metric(
-        "J",
-        "integral of max(0, -S dl/dt) in the steady stretch, for driven cables with signal S and "
-        "length l",
-    )
-    """The work of actuators that cannot take any back."""
-    cost_of_transport: float = _metric("", "actuator work / (weight times way of the centre)")
-    """The way over the ground in the steady stretch, LEAST_WAY at least. Infinite without
-    gravity."""
-    signal_rate: float = _metric("N/s", "root mean square of dS/dt in the steady stretch")
-    """Over all oscillators' signals S: the less, the smoother the drive."""
-    lifted: float = _metric(
-        "",
-        "share of the steady stretch in which a tetrahedron is off the ground, mean of all (says "
-        "little in MuJoCo)",
-    )
-    """Off the ground is a tetrahedron none of whose contact nodes bears a normal force."""
-    clearance: float = _metric(
-        "m",
-        "least distance between the axes of struts of two tetrahedra; less than a strut's diameter "
-        "is overlap",
-        least=True,
-    )
-    """Minimum over all times. Nothing in the model keeps struts apart."""
-    tension: float = _metric(
-        "N", "least tension of any cable; below 0 it would have to push", least=True
-    )
-    """Minimum over all times."""
-    travelling_index: float = _metric(
-        "", "0 if the signals stand along the robot, 1 if they travel, in the steady stretch"
-    )
-    """See results.measures."""
+    distance: float = _metric("m")
+    """Way along x of T1's bottom left node, x₁."""
+    steady_distance: float = _metric("m")
+    """The same from `simulation.steady_from` on: Δx₁ of Eq. 10."""
+    speed: float = _metric("m/s")
+    """Mean speed of the centre along x from `simulation.steady_from` on."""
+    twist: float = _metric("m")
+    """abs(x₁ - x₂) at the end."""
+    lead: float = _metric("m")
+    """x₃ - x₁ at the end."""
+    lateral_drift: float = _metric("m")
+    """abs(y₁): sideways way of T1's bottom left node."""
+    heading_change: float = _metric("rad")
+    """Angle by which the robot has turned to the left at the end. Whole turns count. See
+    results.path."""
+    path_curvature: float = _metric("1/m")
+    """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive to
+    the left of the direction in which the centre moves, be that backward. See results.path."""
+    actuator_work: float = _metric("J")
+    """Integral of max(0, -S dl/dt) in the steady stretch, for driven cables with signal S and
+    length l: the work of actuators that cannot take any back."""
+    cost_of_transport: float = _metric("")
+    """Actuator work / (weight times the centre's way over the ground) in the steady stretch. The
+    way is LEAST_WAY at least. Infinite without gravity."""
+    signal_rate: float = _metric("N/s")
+    """Root mean square of dS/dt in the steady stretch, over all oscillators' signals S: the less,
+    the smoother the drive."""
+    lifted: float = _metric("")
+    """Share of the steady stretch in which a tetrahedron is off the ground, mean of all. Off the
+    ground is one none of whose contact nodes bears a normal force. It says little in MuJoCo."""
+    clearance: float = _metric("m", least=True)
+    """Least distance, at any time, between the axes of struts of two tetrahedra. Less than a
+    strut's diameter is overlap: nothing in the model keeps struts apart."""
+    tension: float = _metric("N", least=True)
+    """Least tension of any cable at any time. Below 0 the cable would have to push."""
+    travelling_index: float = _metric("")
+    """0 if the signals stand along the robot, 1 if they travel, in the steady stretch. See
+    results.measures."""
     lifted_shares: tuple[float, ...] = ()
     """The share of `lifted` of each tetrahedron, from T1 on."""
 
@@ -112,9 +102,6 @@ _FIELDS = [field for field in dataclasses.fields(Metrics) if field.metadata]
 
 METRICS: dict[str, str] = {field.name: field.metadata["unit"] for field in _FIELDS}
 """The SI unit of each metric that is a number, by name."""
-
-DEFINITIONS: dict[str, str] = {field.name: field.metadata["definition"] for field in _FIELDS}
-"""The definition of each metric, by name."""
 
 LEAST = tuple(field.name for field in _FIELDS if field.metadata["least"])
 """Metrics of which the least of several simulations is recorded, in place of their mean."""

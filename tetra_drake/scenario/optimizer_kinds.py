@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.sections import Kinds, Section, named_quantities, quantity, refuse
+from tetra_drake.scenario.sections import Kinds, Section, quantity, refuse
 
 MOST_GAITS = 100_000
 """Upper limit of a population."""
@@ -36,19 +36,20 @@ class SteadyState(Section):
 class CmaEs(Section):
     """Covariance matrix adaptation by pycma (Hansen, arXiv 1604.00772).
 
-    Vectors are drawn from a normal distribution that learns from them. Where it has converged, it
-    begins anew around the best gait, larger.
+    Vectors are drawn from a normal distribution that adapts to the fittest. A search that has
+    converged restarts around the best gait, with twice the population.
     """
 
     population: int | None = Field(default=None, ge=4, le=MOST_GAITS)
-    """Vectors in an iteration; 4 + 3 ln n, rounded down, of n parameters if not given."""
+    """Vectors in an iteration. The default is 4 + 3 ln n, rounded down, for n parameters."""
     sample: int = Field(default=40, ge=0, le=MOST_GAITS)
     """Random gaits evaluated first."""
     starts: int = Field(default=5, ge=1, le=1000)
-    """Searches, of which the one with the best gait goes on: the first from the mean of the best
-    quarter of the sample, the others from its best gaits; without a sample, from the middle of the
-    ranges and random gaits. Fewer where trying them out would take more than half of the
-    evaluations, and one more than the sample at most."""
+    """Searches that are tried out; the one with the best gait continues. The first starts at the
+    mean of the best quarter of the sample, the others at its best gaits. Without a sample, the
+    first starts in the middle of the ranges, the others at random gaits. There are fewer searches
+    where they would take more than half of the evaluations, and at most one more than sampled
+    gaits."""
 
 
 class RandomSearch(Section):
@@ -65,15 +66,14 @@ Count = Annotated[int, Field(ge=2, le=1000)]
 class QualityDiversity(Section):
     """A map of two metrics, in each of whose cells the fittest gait counts (extra `qd`).
 
-    Several runs of CMA-ES look for gaits that raise the levels of cells, which follow the fittest
-    gaits slowly (CMA-MAE by pyribs, Fontaine and Nikolaidis, arXiv 2205.10752).
+    CMA-MAE by pyribs (Fontaine and Nikolaidis, arXiv 2205.10752). Several runs of CMA-ES look for
+    gaits above the levels of cells. A level follows the fittest gait of its cell slowly.
     """
 
-    measures: dict[str, Range] = named_quantities(
+    measures: dict[str, Range] = quantity(
         METRICS, default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
     )
-    """Two metrics with their ranges on the map. What lies outside counts to the cells at the
-    edge."""
+    """Two metrics with their ranges on the map. Values outside count to the cells at the edge."""
     cells: list[Count] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Self, TypeVar
 
 from pydantic import PrivateAttr
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.cable_names import SIDES, mirrored
+from tetra_drake.scenario.cable_names import mirrored, side_of
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
@@ -21,7 +20,7 @@ from tetra_drake.scenario.sections import (
     Whole,
     hint,
     merge,
-    named_quantities,
+    quantity,
     tree_of,
     tree_of_changes,
 )
@@ -36,6 +35,7 @@ from tetra_drake.scenario.settings import (
     SimulationSection,
     separate,
 )
+from tetra_drake.scenario.spacing import balanced_spacing, deciding_numbers
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.yaml_text import dump_yaml
 
@@ -61,10 +61,10 @@ class Scenario(Section):
     gait_bounds: GaitBounds
     simulation: SimulationSection
     engine: Engine = Drake()
-    objective: dict[str, float] = named_quantities({k: inverse(u) for k, u in METRICS.items()})
+    objective: dict[str, float] = quantity({k: inverse(u) for k, u in METRICS.items()})
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
-    require: dict[str, float] = named_quantities(METRICS, default={})
+    require: dict[str, float] = quantity(METRICS, default={})
     """Least values of metrics: a gait with less counts as failed. Replaced as a whole."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
@@ -111,7 +111,10 @@ class Scenario(Section):
         """The scenario of a complete tree; raises InputError that names `source` and key."""
         scenario = super().from_tree(tree, source, key=key)
         if scenario.robot.spacing == 0.0:
-            spacing = balanced_spacing(scenario.robot, scenario.cables, source)
+            try:
+                spacing = balanced_spacing(scenario.robot, scenario.cables)
+            except ValueError as error:
+                raise InputError(source, "robot.spacing", str(error)) from None
             scenario = scenario.with_numbers({"robot.spacing": spacing})
         scenario._tree = _with_tags(tree, scenario)
         check_relations(scenario, source)
@@ -126,18 +129,18 @@ class Scenario(Section):
         whole: {"friction": Coulomb()}. Raises InputError, naming the key.
         """
         source = f"scenario {self.name}"
-        given = tree_of_changes(changes, source)
-        return self.based(_as_a_whole(given, changes), source)
+        return self._merged(_replacing(tree_of_changes(changes, source), changes), source)
 
-    def based_on_this(self, given: Tree, source: object) -> Self:
-        """The scenario of a file that names this one as its base and holds a tree."""
-        return self.based(_as_a_whole(given, given), source)
+    def with_file(self, tree: Tree, source: object) -> Self:
+        """The scenario of a file's tree, of which this one is the base."""
+        return self._merged(_replacing(tree, tree), source)
 
-    def based(self, given: Tree, source: object) -> Self:
-        """A copy with what a tree gives."""
-        tree = merge(self.tree, given)
+    def _merged(self, changes: Tree, source: object) -> Self:
+        tree = merge(self.tree, changes)
         changed = self.from_tree(tree, source)
-        if "spacing" in given.get("robot", {}) or _decisive(changed) == _decisive(self):
+        is_spacing_given = "spacing" in changes.get("robot", {})
+        before = deciding_numbers(self.robot, self.cables)
+        if is_spacing_given or deciding_numbers(changed.robot, changed.cables) == before:
             return changed
         return self.from_tree(merge(tree, {"robot": {"spacing": "balanced"}}), source)
 
@@ -167,53 +170,22 @@ class Scenario(Section):
         }
 
 
-def _as_a_whole(given: Tree, keys: Iterable[str]) -> Tree:
-    """The tree of a file, whose objective and requirements replace those of its base."""
-    whole = {
-        name: Whole(given[name])
-        for name in ("objective", "require")
-        if name in keys and isinstance(given[name], dict)
-    }
-    return given | whole
+def _replacing(tree: Tree, keys: Iterable[str]) -> Tree:
+    """A tree whose objective and requirements replace those of a base, if they are in `keys`."""
+    whole = {}
+    for name in ("objective", "require"):
+        if name in keys and isinstance(tree[name], dict):
+            whole[name] = Whole(tree[name])
+    return tree | whole
 
 
 def _with_tags(tree: Tree, scenario: Scenario) -> Tree:
     """The tree with the tags of all kinds, so that another kind does not merge with them."""
-    kinds = ("friction", "terrain", "engine", "optimizer")
-    tagged = {k: {TAG: type(getattr(scenario, k)).__name__} | tree[k] for k in kinds if k in tree}
+    tagged = {}
+    for name in ("friction", "terrain", "engine", "optimizer"):
+        if name in tree:
+            tagged[name] = {TAG: type(getattr(scenario, name)).__name__} | tree[name]
     return tree | tagged
-
-
-def _decisive(scenario: Scenario) -> tuple[float, ...]:
-    """Numbers on which the balanced spacing depends.
-
-    The weight does not count: twice the density moves T1 by less than 0.003 in.
-    """
-    cables = scenario.cables
-    stiffness = cables.outer_stiffness, cables.inner_stiffness
-    return *stiffness, cables.free_length, scenario.robot.strut_length
-
-
-def balanced_spacing(robot: RobotSection, cables: CableSection, source: object) -> float:
-    """The spacing (m) at which the cables of a junction balance along x.
-
-    Three outer cables of length s pull two tetrahedra together. Three inner ones, from a tip at
-    height h to base nodes at s along and R across, push them apart while s < h. Raises InputError
-    if there is no such spacing.
-    """
-    height, radius = robot.strut_length * math.sqrt(2.0 / 3.0), robot.strut_length / math.sqrt(3.0)
-
-    def pull(s: float) -> float:
-        length = math.hypot(radius, height - s)
-        inner = cables.inner_stiffness * (length - cables.free_length) * (height - s) / length
-        return cables.outer_stiffness * (s - cables.free_length) - inner
-
-    near, far = 0.0, height + cables.free_length
-    if pull(near) >= 0.0:
-        raise InputError(source, "robot.spacing", "the cables balance at no spacing; give one")
-    while near < (middle := 0.5 * (near + far)) < far:
-        near, far = (near, middle) if pull(middle) > 0.0 else (middle, far)
-    return far
 
 
 def check_relations(scenario: Scenario, source: object) -> None:
@@ -231,60 +203,58 @@ def check_relations(scenario: Scenario, source: object) -> None:
     if "load" in scenario.cpg.feedback and scenario.robot.gravity == 0.0:
         problem = "found 0 m/s^2, expected a weight, for feedback of the load"
         raise InputError(source, "robot.gravity", problem)
-    _check_size(scenario, source)
+    _check_memory(scenario, source)
     _check_sides(scenario, source)
     _check_disturbances(scenario, source)
 
 
-def _check_size(scenario: Scenario, source: object) -> None:
+def _check_memory(scenario: Scenario, source: object) -> None:
     """Raises InputError for what does not fit in memory."""
-    simulation, engine = scenario.simulation, scenario.engine
-    most_signals = MOST_SIGNALS_OF_DRAKE if isinstance(engine, Drake) else MOST_SIGNALS
-    per_signal = simulation.duration * scenario.oscillators / most_signals
-    per_sample = simulation.duration * scenario.robot.tetrahedra / MOST_SAMPLES
-    periods = {
-        "cpg.listing_step": (scenario.cpg.listing_step, per_signal),
-        "simulation.sample_period": (simulation.sample_period, per_sample),
-    }
-    if isinstance(engine, Mujoco):
-        periods["engine.step"] = (engine.step, per_signal)
-    for key, (period, least) in periods.items():
+    simulation = scenario.simulation
+    is_drake = isinstance(scenario.engine, Drake)
+    most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
+    least_step = simulation.duration * scenario.oscillators / most_signals
+    least_sample = simulation.duration * scenario.robot.tetrahedra / MOST_SAMPLES
+    periods = [
+        ("cpg.listing_step", scenario.cpg.listing_step, least_step),
+        ("simulation.sample_period", simulation.sample_period, least_sample),
+    ]
+    if isinstance(scenario.engine, Mujoco):
+        periods.append(("engine.step", scenario.engine.step, least_step))
+    for key, period, least in periods:
         if period < least:
-            problem = (
-                f"found {period} s, expected at least {least:.3g} s for this duration and robot"
-            )
-            raise InputError(source, key, f"{problem}, to fit in memory")
+            problem = f"found {period} s, expected at least {least:.3g} s, to fit in memory"
+            raise InputError(source, key, f"{problem}, for this duration and robot")
 
 
 def _check_sides(scenario: Scenario, source: object) -> None:
     """Raises InputError if gaits turn, or are mirrored, where groups of cables have no sides."""
     groups, bounds = scenario.robot.actuation, scenario.gait_bounds
-    sided = any(all(cable.endswith(side) for cable in g) for g in groups for side in SIDES)
-    if bounds.turn != 0.0 and not sided:
+    if bounds.turn != 0.0 and not any(side_of(group) for group in groups):
         problem = f"found {bounds.turn}, expected 0, as no group is on one side"
         raise InputError(source, "gait_bounds.turn", problem)
-    sets = [set(group) for group in groups]
-    for group in groups:
-        if bounds.mirrored and set(mirrored(group)) not in sets:
-            problem = f"found true, expected false, as {group} has no mirror image"
-            raise InputError(source, "gait_bounds.mirrored", problem)
+    if bounds.mirrored:
+        sets = [set(group) for group in groups]
+        for group in groups:
+            if set(mirrored(group)) not in sets:
+                problem = f"found true, expected false, as {group} has no mirror image"
+                raise InputError(source, "gait_bounds.mirrored", problem)
 
 
 def _check_disturbances(scenario: Scenario, source: object) -> None:
     """Raises InputError if a number that draws change cannot be changed that far."""
-    settings = scenario.disturbances
-    if settings is None:
+    if scenario.disturbances is None:
         return
     undisturbed = scenario.with_sections(disturbances=None)
-    known = scenario.numbers()
-    for joined, spread in settings.spreads.items():
+    numbers = scenario.numbers()
+    for joined, spread in scenario.disturbances.spreads.items():
         place, keys = f"disturbances.spreads.{joined}", separate(joined)
         for key in keys:
-            if key not in known:
-                problem = f"'{key}' is no number of the scenario; {hint(key, known)}"
+            if key not in numbers:
+                problem = f"'{key}' is no number of the scenario; {hint(key, numbers)}"
                 raise InputError(source, place, problem)
         for factor in (1.0 - spread, 1.0 + spread):
-            changed = undisturbed.with_numbers({key: factor * known[key] for key in keys})
+            changed = undisturbed.with_numbers({key: factor * numbers[key] for key in keys})
             try:
                 type(scenario).from_tree(changed.tree, source)
             except InputError as error:

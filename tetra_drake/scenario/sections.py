@@ -7,7 +7,6 @@ units. A tagged kind, written `!Name {...}` as in Drake's YAML, is a mapping wit
 from __future__ import annotations
 
 import difflib
-import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NoReturn, Self
@@ -15,7 +14,7 @@ from typing import Any, NoReturn, Self
 import pydantic
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.units import quantity_to_si
@@ -28,28 +27,35 @@ FROM_FILE = {"units": True}
 """Context of a validation in which quantities need units. Without it, numbers are SI."""
 
 
-def quantity(unit: str, *, words: Mapping[str, float] | None = None, **settings: Any) -> Any:
+def quantity(unit: str | Mapping[str, str], **settings: Any) -> Any:
     """A field of numbers in the SI unit `unit`, which files hold as texts with units.
 
-    words: texts that stand for a number. settings: those of pydantic.Field (default, gt, ge, le).
+    unit: units by name for a mapping of numbers; "" for a number without one.
+    settings: those of pydantic.Field (default, gt, ge, le).
     """
-    return Field(json_schema_extra={"unit": unit, "words": dict(words or {})}, **settings)
-
-
-def named_quantities(units: Mapping[str, str], **settings: Any) -> Any:
-    """A field of numbers by name, each in the SI unit of its name; "" for a number without one."""
-    return Field(json_schema_extra={"units": dict(units)}, **settings)
+    return Field(json_schema_extra={"unit": unit}, **settings)  # type: ignore[dict-item]
 
 
 def refuse(key: str, problem: str) -> NoReturn:
-    """Ends a validation with a problem at a key, relative to the section that is checked."""
-    raise PydanticCustomError("refused", "refused", {"key": key, "problem": problem})
+    """Ends a validation with a problem at a key, relative to what is validated."""
+    raise PydanticCustomError("refused", "{key}: {problem}", {"key": key, "problem": problem})
 
 
 class Section(BaseModel):
     """Settings that belong together. Numbers are SI, values cannot be changed in place."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    @pydantic.model_validator(mode="wrap")
+    @classmethod
+    def _explain(cls, tree: Any, validate: pydantic.ModelWrapValidatorHandler[Self]) -> Self:
+        """Puts pydantic's first error into words."""
+        try:
+            return validate(tree)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+        key, problem = _in_words(first, cls, tree)
+        refuse(key, problem)
 
     @pydantic.model_validator(mode="before")
     @classmethod
@@ -64,18 +70,42 @@ class Section(BaseModel):
     @pydantic.field_validator("*", mode="before")
     @classmethod
     def _read_units(cls, value: Any, info: pydantic.ValidationInfo) -> Any:
-        field = cls.model_fields[str(info.field_name)]
-        return _read(value, _extra(field), needs_units=bool(info.context))
+        unit = _unit(cls.model_fields[str(info.field_name)])
+        if isinstance(unit, dict) and isinstance(value, dict):
+            for name in value:
+                if name not in unit:
+                    refuse(str(name), f"unknown name; {hint(name, unit)}")
+
+        def read(number: Any, unit: str, key: str) -> Any:
+            return _read_number(number, unit, key, needs_unit=bool(info.context))
+
+        return _each_number(python_value(value), unit, read)
+
+    @pydantic.model_serializer(mode="wrap")
+    def _write_units(
+        self, serialize: pydantic.SerializerFunctionWrapHandler, info: pydantic.SerializationInfo
+    ) -> Tree:
+        tree = serialize(self)
+        if not info.context:
+            return tree
+        show = info.context["show"]
+
+        def write(number: Any, unit: str, key: str) -> Any:
+            return show(number, unit) if isinstance(number, float) else number
+
+        for name in tree:
+            tree[name] = _each_number(tree[name], _unit(type(self).model_fields[name]), write)
+        return tree
 
     @classmethod
     def _advice(cls, name: str) -> str:
         """Advice on an unknown key: a key of a section, or a similar one."""
-        sections = {key: members(field.annotation) for key, field in keys_of(cls).items()}
-        keys = [
-            f"'{key}.{name}'"
-            for key, kinds in sections.items()
-            if any(is_section(kind) and name in keys_of(kind) for kind in kinds)
-        ]
+        keys = []
+        for key, field in keys_of(cls).items():
+            for kind in _union(field.annotation):
+                if isinstance(kind, type) and issubclass(kind, Section) and name in keys_of(kind):
+                    keys.append(f"'{key}.{name}'")
+                    break
         return f"did you mean {' or '.join(keys)}?" if keys else hint(name, keys_of(cls))
 
     @classmethod
@@ -84,8 +114,8 @@ class Section(BaseModel):
         try:
             return cls.model_validate(tree, context=FROM_FILE)
         except ValidationError as error:
-            problem = input_error(error, cls, tree, source)
-            raise InputError(source, _joined(key, problem.key), problem.problem) from None
+            refused = error.errors(include_url=False)[0]["ctx"]
+            raise InputError(source, _joined(key, refused["key"]), refused["problem"]) from None
 
 
 def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
@@ -99,127 +129,104 @@ class Kinds:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
     ) -> CoreSchema:
-        kinds = {kind.__name__: kind for kind in members(source)}
+        kinds = {kind.__name__: kind for kind in _union(source)}
 
-        def name(value: Any) -> str:
-            if isinstance(value, Section):
-                return type(value).__name__
-            return str(value.get(TAG) or _untagged(value, kinds))
+        def read(value: Any, info: core_schema.ValidationInfo) -> Section:
+            if type(value) in kinds.values():
+                return typing.cast(Section, value)
+            return _kind(value, kinds).model_validate(value, context=info.context)
 
-        def check(value: Any) -> Any:
-            if not isinstance(value, (dict, Section)) or name(value) not in kinds:
-                wanted = name(value) if isinstance(value, (dict, Section)) else ""
-                refuse("", f"found {described(value)}; {hint(f'!{wanted}', tags(kinds))}")
-            if isinstance(value, dict):
-                _check_kind(value, name(value), kinds)
-            return value
+        def write(section: Section, info: core_schema.SerializationInfo) -> Tree:
+            # In full, so that another default does not change what a record means.
+            tree = section.model_dump(context=info.context)
+            return {TAG: type(section).__name__} | tree
 
-        choices = {kind: handler(section) for kind, section in kinds.items()}
-        union = core_schema.tagged_union_schema(choices, discriminator=name)
-        return core_schema.no_info_before_validator_function(check, union)
+        serializer = core_schema.plain_serializer_function_ser_schema(write, info_arg=True)
+        return core_schema.with_info_plain_validator_function(read, serialization=serializer)
 
 
-def _check_kind(tree: Tree, name: str, kinds: Mapping[str, type[Section]]) -> None:
-    """Refuses a key that only another kind has."""
-    for key in tree:
-        others = [other for other, kind in kinds.items() if key in keys_of(kind)]
-        if others and name not in others:
-            refuse(key, f"unknown key of !{name}; did you mean {' or '.join(tags(others))}?")
+def _kind(value: Any, kinds: Mapping[str, type[Section]]) -> type[Section]:
+    """The kind of a mapping; refuses a key that only another kind has."""
+    tags = [f"!{name}" for name in kinds]
+    if not isinstance(value, dict):
+        refuse("", f"found {described(value)}; {hint('!', tags)}")
+    name = value.get(TAG, next(iter(kinds)))
+    if name not in kinds:
+        refuse("", f"found !{name}; {hint(f'!{name}', tags)}")
+    for key in value:
+        others = [f"!{other}" for other, kind in kinds.items() if key in keys_of(kind)]
+        if others and f"!{name}" not in others:
+            refuse(key, f"unknown key of !{name}; did you mean {' or '.join(others)}?")
+    return kinds[name]
 
 
-def tags(kinds: Iterable[str]) -> list[str]:
-    """The tags of kinds as they are written."""
-    return [f"!{name}" for name in kinds]
+def _union(annotation: Any) -> tuple[Any, ...]:
+    """The members of a union type; a type without members alone."""
+    return typing.get_args(annotation) or (annotation,)
 
 
-def _untagged(tree: Tree, kinds: Mapping[str, type[Section]]) -> str:
-    """The kind of a mapping without a tag: the first, unless only another one has all its keys."""
-    fitting = [name for name, kind in kinds.items() if tree.keys() <= keys_of(kind).keys()]
-    first = next(iter(kinds))
-    return first if first in fitting or not fitting else ""
+def _unit(field: FieldInfo) -> Any:
+    """The unit of a field's numbers, units by name, or ""."""
+    extra = field.json_schema_extra
+    return extra.get("unit", "") if isinstance(extra, dict) else ""
 
 
-def members(annotation: Any) -> list[Any]:
-    """The members of a union type, None aside; any other type alone."""
-    if typing.get_origin(annotation) is typing.Annotated:
-        annotation = typing.get_args(annotation)[0]
-    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
-        nested = [members(member) for member in typing.get_args(annotation)]
-        return [kind for kinds in nested for kind in kinds if kind is not types.NoneType]
-    return [annotation]
+def python_value(value: Any) -> Any:
+    """A value with Python's lists and numbers in place of tuples and of what numpy has."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [python_value(item) for item in value]
+    return value
 
 
-def is_section(kind: Any) -> bool:
-    """True if a type is a section."""
-    return isinstance(kind, type) and issubclass(kind, Section)
-
-
-def _extra(field: FieldInfo) -> dict[str, Any]:
-    return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-
-
-def _read(value: Any, extra: Mapping[str, Any], *, needs_units: bool, key: str = "") -> Any:
-    """A value with its quantities in SI."""
-    if hasattr(value, "tolist"):  # numpy's arrays and numbers
-        value = value.tolist()
-    if isinstance(value, tuple):
-        value = list(value)
+def _each_number(
+    value: Any, unit: str | Mapping[str, str], change: Callable[[Any, str, str], Any], key: str = ""
+) -> Any:
+    """A value with change(number, unit, key) in place of each number that has a unit."""
     if isinstance(value, list):
         items = enumerate(value)
-        return [_read(v, extra, needs_units=needs_units, key=f"{key}[{i}]") for i, v in items]
-    if isinstance(value, dict) and "units" in extra:
-        for name in value:
-            if name not in extra["units"]:
-                refuse(f"{key}.{name}", f"unknown name; {hint(name, extra['units'])}")
-    if isinstance(value, dict) and extra:
-        units = extra.get("units") or dict.fromkeys(value, extra.get("unit"))
-        return {
-            name: _read(v, {"unit": units[name]}, needs_units=needs_units, key=f"{key}.{name}")
-            for name, v in value.items()
-        }
-    return _number(value, extra, needs_units, key)
+        return [_each_number(item, unit, change, f"{key}[{i}]") for i, item in items]
+    if isinstance(unit, str):
+        return change(value, unit, key) if unit else value
+    if isinstance(value, dict):
+        return {name: _each_number(item, unit[name], change, name) for name, item in value.items()}
+    return value
 
 
-def _number(value: Any, extra: Mapping[str, Any], needs_units: bool, key: str) -> Any:
-    unit = extra.get("unit")
-    if not unit:
-        return value
-    if isinstance(value, str) and value in extra.get("words", {}):
-        return extra["words"][value]
+def _read_number(value: Any, unit: str, key: str, *, needs_unit: bool) -> Any:
+    """A number in the SI unit `unit`; what is no number is left to pydantic."""
     if isinstance(value, str):
         try:
             return quantity_to_si(value, unit)
         except ValueError as error:
             refuse(key, str(error))
-    if needs_units and type(value) in (int, float) and value != 0:
+    if needs_unit and type(value) in (int, float) and value != 0:
         expected = f"expected a quantity that converts to {unit}"
         refuse(key, f"found {described(value)} without a unit, {expected}")
     return value
 
 
-def input_error(
-    error: ValidationError, section: type[Section], tree: Any, source: object
-) -> InputError:
-    """The first problem of a validation as an error of one line."""
-    errors = error.errors(include_url=False)
-    of_one_field = [each for each in errors if each["loc"][:1] == errors[0]["loc"][:1]]
-    # A value that fits no member of a union has an error for each: the innermost says most.
-    first = max(of_one_field, key=lambda each: _depth(_place(each["loc"], section, tree)[0]))
-    key, value, field = _place(first["loc"], section, tree)
-    if first["type"] == "refused":
-        context = first["ctx"]
-        return InputError(source, _joined(key, context["key"]), context["problem"])
-    if first["type"] == "missing":
-        return InputError(source, key, "is missing; give it, or name a `base` that has it")
-    expected = first["msg"].removeprefix("Input should be ")
-    if first["type"] in _LIMITS:
-        unit = _extra(field).get("unit", "") if field else ""
-        words, name = _LIMITS[first["type"]]
-        expected = f"{words} {first['ctx'][name]:.4g} {unit}".rstrip()
-    elif "actual_length" in first.get("ctx", {}):
-        length = first["ctx"].get("min_length", first["ctx"].get("max_length"))
-        expected = f"{length} items, not {first['ctx']['actual_length']}"
-    return InputError(source, key, f"found {described(value)}, expected {expected}")
+def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[str, str]:
+    """Key and problem of an error in the validation of a tree as a section."""
+    place = [part for part in error["loc"] if part != "[key]"]
+    key = _joined(*place)
+    if error["type"] == "refused":
+        return _joined(key, error["ctx"]["key"]), error["ctx"]["problem"]
+    if error["type"] == "missing":
+        return key, "is missing; give it, or name a `base` that has it"
+    expected, context = error["msg"].removeprefix("Input should be "), error.get("ctx", {})
+    if error["type"] in _LIMITS:
+        words, name = _LIMITS[error["type"]]
+        unit = _unit(keys_of(section)[str(place[0])])
+        expected = f"{words} {context[name]:.4g} {unit}".rstrip()
+    elif "actual_length" in context:
+        length = context.get("min_length", context.get("max_length"))
+        expected = f"{length} items, not {context['actual_length']}"
+    found = tree  # as it was written, with its unit
+    for part in place:
+        found = found[part]
+    return key, f"found {described(found)}, expected {expected}"
 
 
 _LIMITS = {
@@ -230,42 +237,17 @@ _LIMITS = {
 """Words for the kinds of limits, and the names by which pydantic gives their numbers."""
 
 
-def _depth(key: str) -> int:
-    return key.count(".") + key.count("[")
-
-
-def _place(
-    location: tuple[int | str, ...], section: Any, tree: Any
-) -> tuple[str, Any, FieldInfo | None]:
-    """The key of a location with its value in the tree and its field.
-
-    Names of kinds and types, which pydantic puts into a location, are no keys.
-    """
-    key, field = "", None
-    kinds = [section]
-    for part in location:
-        holder = next((k for k in kinds if is_section(k) and part in keys_of(k)), None)
-        if holder is None and not _holds(tree, part):
-            kinds = [k for k in kinds if getattr(k, "__name__", "") == part] or kinds
-            continue
-        if holder is not None:
-            field = keys_of(holder)[str(part)]
-            kinds = members(field.annotation)
+def _joined(*parts: int | str) -> str:
+    """A dotted key of names, indices and other keys."""
+    key = ""
+    for part in parts:
+        if isinstance(part, int):
+            key += f"[{part}]"
+        elif part.startswith("["):
+            key += part
         else:
-            kinds = [m for k in kinds for a in typing.get_args(k) for m in members(a)]
-        key = f"{key}[{part}]" if isinstance(part, int) else _joined(key, part)
-        tree = tree[part] if _holds(tree, part) else None
-    return key, tree, field
-
-
-def _holds(tree: Any, part: int | str) -> bool:
-    if isinstance(tree, list):
-        return isinstance(part, int) and part < len(tree)
-    return isinstance(tree, dict) and part in tree
-
-
-def _joined(key: str, name: str) -> str:
-    return f"{key}{name}" if name.startswith(("[", ".")) else f"{key}.{name}".strip(".")
+            key = f"{key}.{part}".strip(".")
+    return key
 
 
 def described(value: Any) -> str:
@@ -281,9 +263,9 @@ def described(value: Any) -> str:
     return f"'{value}'" if isinstance(value, str) else str(value)[:40]
 
 
-def hint(name: Any, known: Iterable[str]) -> str:
+def hint(name: Any, names: Iterable[str]) -> str:
     """Advice on a misspelt name."""
-    names = list(known)
+    names = list(names)
     close = difflib.get_close_matches(str(name), names, n=1)
     if close:
         return f"did you mean '{close[0]}'?"
@@ -296,65 +278,45 @@ class Whole(Tree):
 
 def merge(base: Any, changes: Any) -> Any:
     """The base with what `changes` gives; lists, and kinds of another tag, are replaced."""
-    both = isinstance(base, dict) and isinstance(changes, dict)
-    if not both or isinstance(changes, Whole) or changes.get(TAG, base.get(TAG)) != base.get(TAG):
+    if isinstance(changes, Whole):
+        return dict(changes)
+    if not isinstance(base, dict) or not isinstance(changes, dict):
         return changes
-    return base | {k: merge(base[k], v) if k in base else v for k, v in changes.items()}
+    if TAG in changes and changes[TAG] != base.get(TAG):
+        return changes
+    merged = dict(base)
+    for name, value in changes.items():
+        merged[name] = merge(base.get(name), value)
+    return merged
 
 
 def tree_of(section: Section, *, show: Show = "{!r} {}".format, sparse: bool = True) -> Tree:
     """The tree of a section; `show` gives the text of a quantity from number and unit.
 
-    If `sparse`, values that are their fields' defaults are left out. Kinds are given in full, so
-    that another default does not change what a record means.
+    If `sparse`, values that are their fields' defaults are left out, but not those of kinds.
     """
-    tree: Tree = {}
-    for name, field in type(section).model_fields.items():
-        value = getattr(section, name)
-        if sparse and not field.is_required() and value == field.get_default():
-            continue
-        tree[name] = _tree(value, field.annotation, _extra(field), show, sparse)
-    return tree
-
-
-def _tree(value: Any, kind: Any, extra: Mapping[str, Any], show: Show, sparse: bool) -> Any:
-    """The tree of a value of a type."""
-    kinds = members(kind)
-    items = typing.get_args(kinds[0])
-    if isinstance(value, Section):
-        if len(kinds) == 1:
-            return tree_of(value, show=show, sparse=sparse)
-        return {TAG: type(value).__name__} | tree_of(value, show=show, sparse=False)
-    if isinstance(value, list):
-        return [_tree(item, items[-1], extra, show, sparse) for item in value]
-    if isinstance(value, dict):
-        units = extra.get("units") or dict.fromkeys(value, extra.get("unit"))
-        return {
-            name: _tree(item, items[-1], {"unit": units[name]}, show, sparse)
-            for name, item in value.items()
-        }
-    unit = extra.get("unit")
-    return show(value, unit) if unit and isinstance(value, float) else value
+    return section.model_dump(context={"show": show}, exclude_defaults=sparse)
 
 
 def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
     """Changes by dotted keys, and mappings of keys, as the tree that a file would hold."""
     tree: Tree = {}
     for key, value in changes.items():
-        value = _given(value)
+        branch = _given(value)
         for name in reversed(key.split(".")):
-            value = {name: value}
-        tree = _joined_trees(tree, value, key, source)
+            branch = {name: branch}
+        tree = _joined_trees(tree, branch, key, source)
     return tree
 
 
 def _given(value: Any) -> Any:
     """A value from Python as a file would hold it."""
+    value = python_value(value)
     if isinstance(value, Section):
         return Whole({TAG: type(value).__name__} | tree_of(value, sparse=False))
     if isinstance(value, str) and value.startswith("!"):
         return {TAG: value.removeprefix("!")}
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, list):
         return [_given(item) for item in value]
     if isinstance(value, Mapping):
         return {name: _given(item) for name, item in value.items()}
@@ -366,8 +328,7 @@ def _joined_trees(first: Tree, second: Tree, key: str, source: object) -> Tree:
     tree = dict(first)
     for name, value in second.items():
         if name in tree:
-            plain = isinstance(tree[name], dict) and isinstance(value, dict)
-            if not plain or Whole in (type(tree[name]), type(value)):
+            if type(tree[name]) is not dict or type(value) is not dict:
                 raise InputError(source, key, "is given twice")
             value = _joined_trees(tree[name], value, key, source)
         tree[name] = value

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, get_args
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from tetra_drake.scenario.cable_names import Cable
 from tetra_drake.scenario.sections import Section, quantity, refuse
@@ -26,21 +26,25 @@ class RobotSection(Section):
     strut_diameter: float = quantity("m", gt=0)
     node_diameter: float = quantity("m", gt=0)
     density: float = quantity("kg/m^3", gt=0)
-    spacing: float = quantity("m", ge=0, words={"balanced": 0.0})
+    spacing: float = quantity("m", ge=0)
     """Distance of base triangles at t = 0. `balanced`, or 0, is the one at which outer and inner
-    cables balance. A file that changes strut length or the cables' stiffness or free length of its
-    base, but no spacing, gets it, too."""
+    cables balance. So is the spacing of a file that changes strut length or the cables' stiffness
+    or free length of its base and gives no spacing."""
     gravity: float = quantity("m/s^2", ge=0)
     offsets: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = quantity(
         "m", default=[]
     )
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
-    """Nodes that the ground can touch: those of the thesis, which are the two bottom nodes of every
-    tetrahedron and the tip of the first in line, or all four of every tetrahedron. Only flat
-    ground leaves the others untouched."""
+    """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
+    tip of the foremost, as no others reach flat ground. `all`: all four of every tetrahedron."""
     actuation: list[list[Cable]] = Field(default=[["outer bottom_left", "outer bottom_right"]])
     """Groups of a junction's cables that share an oscillator, the same for every junction."""
+
+    @field_validator("spacing", mode="before")
+    @classmethod
+    def _read_spacing(cls, value: object) -> object:
+        return 0.0 if value == "balanced" else value
 
     @model_validator(mode="after")
     def _check(self) -> RobotSection:
@@ -85,17 +89,17 @@ class CpgSection(Section):
     initial_state: Annotated[list[float], Field(min_length=3, max_length=3)]
     """At t = 0: u of every neuron, v of extensors, v of flexors."""
     partner_weight: float = Field(ge=0)
-    """Inhibition between extensor and flexor of an oscillator."""
+    """Weight of the inhibition between extensor and flexor of an oscillator."""
     gain: float = quantity("N")
     """Force per unit of y_extensor - y_flexor."""
     start_up: float = quantity("s", ge=0)
     """Time until which the cables are not actuated."""
     signals: Literal["listing", "live"]
-    """`listing`: made beforehand by forward Euler, as in the thesis's listing. `live`: the network
-    is integrated with the robot, which feedback needs."""
+    """`listing`: forward Euler beforehand, as in the thesis's listing. `live`: the network is
+    integrated with the robot. Feedback needs `live`."""
     listing_step: float = quantity("s", ge=1e-6)
     reach: int | None = Field(default=None, ge=0)
-    """Oscillators of junctions at most so far apart inhibit each other; all if not given."""
+    """Oscillators of junctions at most this far apart inhibit each other. The default is all."""
     feedback: list[Pathway] = Field(default=[])
     """Pathways of feedback; their gains are parameters of the gait."""
 
@@ -118,7 +122,7 @@ class GaitBounds(Section):
     mirrored: bool = False
     """True if weights are drawn and evolved in pairs, left and right alike."""
     independent_tau_b: bool = False
-    """True if tau_B evolves by itself instead of staying at 2 tau_A."""
+    """True if tau_B evolves by itself. Otherwise it stays at 2 tau_A."""
 
     @model_validator(mode="after")
     def _check(self) -> GaitBounds:
@@ -173,14 +177,14 @@ class Disturbances(Section):
 
     draws: int = Field(ge=1, le=10_000)
     spreads: dict[str, Spread] = Field(default={})
-    """Spreads by scenario keys: each draw multiplies the number by 1 + up to +-spread. Keys
-    joined by commas get the same factor."""
+    """Spreads by scenario keys. Each draw multiplies the number by a factor from 1 - spread to
+    1 + spread. Keys joined by commas get the same factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)
-    """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing, forward or
-    back, sideways, and up."""
+    """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing along x, y
+    and up."""
     tail: float = Field(default=1.0, gt=0, le=1)
-    """The fitness is the mean over this share of the draws, the worst (the conditional value at
-    risk): 1 is the mean over all; one draw counts at least."""
+    """Share of the draws, the worst ones, over which the fitness is the mean (the conditional value
+    at risk). 1 is the mean over all draws. At least one draw counts."""
 
 
 def separate(joined: str) -> list[str]:
