@@ -22,6 +22,7 @@ from tetra_drake.scenario.terrain_kinds import (
     Flat,
     HeightField,
     Incline,
+    Obstacles,
     Rough,
     Steps,
     Terrain,
@@ -37,6 +38,9 @@ TERRAINS: dict[str, Terrain] = {
     "incline": Incline(slope=np.radians(5.0)),
     "steps": Steps(height=-0.25 * INCH, depth=4.0 * INCH, count=4, start=2.0 * INCH),
     "rough": Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
+    "obstacles": Obstacles(
+        height=0.25 * INCH, radius=1.0 * INCH, spacing=2.5 * INCH, start=14.0 * INCH
+    ),
 }
 
 
@@ -55,7 +59,7 @@ def height_field(tmp_path) -> HeightField:
     return HeightField(file=str(tmp_path / "waves.npy"), cell=0.02, corner=[-0.5, -0.5])
 
 
-@pytest.mark.parametrize("terrain", ["incline", "steps", "rough", "field"])
+@pytest.mark.parametrize("terrain", ["incline", "steps", "rough", "obstacles", "field"])
 @pytest.mark.parametrize("friction", ["reset", COULOMB, FIRM])
 def test_nodes_go_where_the_diagrams_nodes_go(scenario, terrain, friction, height_field):
     friction = scenario.friction if friction == "reset" else friction

@@ -54,6 +54,11 @@ def test_a_gait_file_gives_weights_and_time_constants(tmp_path, scenario):
     assert load_gait(write(tmp_path, gait_file(tau_b_s=0.45)), scenario).tau_b == 0.45
 
 
+def test_weights_may_be_a_list_in_the_order_of_the_listing(tmp_path, scenario):
+    file = write(tmp_path, gait_file(schema=1, weights=list(WEIGHTS.values())))
+    assert load_gait(file, scenario).weights == tuple(WEIGHTS.values())
+
+
 @pytest.mark.parametrize("tetrahedra", [2, 4])
 def test_a_gait_has_the_weights_of_its_robot(tmp_path, scenario, tetrahedra, refused):
     scenario = scenario.with_changes({"robot.tetrahedra": tetrahedra})
@@ -75,12 +80,13 @@ BAD: list[tuple[object, str, str]] = [
     (gait_file(weights=WEIGHTS | {"1->2 flexor": None}), "weights.1->2 flexor", "nothing"),
     (gait_file(weights=without("2->1 extensor")), "weights", "misses 1, as '2->1 extensor'"),
     (gait_file(weights=WEIGHTS | {"5->1 flexor": 1.0}), "weights", "1 others, as '5->1 flexor'"),
-    (gait_file(weights=[1.0] * 24), "weights", "a list"),
+    (gait_file(weights=[1.0] * 23), "weights", "23"),
+    (gait_file(weights=[1.0] * 23 + [-0.1]), "weights[23]", "-0.1"),
     (gait_file(tau_a_s=0), "tau_a_s", "0"),
     (gait_file(tau_b_s="0.3"), "tau_b_s", "0.3"),
     (gait_file(tau_b_s=math.inf), "tau_b_s", "inf"),
     (gait_file(name=5), "name", "5"),
-    (gait_file(schema=1), "schema", "1"),
+    (gait_file(schema=3), "schema", "3"),
     (gait_file(gains={"lenght": 0.1}), "gains.lenght", "'length'"),
     (gait_file(gains={"load": 0.5}), "gains.load", "0.5"),  # the thesis has no feedback
     (gait_file(turn=0.5), "turn", "0.5"),  # its cables are driven in pairs, left and right

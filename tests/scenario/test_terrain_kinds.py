@@ -10,6 +10,7 @@ from tetra_drake.scenario.terrain_kinds import (
     Grid,
     HeightField,
     Incline,
+    Obstacles,
     Rough,
     Steps,
     Terrain,
@@ -23,6 +24,7 @@ KINDS: list[Terrain] = [
     Incline(slope=-0.2, start=0.5),
     Steps(height=0.25 * IN, depth=12 * IN, count=4),
     Rough(amplitude=0.25 * IN, wavelength=6 * IN),
+    Obstacles(height=0.01, radius=0.02, spacing=0.2),
 ]
 
 
@@ -132,6 +134,18 @@ def test_rough_ground_is_flat_before_its_start(across):
     heights = surface(grid_of(Rough(amplitude=0.1, wavelength=0.2, start=0.333)), x, y)
     assert (heights[x <= 0.333] == 0.0).all()
     assert (heights[x > 0.833] != 0.0).mean() > 0.5
+
+
+def test_as_many_bumps_stand_as_there_are_squares():
+    # A paraboloid's volume is half its cylinder's; bumps this small seldom overlap.
+    height, radius, spacing, start = 0.1, 0.01, 0.127, 0.0
+    grid = grid_of(Obstacles(height=height, radius=radius, spacing=spacing, start=start))
+    assert 0.99 * height < grid.heights.max() <= height
+    first = start + radius + 0.75 * radius
+    rows, columns = np.ceil((120 * IN - first) / spacing), 60 * IN / spacing
+    volume = grid.heights.sum() * np.prod(grid.cell)
+    one = 0.5 * np.pi * radius**2 * height
+    assert volume == pytest.approx(rows * columns * one, rel=0.02)
 
 
 @pytest.mark.parametrize(

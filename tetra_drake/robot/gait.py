@@ -205,11 +205,12 @@ Weight = Annotated[float, Field(ge=0)]
 class GaitFile(Section):
     """The content of a gait file; see Gait."""
 
-    version: Literal[2] = Field(alias="schema")
+    version: Literal[1, 2] = Field(alias="schema")
     name: str = ""
     scenario: str = ""
-    weights: dict[str, Weight]
-    """Weights by Actuation.weight_names, in any order."""
+    weights: dict[str, Weight] | list[Weight]
+    """Weights by Actuation.weight_names, in any order, or, as in schema 1 and the thesis, a list in
+    the order of Actuation.couplings."""
     tau_a_s: float = Field(gt=0)
     tau_b_s: float | None = Field(default=None, gt=0)
     turn: float = Field(default=0.0, ge=-1, le=1)
@@ -223,11 +224,13 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     """
     file = _read_file(path, key)
     actuation = Actuation.of(scenario)
-    names = actuation.weight_names
-    _check_names(file.weights, names, path, f"{key}.weights".strip("."))
+    names, weights = actuation.weight_names, file.weights
+    if isinstance(weights, dict):
+        _check_names(weights, names, path, f"{key}.weights".strip("."))
+        weights = [weights[name] for name in names]
     gait = Gait(
         name=file.name or Path(path).stem,
-        weights=tuple(file.weights[name] for name in names),
+        weights=tuple(weights),
         tau_a=file.tau_a_s,
         tau_b=TAU_B_PER_TAU_A * file.tau_a_s if file.tau_b_s is None else file.tau_b_s,
         turn=file.turn,

@@ -53,7 +53,10 @@ class Section(BaseModel):
         try:
             return validate(tree)
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
+            errors = error.errors(include_url=False)
+            # A value that fits no member of a union has an error for each: the innermost says most.
+            of_field = [one for one in errors if one["loc"][:1] == errors[0]["loc"][:1]]
+            first = max(of_field, key=lambda one: len(_place(one, tree)))
         key, problem = _in_words(first, cls, tree)
         refuse(key, problem)
 
@@ -207,9 +210,25 @@ def _read_number(value: Any, unit: str, key: str, *, needs_unit: bool) -> Any:
     return value
 
 
+def _place(error: ErrorDetails, tree: Any) -> list[int | str]:
+    """The keys and indices that lead to an error: pydantic also names the members of unions."""
+    place: list[int | str] = []
+    for part in error["loc"]:
+        if isinstance(tree, list):
+            holds = isinstance(part, int)
+        else:
+            holds = isinstance(tree, dict) and part in tree
+        if holds:
+            tree = tree[part]
+            place.append(part)
+    if error["type"] == "missing":
+        place.append(error["loc"][-1])
+    return place
+
+
 def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[str, str]:
     """Key and problem of an error in the validation of a tree as a section."""
-    place = [part for part in error["loc"] if part != "[key]"]
+    place = _place(error, tree)
     key = _joined(*place)
     if error["type"] == "refused":
         return _joined(key, error["ctx"]["key"]), error["ctx"]["problem"]

@@ -56,7 +56,7 @@ class Relief(Section):
     def grid(self, *, ahead: float, source: object) -> Grid:
         """The heights of the terrain.
 
-        Steps without a start begin at x = `ahead` (m). Raises InputError, naming
+        Steps and obstacles without a start begin at x = `ahead` (m). Raises InputError, naming
         `source` and the key, for more than MOST_CELLS cells, and for a height file that cannot be
         used.
         """
@@ -145,6 +145,43 @@ class Rough(Relief):
         return _grid(x, y, heights, (half, half))
 
 
+class Obstacles(Relief):
+    """Round bumps, h = height max(0, 1 - (r / radius)^2), the highest where two overlap.
+
+    One stands at a random place in each square of side `spacing`, none reaches before `start`, 1 in
+    ahead of the robot if not given. The grid lowers a bump's top by about an eighth. The same seed
+    is the same ground.
+    """
+
+    height: float = quantity("m", gt=0)
+    radius: float = quantity("m", gt=0)
+    spacing: float = quantity("m", gt=0)
+    seed: int = Field(ge=0, default=0)
+    start: float | None = quantity("m", default=None)
+
+    def grid(self, *, ahead: float, source: object) -> Grid:
+        cell, spacing = 0.5 * self.radius, self.spacing
+        _check_size((cell, cell), source, "radius")
+        _check_size((spacing, spacing), source, "spacing")
+        x, y = _axes((cell, cell), 0.0)
+        start = ahead if self.start is None else self.start
+        first = max(-BEHIND, start + self.radius + 1.5 * cell)  # a bump and its control points
+        squares = np.arange(first, AHEAD, spacing), np.arange(-ASIDE, ASIDE, spacing)
+        corners = np.stack(np.meshgrid(*squares, indexing="ij"), axis=-1).reshape(-1, 2)
+        generator = np.random.default_rng(self.seed)
+        centres = corners + spacing * generator.uniform(size=corners.shape)
+        heights = np.zeros((len(x), len(y)))
+        nearest = np.rint((centres - (x[0], y[0])) / cell).astype(int)
+        for offset in np.ndindex(5, 5):  # a bump is four cells wide
+            at = nearest + offset - np.array([2, 2])
+            inside = ((at >= 0) & (at < heights.shape)).all(axis=1)
+            at, centre = at[inside], centres[inside]
+            r_squared = (x[at[:, 0]] - centre[:, 0]) ** 2 + (y[at[:, 1]] - centre[:, 1]) ** 2
+            bumps = self.height * (1.0 - r_squared / self.radius**2)
+            np.maximum.at(heights, (at[:, 0], at[:, 1]), bumps)
+        return _grid(x, y, heights, (cell, cell))
+
+
 class HeightField(Relief):
     """Heights in m from a file: rows along x, columns along y, both upward.
 
@@ -173,7 +210,7 @@ class HeightField(Relief):
         return Grid(heights, (x, y), (self.cell, self.cell))
 
 
-Terrain = Annotated[Flat | Incline | Steps | Rough | HeightField, Kinds()]
+Terrain = Annotated[Flat | Incline | Steps | Rough | Obstacles | HeightField, Kinds()]
 
 
 def _read_heights(file: str, source: object) -> np.ndarray:
