@@ -21,9 +21,10 @@ from tetra_drake.physics.contact import (
 from tetra_drake.physics.friction import (
     STICK,
     ResetConstants,
+    TangentSlide,
     first_zero,
-    next_reset_mode,
-    reset_force,
+    next_tangent_mode,
+    tangent_force,
 )
 from tetra_drake.physics.kinematics import FORCE, NODE_COLUMNS
 from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
@@ -47,7 +48,7 @@ def test_normal_force_is_equation_1():
 @pytest.mark.parametrize("mode", [-1.0, 1.0])
 def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity, mode):
     # F = -s0 abs(v) x with x held at +-p0: it opposes a slip in the direction of `mode`.
-    force = reset_force(velocity, 12.3, mode, LAW)
+    force = tangent_force(TangentSlide(velocity, 12.3, mode), LAW)
     assert force == pytest.approx(-mode * SIGMA_0 * 0.02 * P0, rel=1e-14)
 
 
@@ -55,7 +56,8 @@ def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity, mode):
 @pytest.mark.parametrize("x", [0.5 * P0, -0.9 * P0])
 def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
     expected = -(SIGMA_0 * 0.02 * (1.0 + A_C) * x + SIGMA_1 * velocity)
-    assert reset_force(velocity, x, STICK, LAW) == pytest.approx(expected, rel=1e-14)
+    force = tangent_force(TangentSlide(velocity, x, STICK), LAW)
+    assert force == pytest.approx(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +76,7 @@ def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
     ],
 )
 def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection, mode, after):
-    assert next_reset_mode(velocity, deflection, mode, LAW) == after
+    assert next_tangent_mode(TangentSlide(velocity, deflection, mode), LAW) == after
 
 
 class RobotOnGround:

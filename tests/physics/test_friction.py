@@ -8,6 +8,7 @@ import pytest
 from tetra_drake.physics.friction import (
     CoulombConstants,
     Slide,
+    TangentSlide,
     coulomb_damping,
     coulomb_force,
     next_coulomb_mode,
@@ -32,8 +33,8 @@ def law(*, forward: float = 1.0, backward: float = 1.0, lateral: float = 1.0) ->
 
 def slide(v=(0.0, 0.0), x=(0.0, 0.0), mode=(0.0, 0.0), heading=ALONG_X) -> Slide:
     # Of NumPy's numbers, which may be divided by zero, as in a kernel.
-    v, x, mode, heading = (tuple(np.array(pair)) for pair in (v, x, mode, heading))
-    return Slide(v, x, mode, heading, np.float64(NORMAL))
+    t1, t2 = (TangentSlide(*np.array([v[i], x[i], mode[i]])) for i in range(2))
+    return Slide(t1, t2, heading, np.float64(NORMAL))
 
 
 def test_in_stick_the_bristle_is_a_spring_and_a_damper():

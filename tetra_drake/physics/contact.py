@@ -15,6 +15,7 @@ from tetra_drake.physics.friction import (
     STICK,
     FrictionLaw,
     Slide,
+    TangentSlide,
     friction_force,
     next_mode,
     stuck_along,
@@ -113,10 +114,11 @@ def sliding(
     z = nodes[node, P_WN + 2] - modes[i, STICK_POINT + 2]
     v_1, v_2, v_n = to_frame(v_x, v_y, v_z, frames, i, flat)
     x_1, x_2, _ = to_frame(x, y, z, frames, i, flat)
-    mode = modes[i, MODE], modes[i, MODE + 1]
+    t1 = TangentSlide(v_1, x_1, modes[i, MODE])
+    t2 = TangentSlide(v_2, x_2, modes[i, MODE + 1])
     heading = modes[i, HEADING], modes[i, HEADING + 1]
     normal = normal_force(-gap(nodes, ground, frames, i), -v_n, law)
-    return Slide((v_1, v_2), (x_1, x_2), mode, heading, normal), v_n
+    return Slide(t1, t2, heading, normal), v_n
 
 
 @inlined
@@ -204,16 +206,17 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         changed = changed | (touched ^ touches)
         lands, stays = touches & not_(touched), touched & touches
         slide, _ = sliding(nodes, modes, ground, law, frames, i)
-        (m_1, m_2), (n_1, n_2) = slide.mode, next_mode(slide, ground.friction)
-        n_1, n_2 = select(stays, n_1, STICK), select(stays, n_2, STICK)
-        before_1, before_2 = stuck_along((m_1, m_2), ground.friction)
-        after_1, after_2 = stuck_along((n_1, n_2), ground.friction)
-        resets_1 = after_1 & (lands | not_(before_1))
-        resets_2 = after_2 & (lands | not_(before_2))
+        mode_1, mode_2 = slide.t1.mode, slide.t2.mode
+        next_1, next_2 = next_mode(slide, ground.friction)
+        next_1, next_2 = select(stays, next_1, STICK), select(stays, next_2, STICK)
+        stuck_1, stuck_2 = stuck_along((mode_1, mode_2), ground.friction)
+        sticks_1, sticks_2 = stuck_along((next_1, next_2), ground.friction)
+        resets_1 = sticks_1 & (lands | not_(stuck_1))
+        resets_2 = sticks_2 & (lands | not_(stuck_2))
         if any_lane(lands):
             set_heading(state, nodes, ground, frames, i, lands, modes)
-        modes[i, MODE], modes[i, MODE + 1] = n_1, n_2
-        changed = changed | (n_1 != m_1) | (n_2 != m_2)
+        modes[i, MODE], modes[i, MODE + 1] = next_1, next_2
+        changed = changed | (next_1 != mode_1) | (next_2 != mode_2)
         move_stick_point(nodes, ground, frames, i, resets_1, resets_2, slide, modes)
     return changed
 
@@ -246,7 +249,8 @@ def move_stick_point(
         modes[i, s] = select(along_1, p_x, modes[i, s])
         modes[i, s + 1] = select(along_2, p_y, modes[i, s + 1])
         return
-    x_1, x_2 = select(along_1, slide.deflection[0], 0.0), select(along_2, slide.deflection[1], 0.0)
+    x_1 = select(along_1, slide.t1.deflection, 0.0)
+    x_2 = select(along_2, slide.t2.deflection, 0.0)
     x, y, z = to_world(x_1, x_2, 0.0, frames, i, False)
     both = along_1 & along_2
     modes[i, s] = select(both, p_x, modes[i, s] + x)

@@ -74,8 +74,8 @@ def time_to_mode_change(
             continue
         rate = law.damping * (v_n * v_n + distance * a_n) - law.stiffness * v_n
         rate = select(slide.normal > 0.0, rate, 0.0)
-        change = time_to_friction_change(slide, (a_1, a_2), rate, touches, ground.friction, horizon)
-        time = minimum(time, change)
+        change = time_to_friction_change(slide, (a_1, a_2), rate, ground.friction, horizon)
+        time = minimum(time, select(touches, change, horizon))
     return time
 
 
