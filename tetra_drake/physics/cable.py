@@ -34,7 +34,16 @@ class Cables(NamedTuple):
     free_length: Table
 
 
-CABLE = np.dtype([(name, np.int64 if i < 3 else float) for i, name in enumerate(Cables._fields)])
+CABLE = np.dtype(
+    [
+        ("node_a", np.int64),
+        ("node_b", np.int64),
+        ("signal", np.int64),
+        ("stiffness", float),
+        ("damping", float),
+        ("free_length", float),
+    ]
+)
 """One cable. Kernels take an array of these or Cables, alike."""
 
 DIRECTION, LENGTH, TENSION, PULL_COLUMNS = 0, 3, 4, 5

@@ -443,7 +443,8 @@ def _index_kind(kind: types.Type, index: Any) -> types.Type | None:
     count = len(kind.lengths)
     if count == 1:
         return types.intp if isinstance(index, types.Integer) else None
-    if not isinstance(index, types.BaseTuple) or len(index) != count:
+    is_tuple = isinstance(index, types.BaseTuple)
+    if not is_tuple or len(index.types) != count:
         return None
     if not all(isinstance(i, types.Integer) for i in index.types):
         return None
