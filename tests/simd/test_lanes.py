@@ -277,30 +277,6 @@ def test_the_numbers_of_a_table_have_the_names_of_a_tuple(width):
     assert named(Line, np.array([1.0, 2.0])) == Line(slope=1.0, offset=2.0)
 
 
-def test_one_lanes_garbage_leaves_the_others_alone(width):
-    @jit
-    def laws(x, results):
-        results[0] = 1.0 / x[0]
-        results[1] = math.sqrt(x[0])
-        results[2] = inverse_sqrt(x[0])
-        results[3] = maximum(1.0 / x[0] - math.sqrt(x[0]), 0.5)
-        results[4] = select(x[0] > 0.0, 1.0 / math.sqrt(x[0]), 7.0)
-
-    def of(numbers: np.ndarray) -> np.ndarray:
-        results = lane_table((5,), width)
-        laws(in_lanes(numbers, width), results)
-        return results.array
-
-    sound = np.arange(1.0, width + 1.0)
-    for lane, garbage in itertools.product(range(width), [0.0, -1.0, math.nan, math.inf]):
-        numbers = sound.copy()
-        numbers[lane] = garbage
-        found = of(numbers)
-        others = np.arange(width) != lane
-        assert_same(found[:, others], of(sound)[:, others])
-        assert found[4, lane] == (0.0 if garbage == math.inf else 7.0)
-
-
 # Variables.
 
 
@@ -327,22 +303,6 @@ def test_a_variable_that_was_a_scalar_becomes_lanes(width):
     positive, seen = (numbers > 2.0).any(axis=0), last > 1.0
     expected = [numbers.sum(axis=0), numbers.prod(axis=0), last, positive, seen]
     assert_same(results.array, np.array(expected, float))
-
-
-def test_lanes_pass_through_functions_and_tuples(width):
-    @jit
-    def turned(x, y, z):
-        return (y, z), x
-
-    @jit
-    def turn(x):
-        for _ in range(2):  # twice, each moves all numbers one place
-            (x[0], x[1]), x[2] = turned(x[0], x[1], x[2])
-
-    numbers = np.arange(3.0 * width)
-    x = in_lanes(numbers, width)
-    turn(x)
-    assert_same(x.array, numbers.reshape(3, width)[[2, 0, 1]])
 
 
 # Fields.
