@@ -1,4 +1,4 @@
-"""Coulomb friction of a node, against the law's own statements."""
+"""The laws of friction of a node, against their equations."""
 
 import math
 
@@ -6,12 +6,60 @@ import numpy as np
 import pytest
 
 from tetra_drake.physics.friction import (
+    STICK,
     CoulombConstants,
+    ResetConstants,
     Slide,
+    TangentSlide,
     coulomb_damping,
     coulomb_force,
     next_coulomb_mode,
+    next_tangent_mode,
+    tangent_force,
 )
+
+# The reset integrator, along one tangent.
+
+P0, SIGMA_1, A_C, SIGMA_0 = 1e-4, 70.0, 0.7, 2000.0
+RESET = ResetConstants(P0, SIGMA_1, A_C, SIGMA_0)
+
+
+@pytest.mark.parametrize("velocity", [-0.02, 0.02])
+@pytest.mark.parametrize("mode", [-1.0, 1.0])
+def test_slipping_friction_is_s0_times_the_speed_at_the_range(velocity, mode):
+    # F = -s0 abs(v) x with x held at +-p0: it opposes a slip in the direction of `mode`.
+    force = tangent_force(TangentSlide(velocity, 12.3, mode), RESET)
+    assert force == pytest.approx(-mode * SIGMA_0 * 0.02 * P0, rel=1e-14)
+
+
+@pytest.mark.parametrize("velocity", [-0.02, 0.02])
+@pytest.mark.parametrize("x", [0.5 * P0, -0.9 * P0])
+def test_sticking_friction_is_equation_5_with_the_absolute_speed(velocity, x):
+    expected = -(SIGMA_0 * 0.02 * (1.0 + A_C) * x + SIGMA_1 * velocity)
+    force = tangent_force(TangentSlide(velocity, x, STICK), RESET)
+    assert force == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "deflection", "mode", "after"),
+    [
+        (0.01, 0.99 * P0, STICK, STICK),
+        (0.01, P0, STICK, 1.0),
+        (-0.01, P0, STICK, STICK),  # beyond the range, but moving inward
+        (-0.01, -P0, STICK, -1.0),
+        (0.01, -P0, STICK, STICK),
+        (0.01, 5.0, 1.0, 1.0),
+        (0.0, 5.0, 1.0, STICK),
+        (-0.01, 5.0, 1.0, STICK),
+        (-0.01, -5.0, -1.0, -1.0),
+        (0.01, -5.0, -1.0, STICK),
+    ],
+)
+def test_breaks_free_at_the_range_and_sticks_at_a_reversal(velocity, deflection, mode, after):
+    assert next_tangent_mode(TangentSlide(velocity, deflection, mode), RESET) == after
+
+
+# Coulomb friction.
 
 C, K, STATIC, KINETIC, NORMAL = 70.0, 1000.0, 0.6, 0.5, 0.2
 ALONG_X = (1.0, 0.0)
@@ -32,8 +80,8 @@ def law(*, forward: float = 1.0, backward: float = 1.0, lateral: float = 1.0) ->
 
 def slide(v=(0.0, 0.0), x=(0.0, 0.0), mode=(0.0, 0.0), heading=ALONG_X) -> Slide:
     # Of NumPy's numbers, which may be divided by zero, as in a kernel.
-    v, x, mode, heading = (tuple(np.array(pair)) for pair in (v, x, mode, heading))
-    return Slide(v, x, mode, heading, np.float64(NORMAL))
+    t1, t2 = (TangentSlide(*np.array([v[i], x[i], mode[i]])) for i in range(2))
+    return Slide(t1, t2, heading, np.float64(NORMAL))
 
 
 def test_in_stick_the_bristle_is_a_spring_and_a_damper():

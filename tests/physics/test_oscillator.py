@@ -59,42 +59,43 @@ def test_output_counts_only_firing_neurons():
     assert output.tolist() == [0.4, -0.2]
 
 
+# While both neurons of this oscillator fire, Eq. 7 is linear, without kinks. Halving the step then
+# divides the error of a method by 2^order.
+LINEAR = Network.of([[0.0, 0.4], [0.4, 0.0]], tau_a=0.3, tau_b=0.6, self_inhibition_weight=2.5)
+
+
+def by_listing(steps: int) -> np.ndarray:
+    return last_output(steps, samples=steps, listing=True)
+
+
+def by_runge_kutta(steps: int) -> np.ndarray:
+    return last_output(steps, samples=steps + 1, listing=False)
+
+
+def last_output(steps: int, *, samples: int, listing: bool) -> np.ndarray:
+    neurons, output = neurons_at([0.3, 0.25], [0.1, 0.12]), np.empty((samples, 1))
+    network_output(LINEAR, np.full((1, 2), 0.5), 0.2 / steps, listing, neurons, output)
+    return output[-1]
+
+
+def by_heun(steps: int) -> np.ndarray:
+    """Refuses each step once, and goes back to its start."""
+    neurons, inputs = neurons_at([0.3, 0.25], [0.1, 0.12]), np.full(2, 0.5)
+    for _ in range(steps):
+        for accepted in (False, True):
+            predict_neurons(LINEAR, inputs, 0.2 / steps, neurons)
+            correct_neurons(LINEAR, inputs, 0.2 / steps, accepted, neurons)
+    return neurons[:, [U, V]]
+
+
 @pytest.mark.parametrize(
-    ("listing", "first_row", "order"), [(True, 1, 1), (False, 0, 4)], ids=["Euler", "Runge-Kutta"]
+    ("at_the_end", "steps", "order"),
+    [(by_listing, 4, 1), (by_runge_kutta, 4, 4), (by_heun, 8, 2)],
 )
-def test_integrators_have_their_order(listing, first_row, order):
-    # While both neurons of one oscillator fire, Eq. 7 is linear, without kinks. Halving the
-    # step then divides the error by 2^order.
-    inhibition, tau = [[0.0, 0.4], [0.4, 0.0]], {"tau_a": 0.3, "tau_b": 0.6}
-    network = Network.of(inhibition, **tau, self_inhibition_weight=2.5)
-
-    def output_at_the_end(steps: int) -> float:
-        neurons, output = neurons_at([0.3, 0.25], [0.1, 0.12]), np.empty((steps + 1 - first_row, 1))
-        network_output(network, np.full((1, 2), 0.5), 0.2 / steps, listing, neurons, output)
-        return float(output[-1, 0])
-
-    exact = output_at_the_end(4096)
-    errors = [abs(output_at_the_end(steps) - exact) for steps in (4, 8)]
-    assert errors[0] / errors[1] == pytest.approx(2.0**order, rel=0.15)
-
-
-def test_heuns_method_has_order_2_and_goes_back_if_refused():
-    # As above: linear while both neurons fire.
-    inhibition, tau = [[0.0, 0.4], [0.4, 0.0]], {"tau_a": 0.3, "tau_b": 0.6}
-    network = Network.of(inhibition, **tau, self_inhibition_weight=2.5)
-    inputs = np.full(2, 0.5)
-
-    def at_the_end(steps: int) -> np.ndarray:
-        neurons = neurons_at([0.3, 0.25], [0.1, 0.12])
-        for _ in range(steps):
-            for accepted in (False, True):
-                predict_neurons(network, inputs, 0.2 / steps, neurons)
-                correct_neurons(network, inputs, 0.2 / steps, accepted, neurons)
-        return neurons[:, [U, V]]
-
+def test_integrators_have_their_order(at_the_end, steps, order):
     exact = at_the_end(4096)
-    errors = [np.abs(at_the_end(steps) - exact).max() for steps in (8, 16)]
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
+    coarse, fine = (np.abs(at_the_end(n) - exact).max() for n in (steps, 2 * steps))
+    assert coarse / fine == pytest.approx(2.0**order, rel=0.15)
 
 
 def test_a_matrix_that_is_no_pairs_of_neurons_is_refused():

@@ -61,14 +61,14 @@ def test_the_rate_of_signals_is_integrated_as_its_square():
 
 def test_sums_begin_with_the_first_step_that_is_whole_and_least_values_at_once():
     times, lengths = np.arange(6.0), np.array([5.0, 4.0, 3.0, 2.0, 1.0, 0.0])
-    known = {"lengths": lengths, "signals": np.ones(6), "tensions": [3.0, -1.0, 2.0, 1.0, 1.0, 1.0]}
-    tally = tallied(times, **known, begins=1.5)  # so that the steps from 2 s on count
-    assert (tally.work[0], tally.tension[0]) == (3.0, -1.0)
-    assert tallied(times, **known, begins=2.0).work[0] == 3.0
+    signals, tensions = np.ones(6), np.array([3.0, -1.0, 2.0, 1.0, 1.0, 1.0])
+    tally = tallied(times, lengths=lengths, signals=signals, tensions=tensions, begins=1.5)
+    assert (tally.work[0], tally.tension[0]) == (3.0, -1.0), "the steps from 2 s on work"
+    assert tallied(times, lengths=lengths, signals=signals, begins=2.0).work[0] == 3.0
     # What is seen twice counts once: a step that was rejected.
     twice = np.repeat(np.arange(6), 2)
-    known = {name: np.array(values)[twice] for name, values in known.items()}
-    assert tallied(times[twice], **known).work[0] == 5.0
+    tally = tallied(times[twice], lengths=lengths[twice], signals=signals[twice])
+    assert tally.work[0] == 5.0
 
 
 def test_a_body_is_lifted_while_none_of_its_contacts_bears():

@@ -7,6 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.physics.kinematics import FORCE, P_WN, V_WN, gather_forces, move_nodes
+from tetra_drake.physics.vectors import (
+    add_vector,
+    difference,
+    dot,
+    put_vector,
+    scaled,
+    subtract_vector,
+    vector_at,
+)
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, inverse_sqrt, maximum
 
@@ -25,7 +34,16 @@ class Cables(NamedTuple):
     free_length: Table
 
 
-CABLE = np.dtype([(name, np.int64 if i < 3 else float) for i, name in enumerate(Cables._fields)])
+CABLE = np.dtype(
+    [
+        ("node_a", np.int64),
+        ("node_b", np.int64),
+        ("signal", np.int64),
+        ("stiffness", float),
+        ("damping", float),
+        ("free_length", float),
+    ]
+)
 """One cable. Kernels take an array of these or Cables, alike."""
 
 DIRECTION, LENGTH, TENSION, PULL_COLUMNS = 0, 3, 4, 5
@@ -55,36 +73,29 @@ def add_cable_forces(
     """
     for i in range(pulls.shape[0]):
         a, b, driver = cables.node_a[i], cables.node_b[i], cables.signal[i]
-        d_x = nodes[b, P_WN] - nodes[a, P_WN]
-        d_y = nodes[b, P_WN + 1] - nodes[a, P_WN + 1]
-        d_z = nodes[b, P_WN + 2] - nodes[a, P_WN + 2]
-        square = d_x * d_x + d_y * d_y + d_z * d_z
+        p_AB = difference(vector_at(nodes, b, P_WN), vector_at(nodes, a, P_WN))
+        v_AB = difference(vector_at(nodes, b, V_WN), vector_at(nodes, a, V_WN))
+        square = dot(p_AB, p_AB)
         per_length = inverse_sqrt(square)
-        length = square * per_length
-        d_x *= per_length
-        d_y *= per_length
-        d_z *= per_length
-        rate = (
-            (nodes[b, V_WN] - nodes[a, V_WN]) * d_x
-            + (nodes[b, V_WN + 1] - nodes[a, V_WN + 1]) * d_y
-            + (nodes[b, V_WN + 2] - nodes[a, V_WN + 2]) * d_z
-        )
+        length, direction = square * per_length, scaled(per_length, p_AB)
         signal = 0.0
         if driver != PASSIVE:
             signal = signals[driver]
-        law = cables.stiffness[i], cables.damping[i], cables.free_length[i]
-        tension = cable_tension(length, rate, signal, *law)
+        tension = cable_tension(
+            length,
+            dot(v_AB, direction),
+            signal,
+            cables.stiffness[i],
+            cables.damping[i],
+            cables.free_length[i],
+        )
         if slack:
             tension = maximum(tension, 0.0)
-        f_x, f_y, f_z = tension * d_x, tension * d_y, tension * d_z
-        nodes[a, FORCE] += f_x
-        nodes[a, FORCE + 1] += f_y
-        nodes[a, FORCE + 2] += f_z
-        nodes[b, FORCE] -= f_x
-        nodes[b, FORCE + 1] -= f_y
-        nodes[b, FORCE + 2] -= f_z
+        force = scaled(tension, direction)
+        add_vector(force, a, FORCE, nodes)
+        subtract_vector(force, b, FORCE, nodes)
         if keep:
-            pulls[i, DIRECTION], pulls[i, DIRECTION + 1], pulls[i, DIRECTION + 2] = d_x, d_y, d_z
+            put_vector(direction, i, DIRECTION, pulls)
             pulls[i, LENGTH], pulls[i, TENSION] = length, tension
 
 

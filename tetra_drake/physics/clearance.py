@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tetra_drake.physics.kinematics import P_WN
+from tetra_drake.physics.vectors import Vector, difference, dot, vector_at
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, any_lane, maximum, minimum
 
@@ -25,9 +26,8 @@ def least_strut_distance(nodes: Table, least: Real) -> Real:
     second. Where a plane across the line between their centres has the two on its sides, with more
     room than `least`, no distance is computed.
     """
-    x, y = nodes[1, P_WN] - nodes[0, P_WN], nodes[1, P_WN + 1] - nodes[0, P_WN + 1]
-    z = nodes[1, P_WN + 2] - nodes[0, P_WN + 2]
-    per_square = 1.0 / (x * x + y * y + z * z)  # all struts are alike
+    strut = difference(vector_at(nodes, 1, P_WN), vector_at(nodes, 0, P_WN))
+    per_square = 1.0 / dot(strut, strut)  # all struts are alike
     for first in range(0, nodes.shape[0], CORNERS):
         for second in range(first + CORNERS, nodes.shape[0], CORNERS):
             base, tip, square = room_between(nodes, first, second)
@@ -48,23 +48,24 @@ def room_between(nodes: Table, first: int, second: int) -> tuple[Real, Real, Rea
     tetrahedron begins behind the base, and behind all nodes, of the first; and its square."""
     u_x = u_y = u_z = 0.0
     for k in range(CORNERS):
-        u_x += nodes[second + k, P_WN] - nodes[first + k, P_WN]
-        u_y += nodes[second + k, P_WN + 1] - nodes[first + k, P_WN + 1]
-        u_z += nodes[second + k, P_WN + 2] - nodes[first + k, P_WN + 2]
-    begin = along(nodes, second, u_x, u_y, u_z)
-    end = along(nodes, first, u_x, u_y, u_z)
+        p = difference(vector_at(nodes, second + k, P_WN), vector_at(nodes, first + k, P_WN))
+        u_x += p[0]
+        u_y += p[1]
+        u_z += p[2]
+    u = u_x, u_y, u_z
+    begin, base = along(nodes, second, u), along(nodes, first, u)
     for k in range(1, 3):
-        begin = minimum(begin, along(nodes, second + k, u_x, u_y, u_z))
-        end = maximum(end, along(nodes, first + k, u_x, u_y, u_z))
-    begin = minimum(begin, along(nodes, second + 3, u_x, u_y, u_z))
-    tip = maximum(end, along(nodes, first + 3, u_x, u_y, u_z))
-    return begin - end, begin - tip, u_x * u_x + u_y * u_y + u_z * u_z
+        begin = minimum(begin, along(nodes, second + k, u))
+        base = maximum(base, along(nodes, first + k, u))
+    begin = minimum(begin, along(nodes, second + 3, u))
+    tip = maximum(base, along(nodes, first + 3, u))
+    return begin - base, begin - tip, dot(u, u)
 
 
 @inlined
-def along(nodes: Table, node: int, x: Real, y: Real, z: Real) -> Real:
+def along(nodes: Table, node: int, u: Vector) -> Real:
     """The product of a node's position and a vector."""
-    return x * nodes[node, P_WN] + y * nodes[node, P_WN + 1] + z * nodes[node, P_WN + 2]
+    return dot(u, vector_at(nodes, node, P_WN))
 
 
 @inlined
@@ -86,21 +87,20 @@ def segment_distance(nodes: Table, a: int, b: int, c: int, d: int, per_square: R
     The nearest points of the lines; where one is beyond its segment, the end there, and what is
     nearest to that (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9).
     """
-    u_x, v_x = nodes[b, P_WN] - nodes[a, P_WN], nodes[d, P_WN] - nodes[c, P_WN]
-    u_y, v_y = nodes[b, P_WN + 1] - nodes[a, P_WN + 1], nodes[d, P_WN + 1] - nodes[c, P_WN + 1]
-    u_z, v_z = nodes[b, P_WN + 2] - nodes[a, P_WN + 2], nodes[d, P_WN + 2] - nodes[c, P_WN + 2]
-    r_x = nodes[a, P_WN] - nodes[c, P_WN]
-    r_y = nodes[a, P_WN + 1] - nodes[c, P_WN + 1]
-    r_z = nodes[a, P_WN + 2] - nodes[c, P_WN + 2]
+    u = difference(vector_at(nodes, b, P_WN), vector_at(nodes, a, P_WN))
+    v = difference(vector_at(nodes, d, P_WN), vector_at(nodes, c, P_WN))
+    r = difference(vector_at(nodes, a, P_WN), vector_at(nodes, c, P_WN))
     # Products of u, v and r, in lengths of u and v.
-    uv, ur = u_x * v_x + u_y * v_y + u_z * v_z, u_x * r_x + u_y * r_y + u_z * r_z
-    vr = v_x * r_x + v_y * r_y + v_z * r_z
-    uv, ur, vr = per_square * uv, per_square * ur, per_square * vr
+    uv, ur, vr = per_square * dot(u, v), per_square * dot(u, r), per_square * dot(v, r)
     s = share((uv * vr - ur) / maximum(1.0 - uv * uv, _PARALLEL))
     t = share(uv * s + vr)
     s = share(uv * t - ur)
-    x, y, z = r_x + s * u_x - t * v_x, r_y + s * u_y - t * v_y, r_z + s * u_z - t * v_z
-    return x * x + y * y + z * z
+    apart = (
+        r[0] + s * u[0] - t * v[0],
+        r[1] + s * u[1] - t * v[1],
+        r[2] + s * u[2] - t * v[2],
+    )
+    return dot(apart, apart)
 
 
 @inlined

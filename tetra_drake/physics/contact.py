@@ -15,6 +15,7 @@ from tetra_drake.physics.friction import (
     STICK,
     FrictionLaw,
     Slide,
+    TangentSlide,
     friction_force,
     next_mode,
     stuck_along,
@@ -28,6 +29,7 @@ from tetra_drake.physics.kinematics import (
     move_nodes,
 )
 from tetra_drake.physics.terrain import GAP, SurfaceGrid, find_frames, to_frame, to_world
+from tetra_drake.physics.vectors import add_vector, difference, put_vector, vector_at
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import (
     Real,
@@ -106,17 +108,15 @@ def sliding(
     nodes: Table, modes: Table, ground: Ground, law: NormalForce, frames: Table, i: int
 ) -> tuple[Slide, Real]:
     """Sliding of a contact node, and the rate (m/s) at which its gap grows."""
-    node, flat = ground.contacts[i], ground.flat
-    v_x, v_y, v_z = nodes[node, V_WN], nodes[node, V_WN + 1], nodes[node, V_WN + 2]
-    x = nodes[node, P_WN] - modes[i, STICK_POINT]
-    y = nodes[node, P_WN + 1] - modes[i, STICK_POINT + 1]
-    z = nodes[node, P_WN + 2] - modes[i, STICK_POINT + 2]
-    v_1, v_2, v_n = to_frame(v_x, v_y, v_z, frames, i, flat)
-    x_1, x_2, _ = to_frame(x, y, z, frames, i, flat)
-    mode = modes[i, MODE], modes[i, MODE + 1]
+    node = ground.contacts[i]
+    deflection = difference(vector_at(nodes, node, P_WN), vector_at(modes, i, STICK_POINT))
+    v_1, v_2, v_n = to_frame(vector_at(nodes, node, V_WN), frames, i, ground.flat)
+    x_1, x_2, _ = to_frame(deflection, frames, i, ground.flat)
+    t1 = TangentSlide(v_1, x_1, modes[i, MODE])
+    t2 = TangentSlide(v_2, x_2, modes[i, MODE + 1])
     heading = modes[i, HEADING], modes[i, HEADING + 1]
     normal = normal_force(-gap(nodes, ground, frames, i), -v_n, law)
-    return Slide((v_1, v_2), (x_1, x_2), mode, heading, normal), v_n
+    return Slide(t1, t2, heading, normal), v_n
 
 
 @inlined
@@ -132,18 +132,15 @@ def add_ground_forces(
         node, touches = ground.contacts[i], modes[i, CONTACT] != 0.0
         if not any_lane(touches | (gap(nodes, ground, frames, i) <= 0.0)):
             if keep:
-                pushes[i, FRICTION_1] = pushes[i, FRICTION_2] = pushes[i, NORMAL] = 0.0
+                put_vector((0.0, 0.0, 0.0), i, FRICTION_1, pushes)
             continue
         slide, _ = sliding(nodes, modes, ground, law, frames, i)
         f_1, f_2 = friction_force(slide, ground.friction)
         f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
         if keep:
-            pushes[i, FRICTION_1], pushes[i, FRICTION_2] = f_1, f_2
-            pushes[i, NORMAL] = slide.normal
-        f_x, f_y, f_z = to_world(f_1, f_2, slide.normal, frames, i, ground.flat)
-        nodes[node, FORCE] += f_x
-        nodes[node, FORCE + 1] += f_y
-        nodes[node, FORCE + 2] += f_z
+            put_vector((f_1, f_2, slide.normal), i, FRICTION_1, pushes)
+        force = to_world(f_1, f_2, slide.normal, frames, i, ground.flat)
+        add_vector(force, node, FORCE, nodes)
 
 
 def ground_arguments(ground: Ground) -> tuple[Table, Table, int, Table, bool, Table, Table]:
@@ -204,16 +201,17 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         changed = changed | (touched ^ touches)
         lands, stays = touches & not_(touched), touched & touches
         slide, _ = sliding(nodes, modes, ground, law, frames, i)
-        (m_1, m_2), (n_1, n_2) = slide.mode, next_mode(slide, ground.friction)
-        n_1, n_2 = select(stays, n_1, STICK), select(stays, n_2, STICK)
-        before_1, before_2 = stuck_along((m_1, m_2), ground.friction)
-        after_1, after_2 = stuck_along((n_1, n_2), ground.friction)
-        resets_1 = after_1 & (lands | not_(before_1))
-        resets_2 = after_2 & (lands | not_(before_2))
+        mode_1, mode_2 = slide.t1.mode, slide.t2.mode
+        next_1, next_2 = next_mode(slide, ground.friction)
+        next_1, next_2 = select(stays, next_1, STICK), select(stays, next_2, STICK)
+        stuck_1, stuck_2 = stuck_along((mode_1, mode_2), ground.friction)
+        sticks_1, sticks_2 = stuck_along((next_1, next_2), ground.friction)
+        resets_1 = sticks_1 & (lands | not_(stuck_1))
+        resets_2 = sticks_2 & (lands | not_(stuck_2))
         if any_lane(lands):
             set_heading(state, nodes, ground, frames, i, lands, modes)
-        modes[i, MODE], modes[i, MODE + 1] = n_1, n_2
-        changed = changed | (n_1 != m_1) | (n_2 != m_2)
+        modes[i, MODE], modes[i, MODE + 1] = next_1, next_2
+        changed = changed | (next_1 != mode_1) | (next_2 != mode_2)
         move_stick_point(nodes, ground, frames, i, resets_1, resets_2, slide, modes)
     return changed
 
@@ -240,18 +238,19 @@ def move_stick_point(
     modes: Table,
 ) -> None:
     """Moves the stick point of a contact node to the node, along t1 and along t2."""
-    node, s = ground.contacts[i], STICK_POINT
-    p_x, p_y, p_z = nodes[node, P_WN], nodes[node, P_WN + 1], nodes[node, P_WN + 2]
+    p_x, p_y, p_z = vector_at(nodes, ground.contacts[i], P_WN)
+    stick_x, stick_y, stick_z = vector_at(modes, i, STICK_POINT)
     if ground.flat:
-        modes[i, s] = select(along_1, p_x, modes[i, s])
-        modes[i, s + 1] = select(along_2, p_y, modes[i, s + 1])
+        modes[i, STICK_POINT] = select(along_1, p_x, stick_x)
+        modes[i, STICK_POINT + 1] = select(along_2, p_y, stick_y)
         return
-    x_1, x_2 = select(along_1, slide.deflection[0], 0.0), select(along_2, slide.deflection[1], 0.0)
+    x_1 = select(along_1, slide.t1.deflection, 0.0)
+    x_2 = select(along_2, slide.t2.deflection, 0.0)
     x, y, z = to_world(x_1, x_2, 0.0, frames, i, False)
     both = along_1 & along_2
-    modes[i, s] = select(both, p_x, modes[i, s] + x)
-    modes[i, s + 1] = select(both, p_y, modes[i, s + 1] + y)
-    modes[i, s + 2] = select(both, p_z, modes[i, s + 2] + z)
+    modes[i, STICK_POINT] = select(both, p_x, stick_x + x)
+    modes[i, STICK_POINT + 1] = select(both, p_y, stick_y + y)
+    modes[i, STICK_POINT + 2] = select(both, p_z, stick_z + z)
 
 
 @inlined
@@ -260,8 +259,8 @@ def set_heading(
 ) -> None:
     """Notes the heading of a contact node's body: its x axis, projected into the tangent plane."""
     bodies = state.size // 13
-    x, y, z = forward_axis(state, ground.contacts[i] // (nodes.shape[0] // bodies))
-    h_1, h_2, _ = to_frame(x, y, z, frames, i, ground.flat)
+    forward = forward_axis(state, ground.contacts[i] // (nodes.shape[0] // bodies))
+    h_1, h_2, _ = to_frame(forward, frames, i, ground.flat)
     per_length = inverse_sqrt(maximum(h_1 * h_1 + h_2 * h_2, 1e-30))
     modes[i, HEADING] = select(where, h_1 * per_length, modes[i, HEADING])
     modes[i, HEADING + 1] = select(where, h_2 * per_length, modes[i, HEADING + 1])

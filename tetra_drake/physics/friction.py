@@ -1,8 +1,11 @@
 """The laws of friction of a node on the ground, in the plane that is tangent to it.
 
 The reset integrator (Eq. 3-5) acts along each tangent by itself. Coulomb friction, regularised,
-acts in the plane and is limited by the normal force. Which of them a ground has is asked at the end
-of this module, and nowhere else.
+acts in the plane and is limited by the normal force.
+
+Both laws have the same functions of a Slide: force, damping, stuck, next mode, margin and time to
+the next change. The last section calls those of a ground's law. A further law takes its constants,
+these functions, and a branch in each function of that section.
 """
 
 from __future__ import annotations
@@ -29,16 +32,24 @@ STICK = 0.0
 with the reset integrator +1 or -1 on each tangent, with Coulomb friction a unit vector."""
 
 Pair = tuple[Real, Real]
+"""Components along the tangents t1 and t2."""
+
+
+class TangentSlide(NamedTuple):
+    """A node's slide along one tangent."""
+
+    velocity: Real
+    """m/s."""
+    deflection: Real
+    """Deflection from the stick point, m."""
+    mode: Real
 
 
 class Slide(NamedTuple):
-    """A node on the ground and in motion along it, by components along the tangents t1 and t2."""
+    """A node on the ground, in motion along it."""
 
-    velocity: Pair
-    """m/s."""
-    deflection: Pair
-    """Deflection from the stick point, m."""
-    mode: Pair
+    t1: TangentSlide
+    t2: TangentSlide
     heading: Pair
     """Direction in which the node's body pointed at touchdown, a unit vector."""
     normal: Real
@@ -59,7 +70,7 @@ def first_zero(value: Real, rate: Real, rate_rate: Real, horizon: Real) -> Real:
     return select(falls, minimum(2.0 * value / select(falls, speed, 1.0), horizon), horizon)
 
 
-# The reset integrator, along one tangent.
+# The reset integrator: one law along each tangent.
 
 
 class ResetConstants(NamedTuple):
@@ -72,49 +83,87 @@ class ResetConstants(NamedTuple):
 
 
 @inlined
-def reset_force(velocity: Real, deflection: Real, mode: Real, law: ResetConstants) -> Real:
-    """Friction (N) along one tangent by the reset integrator (Eq. 3-5).
-
-    `velocity` (m/s) is along the tangent and `deflection` (m) from the stick point; in slip
-    the deflection is held at the stiction range, on the side the node slips to.
-    """
-    sigma_0 = law.proportional_stiction * abs(velocity)
-    bristle = sigma_0 * (1.0 + law.stiction_switch) * deflection
-    stick = -(bristle + law.stiction_damping * velocity)
-    slip = -sigma_0 * law.stiction_range * mode
-    return select(mode == STICK, stick, slip)
+def reset_force(slide: Slide, law: ResetConstants) -> Pair:
+    """Friction (N) by the reset integrator (Eq. 3-5)."""
+    return tangent_force(slide.t1, law), tangent_force(slide.t2, law)
 
 
 @inlined
-def next_reset_mode(velocity: Real, deflection: Real, mode: Real, law: ResetConstants) -> Real:
-    """The mode that follows `mode`: breaks free at the stiction range moving outward,
+def tangent_force(slide: TangentSlide, law: ResetConstants) -> Real:
+    """Friction (N) along one tangent; in slip the deflection is held at the stiction range, on the
+    side the node slips to."""
+    sigma_0 = law.proportional_stiction * abs(slide.velocity)
+    bristle = sigma_0 * (1.0 + law.stiction_switch) * slide.deflection
+    stick = -(bristle + law.stiction_damping * slide.velocity)
+    slip = -sigma_0 * law.stiction_range * slide.mode
+    return select(slide.mode == STICK, stick, slip)
+
+
+@inlined
+def reset_damping(slide: Slide, time: Real, law: ResetConstants) -> tuple[Real, Real, Real]:
+    """Stiff part of -(time d/dv + time² d/dx) of the friction, the damping in stick: its components
+    11, 12 and 22."""
+    damping = time * law.stiction_damping
+    along_1 = select(slide.t1.mode == STICK, damping, 0.0)
+    along_2 = select(slide.t2.mode == STICK, damping, 0.0)
+    return along_1, 0.0 * damping, along_2
+
+
+@inlined
+def next_reset_mode(slide: Slide, law: ResetConstants) -> Pair:
+    """The mode that follows on each tangent."""
+    return next_tangent_mode(slide.t1, law), next_tangent_mode(slide.t2, law)
+
+
+@inlined
+def next_tangent_mode(slide: TangentSlide, law: ResetConstants) -> Real:
+    """The mode that follows on one tangent: breaks free at the stiction range moving outward,
     sticks again when the velocity changes sign."""
-    forward = (deflection >= law.stiction_range) & (velocity > 0.0)
-    backward = (deflection <= -law.stiction_range) & (velocity < 0.0)
+    forward = (slide.deflection >= law.stiction_range) & (slide.velocity > 0.0)
+    backward = (slide.deflection <= -law.stiction_range) & (slide.velocity < 0.0)
     from_stick = select(forward, 1.0, select(backward, -1.0, STICK))
-    from_slip = select(mode * velocity > 0.0, mode, STICK)
-    return select(mode == STICK, from_stick, from_slip)
+    from_slip = select(slide.mode * slide.velocity > 0.0, slide.mode, STICK)
+    return select(slide.mode == STICK, from_stick, from_slip)
 
 
 @inlined
-def reset_margin(velocity: float, deflection: float, mode: float, law: ResetConstants) -> float:
+def reset_margin(slide: Slide, law: ResetConstants) -> float:
+    """Mode margin, the lesser of the two tangents'."""
+    return min(tangent_margin(slide.t1, law), tangent_margin(slide.t2, law))
+
+
+@inlined
+def tangent_margin(slide: TangentSlide, law: ResetConstants) -> float:
     """Mode margin along one tangent: in stick m, in slip m/s."""
-    return law.stiction_range - abs(deflection) if mode == STICK else mode * velocity
+    if slide.mode == STICK:
+        return law.stiction_range - abs(slide.deflection)
+    return slide.mode * slide.velocity
 
 
 @inlined
 def time_to_reset_change(
-    v: Real, x: Real, mode: Real, a: Real, touches: Truth, law: ResetConstants, horizon: Real
+    slide: Slide, acceleration: Pair, law: ResetConstants, horizon: Real
 ) -> Real:
-    """Time (s) to the next mode change along one tangent; velocity, deflection, mode and
-    acceleration are along it."""
-    stuck, slips = touches & (mode == STICK), touches & (mode != STICK)
+    """Time (s) to the next mode change on either tangent."""
+    return minimum(
+        time_to_tangent_change(slide.t1, acceleration[0], law, horizon),
+        time_to_tangent_change(slide.t2, acceleration[1], law, horizon),
+    )
+
+
+@inlined
+def time_to_tangent_change(
+    slide: TangentSlide, acceleration: Real, law: ResetConstants, horizon: Real
+) -> Real:
+    """Time (s) to the next mode change on one tangent."""
+    velocity, stuck = slide.velocity, slide.mode == STICK
     # A value of 0 is never reached: it counts as no mode change.
-    to_front = select(stuck, law.stiction_range - x, 0.0)
-    to_back = select(stuck, law.stiction_range + x, 0.0)
-    time = first_zero(to_front, -v, -a, horizon)
-    time = minimum(time, first_zero(to_back, v, a, horizon))
-    return minimum(time, first_zero(select(slips, mode * v, 0.0), mode * a, 0.0, horizon))
+    to_front = select(stuck, law.stiction_range - slide.deflection, 0.0)
+    to_back = select(stuck, law.stiction_range + slide.deflection, 0.0)
+    to_rest = select(stuck, 0.0, slide.mode * velocity)
+    time = first_zero(to_front, -velocity, -acceleration, horizon)
+    time = minimum(time, first_zero(to_back, velocity, acceleration, horizon))
+    return minimum(time, first_zero(to_rest, slide.mode * acceleration, 0.0, horizon))
 
 
 # Coulomb friction, in the plane.
@@ -136,38 +185,40 @@ class CoulombConstants(NamedTuple):
 class Pull(NamedTuple):
     """Pull at a node's bristle: u = c v, in stick + k x."""
 
-    u: Pair
-    """N."""
+    u_1: Real
+    """N; along t1, and next along t2."""
+    u_2: Real
     size: Real
     """Size of u, N: its length where friction is the same in all directions."""
     limit: Real
     """Limit of the size, mu F_N."""
+    stuck: Truth
 
 
 @inlined
-def sticks(mode: Pair) -> Truth:
+def coulomb_sticks(mode: Pair) -> Truth:
     """True if a mode of Coulomb friction sticks."""
     return (mode[0] == STICK) & (mode[1] == STICK)
 
 
 @inlined
 def coulomb_pull(slide: Slide, law: CoulombConstants) -> Pull:
-    """The pull at the bristle. The directional factors make its size that of an ellipse, whose
-    half-axis along the heading is `forward` or `backward` by the way u points."""
-    stuck = sticks(slide.mode)
-    k = select(stuck, law.stiffness, 0.0)
-    u_1 = law.damping * slide.velocity[0] + k * slide.deflection[0]
-    u_2 = law.damping * slide.velocity[1] + k * slide.deflection[1]
-    size = coulomb_size((u_1, u_2), slide.heading, law)
+    """The pull at the bristle."""
+    stuck = coulomb_sticks((slide.t1.mode, slide.t2.mode))
+    stiffness = select(stuck, law.stiffness, 0.0)
+    u_1 = law.damping * slide.t1.velocity + stiffness * slide.t1.deflection
+    u_2 = law.damping * slide.t2.velocity + stiffness * slide.t2.deflection
+    size = coulomb_size(u_1, u_2, slide.heading, law)
     limit = select(stuck, law.static, law.kinetic) * slide.normal
-    return Pull((u_1, u_2), size, limit)
+    return Pull(u_1, u_2, size, limit, stuck)
 
 
 @inlined
-def coulomb_size(u: Pair, heading: Pair, law: CoulombConstants) -> Real:
-    """The length of a vector, measured in directional factors."""
-    along = u[0] * heading[0] + u[1] * heading[1]
-    across = u[1] * heading[0] - u[0] * heading[1]
+def coulomb_size(u_1: Real, u_2: Real, heading: Pair, law: CoulombConstants) -> Real:
+    """The length of a vector, measured in directional factors: vectors of the same size are on an
+    ellipse, whose half-axis along the heading is `forward` or `backward` by the way they point."""
+    along = u_1 * heading[0] + u_2 * heading[1]
+    across = u_2 * heading[0] - u_1 * heading[1]
     along *= select(along > 0.0, law.per_forward, law.per_backward)
     across *= law.per_lateral
     return math.sqrt(along * along + across * across)
@@ -178,30 +229,47 @@ def coulomb_force(slide: Slide, law: CoulombConstants) -> Pair:
     """Friction (N): -u, as far as the normal force allows."""
     pull = coulomb_pull(slide, law)
     share = select(pull.size > pull.limit, pull.limit / pull.size, 1.0)
-    return -share * pull.u[0], -share * pull.u[1]
+    return -share * pull.u_1, -share * pull.u_2
+
+
+@inlined
+def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Real, Real, Real]:
+    """-(time d/dv + time² d/dx) of the friction: its components 11, 12 and 22.
+
+    Beyond the limit only the direction of the force changes (exact without directional factors).
+    """
+    pull = coulomb_pull(slide, law)
+    stiffness = select(pull.stuck, time * law.stiffness, 0.0)
+    slips = pull.size > pull.limit
+    rate = time * (law.damping + stiffness) * select(slips, pull.limit / pull.size, 1.0)
+    u_1, u_2 = pull.u_1, pull.u_2
+    per_square = select(slips, rate / (u_1 * u_1 + u_2 * u_2), 0.0)
+    return rate - per_square * u_1 * u_1, -per_square * u_1 * u_2, rate - per_square * u_2 * u_2
 
 
 @inlined
 def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> Pair:
     """The mode that follows: breaks free beyond the static limit moving outward, and sticks again
     where its damping alone holds it."""
-    pull, stuck = coulomb_pull(slide, law), sticks(slide.mode)
-    (u_1, u_2), (v_1, v_2) = pull.u, slide.velocity
+    pull = coulomb_pull(slide, law)
+    u_1, u_2 = pull.u_1, pull.u_2
     beyond = pull.size > pull.limit
-    breaks = stuck & beyond & (u_1 * v_1 + u_2 * v_2 > 0.0)
+    breaks = pull.stuck & beyond & (u_1 * slide.t1.velocity + u_2 * slide.t2.velocity > 0.0)
     length = math.sqrt(u_1 * u_1 + u_2 * u_2)
     return (
-        select(breaks, u_1 / length, select(beyond, slide.mode[0], STICK)),
-        select(breaks, u_2 / length, select(beyond, slide.mode[1], STICK)),
+        select(breaks, u_1 / length, select(beyond, slide.t1.mode, STICK)),
+        select(breaks, u_2 / length, select(beyond, slide.t2.mode, STICK)),
     )
 
 
 @inlined
 def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
     """Mode margin (N): in stick what is left of the limit, in slip what exceeds it."""
-    pull, (v_1, v_2) = coulomb_pull(slide, law), slide.velocity
-    left, outward = pull.limit - pull.size, pull.u[0] * v_1 + pull.u[1] * v_2
-    return max(left, -outward) if sticks(slide.mode) else -left
+    pull = coulomb_pull(slide, law)
+    if not pull.stuck:
+        return pull.size - pull.limit
+    outward = pull.u_1 * slide.t1.velocity + pull.u_2 * slide.t2.velocity
+    return max(pull.limit - pull.size, -outward)
 
 
 @inlined
@@ -209,31 +277,17 @@ def time_to_coulomb_change(
     slide: Slide, acceleration: Pair, normal_rate: Real, law: CoulombConstants, horizon: Real
 ) -> Real:
     """Time (s) until a node's pull crosses the limit, by its rate now."""
-    pull, (v_1, v_2), stuck = coulomb_pull(slide, law), slide.velocity, sticks(slide.mode)
-    k = select(stuck, law.stiffness, 0.0)
-    u_1, u_2 = law.damping * acceleration[0], law.damping * acceleration[1]
-    u_1, u_2 = u_1 + k * v_1, u_2 + k * v_2
-    time = 1e-6  # s; the difference gives the rate of the pull's size
-    later = coulomb_size((pull.u[0] + time * u_1, pull.u[1] + time * u_2), slide.heading, law)
-    left = pull.limit - pull.size
-    left_rate = select(stuck, law.static, law.kinetic) * normal_rate - (later - pull.size) / time
-    sign = select(stuck, 1.0, -1.0)
-    return first_zero(sign * left, sign * left_rate, 0.0, horizon)
-
-
-@inlined
-def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Real, Real, Real]:
-    """-(time d/dv + time² d/dx) of the friction: its components 11, 12 and 22; time in s.
-
-    Beyond the limit only the direction of the force changes (exact without directional factors).
-    """
     pull = coulomb_pull(slide, law)
-    k = select(sticks(slide.mode), time * law.stiffness, 0.0)
-    slips = pull.size > pull.limit
-    rate = time * (law.damping + k) * select(slips, pull.limit / pull.size, 1.0)
-    u_1, u_2 = pull.u
-    per_square = select(slips, rate / (u_1 * u_1 + u_2 * u_2), 0.0)
-    return rate - per_square * u_1 * u_1, -per_square * u_1 * u_2, rate - per_square * u_2 * u_2
+    stiffness = select(pull.stuck, law.stiffness, 0.0)
+    rate_1 = law.damping * acceleration[0] + stiffness * slide.t1.velocity
+    rate_2 = law.damping * acceleration[1] + stiffness * slide.t2.velocity
+    time = 1e-6  # s; the difference gives the rate of the pull's size
+    u_1, u_2 = pull.u_1 + time * rate_1, pull.u_2 + time * rate_2
+    size_rate = (coulomb_size(u_1, u_2, slide.heading, law) - pull.size) / time
+    limit_rate = select(pull.stuck, law.static, law.kinetic) * normal_rate
+    sign = select(pull.stuck, 1.0, -1.0)
+    room, room_rate = pull.limit - pull.size, limit_rate - size_rate
+    return first_zero(sign * room, sign * room_rate, 0.0, horizon)
 
 
 # The law of a ground.
@@ -265,9 +319,7 @@ def friction_force(slide: Slide, friction: FrictionLaw) -> Pair:
     """Friction (N) along the tangents on a node that touches the ground."""
     if friction.kind == COULOMB:
         return coulomb_force(slide, named(CoulombConstants, friction.constants))
-    law = named(ResetConstants, friction.constants)
-    (v_1, v_2), (x_1, x_2), (m_1, m_2) = slide.velocity, slide.deflection, slide.mode
-    return reset_force(v_1, x_1, m_1, law), reset_force(v_2, x_2, m_2, law)
+    return reset_force(slide, named(ResetConstants, friction.constants))
 
 
 @inlined
@@ -276,16 +328,15 @@ def friction_damping(slide: Slide, time: Real, friction: FrictionLaw) -> tuple[R
     22; time in s."""
     if friction.kind == COULOMB:
         return coulomb_damping(slide, time, named(CoulombConstants, friction.constants))
-    damping = time * named(ResetConstants, friction.constants).stiction_damping
-    m_1, m_2 = slide.mode
-    return select(m_1 == STICK, damping, 0.0), 0.0 * damping, select(m_2 == STICK, damping, 0.0)
+    return reset_damping(slide, time, named(ResetConstants, friction.constants))
 
 
 @inlined
 def stuck_along(mode: Pair, friction: FrictionLaw) -> tuple[Truth, Truth]:
     """True along each tangent on which a mode sticks."""
     if friction.kind == COULOMB:
-        return sticks(mode), sticks(mode)
+        stuck = coulomb_sticks(mode)
+        return stuck, stuck
     return mode[0] == STICK, mode[1] == STICK
 
 
@@ -294,43 +345,29 @@ def next_mode(slide: Slide, friction: FrictionLaw) -> Pair:
     """The mode that follows on a node that stays on the ground."""
     if friction.kind == COULOMB:
         return next_coulomb_mode(slide, named(CoulombConstants, friction.constants))
-    law = named(ResetConstants, friction.constants)
-    (v_1, v_2), (x_1, x_2), (m_1, m_2) = slide.velocity, slide.deflection, slide.mode
-    return next_reset_mode(v_1, x_1, m_1, law), next_reset_mode(v_2, x_2, m_2, law)
+    return next_reset_mode(slide, named(ResetConstants, friction.constants))
 
 
 @inlined
 def friction_margin(slide: Slide, friction: FrictionLaw) -> float:
-    """Positive while the mode is not due to change, zero where it is; only its sign has a
-    meaning."""
+    """Mode margin of a node on the ground: positive while no change is due, zero where one is. Only
+    its sign has a meaning."""
     if friction.kind == COULOMB:
         return coulomb_margin(slide, named(CoulombConstants, friction.constants))
-    law = named(ResetConstants, friction.constants)
-    (v_1, v_2), (x_1, x_2), (m_1, m_2) = slide.velocity, slide.deflection, slide.mode
-    return min(reset_margin(v_1, x_1, m_1, law), reset_margin(v_2, x_2, m_2, law))
+    return reset_margin(slide, named(ResetConstants, friction.constants))
 
 
 @inlined
 def time_to_friction_change(
-    slide: Slide,
-    acceleration: Pair,
-    normal_rate: Real,
-    touches: Truth,
-    friction: FrictionLaw,
-    horizon: Real,
+    slide: Slide, acceleration: Pair, normal_rate: Real, friction: FrictionLaw, horizon: Real
 ) -> Real:
-    """Time (s) to the next mode change, at most `horizon`, of nodes that touch the ground.
+    """Time (s) to the next mode change, at most `horizon`, of a node on the ground.
 
     `acceleration` is along the tangents; `normal_rate` (N/s) is that of the normal force.
     """
     if friction.kind == COULOMB:
-        coulomb = named(CoulombConstants, friction.constants)
-        time = time_to_coulomb_change(slide, acceleration, normal_rate, coulomb, horizon)
-        return select(touches, time, horizon)
-    law = named(ResetConstants, friction.constants)
-    (v_1, v_2), (x_1, x_2), (m_1, m_2) = slide.velocity, slide.deflection, slide.mode
-    a_1, a_2 = acceleration
-    return minimum(
-        time_to_reset_change(v_1, x_1, m_1, a_1, touches, law, horizon),
-        time_to_reset_change(v_2, x_2, m_2, a_2, touches, law, horizon),
+        law = named(CoulombConstants, friction.constants)
+        return time_to_coulomb_change(slide, acceleration, normal_rate, law, horizon)
+    return time_to_reset_change(
+        slide, acceleration, named(ResetConstants, friction.constants), horizon
     )

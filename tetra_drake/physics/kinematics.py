@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tetra_drake.physics.vectors import Vector, cross, put_vector, vector_at
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, inverse_sqrt
 
@@ -34,19 +35,17 @@ def move_nodes(state: Table, p_BN: Table, nodes: Table) -> None:
         w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
         v_x, v_y, v_z = state[v + 3], state[v + 4], state[v + 5]
         for k in range(per_body):
-            a, b, c = p_BN[k, 0], p_BN[k, 1], p_BN[k, 2]
+            a, b, c = vector_at(p_BN, k, 0)
             p_x = r_00 * a + r_01 * b + r_02 * c
             p_y = r_10 * a + r_11 * b + r_12 * c
             p_z = r_20 * a + r_21 * b + r_22 * c
             node = per_body * body + k
-            nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2] = p_x, p_y, p_z
-            nodes[node, P_WN] = o_x + p_x
-            nodes[node, P_WN + 1] = o_y + p_y
-            nodes[node, P_WN + 2] = o_z + p_z
+            put_vector((p_x, p_y, p_z), node, P_BN_W, nodes)
+            put_vector((o_x + p_x, o_y + p_y, o_z + p_z), node, P_WN, nodes)
             nodes[node, V_WN] = v_x + w_y * p_z - w_z * p_y
             nodes[node, V_WN + 1] = v_y + w_z * p_x - w_x * p_z
             nodes[node, V_WN + 2] = v_z + w_x * p_y - w_y * p_x
-            nodes[node, FORCE], nodes[node, FORCE + 1], nodes[node, FORCE + 2] = 0.0, 0.0, 0.0
+            put_vector((0.0, 0.0, 0.0), node, FORCE, nodes)
 
 
 @inlined
@@ -78,7 +77,7 @@ def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> No
 
 
 @inlined
-def forward_axis(state: Table, body: int) -> tuple[Real, Real, Real]:
+def forward_axis(state: Table, body: int) -> Vector:
     """The x axis of a body in World."""
     q = 7 * body
     w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
@@ -87,18 +86,14 @@ def forward_axis(state: Table, body: int) -> tuple[Real, Real, Real]:
 
 
 @inlined
-def node_acceleration(
-    state: Table, acceleration: Table, nodes: Table, node: int
-) -> tuple[Real, Real, Real]:
+def node_acceleration(state: Table, acceleration: Table, nodes: Table, node: int) -> Vector:
     """Acceleration (m/s²) of a node in World from dv/dt of the bodies, 6 numbers per body."""
     bodies = state.size // 13
     body = node // (nodes.shape[0] // bodies)
     v, a = 7 * bodies + 6 * body, 6 * body
     w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
-    p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
-    u_x = w_y * p_z - w_z * p_y
-    u_y = w_z * p_x - w_x * p_z
-    u_z = w_x * p_y - w_y * p_x
+    p_x, p_y, p_z = vector_at(nodes, node, P_BN_W)
+    u_x, u_y, u_z = cross((w_x, w_y, w_z), (p_x, p_y, p_z))
     alpha_x, alpha_y, alpha_z = acceleration[a], acceleration[a + 1], acceleration[a + 2]
     return (
         acceleration[a + 3] + alpha_y * p_z - alpha_z * p_y + w_y * u_z - w_z * u_y,
@@ -116,14 +111,14 @@ def gather_forces(nodes: Table, generalized_force: Table) -> None:
     for body in range(bodies):
         t_x = t_y = t_z = f_x = f_y = f_z = 0.0
         for node in range(per_body * body, per_body * (body + 1)):
-            p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
-            x, y, z = nodes[node, FORCE], nodes[node, FORCE + 1], nodes[node, FORCE + 2]
-            t_x += p_y * z - p_z * y
-            t_y += p_z * x - p_x * z
-            t_z += p_x * y - p_y * x
-            f_x += x
-            f_y += y
-            f_z += z
+            force = vector_at(nodes, node, FORCE)
+            torque = cross(vector_at(nodes, node, P_BN_W), force)
+            t_x += torque[0]
+            t_y += torque[1]
+            t_z += torque[2]
+            f_x += force[0]
+            f_y += force[1]
+            f_z += force[2]
         g = 6 * body
         generalized_force[g] = t_x
         generalized_force[g + 1] = t_y

@@ -65,7 +65,7 @@ def time_to_mode_change(
     time, law = horizon, named(NormalForce, ground.normal)
     for i in range(ground.contacts.size):
         a_WN = node_acceleration(state, acceleration, nodes, ground.contacts[i])
-        a_1, a_2, a_n = to_frame(a_WN[0], a_WN[1], a_WN[2], frames, i, ground.flat)
+        a_1, a_2, a_n = to_frame(a_WN, frames, i, ground.flat)
         slide, v_n = sliding(nodes, modes, ground, law, frames, i)
         touches, distance = modes[i, CONTACT] != 0.0, gap(nodes, ground, frames, i)
         up = select(touches, -1.0, 1.0)  # the way that leads to the ground's surface
@@ -74,8 +74,8 @@ def time_to_mode_change(
             continue
         rate = law.damping * (v_n * v_n + distance * a_n) - law.stiffness * v_n
         rate = select(slide.normal > 0.0, rate, 0.0)
-        change = time_to_friction_change(slide, (a_1, a_2), rate, touches, ground.friction, horizon)
-        time = minimum(time, change)
+        change = time_to_friction_change(slide, (a_1, a_2), rate, ground.friction, horizon)
+        time = minimum(time, select(touches, change, horizon))
     return time
 
 

@@ -14,21 +14,23 @@ from tetra_drake.simd.lanes import Real, Table, Truth, maximum, select
 Array = np.ndarray
 
 U, V, U_RATE, V_RATE, Y, U_START, V_START, U_SUM, V_SUM, NEURON_COLUMNS = range(10)
-"""Columns of `neurons`, (2n, 9): inner state u, self-inhibition v, their rates in 1/s, and what the
-kernels note besides; and their number."""
+"""Columns of `neurons`, (2n, 9): inner state u, self-inhibition v, their rates in 1/s, output y, u
+and v at the start of a step, sums of their rates; and the number of columns."""
 
 
 class Network(NamedTuple):
     """The constants of a network, by neuron."""
 
     first: Table
-    """(2n,): the first of the neurons that inhibit each, and next, the one after the last."""
+    """(2n,): the first neuron that inhibits each neuron."""
     beyond: Table
+    """(2n,): one more than the last neuron that inhibits each; 0 if none does."""
     inhibition: Table
     """(2n, 2n): W[i, j], of neuron i by neuron j."""
     per_tau_a: Table
-    """(2n,): 1 / tau_A and, next, 1 / tau_B, in 1/s."""
+    """(2n,): 1 / tau_A in 1/s."""
     per_tau_b: Table
+    """(2n,): 1 / tau_B in 1/s."""
     self_inhibition_weight: Table
     """(2n,): beta."""
 
@@ -51,9 +53,15 @@ class Network(NamedTuple):
         inhibits = matrix != 0.0
         first = inhibits.argmax(axis=1)
         beyond = np.where(inhibits.any(axis=1), len(matrix) - inhibits[:, ::-1].argmax(axis=1), 0)
-        constants = 1.0 / np.asarray(tau_a), 1.0 / np.asarray(tau_b), self_inhibition_weight
-        by_neuron = (np.full(len(matrix), values, dtype=float) for values in constants)
-        return cls(first, beyond, matrix, *by_neuron)
+        neurons = len(matrix)
+        return cls(
+            first,
+            beyond,
+            matrix,
+            per_tau_a=np.full(neurons, 1.0 / np.asarray(tau_a)),
+            per_tau_b=np.full(neurons, 1.0 / np.asarray(tau_b)),
+            self_inhibition_weight=np.full(neurons, self_inhibition_weight, dtype=float),
+        )
 
 
 def make_neurons(state: Array) -> Array:

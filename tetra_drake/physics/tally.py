@@ -12,16 +12,16 @@ from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
 
 
 class Tally(NamedTuple):
-    """Sums over the steps that begin at `begins` or later, and least values of all; SI units."""
+    """Sums over the steps that begin at `begins` or later, and least values of all steps."""
 
     begins: Table
-    """(1,): in s."""
+    """(1,): time in s."""
     time: Table
-    """(1,): that of the latest observation, in s; so are the next two."""
+    """(1,): time of the latest observation, in s."""
     signals: Table
-    """(signals,)."""
+    """(signals,): signals at the latest observation, in N."""
     lengths: Table
-    """(cables,)."""
+    """(cables,): lengths of the driven cables at the latest observation, in m."""
     work: Table
     """(1,): the integral of max(0, -S dl/dt) of the driven cables, in J."""
     roughness: Table
@@ -29,7 +29,7 @@ class Tally(NamedTuple):
     lifted: Table
     """(bodies,): the time in which no contact node of a body bears a normal force, in s."""
     tension: Table
-    """(1,): the least of a cable, in N."""
+    """(1,): the least tension of a cable, in N."""
     clearance: Table
     """(1,): the square of the least distance between struts, in m²; see physics.clearance."""
 
@@ -44,8 +44,8 @@ def observe(
     pulls: Table,
     pushes: Table,
 ) -> None:
-    """Adds the step that ends at a time (s), with the forces there, as cables and ground write
-    them. At the time of the latest observation it adds nothing."""
+    """Adds the step that ends at a time (s), with the `pulls` of cables and the `pushes` of the
+    ground there. A second observation of the same time adds nothing."""
     passed = time - tally.time[0]
     counts = (passed > 0.0) & (tally.time[0] >= tally.begins[0])
     work, roughness, tension = 0.0 * passed, 0.0 * passed, tally.tension[0]
@@ -69,7 +69,7 @@ def observe(
 
 @inlined
 def add_lifted(tally: Tally, contacts: Table, passed: Real, pushes: Table) -> None:
-    """Adds the time (s) to that of lifted bodies; contact nodes are in the order of bodies."""
+    """Adds the time (s) that has passed to each lifted body; contacts are in order of bodies."""
     i = 0
     for body in range(tally.lifted.size):
         load = 0.0 * passed
@@ -81,5 +81,5 @@ def add_lifted(tally: Tally, contacts: Table, passed: Real, pushes: Table) -> No
 
 @inlined
 def look(tally: Tally, nodes: Table) -> None:
-    """Takes note of the distances between struts; `nodes` of physics.kinematics."""
+    """Notes the clearance of struts; `nodes` of physics.kinematics."""
     tally.clearance[0] = least_strut_distance(nodes, tally.clearance[0])

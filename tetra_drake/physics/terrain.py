@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.physics.kinematics import P_WN
+from tetra_drake.physics.vectors import Vector, put_vector
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import (
     Real,
@@ -56,10 +57,11 @@ def surface(x: Real, y: Real, grid: SurfaceGrid, heights: Table) -> tuple[Real, 
 
     `heights`, (points,), are the control points, row by row.
     """
-    across = (x - grid.corner_x) * grid.per_cell_x, (y - grid.corner_y) * grid.per_cell_y
+    cells_x = (x - grid.corner_x) * grid.per_cell_x
+    cells_y = (y - grid.corner_y) * grid.per_cell_y
     # In this order, a NaN becomes a bound, and no index leaves the grid.
-    s = maximum(minimum(across[0], grid.last_row), 0.5)
-    t = maximum(minimum(across[1], grid.last_column), 0.5)
+    s = maximum(minimum(cells_x, grid.last_row), 0.5)
+    t = maximum(minimum(cells_y, grid.last_column), 0.5)
     row, column = floor(s + 0.5), floor(t + 0.5)
     a, b = s - row, t - column
     index = grid.first + (row - 1.0) * grid.columns + (column - 1.0)
@@ -68,15 +70,15 @@ def surface(x: Real, y: Real, grid: SurfaceGrid, heights: Table) -> tuple[Real, 
     h_2, b_2 = _across_row(heights, index + 2.0 * grid.columns, b)
     height, by_a = _spline(h_0, h_1, h_2, a)
     by_b, _ = _spline(b_0, b_1, b_2, a)
-    h_x = select(s == across[0], by_a * grid.per_cell_x, 0.0)
-    h_y = select(t == across[1], by_b * grid.per_cell_y, 0.0)
+    h_x = select(s == cells_x, by_a * grid.per_cell_x, 0.0)
+    h_y = select(t == cells_y, by_b * grid.per_cell_y, 0.0)
     return height, h_x, h_y
 
 
 @inlined
 def _across_row(heights: Table, index: Real, b: Real) -> tuple[Real, Real]:
-    three = gather(heights, index, 0), gather(heights, index, 1), gather(heights, index, 2)
-    return _spline(three[0], three[1], three[2], b)
+    before, here = gather(heights, index, 0), gather(heights, index, 1)
+    return _spline(before, here, gather(heights, index, 2), b)
 
 
 @inlined
@@ -101,27 +103,31 @@ def find_frames(
         node = contacts[i]
         z = nodes[node, P_WN + 2]
         near = z <= grid.top
-        height, h_x, h_y, c, n_z = grid.top, 0.0 * z, 0.0 * z, 0.0 * z + 1.0, 0.0 * z + 1.0
+        height, h_x, h_y = grid.top, 0.0 * z, 0.0 * z
+        c = n_z = 0.0 * z + 1.0
         if any_lane(near):
-            found = surface(nodes[node, P_WN], nodes[node, P_WN + 1], grid, heights)
-            height = select(near, found[0], height)
-            h_x, h_y = select(near, found[1], h_x), select(near, found[2], h_y)
+            z_at, slope_x, slope_y = surface(
+                nodes[node, P_WN], nodes[node, P_WN + 1], grid, heights
+            )
+            height = select(near, z_at, height)
+            h_x, h_y = select(near, slope_x, h_x), select(near, slope_y, h_y)
             c = inverse_sqrt(1.0 + h_y * h_y)
             n_z = inverse_sqrt(1.0 + h_x * h_x + h_y * h_y)
         frames[i, GAP] = (z - height) * n_z  # exact on a plane
-        frames[i, N_X], frames[i, N_Y], frames[i, N_Z] = -h_x * n_z, -h_y * n_z, n_z
+        put_vector((-h_x * n_z, -h_y * n_z, n_z), i, N_X, frames)
         frames[i, T1_X] = (1.0 + h_y * h_y) * c * n_z
-        frames[i, T1_Y], frames[i, T1_Z] = -h_x * h_y * c * n_z, h_x * c * n_z
-        frames[i, T2_Y], frames[i, T2_Z] = c, h_y * c
+        frames[i, T1_Y] = -h_x * h_y * c * n_z
+        frames[i, T1_Z] = h_x * c * n_z
+        frames[i, T2_Y] = c
+        frames[i, T2_Z] = h_y * c
 
 
 @inlined
-def to_frame(
-    x: Real, y: Real, z: Real, frames: Table, i: int, flat: bool
-) -> tuple[Real, Real, Real]:
+def to_frame(vector: Vector, frames: Table, i: int, flat: bool) -> Vector:
     """A vector of World along t1, t2 and n of a frame."""
     if flat:
-        return x, y, z
+        return vector
+    x, y, z = vector
     return (
         x * frames[i, T1_X] + y * frames[i, T1_Y] + z * frames[i, T1_Z],
         y * frames[i, T2_Y] + z * frames[i, T2_Z],
@@ -130,9 +136,7 @@ def to_frame(
 
 
 @inlined
-def to_world(
-    t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool
-) -> tuple[Real, Real, Real]:
+def to_world(t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool) -> Vector:
     """A vector along t1, t2 and n of a frame, in World."""
     if flat:
         return t_1, t_2, n

@@ -1,4 +1,4 @@
-"""The one way kernels are compiled."""
+"""Compilation of kernels by numba, and the cache of their machine code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import pickle
 import re
 import sys
 import threading
-import uuid
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -20,6 +19,9 @@ import numba
 from numba.core.caching import CompileResultCacheImpl, NullCache
 from numba.core.serialize import dumps
 from numba.extending import overload
+
+from tetra_drake.errors import InputError
+from tetra_drake.files import write_whole
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -32,7 +34,8 @@ _OPTIONS: dict[str, Any] = {
     "no_cfunc_wrapper": True,  # which C would call
 }
 
-_MOMENT = 2.0  # s
+_MOMENT = 2.0
+"""Time (s) that a compilation takes before it is announced."""
 
 
 def compiled(function: F, *, nogil: bool = False) -> F:
@@ -40,27 +43,25 @@ def compiled(function: F, *, nogil: bool = False) -> F:
     user's cache.
 
     Division follows NumPy (no check for zero); a product may be rounded together with the sum it
-    goes into. With `nogil`, other threads run meanwhile; else a kernel becomes part of the kernels
-    that call it, too, since calls with many tables are slow.
+    goes into. With `nogil`, other threads run meanwhile; without it, kernels that call this one
+    contain it, since calls with many tables are slow.
 
-    Where no folder can hold the cache (say, a read-only installation without a home), the
-    kernel is compiled anew each time.
+    Where no folder can hold the cache (say, a read-only installation without a home), the kernel
+    is compiled anew each time.
     """
     return _kernel(function, nogil=nogil, forceinline=not nogil)
 
 
 def merged(function: F) -> F:
-    """A large kernel whose source becomes part of the one that calls it, before that is compiled.
-
-    So it is not compiled by itself, unless Python calls it.
-    """
+    """A large kernel whose source becomes part of the one that calls it; it is compiled by itself
+    only if Python calls it."""
     return _kernel(function, inline="always")
 
 
 def inlined(function: F) -> F:
     """A function that becomes part of the kernels that call it; from Python, a Python function.
 
-    So it is compiled without what a call from Python takes, which costs as much as itself.
+    Compiling what a call from Python takes would cost as much again.
     """
     options: Any = _OPTIONS | {"forceinline": True}
 
@@ -104,7 +105,7 @@ class KernelCache(NullCache):
         return str(self._content.locator.get_cache_path()) if self._content else None
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
-        """The kernel compiled for a signature earlier; None if it has to be compiled now."""
+        """The kernel compiled earlier for a signature; None if it has to be compiled now."""
         target_context.refresh()
         if self._content:
             path, key = self._entry(sig, target_context.codegen())
@@ -125,8 +126,8 @@ class KernelCache(NullCache):
         if self._content and self._content.check_cachable(data):
             path, key = self._entry(sig, data.codegen)
             content = dumps((sig, self._content.reduce(data)))
-            with contextlib.suppress(OSError):
-                _write(path, _seal(key, content) + content)
+            with contextlib.suppress(InputError, OSError):
+                write_whole(path, _seal(key, content) + content)
 
     def _entry(self, sig: object, codegen: Any) -> tuple[Path, str]:
         """The file of a signature, and a text with all that its content depends on."""
@@ -149,17 +150,6 @@ def _read(path: Path) -> tuple[bytes, bytes]:
     return whole[:size], whole[size:]
 
 
-def _write(path: Path, content: bytes) -> None:
-    """Writes a file by rename, so that no process ever reads half of it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{path.name}.{uuid.uuid4().hex[:16]}")
-    try:
-        temporary.write_bytes(content)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
 @functools.cache
 def announce(kept: bool) -> None:
     """Logs, once a process, that kernels are compiled, and whether that is `kept`."""
@@ -171,14 +161,14 @@ def announce(kept: bool) -> None:
 
 def source_stamp(file: str) -> str:
     """A digest of a module's source and of all modules of this package that it imports."""
-    seen: set[Path] = set()
+    sources: set[Path] = set()
     pending = [Path(file).resolve()]
     while pending:
         path = pending.pop()
-        if path not in seen:
-            seen.add(path)
+        if path not in sources:
+            sources.add(path)
             pending += _imported(path)
-    return hashlib.sha256(b"".join(sorted(path.read_bytes() for path in seen))).hexdigest()
+    return hashlib.sha256(b"".join(sorted(path.read_bytes() for path in sources))).hexdigest()
 
 
 @functools.cache

@@ -11,17 +11,17 @@ How numba is taught the type
     like `double`. To numba a type is a Python class (Lanes, Mask, Field) and a model that names its
     LLVM type. An operator needs two entries: which types it takes and gives (a template), and the
     instruction to emit (a lowering). LLVM's instructions fadd, fmul, fcmp ... take vectors and
-    doubles alike, so a lowering is one line. If the processor's registers are narrower than W, LLVM
-    splits an instruction in two or more; the numbers are the same. (What changes the last digit is
-    whether a processor can multiply and add in one rounding, for single numbers as for lanes.)
+    doubles alike. If the processor's registers are narrower than W, LLVM splits an instruction in
+    two or more; the numbers are the same. (The last digit depends on whether a processor can
+    multiply and add in one rounding, for single numbers as for lanes.)
 
 What a kernel must not do
     Comparing lanes gives a `Mask(W)`, W truth values, and `if` cannot go two ways at once: numba
     refuses `if mask`, and `and`, `or`, `not`, `a < b < c` of lanes. So laws are written without
-    branches, with & | ~ and parentheses: `select(mask, x, y)` computes both and picks lane by lane,
-    and `minimum` and `maximum` are made of it. An `if any_lane(mask)` may skip work that no lane
-    needs. A lane that is not picked may compute nonsense (a division by zero, say): no other lane
-    sees it. Lanes may stand in variables, tuples and fields, not in lists.
+    branches, with &, |, ^, `not_` and parentheses: `select(mask, x, y)` computes both and picks
+    lane by lane. An `if any_lane(mask)` may skip work that no lane needs. A lane that is not picked
+    may compute nonsense (a division by zero, say): no other lane sees it. Lanes may stand in
+    variables, tuples and fields, not in lists.
 
 The same kernel for one simulation
     `select`, `any_lane` and the others take plain floats and booleans as well, and arrays are
@@ -45,7 +45,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import from_dtype, types
 from numba.core import cgutils
 from numba.core.imputils import lower_builtin, lower_cast
 from numba.core.typeconv import Conversion
@@ -60,6 +60,8 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
+
+from tetra_drake.simd.compiling import inlined
 
 Real: TypeAlias = float
 Truth: TypeAlias = bool
@@ -127,31 +129,34 @@ def _to_all_lanes(context: Any, builder: Any, of: Any, to: Lanes, value: Any) ->
 
 
 def _operator(
-    names: Sequence[str], emit: Callable[..., Any], *, over: type = Lanes, to: type = Lanes
+    names: Sequence[str],
+    emit: Callable[..., Any],
+    *,
+    operands: int = 2,
+    over: type = Lanes,
+    to: type = Lanes,
 ) -> None:
-    for name in names:
-        _register(getattr(operator, name), emit, over, to)
+    """Teaches numba an operator of the type `over`; one of two operands may be a scalar."""
 
-
-def _register(function: Any, emit: Callable[..., Any], over: type, to: type) -> None:
     def generic(self: Any, args: tuple[Any, ...], kws: Any) -> Any:
-        own: Any = next((a for a in args if type(a) is over), None)
-        if own is None or not all(a == own or own.accepts(a) for a in args):
+        vector: Any = next((kind for kind in args if type(kind) is over), None)
+        if vector is None or not all(kind == vector or vector.accepts(kind) for kind in args):
             return None
-        return signature(to(own.width), *[own] * len(args))
+        return signature(to(vector.width), *[vector] * len(args))
 
-    template = type(f"_{function.__name__}", (AbstractTemplate,), {"generic": generic})
-    infer_global(function)(template)
-    count = 1 if function in (operator.neg, operator.invert) else 2
-    lower_builtin(function, *[over] * count)(lambda c, builder, s, args: emit(builder, *args))
+    for name in names:
+        function = getattr(operator, name)
+        infer_global(function)(type(f"_{name}", (AbstractTemplate,), {"generic": generic}))
+        lower = lower_builtin(function, *[over] * operands)
+        lower(lambda context, builder, s, args: emit(builder, *args))
 
 
 # Numba types x += y by the in-place name, and then adds.
-_operator(["add", "iadd"], lambda b, x, y: b.fadd(x, y))
-_operator(["sub", "isub"], lambda b, x, y: b.fsub(x, y))
-_operator(["mul", "imul"], lambda b, x, y: b.fmul(x, y))
-_operator(["truediv", "itruediv"], lambda b, x, y: b.fdiv(x, y))
-_operator(["neg"], lambda b, x: b.fneg(x))
+_operator(["add", "iadd"], ir.IRBuilder.fadd)
+_operator(["sub", "isub"], ir.IRBuilder.fsub)
+_operator(["mul", "imul"], ir.IRBuilder.fmul)
+_operator(["truediv", "itruediv"], ir.IRBuilder.fdiv)
+_operator(["neg"], ir.IRBuilder.fneg, operands=1)
 # Ordered comparisons are false where either is NaN; != is true there.
 _operator(["lt"], lambda b, x, y: b.fcmp_ordered("<", x, y), to=Mask)
 _operator(["le"], lambda b, x, y: b.fcmp_ordered("<=", x, y), to=Mask)
@@ -159,40 +164,47 @@ _operator(["gt"], lambda b, x, y: b.fcmp_ordered(">", x, y), to=Mask)
 _operator(["ge"], lambda b, x, y: b.fcmp_ordered(">=", x, y), to=Mask)
 _operator(["eq"], lambda b, x, y: b.fcmp_ordered("==", x, y), to=Mask)
 _operator(["ne"], lambda b, x, y: b.fcmp_unordered("!=", x, y), to=Mask)
-_operator(["and_", "iand"], lambda b, x, y: b.and_(x, y), over=Mask, to=Mask)
-_operator(["or_", "ior"], lambda b, x, y: b.or_(x, y), over=Mask, to=Mask)
-_operator(["xor", "ixor"], lambda b, x, y: b.xor(x, y), over=Mask, to=Mask)
-_operator(["invert"], lambda b, x: b.not_(x), over=Mask, to=Mask)
+_operator(["and_", "iand"], ir.IRBuilder.and_, over=Mask, to=Mask)
+_operator(["or_", "ior"], ir.IRBuilder.or_, over=Mask, to=Mask)
+_operator(["xor", "ixor"], ir.IRBuilder.xor, over=Mask, to=Mask)
 
 
-# Functions. Each is Python for floats; numba compiles the overload.
+# Functions. From Python they take floats; a kernel gets the overload, for floats and lanes.
 
 
 def _call(builder: Any, name: str, x: Any) -> Any:
     """A call of an LLVM function of one number or vector, such as llvm.sqrt.v8f64."""
-    vector = isinstance(x.type, ir.VectorType)
-    bits = 32 if (x.type.element if vector else x.type) == ir.FloatType() else 64
-    suffix = f"v{x.type.count}f{bits}" if vector else f"f{bits}"
+    is_vector = isinstance(x.type, ir.VectorType)
+    count = f"v{x.type.count}" if is_vector else ""
+    element = x.type.element if is_vector else x.type
+    bits = 32 if element == ir.FloatType() else 64
     kind = ir.FunctionType(x.type, [x.type])
-    return builder.call(
-        cgutils.get_or_insert_function(builder.module, kind, f"{name}.{suffix}"), [x]
-    )
+    function = cgutils.get_or_insert_function(builder.module, kind, f"{name}.{count}f{bits}")
+    return builder.call(function, [x])
 
 
-@_intrinsic
-def _sqrt(context: Any, x: types.Type) -> Any:
-    return signature(x, x), lambda c, builder, s, args: _call(builder, "llvm.sqrt", *args)
+def _llvm_function(name: str) -> Any:
+    """An LLVM function of one number, for kernels."""
+
+    @_intrinsic
+    def function(context: Any, x: types.Type) -> Any:
+        return signature(x, x), lambda c, builder, s, args: _call(builder, name, *args)
+
+    return function
 
 
-@_intrinsic
-def _abs(context: Any, x: types.Type) -> Any:
-    return signature(x, x), lambda c, builder, s, args: _call(builder, "llvm.fabs", *args)
-
+_sqrt, _abs, _floor = map(_llvm_function, ("llvm.sqrt", "llvm.fabs", "llvm.floor"))
 
 overload(math.sqrt)(lambda x: (lambda x: _sqrt(x)) if isinstance(x, Lanes) else None)
-
-
 overload(abs)(lambda x: (lambda x: _abs(x)) if isinstance(x, Lanes) else None)
+
+
+def floor(x: Real) -> Real:
+    """The largest whole number that is not larger."""
+    return float(np.floor(x))
+
+
+overload(floor)(lambda x: lambda x: _floor(x))
 
 
 def select(mask: Truth, x: Real, y: Real) -> Real:
@@ -211,20 +223,41 @@ def _select(context: Any, mask: types.Type, x: types.Type, y: types.Type) -> Any
 overload(select)(lambda mask, x, y: lambda mask, x, y: _select(mask, x, y))
 
 
+@inlined
 def minimum(x: Real, y: Real) -> Real:
     """The smaller; y where they are equal or either is NaN."""
-    return x if x < y else y
+    return select(x < y, x, y)
 
 
-overload(minimum)(lambda x, y: lambda x, y: select(x < y, x, y))
-
-
+@inlined
 def maximum(x: Real, y: Real) -> Real:
     """The larger; y where they are equal or either is NaN."""
-    return x if x > y else y
+    return select(x > y, x, y)
 
 
-overload(maximum)(lambda x, y: lambda x, y: select(x > y, x, y))
+@inlined
+def not_(mask: Truth) -> Truth:
+    """The opposite."""
+    return mask ^ True
+
+
+def any_lane(mask: Truth) -> bool:
+    """True if the mask is true in any lane."""
+    return mask
+
+
+@_intrinsic
+def _any(context: Any, mask: Mask) -> Any:
+    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
+        bits = builder.bitcast(args[0], ir.IntType(mask.width))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+    return signature(types.boolean, mask), emit
+
+
+overload(any_lane)(
+    lambda mask: (lambda mask: _any(mask)) if isinstance(mask, Mask) else (lambda mask: mask)
+)
 
 
 def inverse_sqrt(x: Real) -> Real:
@@ -262,19 +295,6 @@ def _overload_inverse_sqrt(x):  # type: ignore[no-untyped-def]
     return newton
 
 
-def floor(x: Real) -> Real:
-    """The largest whole number that is not larger."""
-    return float(np.floor(x))
-
-
-@_intrinsic
-def _floor(context: Any, x: types.Type) -> Any:
-    return signature(x, x), lambda c, builder, s, args: _call(builder, "llvm.floor", *args)
-
-
-overload(floor)(lambda x: lambda x: _floor(x))
-
-
 def gather(numbers: Table, index: Real, offset: int) -> Real:
     """The number at a whole `index`, which each lane has for itself, plus `offset`; `numbers`,
     (size,), have no lanes."""
@@ -287,52 +307,21 @@ def _gather(context: Any, numbers: Any, index: Any, offset: Any) -> Any:
         field = cgutils.create_struct_proxy(numbers)(c, builder, args[0])
         first = builder.gep(field.data, [args[2]])
         vector = ir.VectorType(_INT, index.width)
-        indices, found = builder.fptosi(args[1], vector), ir.Constant(args[1].type, ir.Undefined)
-        for lane in range(index.width):
-            place = builder.extract_element(indices, ir.Constant(_INT32, lane))
-            number = builder.load(builder.gep(first, [place]))
-            found = builder.insert_element(found, number, ir.Constant(_INT32, lane))
-        return found
+        indices, gathered = builder.fptosi(args[1], vector), ir.Constant(args[1].type, ir.Undefined)
+        for i in range(index.width):
+            lane = ir.Constant(_INT32, i)
+            number = builder.load(builder.gep(first, [builder.extract_element(indices, lane)]))
+            gathered = builder.insert_element(gathered, number, lane)
+        return gathered
 
     return signature(index, numbers, index, types.intp), emit
 
 
-overload(gather)(
-    lambda numbers, index, offset: (
-        (lambda numbers, index, offset: _gather(numbers, index, offset))
-        if isinstance(index, Lanes)
-        else (lambda numbers, index, offset: numbers[int(index) + offset])
-    )
-)
-
-
-def any_lane(mask: Truth) -> bool:
-    """True if the mask is true in any lane."""
-    return mask
-
-
-@_intrinsic
-def _any(context: Any, mask: Mask) -> Any:
-    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
-        bits = builder.bitcast(args[0], ir.IntType(mask.width))
-        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
-
-    return signature(types.boolean, mask), emit
-
-
-overload(any_lane)(
-    lambda mask: (lambda mask: _any(mask)) if isinstance(mask, Mask) else (lambda mask: mask)
-)
-
-
-def not_(mask: Truth) -> Truth:
-    """The opposite."""
-    return not mask
-
-
-overload(not_)(
-    lambda mask: (lambda mask: ~mask) if isinstance(mask, Mask) else (lambda mask: not mask)
-)
+@overload(gather)
+def _overload_gather(numbers, index, offset):  # type: ignore[no-untyped-def]
+    if isinstance(index, Lanes):
+        return lambda numbers, index, offset: _gather(numbers, index, offset)
+    return lambda numbers, index, offset: numbers[int(index) + offset]
 
 
 def named(kind: type[Record], table: Table) -> Record:
@@ -386,15 +375,9 @@ class FieldArray:
             raise ValueError(f"no field: {array.dtype}, {array.shape}, {array.strides}, {width=}")
         self.array, self.address = array, array.ctypes.data
         self.shape = array.shape if width is None else array.shape[:-1]
-        number = _number(array, width)
-        known = [None] * len(self.shape) if any_size else [None, *self.shape[1:]]
-        self.kind = Field(number, tuple(known))
-
-
-def _number(array: np.ndarray, width: int | None) -> types.Type:
-    if width is None:
-        return types.int64 if array.dtype == np.int64 else types.float64
-    return types.float64 if width == 1 else Lanes(width)
+        number = from_dtype(array.dtype) if width in (None, 1) else Lanes(width)
+        typed = [None] * len(self.shape) if any_size else [None, *self.shape[1:]]
+        self.kind = Field(number, tuple(typed))
 
 
 def lane_table(shape: tuple[int, ...], width: int, *, any_size: bool = False) -> FieldArray:
@@ -425,19 +408,21 @@ def _unbox(kind: Field, value: Any, c: Any) -> NativeValue:
     address = c.pyapi.object_getattr_string(value, "address")
     field.data = c.builder.inttoptr(c.pyapi.long_as_longlong(address), field.data.type)
     shape = c.pyapi.object_getattr_string(value, "shape")
-    field.lengths = c.pyapi.to_native_value(
-        types.UniTuple(types.intp, len(kind.lengths)), shape
-    ).value
+    lengths = types.UniTuple(types.intp, len(kind.lengths))
+    field.lengths = c.pyapi.to_native_value(lengths, shape).value
     c.pyapi.decref(address)
     c.pyapi.decref(shape)
     return NativeValue(field._getvalue())
 
 
 def _lengths(context: Any, builder: Any, kind: Field, value: Any) -> list[Any]:
+    """The lengths of a field: constants where the type knows them."""
     field = cgutils.create_struct_proxy(kind)(context, builder, value)
-    found = cgutils.unpack_tuple(builder, field.lengths)
-    known = [n if n is None else ir.Constant(_INT, n) for n in kind.lengths]
-    return [a if b is None else b for a, b in zip(found, known, strict=True)]
+    lengths = cgutils.unpack_tuple(builder, field.lengths)
+    for axis, length in enumerate(kind.lengths):
+        if length is not None:
+            lengths[axis] = ir.Constant(_INT, length)
+    return lengths
 
 
 def _place(context: Any, builder: Any, kind: Field, value: Any, index: Any) -> Any:
@@ -455,13 +440,15 @@ def _index_kind(kind: types.Type, index: Any) -> types.Type | None:
     """Type of a cast index; None if it is not one for a number of a field."""
     if not isinstance(kind, Field):
         return None
-    count, is_tuple = len(kind.lengths), isinstance(index, types.BaseTuple)
-    indices = index.types if is_tuple else [index]
-    if len(indices) != count or is_tuple != (count > 1):
+    count = len(kind.lengths)
+    if count == 1:
+        return types.intp if isinstance(index, types.Integer) else None
+    is_tuple = isinstance(index, types.BaseTuple)
+    if not is_tuple or len(index.types) != count:
         return None
-    if not all(isinstance(i, types.Integer) for i in indices):
+    if not all(isinstance(i, types.Integer) for i in index.types):
         return None
-    return types.UniTuple(types.intp, count) if is_tuple else types.intp
+    return types.UniTuple(types.intp, count)
 
 
 @infer_global(operator.getitem)

@@ -24,19 +24,22 @@ class Feedback(LeafSystem):
     def __init__(self, robot: Robot, *, gains: npt.ArrayLike) -> None:
         """`gains` of length, load and pitch. Raises InputError if the robot finds no rest."""
         super().__init__()
-        structure, self._senses = robot.structure, robot.senses
+        structure = robot.structure
+        self._senses = robot.senses
         self._gains = np.array(gains, dtype=float)
         self._neurons = 2 * structure.signals
-        sizes = 13 * len(structure.bodies), len(structure.cables), len(structure.contacts)
-        names = ("state", "lengths", "normal_forces")
-        self._inputs = [
-            self.DeclareVectorInputPort(name, size) for name, size in zip(names, sizes, strict=True)
-        ]
-        tickets = {port.ticket() for port in self._inputs}
-        self.DeclareVectorOutputPort("feedback", self._neurons, self._calc_feedback, tickets)
+        self._state = self.DeclareVectorInputPort("state", 13 * len(structure.bodies))
+        self._lengths = self.DeclareVectorInputPort("lengths", len(structure.cables))
+        self._loads = self.DeclareVectorInputPort("normal_forces", len(structure.contacts))
+        inputs = {self._state.ticket(), self._lengths.ticket(), self._loads.ticket()}
+        self.DeclareVectorOutputPort("feedback", self._neurons, self._calc_feedback, inputs)
 
     def _calc_feedback(self, context: Context, output: BasicVector) -> None:
-        feedback = np.empty(self._neurons)
-        state, lengths, normal_forces = (port.Eval(context) for port in self._inputs)
-        sense(self._senses, self._gains, state, lengths, normal_forces, feedback)
-        output.SetFromVector(feedback)
+        sense(
+            self._senses,
+            self._gains,
+            self._state.Eval(context),
+            self._lengths.Eval(context),
+            self._loads.Eval(context),
+            output.get_mutable_value(),
+        )

@@ -17,6 +17,8 @@ from pydrake.systems.framework import (
 
 from tetra_drake.physics.contact import (
     MODE_COLUMNS,
+    NORMAL,
+    PUSH_COLUMNS,
     STICK_POINT,
     ground_arguments,
     ground_forces,
@@ -61,7 +63,7 @@ class GroundContact(LeafSystem):
         # Room for the kernels, which write what they need of it at every call.
         self._nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
         self._frames = np.empty((count, FRAME_COLUMNS))
-        self._pushes = np.empty((count, 3))
+        self._pushes = np.empty((count, PUSH_COLUMNS))
         self._force = np.empty(6 * bodies)
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self.DeclareDiscreteState(MODE_COLUMNS * count)
@@ -72,7 +74,6 @@ class GroundContact(LeafSystem):
         this, falls = weakref.proxy(self), WitnessFunctionDirection.kPositiveThenNonPositive
         margin = self.MakeWitnessFunction("mode margin", falls, lambda c: this._margin(c))
         self._witnesses = [margin] if witness else []
-
         sources = {self._state.ticket(), self.xd_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, sources)
         self.DeclareVectorOutputPort("normal_forces", count, self._calc_normal, sources)
@@ -87,18 +88,16 @@ class GroundContact(LeafSystem):
 
         `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
         """
-        state, modes = self._state.Eval(context), self._modes(context).copy()
-        due, time = next_mode_change(
-            state,
+        return next_mode_change(
+            self._state.Eval(context),
             acceleration,
-            modes,
+            self._modes(context).copy(),
             self._p_BN,
             self._ground,
             self._nodes,
             self._frames,
             horizon,
         )
-        return due, time
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """The one witness, if asked for."""
@@ -115,8 +114,8 @@ class GroundContact(LeafSystem):
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         modes = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
-        state, room = self._state.Eval(context), (self._nodes, self._frames)
-        if modes_after_step(state, self._p_BN, self._ground, *room, modes):
+        state = self._state.Eval(context)
+        if modes_after_step(state, self._p_BN, self._ground, self._nodes, self._frames, modes):
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
@@ -131,8 +130,7 @@ class GroundContact(LeafSystem):
         )
 
     def _push(self, context: Context) -> None:
-        """Writes the generalized force and, by contact, friction along t1 and t2 and the normal
-        force."""
+        """Writes the generalized force and the ground's `pushes`."""
         ground_forces(
             self._state.Eval(context),
             self._modes(context),
@@ -150,11 +148,11 @@ class GroundContact(LeafSystem):
 
     def _calc_normal(self, context: Context, output: BasicVector) -> None:
         self._push(context)
-        output.SetFromVector(self._pushes[:, 2])
+        output.SetFromVector(self._pushes[:, NORMAL])
 
     def _calc_friction(self, context: Context, output: BasicVector) -> None:
         self._push(context)
-        output.SetFromVector(self._pushes[:, :2].ravel())
+        output.SetFromVector(self._pushes[:, :NORMAL].ravel())
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._modes(context)[:, :STICK_POINT].ravel())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.systems.framework import BasicVector, Context, ContinuousState, InputPort, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
 from tetra_drake.physics.oscillator import (
     U_RATE,
@@ -45,7 +45,7 @@ class MatsuokaCpg(LeafSystem):
         super().__init__()
         neurons = len(network.inhibition)
         self._network, self._gain = network, gain
-        self._default = np.full(neurons, tonic, dtype=float), np.zeros(neurons)
+        self._default_tonic = np.full(neurons, tonic, dtype=float)
         self._tonic = self.DeclareVectorInputPort("tonic", neurons)
         self._feedback = self.DeclareVectorInputPort("feedback", neurons)
         state = np.array(initial_state, dtype=float)
@@ -53,18 +53,18 @@ class MatsuokaCpg(LeafSystem):
             expected = f"({2 * neurons},) for {neurons} neurons"
             raise ValueError(f"found initial_state of shape {state.shape}, expected {expected}")
         self.DeclareContinuousState(BasicVector(state))
-        tickets = {self.xc_ticket()}
-        self.DeclareVectorOutputPort("signals", neurons // 2, self._calc_signals, tickets)
-        self.DeclareVectorOutputPort("neurons", neurons, self._calc_neurons, tickets)
+        sources = {self.xc_ticket()}
+        self.DeclareVectorOutputPort("signals", neurons // 2, self._calc_signals, sources)
+        self.DeclareVectorOutputPort("neurons", neurons, self._calc_neurons, sources)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Eq. 7."""
         neurons = self._neurons(context)
-        ports: tuple[InputPort, InputPort] = self._tonic, self._feedback
-        tonic, feedback = (
-            port.Eval(context) if port.HasValue(context) else default
-            for port, default in zip(ports, self._default, strict=True)
-        )
+        tonic, feedback = self._default_tonic, 0.0
+        if self._tonic.HasValue(context):
+            tonic = self._tonic.Eval(context)
+        if self._feedback.HasValue(context):
+            feedback = self._feedback.Eval(context)
         neuron_rates(self._network, tonic + feedback, neurons)
         derivatives.SetFromVector(neurons[:, U_RATE : V_RATE + 1].T.ravel())
 

@@ -28,9 +28,11 @@ class Steering(LeafSystem):
         super().__init__()
         self._tonic_input, self._default = tonic_input, turn
         self._turn = self.DeclareVectorInputPort("turn", 1)
-        size, tickets = len(tonic_input(np.array(0.0))), {self._turn.ticket()}
-        tickets |= {self.time_ticket()} if callable(turn) else set()
-        self.DeclareVectorOutputPort("tonic", size, self._calc_tonic, tickets)
+        sources = {self._turn.ticket()}
+        if callable(turn):
+            sources.add(self.time_ticket())
+        size = len(tonic_input(np.array(0.0)))
+        self.DeclareVectorOutputPort("tonic", size, self._calc_tonic, sources)
 
     def _calc_tonic(self, context: Context, output: BasicVector) -> None:
         turn = self._default
