@@ -7,6 +7,7 @@ of nodes with edges.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -229,7 +230,7 @@ def _bonded_pairs(
         if name not in parts:
             raise InputError(file, key, f"found unknown '{name}'; {hint(name, parts)}")
     bonded = []
-    for first, second in zip(names, names[1:], strict=False):
+    for first, second in itertools.pairwise(names):
         for place, pair in enumerate(pairs):
             start = parts[first].find_node(pair[0], file, f"{key}[{place}]")
             end = parts[second].find_node(pair[1], file, f"{key}[{place}]")

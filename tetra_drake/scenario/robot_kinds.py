@@ -1,7 +1,7 @@
 """Structures: any tensegrity as data, read from a structure file.
 
-Struts that share a node are one rigid body; cables join bodies. Coordinates are in World: x forward,
-y left, z up. They need only be near a static equilibrium.
+Struts that share a node are one rigid body; cables join bodies. Coordinates are in World (x
+forward, y left, z up) and need only be near a static equilibrium.
 """
 
 from __future__ import annotations
@@ -127,8 +127,8 @@ class Structure(Section):
         return {node: body for body, nodes in enumerate(self.bodies) for node in nodes}
 
     @cached_property
-    def free_lengths(self) -> np.ndarray:
-        """(cables,): free lengths in m; from the tension where the file gives that."""
+    def free_lengths(self) -> tuple[float, ...]:
+        """Free lengths of the cables in m; from the tension where the file gives that."""
         lengths = []
         for cable in self.all_cables:
             group = self.cables[cable.group]
@@ -136,7 +136,7 @@ class Structure(Section):
                 lengths.append(group.free_length)
             elif group.tension is not None:
                 lengths.append(self._length(cable) - group.tension / group.stiffness)
-        return np.array(lengths)
+        return tuple(lengths)
 
     @cached_property
     def cables_of_oscillator(self) -> dict[str, tuple[int, ...]]:
@@ -168,18 +168,21 @@ class Structure(Section):
 
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _read_unit(cls, tree: Any) -> Any:
-        """The tree with a unit at every coordinate."""
-        if not isinstance(tree, dict) or "unit" not in tree:
+    def _read_nodes(cls, tree: Any) -> Any:
+        """The tree with a unit at every coordinate, if it has the key `unit`."""
+        if not isinstance(tree, dict) or not isinstance(tree.get("nodes"), dict):
+            return tree
+        for node in tree["nodes"]:
+            if not isinstance(node, str):
+                refuse(f"nodes.{node}", f"found the name {node}, expected a text, such as n{node}")
+        if "unit" not in tree:
             return tree
         unit = tree["unit"]
         try:
             quantity_to_si(f"1 {unit}", "m")
         except ValueError:
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
-        nodes = tree.get("nodes")
-        if isinstance(nodes, dict):
-            nodes = {node: _with_unit(point, unit) for node, point in nodes.items()}
+        nodes = {node: _with_unit(point, unit) for node, point in tree["nodes"].items()}
         return tree | {"unit": "m", "nodes": nodes}
 
     @pydantic.model_validator(mode="after")
