@@ -79,6 +79,11 @@ def test_a_tension_gives_the_free_length() -> None:
     assert structure().free_lengths == pytest.approx([0.02, 0.02, length - 2 / 100])
 
 
+def test_a_node_has_the_sphere_of_its_first_strut() -> None:
+    given = structure()
+    assert [given.sphere_of_node[node].node_diameter for node in "abcf"] == [0.016, 0.016, 0, 0.01]
+
+
 def test_contact_nodes() -> None:
     assert structure().contact_nodes == ("g", "a")
     assert structure("contacts: all").contact_nodes == tuple("gabcdef")
@@ -100,11 +105,19 @@ def test_one_rigid_body_needs_no_cables() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "bodies", "cables", "oscillators"),
-    [("prism", 3, 9, 3), ("six_bar", 6, 24, 3), ("mast", 4, 24, 3), ("pair", 2, 8, 2)],
+    ("name", "first", "bodies", "cables", "oscillators"),
+    [
+        ("prism", "n0 n4", 3, 9, 3),
+        ("six_bar", "n0 n1", 6, 24, 3),
+        ("mast", "v1", 4, 24, 3),
+        ("pair", "t1", 2, 8, 2),
+    ],
 )
-def test_shipped_structures(name: str, bodies: int, cables: int, oscillators: int) -> None:
+def test_shipped_structures(
+    name: str, first: str, bodies: int, cables: int, oscillators: int
+) -> None:
     given = read_structure(SHIPPED / f"{name}.yaml")
+    assert given.body_names[0] == first
     assert len(given.bodies) == bodies
     assert len(given.all_cables) == cables
     assert len(given.cables_of_oscillator) == oscillators
@@ -117,11 +130,6 @@ def test_struts_of_the_shipped_true_tensegrities(name: str) -> None:
     for first, second in (strut.nodes for strut in given.all_struts):
         length = np.linalg.norm(np.subtract(given.nodes[second], given.nodes[first]))
         assert length == pytest.approx(0.25083960627398694, rel=1e-12)
-
-
-def test_the_first_names_of_the_shipped_bodies() -> None:
-    firsts = {f.stem: read_structure(f).body_names[0] for f in SHIPPED.glob("*.yaml")}
-    assert firsts == {"prism": "n0 n4", "six_bar": "n0 n1", "mast": "v1", "pair": "t1"}
 
 
 @pytest.mark.parametrize(

@@ -119,6 +119,7 @@ def ntrt_tree(file: str | Path, *, unit: float) -> Tree:
     """The tree of a structure file for a file of NTRT.
 
     unit: length of NTRT's unit in m. The axes z, x, y of NTRT are x (forward), y (left), z (up).
+    A substructure's nodes are named "SUBSTRUCTURE.NODE", groups by their tags joined by dots.
     Raises InputError that names file and key, for substructures too.
     """
     part = _read(Path(file), ())
@@ -126,18 +127,18 @@ def ntrt_tree(file: str | Path, *, unit: float) -> Tree:
     cables: Tree = {}
     for tags, pairs in part.pairs.items():
         builder = _builder_of(tags, part.builders, file)
-        group: Tree = {"pairs": [list(pair) for pair in pairs]}
-        name = "_".join(tags.split())
+        name = ".".join(tags.split())
         if isinstance(builder, Rod):
+            group = struts.setdefault(name, {"pairs": []})
             group["diameter"] = f"{2.0 * builder.radius * unit!r} m"
             group["density"] = f"{builder.density / unit**3!r} kg/m^3"
             group["node_diameter"] = "0 m"
-            struts[name] = group
         else:
+            group = cables.setdefault(name, {"pairs": []})
             group["stiffness"] = f"{builder.stiffness!r} N/m"
             group["damping"] = f"{builder.damping!r} N*s/m"
             group["tension"] = f"{builder.pretension * unit!r} N"
-            cables[name] = group
+        group["pairs"] += [list(pair) for pair in pairs]
     nodes = {name: (unit * p[[2, 0, 1]]).tolist() for name, p in part.nodes.items()}
     return {"unit": "m", "nodes": nodes, "struts": struts, "cables": cables}
 

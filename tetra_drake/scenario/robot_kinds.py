@@ -40,8 +40,7 @@ class StrutGroup(Section):
     diameter: float = quantity("m", gt=0)
     density: float = quantity("kg/m^3", gt=0)
     node_diameter: float = quantity("m", ge=0)
-    """Diameter of the spheres; 0 for none. Where struts meet there is one sphere, as the first
-    strut at the node in the file has it."""
+    """Diameter of the spheres; 0 for none. A node has one, that of its first strut in the file."""
 
 
 class CableGroup(Section):
@@ -125,6 +124,15 @@ class Structure(Section):
     def body_of_node(self) -> dict[str, int]:
         """The number of the body that a node belongs to."""
         return {node: body for body, nodes in enumerate(self.bodies) for node in nodes}
+
+    @cached_property
+    def sphere_of_node(self) -> dict[str, StrutGroup]:
+        """The group whose sphere a node has: that of the first strut at the node."""
+        groups: dict[str, StrutGroup] = {}
+        for strut in self.all_struts:
+            for node in strut.nodes:
+                groups.setdefault(node, self.struts[strut.group])
+        return groups
 
     @cached_property
     def free_lengths(self) -> tuple[float, ...]:
