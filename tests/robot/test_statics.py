@@ -32,7 +32,7 @@ def structure(nodes, struts, cables) -> Structure:
 
 def prism(n: int, twist: float, *, radius=1.0, height=1.5, digits=15) -> Structure:
     """Bottom cables, then top ones, then sides, which the twist (deg) makes slant."""
-    angles = np.radians(360.0 / n * np.arange(n))
+    angles = np.radians(10.0 + 360.0 / n * np.arange(n))
     tops = angles + math.radians(twist)
     bottom = np.stack([radius * np.cos(angles), radius * np.sin(angles), 0.0 * angles], axis=1)
     top = np.stack([radius * np.cos(tops), radius * np.sin(tops), height + 0.0 * tops], axis=1)
@@ -93,7 +93,7 @@ def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
         (prism(3, 30.0), 1, 1),
         (prism(3, 30.0, digits=6), 1, 1),
         (prism(3, 31.0), 0, 0),
-        (prism(3, 30.0, radius=1e-3, height=2e-3), 1, 1),
+        (prism(3, 30.0, radius=1e-6, height=1.5e-6), 1, 1),
         (prism(4, 45.0), 1, 3),
         (prism(4, 30.0), 0, 2),
         (six_bar(0.5), 1, 1),

@@ -70,7 +70,7 @@ pair_groups:
 
 VERTEBRA = """
 nodes:
-  {middle: [0, 0, 0], front: [1, 1, 1], right: [1, -1, -1], back: [-1, 1, -1], left: [-1, -1, 1]}
+  {middle: [0, 1, 0], front: [1, 2, 1], right: [1, 0, -1], back: [-1, 2, -1], left: [-1, 0, 1]}
 pair_groups:
   rod: [[middle, front], [middle, right], [middle, back], [middle, left]]
 """
@@ -126,9 +126,9 @@ def test_a_spine_by_substructures(tmp_path: Path) -> None:
     write(tmp_path, VERTEBRA, "vertebra.yaml")
     given = read(write(tmp_path, SPINE))
     assert len(given.bodies) == 3
-    assert given.nodes["v1.front"] == pytest.approx([0.1, 0.1, 0.1])
-    assert given.nodes["v2.front"] == pytest.approx([0.05, -0.1, 0.1])
-    assert given.nodes["v3.left"] == pytest.approx([0.4, -0.1, -0.1])
+    assert given.nodes["v1.front"] == pytest.approx([0.1, 0.1, 0.2])
+    assert given.nodes["v2.front"] == pytest.approx([0.05, -0.1, 0.2])
+    assert given.nodes["v3.left"] == pytest.approx([0.4, -0.1, 0.0])
     names = [cable.name for cable in given.all_cables]
     assert len(names) == 8
     assert names[:5:4] == ["string v1.front v2.front", "string v2.front v3.front"]
@@ -137,12 +137,12 @@ def test_a_spine_by_substructures(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("entry", "front"),
     [
-        ("translation: [1, 2, 3]", [2, 3, 4]),
-        ("rotation: {axis: [0, 2, 0], angle: 90}", [1, 1, -1]),
-        ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [0, 0, 1]),
-        ("scale: 3", [3, 3, 3]),
-        ("scale: 3, translation: [1, 0, 0], rotation: {axis: [0, 1, 0], angle: 90}", [4, 3, -3]),
-        ("offset: [5, 5, 5]", [1, 1, 1]),
+        ("translation: [1, 2, 3]", [2, 4, 4]),
+        ("rotation: {axis: [0, 2, 0], angle: 90}", [1, 2, -1]),
+        ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1]),
+        ("scale: 3", [3, 4, 3]),
+        ("scale: 3, translation: [1, 0, 0], rotation: {axis: [0, 1, 0], angle: 90}", [4, 4, -3]),
+        ("offset: [5, 5, 5]", [1, 2, 1]),
     ],
 )
 def test_places_of_substructures(entry: str, front: list[float], tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ cables:
   long: {pairs: [[e, f]], stiffness: 100 N/m, damping: 0 N*s/m, tension: 2 N}
 actuated: {left: [side d b, long e f], right: [side c d]}
 masses: {g: 20 g}
-contacts: [g, a]
+contacts: [a, g]
 """
 
 
