@@ -30,7 +30,7 @@ def structure(nodes, struts, cables) -> Structure:
     )
 
 
-def prism(n: int, twist: float, *, radius=1.0, height=1.5, digits=15) -> Structure:
+def prism(n: int, twist: float, *, radius=1.0, height=1.5) -> Structure:
     """Bottom cables, then top ones, then sides, which the twist (deg) makes slant."""
     angles = np.radians(10.0 + 360.0 / n * np.arange(n))
     tops = angles + math.radians(twist)
@@ -40,8 +40,7 @@ def prism(n: int, twist: float, *, radius=1.0, height=1.5, digits=15) -> Structu
     struts = [(i, n + following[i]) for i in range(n)]
     horizontal = [(i, following[i]) for i in range(n)]
     horizontal += [(n + i, n + following[i]) for i in range(n)]
-    nodes = np.round([*bottom, *top], digits)
-    return structure(nodes, struts, horizontal + [(i, n + i) for i in range(n)])
+    return structure([*bottom, *top], struts, horizontal + [(i, n + i) for i in range(n)])
 
 
 def six_bar(apart: float) -> Structure:
@@ -91,7 +90,7 @@ def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
     ("given", "self_stress_states", "mechanisms"),
     [
         (prism(3, 30.0), 1, 1),
-        (prism(3, 30.0, digits=6), 1, 1),
+        (prism(3, 30.00001), 1, 1),
         (prism(3, 31.0), 0, 0),
         (prism(3, 30.0, radius=1e-6, height=1.5e-6), 1, 1),
         (prism(4, 45.0), 1, 3),
