@@ -1,0 +1,218 @@
+"""Files of NTRT: a prism, a six-bar and a spine, read into structures."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tetra_drake.errors import InputError
+from tetra_drake.robot.statics import statics_of
+from tetra_drake.scenario.ntrt import ntrt_tree
+from tetra_drake.scenario.robot_kinds import Structure
+
+# Height 2, radius 1, the upper triangle twisted by 30 deg about the vertical, which is y.
+PRISM = """
+nodes:
+  low1: [1, 0, 0]
+  low2: [-0.5, 0, -0.8660254037844386]
+  low3: [-0.5, 0, 0.8660254037844386]
+  high1: [0.8660254037844386, 2, -0.5]
+  high2: [-0.8660254037844386, 2, -0.5]
+  high3: [0, 2, 1]
+pair_groups:
+  prism_rod:
+    - [low1, high2]
+    - [low2, high3]
+    - [low3, high1]
+  horizontal string:
+    - [low1, low2]
+    - [low2, low3]
+    - [low3, low1]
+    - [high1, high2]
+    - [high2, high3]
+    - [high3, high1]
+  vertical string:
+    - [low1, high1]
+    - [low2, high2]
+    - [low3, high3]
+builders:
+  prism_rod:
+    class: tgRodInfo
+    parameters: {density: 0.5, radius: 0.25, friction: 0.9, restitution: 0}
+  vertical:
+    class: tgKinematicActuatorInfo
+    parameters: {stiffness: 800, damping: 5, pretension: 1200, radius: 2, history: true}
+"""
+
+# Struts of 4 units in three parallel pairs, half a strut apart.
+SIX_BAR = """
+nodes:
+  x1: [-2, 0, -1]
+  x2: [2, 0, -1]
+  x3: [-2, 0, 1]
+  x4: [2, 0, 1]
+  y1: [-1, -2, 0]
+  y2: [-1, 2, 0]
+  y3: [1, -2, 0]
+  y4: [1, 2, 0]
+  z1: [0, -1, -2]
+  z2: [0, -1, 2]
+  z3: [0, 1, -2]
+  z4: [0, 1, 2]
+pair_groups:
+  rod: [[x1, x2], [x3, x4], [y1, y2], [y3, y4], [z1, z2], [z3, z4]]
+  string:
+    [[x1, y1], [x1, y2], [x3, y1], [x3, y2], [x2, y3], [x2, y4], [x4, y3], [x4, y4],
+     [y1, z1], [y1, z2], [y3, z1], [y3, z2], [y2, z3], [y2, z4], [y4, z3], [y4, z4],
+     [z1, x1], [z1, x2], [z3, x1], [z3, x2], [z2, x3], [z2, x4], [z4, x3], [z4, x4]]
+"""
+
+VERTEBRA = """
+nodes:
+  {middle: [0, 1, 0], front: [1, 2, 1], right: [1, 0, -1], back: [-1, 2, -1], left: [-1, 0, 1]}
+pair_groups:
+  rod: [[middle, front], [middle, right], [middle, back], [middle, left]]
+"""
+
+SPINE = """
+substructures:
+  v1/v2/v3: {path: vertebra.yaml, offset: [0, 0, 1.5]}
+  v2: {rotation: {axis: [0, 1, 0], angle: 180}}
+bond_groups:
+  string:
+    v1/v2/v3/node_node: [[front, front], [right, right], [back, back], [left, left]]
+"""
+
+
+def write(folder: Path, text: str, name: str = "my.yaml") -> Path:
+    (folder / name).write_text(text)
+    return folder / name
+
+
+def read(file: Path, unit: float = 0.1) -> Structure:
+    return Structure.from_tree(ntrt_tree(file, unit=unit), file)
+
+
+def test_a_prism_in_decimetres(tmp_path: Path) -> None:
+    given = read(write(tmp_path, PRISM))
+    rod, side = given.struts["prism_rod"], given.cables["vertical.string"]
+    assert (rod.diameter, rod.density, rod.node_diameter) == pytest.approx((0.05, 500.0, 0.0))
+    assert (side.stiffness, side.damping, side.tension) == pytest.approx((800.0, 5.0, 120.0))
+    default = given.cables["horizontal.string"]
+    assert (default.stiffness, default.damping, default.tension) == (1000.0, 10.0, 0.0)
+    assert given.all_cables[6].name == "vertical.string low1 high1"
+    assert len(given.bodies) == 3
+    statics = statics_of(given)
+    assert (statics.self_stress_states, statics.mechanisms) == (1, 1)
+
+
+def test_y_is_up_and_the_frame_stays_right_handed(tmp_path: Path) -> None:
+    given = read(write(tmp_path, PRISM.replace("low1: [1, 0, 0]", "low1: [1, 2, 3]")))
+    assert given.nodes["low1"] == pytest.approx([0.3, 0.1, 0.2])
+
+
+def test_a_six_bar_by_the_default_builders(tmp_path: Path) -> None:
+    given = read(write(tmp_path, SIX_BAR), unit=0.01)
+    assert given.struts["rod"].diameter == pytest.approx(0.01)
+    assert given.struts["rod"].density == pytest.approx(1e6)
+    assert given.nodes["z4"] == pytest.approx([0.02, 0.0, 0.01])
+    statics = statics_of(given)
+    assert (statics.self_stress_states, statics.mechanisms) == (1, 1)
+    assert np.abs(statics.self_stresses) == pytest.approx(math.sqrt(1 / 24), rel=1e-9)
+
+
+def test_a_spine_by_substructures(tmp_path: Path) -> None:
+    write(tmp_path, VERTEBRA, "vertebra.yaml")
+    given = read(write(tmp_path, SPINE))
+    assert len(given.bodies) == 3
+    assert given.nodes["v1.front"] == pytest.approx([0.1, 0.1, 0.2])
+    assert given.nodes["v2.front"] == pytest.approx([0.05, -0.1, 0.2])
+    assert given.nodes["v3.left"] == pytest.approx([0.4, -0.1, 0.0])
+    names = [cable.name for cable in given.all_cables]
+    assert len(names) == 8
+    assert names[:5:4] == ["string v1.front v2.front", "string v2.front v3.front"]
+
+
+@pytest.mark.parametrize(
+    ("entry", "front"),
+    [
+        ("translation: [1, 2, 3]", [2, 4, 4]),
+        ("rotation: {axis: [0, 2, 0], angle: 90}", [1, 2, -1]),
+        ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1]),
+        ("scale: 3", [3, 4, 3]),
+        ("scale: 3, translation: [1, 0, 0], rotation: {axis: [0, 1, 0], angle: 90}", [4, 4, -3]),
+        ("offset: [5, 5, 5]", [1, 2, 1]),
+    ],
+)
+def test_places_of_substructures(entry: str, front: list[float], tmp_path: Path) -> None:
+    """Turned, then scaled about their centre, then moved."""
+    write(tmp_path, VERTEBRA, "vertebra.yaml")
+    file = write(tmp_path, f"substructures: {{v: {{path: vertebra.yaml, {entry}}}}}")
+    x, y, z = front
+    assert read(file, unit=1.0).nodes["v.front"] == pytest.approx([z, x, y])
+
+
+def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> None:
+    """A superstructure overrides builders; a name means the least nested node that has it."""
+    write(tmp_path, VERTEBRA, "vertebra.yaml")
+    spine = SPINE + "builders: {string: {class: tgBasicActuatorInfo, parameters: {stiffness: 7}}}"
+    write(tmp_path, spine, "spine.yaml")
+    text = """
+        substructures:
+          a: {path: spine.yaml}
+          b: {path: vertebra.yaml, translation: [0, 0, 9]}
+        pair_groups: {string: [[b.left, a.v2.left], [front, v3.back]]}
+        bond_groups: {a/b/node_node: {string: [[v3.right, right]]}}
+    """
+    given = read(write(tmp_path, text))
+    assert [cable.name for cable in given.all_cables[8:]] == [
+        "string b.left a.v2.left",
+        "string b.front a.v3.back",
+        "string a.v3.right b.right",
+    ]
+    assert given.cables["string"].stiffness == 7.0
+    builder = "builders: {string: {class: tgBasicActuatorInfo, parameters: {stiffness: 9}}}"
+    given = read(write(tmp_path, f"{text}\n        {builder}"))
+    assert given.cables["string"].stiffness == 9.0
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "fact"),
+    [
+        ("nods: {}", "nods", "'nodes'"),
+        ("{}", "nodes", "1 to"),
+        ("nodes: {a: [0, 0]}", "nodes.a", "3 items"),
+        (PRISM.replace("[low1, high2]", "[low1, hihg2]"), "pair_groups.prism_rod[0]", "'high2'"),
+        (PRISM.replace("tgRodInfo", "tgBoxInfo"), "builders.prism_rod.class", "'tgBoxInfo'"),
+        (PRISM.replace("density", "dens"), "builders.prism_rod.parameters.dens", "'density'"),
+        (PRISM.replace(": 0.25", ": 0"), "builders.prism_rod.parameters.radius", "more than 0"),
+        (PRISM.replace("prism_rod:\n    class", "rods:\n    class"), "builders", "'prism_rod'"),
+        (PRISM + "  string: {class: tgBasicActuatorInfo}", "builders", "vertical and string"),
+        (SPINE.replace("v3/node_node", "node_edge"), "bond_groups.string.v1/v2/node_edge", "'A/B"),
+        (SPINE.replace("v3/node", "v4/node"), "bond_groups.string.v1/v2/v4/node_node", "'v4'"),
+        (SPINE.replace("[back,", "[bakc,"), "bond_groups.string.v1/v2/v3/node_node[2]", "'bakc'"),
+        ("substructures: {v: {scale: 2}}", "substructures.v", "'v'"),
+        (SPINE.replace("/v2/v3: {", "/v1: {"), "substructures.v1/v1.path", "'v1'"),
+        (SPINE.replace("[0, 1, 0]", "[0, 0, 0]"), "substructures.v2.rotation.axis", "length 0"),
+        ("substructures: {v: {path: my.yaml}}", "substructures", "itself"),
+    ],
+)
+def test_problems_name_file_key_and_facts(text: str, key: str, fact: str, tmp_path: Path) -> None:
+    write(tmp_path, VERTEBRA, "vertebra.yaml")
+    file = write(tmp_path, text)
+    with pytest.raises(InputError) as caught:
+        read(file)
+    assert (caught.value.source, caught.value.key) == (str(file), key)
+    assert fact in caught.value.problem
+
+
+def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path) -> None:
+    part = write(tmp_path, VERTEBRA.replace("left:", "lleft:"), "vertebra.yaml")
+    with pytest.raises(InputError) as caught:
+        read(write(tmp_path, SPINE))
+    assert (caught.value.source, caught.value.key) == (str(part), "pair_groups.rod[3]")
+    part.unlink()
+    with pytest.raises(InputError) as caught:
+        read(write(tmp_path, SPINE))
+    assert caught.value.source == str(part)

@@ -1,0 +1,195 @@
+"""Structure files: what is read from them, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tetra_drake
+from tetra_drake.errors import InputError
+from tetra_drake.scenario import robot_kinds
+from tetra_drake.scenario.robot_kinds import Member, Structure, read_structure
+from tetra_drake.scenario.sections import Tree, merge, tree_of
+from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
+
+IN = 0.0254
+SHIPPED = Path(tetra_drake.__file__).parent / "scenario" / "structures"
+
+# A bent body of two groups, b-a-c, a bar d-e, and a bar f-g.
+FILE = """
+unit: cm
+nodes:
+  g: [9, 2, 10 in]
+  a: [0, 0, 0]
+  b: [10, 0, 0]
+  c: [0, 10, 0]
+  d: [2, 2, 5]
+  e: [2, 2, 15]
+  f: [9, 2, 5]
+struts:
+  arm:
+    pairs: [[b, a], [d, e]]
+    diameter: 8 mm
+    density: 1.2 g/cm^3
+    node_diameter: 16 mm
+  leg: {pairs: [[a, c]], diameter: 4 mm, density: 2 g/cm^3, node_diameter: 0 m}
+  bar: {pairs: [[f, g]], diameter: 4 mm, density: 2 g/cm^3, node_diameter: 1 cm}
+cables:
+  side: {pairs: [[b, d], [c, d]], stiffness: 2 N/cm, damping: 3 N*s/m, free_length: 20 mm}
+  long: {pairs: [[e, f]], stiffness: 100 N/m, damping: 0 N*s/m, tension: 2 N}
+actuated: {left: [side d b, long e f], right: [side c d]}
+masses: {g: 20 g}
+contacts: [a, g]
+"""
+
+
+def structure(changes: str = "") -> Structure:
+    tree: Tree = merge(parse_yaml(FILE, "my.yaml"), parse_yaml(changes, "my.yaml") or {})
+    return Structure.from_tree(tree, "my.yaml")
+
+
+def test_numbers_are_si() -> None:
+    given = structure()
+    assert given.nodes["g"] == pytest.approx([0.09, 0.02, 10 * IN])
+    assert given.nodes["e"] == pytest.approx([0.02, 0.02, 0.15])
+    arm, side = given.struts["arm"], given.cables["side"]
+    assert (arm.diameter, arm.node_diameter) == (0.008, 0.016)
+    assert arm.density == pytest.approx(1200.0)
+    assert (side.stiffness, side.damping, side.free_length) == (200.0, 3.0, 0.02)
+    assert given.masses == {"g": 0.02}
+    assert given.gravity == 9.80665
+
+
+def test_bodies_are_what_struts_connect() -> None:
+    given = structure()
+    assert given.bodies == (("b", "a", "c"), ("d", "e"), ("f", "g"))
+    assert given.body_names == ("b a c", "d e", "bar")
+    assert [given.body_of_node[node] for node in "abcdefg"] == [0, 0, 0, 1, 1, 2, 2]
+
+
+def test_cables_are_named_by_group_and_nodes() -> None:
+    given = structure()
+    assert [cable.name for cable in given.all_cables] == ["side b d", "side c d", "long e f"]
+    assert given.all_cables[1] == Member("cables.side.pairs[1]", "side", ("c", "d"))
+    assert given.cables_of_oscillator == {"left": (0, 2), "right": (1,)}
+
+
+def test_a_tension_gives_the_free_length() -> None:
+    length = np.hypot(0.07, 0.10)
+    assert structure().free_lengths == pytest.approx([0.02, 0.02, length - 2 / 100])
+
+
+def test_a_node_has_the_sphere_of_its_first_strut() -> None:
+    given = structure()
+    assert [given.sphere_of_node[node].node_diameter for node in "abcf"] == [0.016, 0.016, 0, 0.01]
+
+
+def test_contact_nodes() -> None:
+    assert structure().contact_nodes == ("g", "a")
+    assert structure("contacts: all").contact_nodes == tuple("gabcdef")
+
+
+def test_a_written_structure_is_read_as_it_was(tmp_path: Path) -> None:
+    (tmp_path / "my.yaml").write_text(dump_yaml(tree_of(structure())))
+    again = read_structure(tmp_path / "my.yaml")
+    assert again == structure()
+    assert again.bodies == structure().bodies
+
+
+def test_one_rigid_body_needs_no_cables() -> None:
+    tree = parse_yaml(FILE, "my.yaml")
+    bar = {"unit": "m", "nodes": {"f": [0, 0, 0], "g": [0, 0, 1]}}
+    given = Structure.from_tree(bar | {"struts": {"bar": tree["struts"]["bar"]}}, "my.yaml")
+    assert given.body_names == ("bar",)
+    assert given.free_lengths == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "bodies", "cables", "oscillators"),
+    [
+        ("prism", "n0 n4", 3, 9, 3),
+        ("six_bar", "n0 n1", 6, 24, 3),
+        ("mast", "v1", 4, 24, 3),
+        ("pair", "t1", 2, 8, 2),
+    ],
+)
+def test_shipped_structures(
+    name: str, first: str, bodies: int, cables: int, oscillators: int
+) -> None:
+    given = read_structure(SHIPPED / f"{name}.yaml")
+    assert given.body_names[0] == first
+    assert len(given.bodies) == bodies
+    assert len(given.all_cables) == cables
+    assert len(given.cables_of_oscillator) == oscillators
+
+
+@pytest.mark.parametrize("name", ["prism", "six_bar"])
+def test_struts_of_the_shipped_true_tensegrities(name: str) -> None:
+    """The struts of the independent simulation's robots, 0.2508 m long."""
+    given = read_structure(SHIPPED / f"{name}.yaml")
+    for first, second in (strut.nodes for strut in given.all_struts):
+        length = np.linalg.norm(np.subtract(given.nodes[second], given.nodes[first]))
+        assert length == pytest.approx(0.25083960627398694, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "facts"),
+    [
+        ("cables: {side: {pairs: [[b, dd]]}}", "cables.side.pairs[0]", ["'dd'", "mean 'd'"]),
+        ("struts: {bar: {pairs: [[f, h]]}}", "struts.bar.pairs[0]", ["'h'"]),
+        ("struts: {bar: {pairs: [[f, f]]}}", "struts.bar.pairs[0]", ["'f' twice"]),
+        ("struts: {bar: {pairs: [[f]]}}", "struts.bar.pairs[0]", ["2"]),
+        ("struts: {bar: {pairs: [[f, g], [g, f]]}}", "struts.bar.pairs[1]", ["bar.pairs[0]"]),
+        ("cables: {long: {pairs: [[e, f], [d, b]]}}", "cables.long.pairs[1]", ["side.pairs[0]"]),
+        ("cables: {side: {pairs: [[b, d], [b, c]]}}", "cables.side.pairs[1]", ["'b a c'"]),
+        ("cables: {long: {pairs: [[c, e]]}}", "cables", ["'bar'", "'b a c'"]),
+        ("cables: {long: {tension: 12.3 N}}", "cables.long.tension", ["12.3 N", "12.21 N"]),
+        ("cables: {long: {free_length: 1 m}}", "cables.long.tension", ["one of"]),
+        ("cables: {side: {free_length: null}}", "cables.side.free_length", ["one of"]),
+        ("cables: {side: {stifness: 1 N/m}}", "cables.side.stifness", ["'stiffness'"]),
+        ("cables: {side: {stiffness: 1 N}}", "cables.side.stiffness", ["N/m"]),
+        ("cables: {a b: {}}", "cables.a b.pairs", []),
+        ("nodes: {h: [1, 1, 1]}", "nodes.h", ["no strut"]),
+        ("nodes: {d: [9, 2, 5]}", "nodes.f", ["'d'", "0.0001 m"]),
+        ("nodes: {e: [2, 2, 5]}", "struts.arm.pairs[1]", ["length 0"]),
+        ("nodes: {e: [2, 2]}", "nodes.e", ["3 items"]),
+        ("nodes: {e: [2, 2, up]}", "nodes.e[2]", ["'up'"]),
+        ("nodes: {7: [2, 2, 1]}", "nodes.7", ["n7"]),
+        ("{nodes: {h i: [2, 2, 1]}}", "nodes.h i", ["'h i'", "blanks"]),
+        ("unit: kg", "unit", ["'kg'"]),
+        ("masses: {q: 1 g}", "masses.q", ["'q'"]),
+        ("masses: {g: 0 g}", "masses.g", ["more than 0"]),
+        ("contacts: [a, q]", "contacts[1]", ["'q'"]),
+        ("actuated: {left: [side b e]}", "actuated.left[0]", ["'side b e'", "mean 'side b d'"]),
+        ("actuated: {right: [side c d, side b d]}", "actuated.right[1]", ["'left'"]),
+        ("actuated: {right: [side c d, side d c]}", "actuated.right[1]", ["'right'"]),
+        ("actuated: {to left: [side c d]}", "actuated.to left", ["blanks"]),
+    ],
+)
+def test_problems_name_key_and_facts(changes: str, key: str, facts: list[str]) -> None:
+    with pytest.raises(InputError) as caught:
+        structure(changes)
+    assert (caught.value.source, caught.value.key) == ("my.yaml", key)
+    for fact in facts:
+        assert fact in caught.value.problem
+
+
+def test_nodes_with_units_need_no_unit_and_bare_ones_do(tmp_path: Path) -> None:
+    file = tmp_path / "my.yaml"
+    file.write_text(FILE.replace("unit: cm", ""))
+    with pytest.raises(InputError) as caught:
+        read_structure(file)
+    assert (caught.value.source, caught.value.key) == (str(file), "nodes.g[0]")
+
+
+@pytest.mark.parametrize(
+    ("limit", "most", "key"),
+    [("MOST_NODES", 6, "nodes"), ("MOST_BODIES", 2, "struts"), ("MOST_CABLES", 2, "cables")],
+)
+def test_limits(limit: str, most: int, key: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_kinds, limit, most + 1)
+    structure()
+    monkeypatch.setattr(robot_kinds, limit, most)
+    with pytest.raises(InputError) as caught:
+        structure()
+    assert caught.value.key == key
