@@ -27,6 +27,7 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.inertia import XX
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
@@ -255,33 +256,37 @@ def _add_floor(world: Element, robot: Robot) -> None:
     """The floor, a plane, which is geom 0."""
     slope = robot.scenario.terrain.plane_slope or 0.0
     pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
-    turned = {"pos": pos, "quat": robot.structure.q_WB}
-    _add(world, "geom", name="floor", type="plane", size="0 0 1", **turned, **_ALONE)
+    quat = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
+    _add(world, "geom", name="floor", type="plane", size="0 0 1", pos=pos, quat=quat, **_ALONE)
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
-    """The tetrahedra, with a site at each node, and spheres on those that touch the floor."""
-    structure, contact = robot.structure, _contact(robot)
-    pairs, names = _add(model, "contact"), iter(enumerate(structure.node_names))
-    mass, moment = robot.model.body.mass[0], robot.model.body.moment[0]
-    for body_name, p_WB in zip(structure.bodies, structure.p_WB, strict=True):
-        body = _add(world, "body", name=body_name, pos=p_WB, quat=structure.q_WB)
+    """The bodies, with a site at each node, and spheres on those that touch the floor."""
+    structure, bodies = robot.structure, robot.model.bodies
+    pairs = _add(model, "contact")
+    for i, body_name in enumerate(structure.bodies):
+        pos, quat = structure.p_WB[i], structure.q_WB[i]
+        body = _add(world, "body", name=body_name, pos=pos, quat=quat)
         _add(body, "freejoint")
-        _add(body, "inertial", pos="0 0 0", mass=mass, diaginertia=3 * [moment])
-        for p_BN in structure.p_BN:
-            node, name = next(names)
+        mass, inertia = bodies.mass[i], bodies.inertia[i]
+        if structure.isotropic:
+            _add(body, "inertial", pos="0 0 0", mass=mass, diaginertia=3 * [inertia[XX]])
+        else:
+            _add(body, "inertial", pos="0 0 0", mass=mass, fullinertia=inertia)
+        contact = _contact(robot, mass)
+        for node in range(structure.first_node[i], structure.first_node[i + 1]):
+            name, p_BN = structure.node_names[node], structure.p_BN[node]
             _add(body, "site", name=name, pos=p_BN)
             if node in structure.contacts:
                 _add(body, "geom", name=name, pos=p_BN, size=_POINT, **_ALONE)
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
 
 
-def _contact(robot: Robot) -> dict:
-    """Contact settings of the floor."""
+def _contact(robot: Robot, mass: float) -> dict:
+    """Contact settings of the floor and a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
-    mass, bodies = robot.model.body.mass[0], len(robot.structure.bodies)
-    borne = robot.weight / (2 * bodies + 1)  # by a foot of the thesis's
+    borne = robot.weight / robot.structure.feet
     rest_damping = ground.damping * borne / ground.stiffness
     # MuJoCo takes accelerations for forces, and divides them by 1 - impedance. The minus says
     # that the numbers are stiffness and damping.

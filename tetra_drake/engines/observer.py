@@ -64,7 +64,7 @@ def observe_states(
         modes[:] = 0.0
         move_robot(robot, states[k], forces)
         update_modes(states[k], forces.nodes, robot.ground, forces.frames, modes)
-        compute_forces(robot, modes, signals[k], True, forces, generalized)
-        cables, contacts = robot.cables, robot.ground.contacts
-        observe(tally, cables, contacts, times[k], signals[k], forces.pulls, forces.pushes)
+        compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
+        cables, carriers = robot.cables, robot.ground.carriers
+        observe(tally, cables, carriers, times[k], signals[k], forces.pulls, forces.pushes)
         look(tally, forces.nodes)

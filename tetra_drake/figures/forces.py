@@ -16,7 +16,7 @@ from tetra_drake.figures.style import OKABE_ITO, SHADE, add_grid, common_style, 
 from tetra_drake.formatting import fixed
 from tetra_drake.physics.contact import Ground
 from tetra_drake.results.measures import intervals, off_ground, share_of_time
-from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, NODES
+from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, NODES
 from tetra_drake.scenario.units import POUND_FORCE
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}

@@ -25,7 +25,7 @@ from tetra_drake.formatting import fixed, signed
 from tetra_drake.physics.contact import Ground
 from tetra_drake.results import measures
 from tetra_drake.robot.ground import ground_heights
-from tetra_drake.robot.structure import BOTTOM_LEFT, STRUTS, TOP
+from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, STRUTS, TOP
 from tetra_drake.scenario.units import INCH
 
 X, Y, Z = range(3)

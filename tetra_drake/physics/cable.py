@@ -104,6 +104,7 @@ def cable_forces(
     state: Table,
     signals: Table,
     p_BN: Table,
+    first_node: Table,
     cables: Table,
     slack: bool,
     nodes: Table,
@@ -112,6 +113,6 @@ def cable_forces(
 ) -> None:
     """Writes [t_W; f_W] of all cables at each Bo, (6 bodies,), for a state of the bodies; also
     `nodes` and `pulls`."""
-    move_nodes(state, p_BN, nodes)
+    move_nodes(state, p_BN, first_node, nodes)
     add_cable_forces(nodes, signals, cables, slack, True, pulls)
-    gather_forces(nodes, generalized_force)
+    gather_forces(nodes, first_node, generalized_force)

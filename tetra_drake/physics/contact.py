@@ -64,6 +64,8 @@ class Ground(NamedTuple):
 
     contacts: Table
     """(contacts,), the indices of the nodes."""
+    carriers: Table
+    """(contacts,), the indices of their bodies, ascending."""
     normal: Table
     """The numbers of a NormalForce."""
     friction: FrictionLaw
@@ -75,10 +77,12 @@ class Ground(NamedTuple):
 
 
 @inlined
-def meet_ground(state: Table, p_BN: Table, ground: Ground, nodes: Table, frames: Table) -> None:
+def meet_ground(
+    state: Table, p_BN: Table, first_node: Table, ground: Ground, nodes: Table, frames: Table
+) -> None:
     """Writes the `nodes` of `kinematics` for a state of the bodies, without forces, and where they
     meet the ground: `frames`, (contacts, FRAME_COLUMNS), which flat ground leaves as they are."""
-    move_nodes(state, p_BN, nodes)
+    move_nodes(state, p_BN, first_node, nodes)
     if not ground.flat:
         grid = named(SurfaceGrid, ground.grid)
         find_frames(nodes, ground.contacts, grid, ground.heights, frames)
@@ -143,11 +147,14 @@ def add_ground_forces(
         add_vector(force, node, FORCE, nodes)
 
 
-def ground_arguments(ground: Ground) -> tuple[Table, Table, int, Table, bool, Table, Table]:
+def ground_arguments(
+    ground: Ground,
+) -> tuple[Table, Table, Table, int, Table, bool, Table, Table]:
     """A ground as ground_forces() takes it: no tuple within it."""
     friction = ground.friction
     return (
         ground.contacts,
+        ground.carriers,
         ground.normal,
         friction.kind,
         friction.constants,
@@ -162,7 +169,9 @@ def ground_forces(
     state: Table,
     modes: Table,
     p_BN: Table,
+    first_node: Table,
     contacts: Table,
+    carriers: Table,
     normal: Table,
     kind: int,
     constants: Table,
@@ -177,10 +186,11 @@ def ground_forces(
     """Writes [t_W; f_W] of the ground at each Bo, (6 bodies,), for a state of the bodies; also
     `nodes`, `frames` and `pushes`. From `contacts` to `heights`, the arguments are those of
     ground_arguments(): a call from Python takes a microsecond longer if it has to unpack them."""
-    ground = Ground(contacts, normal, FrictionLaw(kind, constants), flat, grid, heights)
-    meet_ground(state, p_BN, ground, nodes, frames)
+    friction = FrictionLaw(kind, constants)
+    ground = Ground(contacts, carriers, normal, friction, flat, grid, heights)
+    meet_ground(state, p_BN, first_node, ground, nodes, frames)
     add_ground_forces(nodes, modes, ground, frames, True, pushes)
-    gather_forces(nodes, generalized_force)
+    gather_forces(nodes, first_node, generalized_force)
 
 
 @inlined
@@ -209,7 +219,7 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
         resets_1 = sticks_1 & (lands | not_(stuck_1))
         resets_2 = sticks_2 & (lands | not_(stuck_2))
         if any_lane(lands):
-            set_heading(state, nodes, ground, frames, i, lands, modes)
+            set_heading(state, ground, frames, i, lands, modes)
         modes[i, MODE], modes[i, MODE + 1] = next_1, next_2
         changed = changed | (next_1 != mode_1) | (next_2 != mode_2)
         move_stick_point(nodes, ground, frames, i, resets_1, resets_2, slide, modes)
@@ -218,11 +228,17 @@ def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, mode
 
 @compiled
 def modes_after_step(
-    state: Table, p_BN: Table, ground: Ground, nodes: Table, frames: Table, modes: Table
+    state: Table,
+    p_BN: Table,
+    first_node: Table,
+    ground: Ground,
+    nodes: Table,
+    frames: Table,
+    modes: Table,
 ) -> Truth:
     """Brings `modes` up to date with a state of the bodies, as update_modes() does; writes `nodes`
     and `frames`, too."""
-    meet_ground(state, p_BN, ground, nodes, frames)
+    meet_ground(state, p_BN, first_node, ground, nodes, frames)
     return update_modes(state, nodes, ground, frames, modes)
 
 
@@ -255,11 +271,10 @@ def move_stick_point(
 
 @inlined
 def set_heading(
-    state: Table, nodes: Table, ground: Ground, frames: Table, i: int, where: Truth, modes: Table
+    state: Table, ground: Ground, frames: Table, i: int, where: Truth, modes: Table
 ) -> None:
     """Notes the heading of a contact node's body: its x axis, projected into the tangent plane."""
-    bodies = state.size // 13
-    forward = forward_axis(state, ground.contacts[i] // (nodes.shape[0] // bodies))
+    forward = forward_axis(state, ground.carriers[i])
     h_1, h_2, _ = to_frame(forward, frames, i, ground.flat)
     per_length = inverse_sqrt(maximum(h_1 * h_1 + h_2 * h_2, 1e-30))
     modes[i, HEADING] = select(where, h_1 * per_length, modes[i, HEADING])

@@ -8,8 +8,9 @@ import numpy as np
 
 from tetra_drake.physics.cable import PULL_COLUMNS, add_cable_forces
 from tetra_drake.physics.contact import PUSH_COLUMNS, add_ground_forces, meet_ground
+from tetra_drake.physics.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia
 from tetra_drake.physics.kinematics import NODE_COLUMNS, gather_forces
-from tetra_drake.physics.model import JUNCTION_CABLES, Model
+from tetra_drake.physics.model import Model
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Table
@@ -26,40 +27,61 @@ class Forces(NamedTuple):
     """(cables, PULL_COLUMNS): of the cables."""
     pushes: Table
     """(contacts, PUSH_COLUMNS): of the ground."""
+    inertia: Table
+    """(bodies, INERTIA_COLUMNS): of the bodies along World's axes, unless they are isotropic."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
         """Room for the forces on a robot."""
         cables, contacts = robot.cables.size, robot.ground.contacts.size
-        bodies = cables // JUNCTION_CABLES + 1
         return cls(
-            nodes=np.zeros((bodies * len(robot.p_BN), NODE_COLUMNS)),
+            nodes=np.zeros((len(robot.p_BN), NODE_COLUMNS)),
             frames=np.zeros((contacts, FRAME_COLUMNS)),
             pulls=np.zeros((cables, PULL_COLUMNS)),
             pushes=np.zeros((contacts, PUSH_COLUMNS)),
+            inertia=np.zeros((len(robot.bodies.mass), INERTIA_COLUMNS)),
         )
 
 
 @inlined
 def move_robot(robot: Model, state: Table, forces: Forces) -> None:
     """Moves the nodes to where a state (13 bodies,) has them; no forces act on them yet."""
-    meet_ground(state, robot.p_BN, robot.ground, forces.nodes, forces.frames)
+    nodes, frames = forces.nodes, forces.frames
+    meet_ground(state, robot.p_BN, robot.first_node, robot.ground, nodes, frames)
+    if not robot.isotropic:
+        turn_inertia(state, robot.bodies.inertia, forces.inertia)
 
 
 @inlined
 def compute_forces(
-    robot: Model, modes: Table, signals: Table, keep: bool, forces: Forces, generalized: Table
+    robot: Model,
+    state: Table,
+    modes: Table,
+    signals: Table,
+    keep: bool,
+    forces: Forces,
+    generalized: Table,
 ) -> None:
-    """Writes all forces on nodes that have just been moved, with gravity, as (6 bodies,).
+    """Writes all forces at a state to which the robot has just been moved, with gravity and
+    gyroscopic torques, as (6 bodies,).
 
     With `keep`, those of the cables and the ground by themselves, too.
     """
     add_cable_forces(forces.nodes, signals, robot.cables, robot.slack, keep, forces.pulls)
     add_ground_forces(forces.nodes, modes, robot.ground, forces.frames, keep, forces.pushes)
-    gather_forces(forces.nodes, generalized)
-    weight = robot.body.mass[0] * robot.body.gravity[0]
-    for body in range(generalized.size // 6):
-        generalized[6 * body + 5] -= weight
+    gather_forces(forces.nodes, robot.first_node, generalized)
+    bodies = generalized.size // 6
+    for body in range(bodies):
+        generalized[6 * body + 5] -= robot.bodies.weight[body]
+    if robot.isotropic:
+        return
+    for body in range(bodies):
+        t, v = 6 * body, 7 * bodies + 6 * body
+        w_WB = state[v], state[v + 1], state[v + 2]
+        t_x, t_y, t_z = gyroscopic_torque(forces.inertia, body, w_WB)
+        generalized[t] += t_x
+        generalized[t + 1] += t_y
+        generalized[t + 2] += t_z
 
 
 @compiled
@@ -77,6 +99,6 @@ def forces_along(
     generalized = np.empty(6 * (states.shape[1] // 13))
     for k in range(states.shape[0]):
         move_robot(robot, states[k], forces)
-        compute_forces(robot, modes[k], signals[k], True, forces, generalized)
+        compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized)
         pulls[k] = forces.pulls
         pushes[k] = forces.pushes

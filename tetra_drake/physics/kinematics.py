@@ -17,35 +17,50 @@ run body by body."""
 
 
 @compiled
-def move_nodes(state: Table, p_BN: Table, nodes: Table) -> None:
+def move_nodes(state: Table, p_BN: Table, first_node: Table, nodes: Table) -> None:
     """Writes the `nodes`, fixed to the bodies, without forces.
 
-    `state` is [q; v] of the bodies, 13 numbers per body; `p_BN`, (nodes per body, 3) in m, is
-    the same for every body.
+    `state` is [q; v] of the bodies, 13 numbers per body; `p_BN`, (nodes, 3) in m, are the nodes in
+    the frames of their bodies; `first_node`, (bodies + 1,), is the index of each body's first node,
+    and the number of nodes.
     """
-    bodies, per_body = state.size // 13, p_BN.shape[0]
+    bodies = state.size // 13
     for body in range(bodies):
         q, v = 7 * body, 7 * bodies + 6 * body
-        w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
-        s = 2.0 / (w * w + x * x + y * y + z * z)
-        r_00, r_01, r_02 = 1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
-        r_10, r_11, r_12 = s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)
-        r_20, r_21, r_22 = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
+        r_00, r_01, r_02, r_10, r_11, r_12, r_20, r_21, r_22 = rotation(state, body)
         o_x, o_y, o_z = state[q + 4], state[q + 5], state[q + 6]
         w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
         v_x, v_y, v_z = state[v + 3], state[v + 4], state[v + 5]
-        for k in range(per_body):
-            a, b, c = vector_at(p_BN, k, 0)
+        for node in range(first_node[body], first_node[body + 1]):
+            a, b, c = vector_at(p_BN, node, 0)
             p_x = r_00 * a + r_01 * b + r_02 * c
             p_y = r_10 * a + r_11 * b + r_12 * c
             p_z = r_20 * a + r_21 * b + r_22 * c
-            node = per_body * body + k
             put_vector((p_x, p_y, p_z), node, P_BN_W, nodes)
             put_vector((o_x + p_x, o_y + p_y, o_z + p_z), node, P_WN, nodes)
             nodes[node, V_WN] = v_x + w_y * p_z - w_z * p_y
             nodes[node, V_WN + 1] = v_y + w_z * p_x - w_x * p_z
             nodes[node, V_WN + 2] = v_z + w_x * p_y - w_y * p_x
             put_vector((0.0, 0.0, 0.0), node, FORCE, nodes)
+
+
+@inlined
+def rotation(state: Table, body: int) -> tuple[Real, ...]:
+    """The nine numbers of R_WB of a body, row by row."""
+    q = 7 * body
+    w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    return (
+        1.0 - s * (y * y + z * z),
+        s * (x * y - w * z),
+        s * (x * z + w * y),
+        s * (x * y + w * z),
+        1.0 - s * (x * x + z * z),
+        s * (y * z - w * x),
+        s * (x * z - w * y),
+        s * (y * z + w * x),
+        1.0 - s * (x * x + y * y),
+    )
 
 
 @inlined
@@ -86,11 +101,12 @@ def forward_axis(state: Table, body: int) -> Vector:
 
 
 @inlined
-def node_acceleration(state: Table, acceleration: Table, nodes: Table, node: int) -> Vector:
-    """Acceleration (m/s²) of a node in World from dv/dt of the bodies, 6 numbers per body."""
-    bodies = state.size // 13
-    body = node // (nodes.shape[0] // bodies)
-    v, a = 7 * bodies + 6 * body, 6 * body
+def node_acceleration(
+    state: Table, acceleration: Table, nodes: Table, node: int, body: int
+) -> Vector:
+    """Acceleration (m/s²) of a node of a body in World from dv/dt of the bodies, 6 numbers per
+    body."""
+    v, a = 7 * (state.size // 13) + 6 * body, 6 * body
     w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
     p_x, p_y, p_z = vector_at(nodes, node, P_BN_W)
     u_x, u_y, u_z = cross((w_x, w_y, w_z), (p_x, p_y, p_z))
@@ -103,14 +119,12 @@ def node_acceleration(state: Table, acceleration: Table, nodes: Table, node: int
 
 
 @inlined
-def gather_forces(nodes: Table, generalized_force: Table) -> None:
+def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> None:
     """Writes the forces on the nodes as [t_W; f_W] at each Bo, (6 bodies,): Drake's
     applied_generalized_force."""
-    bodies = generalized_force.size // 6
-    per_body = nodes.shape[0] // bodies
-    for body in range(bodies):
+    for body in range(generalized_force.size // 6):
         t_x = t_y = t_z = f_x = f_y = f_z = 0.0
-        for node in range(per_body * body, per_body * (body + 1)):
+        for node in range(first_node[body], first_node[body + 1]):
             force = vector_at(nodes, node, FORCE)
             torque = cross(vector_at(nodes, node, P_BN_W), force)
             t_x += torque[0]

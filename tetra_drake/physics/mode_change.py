@@ -26,14 +26,20 @@ Array = np.ndarray
 
 @compiled
 def mode_margin(
-    state: Array, modes: Array, p_BN: Array, ground: Ground, nodes: Array, frames: Array
+    state: Array,
+    modes: Array,
+    p_BN: Array,
+    first_node: Array,
+    ground: Ground,
+    nodes: Array,
+    frames: Array,
 ) -> float:
     """Positive while no mode is due to change; crosses zero where the first one is.
 
     The least of: gap in the air, depth on the ground (m), the margin of friction. Only its sign has
     a meaning. Writes `nodes` and `frames`.
     """
-    meet_ground(state, p_BN, ground, nodes, frames)
+    meet_ground(state, p_BN, first_node, ground, nodes, frames)
     margin, law = math.inf, named(NormalForce, ground.normal)
     for i in range(ground.contacts.size):
         distance = gap(nodes, ground, frames, i)
@@ -64,7 +70,8 @@ def time_to_mode_change(
     """
     time, law = horizon, named(NormalForce, ground.normal)
     for i in range(ground.contacts.size):
-        a_WN = node_acceleration(state, acceleration, nodes, ground.contacts[i])
+        node, body = ground.contacts[i], ground.carriers[i]
+        a_WN = node_acceleration(state, acceleration, nodes, node, body)
         a_1, a_2, a_n = to_frame(a_WN, frames, i, ground.flat)
         slide, v_n = sliding(nodes, modes, ground, law, frames, i)
         touches, distance = modes[i, CONTACT] != 0.0, gap(nodes, ground, frames, i)
@@ -85,6 +92,7 @@ def next_mode_change(
     acceleration: Array,
     modes: Array,
     p_BN: Array,
+    first_node: Array,
     ground: Ground,
     nodes: Array,
     frames: Array,
@@ -95,5 +103,5 @@ def next_mode_change(
 
     Writes `nodes` and `frames`, and brings `modes` up to date.
     """
-    due = modes_after_step(state, p_BN, ground, nodes, frames, modes)
+    due = modes_after_step(state, p_BN, first_node, ground, nodes, frames, modes)
     return due, time_to_mode_change(state, acceleration, nodes, modes, ground, frames, horizon)

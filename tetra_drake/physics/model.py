@@ -7,28 +7,45 @@ from typing import NamedTuple
 from tetra_drake.physics.contact import Ground
 from tetra_drake.simd.lanes import Table
 
-JUNCTION_CABLES = 6
-"""The cables between two neighbouring bodies."""
 
-
-class Body(NamedTuple):
-    """Constants of all bodies; SI units. Each a table of one."""
+class Bodies(NamedTuple):
+    """Constants of the bodies; SI units."""
 
     mass: Table
-    moment: Table
-    """Moment of inertia about any axis through the centre of mass."""
+    """(bodies,)."""
+    inertia: Table
+    """(bodies, 6): about the centre of mass in the body's frame; see physics.inertia."""
     radius: Table
-    """Distance of the nodes from the centre of mass."""
-    gravity: Table
+    """(bodies,): the greatest distance of a node from the centre of mass."""
+    weight: Table
+    """(bodies,)."""
+
+
+class Couplings(NamedTuple):
+    """The pairs of bodies that cables join. The cables of a pair follow each other, and run from
+    its first body, which has the lower index, to its second one."""
+
+    first: Table
+    """(pairs,)."""
+    second: Table
+    """(pairs,)."""
+    first_cable: Table
+    """(pairs + 1,): the index of each pair's first cable, and the number of cables."""
 
 
 class Model(NamedTuple):
     """A structure and the constants of its laws; SI units."""
 
     p_BN: Table
-    """(nodes per body, 3)."""
+    """(nodes, 3): nodes in the frames of their bodies, body by body."""
+    first_node: Table
+    """(bodies + 1,): the index of each body's first node, and the number of nodes."""
     cables: Table
-    """(cables,) of dtype CABLE or Cables; JUNCTION_CABLES from each body to the next, in order."""
+    """(cables,) of dtype CABLE or Cables."""
+    couplings: Couplings
     ground: Ground
-    body: Body
+    bodies: Bodies
+    isotropic: bool
+    """True if each body has the same moment of inertia about all axes."""
     slack: bool
+    """True if a cable cannot push."""

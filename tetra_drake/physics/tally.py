@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION, Cables
-from tetra_drake.physics.clearance import CORNERS, least_strut_distance
+from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
@@ -38,7 +38,7 @@ class Tally(NamedTuple):
 def observe(
     tally: Tally,
     cables: Cables,
-    contacts: Table,
+    carriers: Table,
     time: Real,
     signals: Table,
     pulls: Table,
@@ -63,17 +63,17 @@ def observe(
         tally.signals[k] = signals[k]
     tally.work[0] += select(counts, work, 0.0)
     tally.roughness[0] += select(counts, roughness / passed, 0.0)
-    add_lifted(tally, contacts, select(counts, passed, 0.0), pushes)
+    add_lifted(tally, carriers, select(counts, passed, 0.0), pushes)
     tally.time[0] = time
 
 
 @inlined
-def add_lifted(tally: Tally, contacts: Table, passed: Real, pushes: Table) -> None:
-    """Adds the time (s) that has passed to each lifted body; contacts are in order of bodies."""
+def add_lifted(tally: Tally, carriers: Table, passed: Real, pushes: Table) -> None:
+    """Adds the time (s) that has passed to each lifted body; `carriers` are a Ground's."""
     i = 0
     for body in range(tally.lifted.size):
         load = 0.0 * passed
-        while i < contacts.size and contacts[i] < CORNERS * (body + 1):
+        while i < carriers.size and carriers[i] == body:
             load += pushes[i, NORMAL]
             i += 1
         tally.lifted[body] += select(load == 0.0, passed, 0.0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetra_drake.results.path import CentrePath, follow
-from tetra_drake.robot.structure import BOTTOM_LEFT
+from tetra_drake.robot.tetrahedra import BOTTOM_LEFT
 
 if TYPE_CHECKING:
     import xarray

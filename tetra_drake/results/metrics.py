@@ -12,7 +12,7 @@ from tetra_drake.physics.tally import Tally
 from tetra_drake.results.measures import travelling_index
 from tetra_drake.results.path import CentrePath, curvature
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP
+from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, TIP
 from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown

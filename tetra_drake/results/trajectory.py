@@ -15,7 +15,8 @@ from tetra_drake.physics.contact import PUSH_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces, forces_along
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import NODES, Structure, moved_nodes
+from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.robot.tetrahedra import NODES
 
 if TYPE_CHECKING:
     import xarray

@@ -66,11 +66,11 @@ def find_rest(model: Model, start: np.ndarray) -> Rest | None:
     the minimum of potential energy downhill from there; friction carries nothing. None if it is
     not found."""
     robot, state = Resting.of(model), start
-    weight, radius = model.body.mass[0] * model.body.gravity[0], model.body.radius[0]
+    weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
     reach = FIRST_REACH * radius
     for _ in range(ITERATIONS):
         force = force_at_rest(robot, state)
-        greatest = max(np.abs(robot.forces.pulls[:, TENSION]).max(), weight * force.size / 6)
+        greatest = max(np.abs(robot.forces.pulls[:, TENSION]).max(), weight)
         if np.abs(force).max() <= TOLERANCE * greatest:
             return Rest(state, np.round(robot.forces.pulls[:, LENGTH], LENGTH_DIGITS))
         step = _newton_step(robot, state, force)
@@ -102,7 +102,7 @@ def _free_motions(robot: Resting, state: np.ndarray) -> np.ndarray:
     """(6 n, 3): displacements of the whole robot along x, along y, and about z."""
     motions = np.zeros((len(state) // 13, 6, 3))
     p_WB = state[: 7 * len(motions)].reshape(-1, 7)[:, 4:]
-    x, y = ((p_WB - p_WB.mean(axis=0)) / robot.model.body.radius[0])[:, :2].T
+    x, y = ((p_WB - p_WB.mean(axis=0)) / robot.model.bodies.radius.max())[:, :2].T
     motions[:, 3, 0] = motions[:, 4, 1] = motions[:, 2, 2] = 1.0
     motions[:, 3, 2], motions[:, 4, 2] = -y, x
     return motions.reshape(-1, 3)
@@ -116,9 +116,10 @@ def force_at_rest(robot: Resting, state: Table) -> Table:
     generalized = np.empty(6 * (state.size // 13))
     move_robot(model, state, forces)
     update_modes(state, forces.nodes, model.ground, forces.frames, modes)
-    compute_forces(model, modes, np.zeros(1), True, forces, generalized)
+    compute_forces(model, state, modes, np.zeros(1), True, forces, generalized)
+    radius = model.bodies.radius.max()
     for body in range(generalized.size // 6):
-        generalized[6 * body : 6 * body + 3] /= model.body.radius[0]
+        generalized[6 * body : 6 * body + 3] /= radius
     return generalized
 
 
@@ -126,8 +127,9 @@ def force_at_rest(robot: Resting, state: Table) -> Table:
 def displaced(robot: Resting, state: Table, step: Table) -> Table:
     """A state whose bodies have moved by `step`, (6 n,): rotation times radius, translation (m)."""
     moved, motion = state.copy(), step.copy()
+    radius = robot.model.bodies.radius.max()
     for body in range(step.size // 6):
-        motion[6 * body : 6 * body + 3] /= robot.model.body.radius[0]
+        motion[6 * body : 6 * body + 3] /= radius
     move_bodies(state, motion, 1.0, moved)
     return moved
 
@@ -135,7 +137,7 @@ def displaced(robot: Resting, state: Table, step: Table) -> Table:
 @compiled
 def stiffness_at_rest(robot: Resting, state: Table) -> Table:
     """(6 n, 6 n), in N/m: minus the derivative of the forces by the displacements."""
-    count, half = state.size // 13 * 6, DIFFERENCE * robot.model.body.radius[0]
+    count, half = state.size // 13 * 6, DIFFERENCE * robot.model.bodies.radius.max()
     stiffness, motion = np.empty((count, count)), np.zeros(count)
     for j in range(count):
         motion[j] = half

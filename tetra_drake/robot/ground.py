@@ -45,6 +45,7 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     grid = scenario.terrain.grid(ahead=ahead, source=scenario.name)
     made = Ground(
         contacts=structure.contacts,
+        carriers=structure.carriers[structure.contacts],
         normal=np.array(NormalForce(scenario.ground.stiffness, scenario.ground.damping)),
         friction=scenario.friction.law(),
         flat=isinstance(scenario.terrain, Flat),

@@ -15,15 +15,15 @@ from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, modes_after_step
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.physics.model import JUNCTION_CABLES, Body, Model
+from tetra_drake.physics.model import Bodies, Couplings, Model
 from tetra_drake.physics.oscillator import Network, steered_input
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.actuation import Actuation
-from tetra_drake.robot.bodies import tetrahedron_inertia
 from tetra_drake.robot.equilibrium import Rest, find_rest
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import make_ground
-from tetra_drake.robot.structure import NODES, MakeStructure, Structure
+from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.tetrahedra import MakeTetrahedra
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import CpgSection
 from tetra_drake.scenario.terrain_kinds import Flat
@@ -47,7 +47,7 @@ class Robot:
 
         Raises InputError if it would start in the ground, or off its terrain.
         """
-        structure = structure or MakeStructure(scenario)
+        structure = structure or MakeTetrahedra(scenario)
         return cls(scenario, structure, _make_model(scenario, structure))
 
     @property
@@ -63,8 +63,7 @@ class Robot:
     @property
     def weight(self) -> float:
         """Weight of all bodies in N."""
-        mass = len(self.structure.bodies) * float(self.model.body.mass[0])
-        return mass * self.scenario.robot.gravity
+        return float(self.structure.mass.sum()) * self.scenario.robot.gravity
 
     @functools.cached_property
     def rest(self) -> Rest:
@@ -89,7 +88,7 @@ class Robot:
         return Senses(
             drivers=drivers,
             ahead=self.actuation.junctions + 1,
-            carriers=self.structure.contacts // len(NODES),
+            carriers=self.ground.carriers,
             settled=settled,
             per_length=1.0 / (settled * sizes),
             per_load=np.array([per_load]),
@@ -140,8 +139,8 @@ class Robot:
         structure, count = self.structure, len(self.structure.contacts)
         nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
         modes, frames = np.zeros((count, MODE_COLUMNS)), np.empty((count, FRAME_COLUMNS))
-        start = structure.initial_state
-        modes_after_step(start, structure.p_BN, self.ground, nodes, frames, modes)
+        start, points = structure.initial_state, (structure.p_BN, structure.first_node)
+        modes_after_step(start, *points, self.ground, nodes, frames, modes)
         return modes
 
 
@@ -162,26 +161,35 @@ def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:
 
 
 def _make_model(scenario: Scenario, structure: Structure) -> Model:
-    """The structure and its laws as the kernels take them; cables and ground are records."""
-    nodes, cables = len(structure.p_BN), structure.cables
-    junction = np.arange(len(cables)) // JUNCTION_CABLES
-    rear, front = cables["node_a"] // nodes, cables["node_b"] // nodes
-    if not ((rear == junction).all() and (front == junction + 1).all()):
-        raise ValueError("a cable does not join a body to the next one")
-    inertia = tetrahedron_inertia(structure)
-    mass = inertia.get_mass()
-    moments = mass * inertia.get_unit_inertia().get_moments()
-    if np.ptp(moments) > 1e-12 * moments[0]:
-        raise ValueError("the bodies' inertia is not isotropic")
+    """The structure and its laws as the kernels take them; cables are records."""
+    distances = np.linalg.norm(structure.p_BN, axis=1)
     return Model(
         p_BN=structure.p_BN,
-        cables=cables,
+        first_node=structure.first_node,
+        cables=structure.cables,
+        couplings=_couplings(structure),
         ground=make_ground(scenario, structure),
-        body=Body(
-            mass=np.array([mass]),
-            moment=np.array([moments[0]]),
-            radius=np.array([np.linalg.norm(structure.p_BN, axis=1).max()]),
-            gravity=np.array([scenario.robot.gravity]),
+        bodies=Bodies(
+            mass=structure.mass,
+            inertia=structure.mass[:, np.newaxis] * structure.unit_inertia,
+            radius=np.maximum.reduceat(distances, structure.first_node[:-1]),
+            weight=structure.mass * scenario.robot.gravity,
         ),
+        isotropic=structure.isotropic,
         slack=scenario.cables.slack,
+    )
+
+
+def _couplings(structure: Structure) -> Couplings:
+    """The pairs of bodies in the order of the cables; ValueError if they are in no such order."""
+    carriers, cables = structure.carriers, structure.cables
+    pairs = np.column_stack([carriers[cables["node_a"]], carriers[cables["node_b"]]])
+    begins = np.flatnonzero(np.any(np.diff(pairs, axis=0, prepend=-1), axis=1))
+    distinct = pairs[begins]
+    if (distinct[:, 0] >= distinct[:, 1]).any() or len(np.unique(distinct, axis=0)) < len(begins):
+        raise ValueError("the cables are not in the order of the pairs of bodies that they join")
+    return Couplings(
+        first=distinct[:, 0].copy(),
+        second=distinct[:, 1].copy(),
+        first_cable=np.append(begins, len(cables)),
     )

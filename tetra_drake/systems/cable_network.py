@@ -45,6 +45,7 @@ class CableNetwork(LeafSystem):
             self._state.Eval(context),
             self._signals.Eval(context),
             self._model.p_BN,
+            self._model.first_node,
             self._model.cables,
             self._model.slack,
             self._nodes,

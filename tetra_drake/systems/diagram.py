@@ -8,7 +8,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import Adder, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from tetra_drake.robot.bodies import AddTetrahedra
+from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import signal_samples
@@ -48,7 +48,7 @@ def MakeTensegrityDiagram(
     builder = DiagramBuilder()
 
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-    AddTetrahedra(plant, structure)
+    AddBodies(plant, structure)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])

@@ -57,7 +57,8 @@ class GroundContact(LeafSystem):
     def __init__(self, robot: Robot, *, witness: bool = False) -> None:
         super().__init__()
         structure = robot.structure
-        self._p_BN, self._ground = structure.p_BN, robot.ground
+        self._p_BN, self._first_node = structure.p_BN, structure.first_node
+        self._ground = robot.ground
         self._ground_arguments = ground_arguments(self._ground)
         bodies, count = len(structure.bodies), len(structure.contacts)
         # Room for the kernels, which write what they need of it at every call.
@@ -93,6 +94,7 @@ class GroundContact(LeafSystem):
             acceleration,
             self._modes(context).copy(),
             self._p_BN,
+            self._first_node,
             self._ground,
             self._nodes,
             self._frames,
@@ -114,8 +116,16 @@ class GroundContact(LeafSystem):
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         modes = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
-        state = self._state.Eval(context)
-        if modes_after_step(state, self._p_BN, self._ground, self._nodes, self._frames, modes):
+        changed = modes_after_step(
+            self._state.Eval(context),
+            self._p_BN,
+            self._first_node,
+            self._ground,
+            self._nodes,
+            self._frames,
+            modes,
+        )
+        if changed:
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
@@ -124,6 +134,7 @@ class GroundContact(LeafSystem):
             self._state.Eval(context),
             self._modes(context),
             self._p_BN,
+            self._first_node,
             self._ground,
             self._nodes,
             self._frames,
@@ -135,6 +146,7 @@ class GroundContact(LeafSystem):
             self._state.Eval(context),
             self._modes(context),
             self._p_BN,
+            self._first_node,
             *self._ground_arguments,
             self._nodes,
             self._frames,

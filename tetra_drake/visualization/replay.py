@@ -20,7 +20,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import render
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT
+from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.visualization.scene import (
     ASPECT,

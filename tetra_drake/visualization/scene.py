@@ -16,7 +16,8 @@ from tetra_drake.physics.contact import Ground
 from tetra_drake.robot.bodies import strut_pose
 from tetra_drake.robot.ground import ground_axes, ground_heights
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import NODES, STRUTS, TIP, Structure
+from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.tetrahedra import NODES, STRUTS, TIP
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 if TYPE_CHECKING:

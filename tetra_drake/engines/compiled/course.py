@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
+from tetra_drake.engines.compiled.block_sparse import BLOCK
+from tetra_drake.engines.compiled.dynamics import CABLES_AT_ONCE, LINE_COLUMNS, Solver
 from tetra_drake.engines.compiled.loop import (
     ASKED_ROWS,
     CLOCK_ROWS,
@@ -24,7 +25,7 @@ from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import Cables
 from tetra_drake.physics.forces import Forces
-from tetra_drake.physics.model import JUNCTION_CABLES
+from tetra_drake.physics.inertia import INERTIA_COLUMNS
 from tetra_drake.physics.oscillator import make_neurons
 from tetra_drake.physics.tally import Tally
 from tetra_drake.results.metrics import empty_tally
@@ -108,6 +109,7 @@ class PreparedGait:
         ground = model.ground._replace(heights=None)  # of which lanes have different numbers
         return Constants(
             robot=model._replace(cables=cables, ground=ground),
+            solver=Solver.of(model),
             network=robot.network(gait),
             senses=robot.senses,
             sides=np.repeat(robot.actuation.sides, 2).astype(float),
@@ -141,8 +143,9 @@ class PreparedGait:
                 stage=velocities,
                 k1=velocities,
                 k2=velocities,
-                rows=np.zeros((bodies, BLOCK, ROW)),
-                lines=np.zeros((JUNCTION_CABLES, 9)),
+                rows=np.zeros((bodies, BLOCK, Solver.of(robot.model).schedule.width)),
+                lines=np.zeros((CABLES_AT_ONCE, LINE_COLUMNS)),
+                inertia=np.zeros((bodies, INERTIA_COLUMNS)),
             ),
             forces=Forces.of(robot.model),
             modes=robot.starting_modes(),

@@ -5,7 +5,12 @@ Vectors over bodies hold 6 numbers per body, rotation before translation, in Wor
 
 from __future__ import annotations
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
+from collections.abc import Iterable
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from tetra_drake.engines.compiled.block_sparse import BLOCK, Schedule
 from tetra_drake.physics.cable import DIRECTION
 from tetra_drake.physics.contact import (
     CONTACT,
@@ -17,37 +22,122 @@ from tetra_drake.physics.contact import (
 )
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.friction import friction_damping
+from tetra_drake.physics.inertia import XX, XY, XZ, YY, YZ, ZZ, over_inertia, times_inertia
 from tetra_drake.physics.kinematics import P_BN_W
-from tetra_drake.physics.model import JUNCTION_CABLES, Model
+from tetra_drake.physics.model import Model
 from tetra_drake.physics.terrain import to_world
 from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, any_lane, named, select
 
+CABLES_AT_ONCE, LINE_COLUMNS = 6, 9
+"""The cables of a pair of bodies whose damping is summed at once, and the numbers of each."""
+
+
+class Solver(NamedTuple):
+    """Where the blocks of the implicit matrix stand, and the order in which it is eliminated."""
+
+    schedule: Schedule
+    columns: Table
+    """(pairs,): the column of the block of each pair of coupled bodies."""
+    fill_bodies: Table
+    """(blocks,): of blocks that only elimination fills in, the bodies in whose rows they stand."""
+    fill_columns: Table
+    """(blocks,): their columns."""
+
+    @classmethod
+    def of(cls, robot: Model) -> Self:
+        """The solver of a robot."""
+        first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
+        pairs = list(zip(first, second, strict=True))
+        schedule = Schedule.of(len(robot.bodies.mass), pairs)
+        fill = sorted(schedule.blocks - set(pairs))
+        return cls(
+            schedule,
+            columns=_indices(schedule.column_of(*pair) for pair in pairs),
+            fill_bodies=_indices(body for body, _ in fill),
+            fill_columns=_indices(schedule.column_of(*pair) for pair in fill),
+        )
+
+
+def _indices(numbers: Iterable[int]) -> np.ndarray:
+    return np.array(list(numbers), dtype=np.int64)
+
 
 @inlined
-def inertia(robot: Model, j: int) -> Real:
-    """The diagonal of a body's mass matrix: of rotation for j = 0, 1, 2, else of translation."""
-    return robot.body.moment[0] if j < 3 else robot.body.mass[0]
+def accelerate(robot: Model, inertia: Table, force: Table, acceleration: Table) -> None:
+    """Writes the accelerations (6 bodies,) of bodies under forces (6 bodies,); `inertia` as in
+    Forces."""
+    for body in range(force.size // BLOCK):
+        i = BLOCK * body
+        per_mass = 1.0 / robot.bodies.mass[body]
+        if robot.isotropic:
+            per_moment = 1.0 / robot.bodies.inertia[body, XX]
+            turns = force[i] * per_moment, force[i + 1] * per_moment, force[i + 2] * per_moment
+        else:
+            turns = over_inertia(inertia, body, (force[i], force[i + 1], force[i + 2]))
+        acceleration[i], acceleration[i + 1], acceleration[i + 2] = turns
+        acceleration[i + 3] = force[i + 3] * per_mass
+        acceleration[i + 4] = force[i + 4] * per_mass
+        acceleration[i + 5] = force[i + 5] * per_mass
+
+
+@inlined
+def momentum(robot: Model, inertia: Table, velocity: Table, body: int) -> tuple[Real, ...]:
+    """The mass matrix of a body times its part of a vector over bodies; `inertia` as in Forces."""
+    i, mass = BLOCK * body, robot.bodies.mass[body]
+    if robot.isotropic:
+        moment = robot.bodies.inertia[body, XX]
+        turns = moment * velocity[i], moment * velocity[i + 1], moment * velocity[i + 2]
+    else:
+        turns = times_inertia(inertia, body, (velocity[i], velocity[i + 1], velocity[i + 2]))
+    moves = mass * velocity[i + 3], mass * velocity[i + 4], mass * velocity[i + 5]
+    return turns[0], turns[1], turns[2], moves[0], moves[1], moves[2]
+
+
+@inlined
+def refer_torques(inertia: Table, inertia_now: Table, force: Table) -> None:
+    """Turns the torques in `force`, (6 bodies,), into those that give bodies of another `inertia`
+    the same acceleration."""
+    for body in range(force.size // BLOCK):
+        i = BLOCK * body
+        torque = force[i], force[i + 1], force[i + 2]
+        acceleration = over_inertia(inertia_now, body, torque)
+        force[i], force[i + 1], force[i + 2] = times_inertia(inertia, body, acceleration)
 
 
 @merged
 def implicit_matrix(
-    robot: Model, modes: Table, forces: Forces, time: Real, lines: Table, rows: Table
+    robot: Model,
+    solver: Solver,
+    modes: Table,
+    forces: Forces,
+    time: Real,
+    lines: Table,
+    rows: Table,
 ) -> None:
     """Writes mass matrix + time * damping matrix + time² * contact stiffness, as rows of
-    block_tridiagonal; time in s.
+    block_sparse; time in s.
 
     Damping is what makes the equations stiff: that of cables, normal forces and stiction.
-    `lines`, (JUNCTION_CABLES, 9), is room for what is computed on the way.
+    `lines`, (CABLES_AT_ONCE, LINE_COLUMNS), is room for what is computed on the way.
     """
-    for r in range(BLOCK):
-        for c in range(r, BLOCK):
-            rows[0, r, c] = 0.0
-    for junction in range(rows.shape[0] - 1):
-        add_junction(robot, forces, time, junction, lines, rows)
     for body in range(rows.shape[0]):
         for r in range(BLOCK):
-            rows[body, r, r] += inertia(robot, r)
+            for c in range(r, BLOCK):
+                rows[body, r, c] = 0.0
+    for k in range(solver.fill_bodies.size):
+        body, column = solver.fill_bodies[k], solver.fill_columns[k]
+        for r in range(BLOCK):
+            for c in range(column, column + BLOCK):
+                rows[body, r, c] = 0.0
+    couplings = robot.couplings
+    for pair in range(solver.columns.size):
+        column = solver.columns[pair]
+        last = couplings.first_cable[pair + 1]
+        for cable in range(couplings.first_cable[pair], last, CABLES_AT_ONCE):
+            adds = cable > couplings.first_cable[pair]
+            add_cables(robot, forces, time, pair, cable, last, adds, column, lines, rows)
+    add_masses(robot, forces.inertia, rows)
     law = named(NormalForce, robot.ground.normal)
     for i in range(robot.ground.contacts.size):
         if any_lane(modes[i, CONTACT] != 0.0):
@@ -55,18 +145,51 @@ def implicit_matrix(
 
 
 @inlined
-def add_junction(
-    robot: Model, forces: Forces, time: Real, junction: int, lines: Table, rows: Table
-) -> None:
-    """Adds time * damping * l lᵀ for each cable from body `junction` to the next, the first to
-    contribute to that one's rows.
+def add_masses(robot: Model, inertia: Table, rows: Table) -> None:
+    """Adds the mass matrix; `inertia` as in Forces."""
+    for body in range(rows.shape[0]):
+        mass = robot.bodies.mass[body]
+        if robot.isotropic:
+            moment = robot.bodies.inertia[body, XX]
+            for r in range(3):
+                rows[body, r, r] += moment
+        else:
+            rows[body, 0, 0] += inertia[body, XX]
+            rows[body, 1, 1] += inertia[body, YY]
+            rows[body, 2, 2] += inertia[body, ZZ]
+            rows[body, 0, 1] += inertia[body, XY]
+            rows[body, 0, 2] += inertia[body, XZ]
+            rows[body, 1, 2] += inertia[body, YZ]
+        for r in range(3, BLOCK):
+            rows[body, r, r] += mass
 
-    l, (ROW,), times the velocities of both bodies is the rate of the cable's length: the ends at
-    p_a and p_b move apart along d, so l = (u, -d, w, d) with u = d x p_a and w = p_b x d. All
-    cables of the junction are summed at once, a product of two columns of `lines`: u, w, d.
+
+@inlined
+def add_cables(
+    robot: Model,
+    forces: Forces,
+    time: Real,
+    pair: int,
+    first: int,
+    last: int,
+    adds: bool,
+    column: int,
+    lines: Table,
+    rows: Table,
+) -> None:
+    """Adds time * damping * l lᵀ for the cables of a pair of bodies from `first` on, before `last`
+    and at most CABLES_AT_ONCE.
+
+    l, of 12 numbers, times the velocities of both bodies is the rate of the cable's length: the
+    ends at p_a and p_b move apart along d, so l = (u, -d, w, d) with u = d x p_a and w = p_b x d.
+    All cables are summed at once, a product of two columns of `lines`: u, w, d.
     """
-    for j in range(JUNCTION_CABLES):
-        i = JUNCTION_CABLES * junction + j
+    for j in range(CABLES_AT_ONCE):
+        i = first + j
+        if i >= last:
+            for c in range(LINE_COLUMNS):
+                lines[j, c] = 0.0
+            continue
         d_x, d_y = forces.pulls[i, DIRECTION], forces.pulls[i, DIRECTION + 1]
         d_z = forces.pulls[i, DIRECTION + 2]
         a, b = robot.cables.node_a[i], robot.cables.node_b[i]
@@ -81,36 +204,47 @@ def add_junction(
         lines[j, 4] = p_z * d_x - p_x * d_z
         lines[j, 5] = p_x * d_y - p_y * d_x
         lines[j, 6], lines[j, 7], lines[j, 8] = d_x, d_y, d_z
-    first, damping = JUNCTION_CABLES * junction, robot.cables.damping
+    damping = robot.cables.damping
     weights = (
         time * damping[first],
-        time * damping[first + 1],
-        time * damping[first + 2],
-        time * damping[first + 3],
-        time * damping[first + 4],
-        time * damping[first + 5],
+        time * damping[min(first + 1, last - 1)],
+        time * damping[min(first + 2, last - 1)],
+        time * damping[min(first + 3, last - 1)],
+        time * damping[min(first + 4, last - 1)],
+        time * damping[min(first + 5, last - 1)],
     )
-    after = junction + 1
+    rear, front = robot.couplings.first[pair], robot.couplings.second[pair]
+    turn, shift = column, column + 3  # the columns of the front body's rotation and translation
     for r in range(3):
         u = weighted(lines, r, weights)
         w = weighted(lines, 3 + r, weights)
         d = weighted(lines, 6 + r, weights)
         for c in range(r, 3):
-            rows[junction, r, c] += product(u, lines, c)
-            rows[after, r, c] = product(w, lines, 3 + c)
+            rows[rear, r, c] += product(u, lines, c)
+            rows[front, r, c] += product(w, lines, 3 + c)
             dd = product(d, lines, 6 + c)
-            rows[junction, 3 + r, 3 + c] += dd
-            rows[after, 3 + r, 3 + c] = dd
-            rows[junction, 3 + r, 9 + c] = -dd
-            rows[junction, 3 + c, 9 + r] = -dd
+            rows[rear, 3 + r, 3 + c] += dd
+            rows[front, 3 + r, 3 + c] += dd
+            put(-dd, adds, rear, 3 + r, shift + c, rows)
+            if c > r:
+                put(-dd, adds, rear, 3 + c, shift + r, rows)
         for c in range(3):
-            rows[junction, r, 6 + c] = product(u, lines, 3 + c)
+            put(product(u, lines, 3 + c), adds, rear, r, turn + c, rows)
             ud = product(u, lines, 6 + c)
-            rows[junction, r, 3 + c] -= ud
-            rows[junction, r, 9 + c] = ud
+            rows[rear, r, 3 + c] -= ud
+            put(ud, adds, rear, r, shift + c, rows)
             wd = product(w, lines, 6 + c)
-            rows[after, r, 3 + c] = wd
-            rows[junction, 3 + c, 6 + r] = -wd
+            rows[front, r, 3 + c] += wd
+            put(-wd, adds, rear, 3 + c, turn + r, rows)
+
+
+@inlined
+def put(value: Real, adds: bool, body: int, r: int, c: int, rows: Table) -> None:
+    """Writes a value into the rows, or adds it."""
+    if adds:
+        rows[body, r, c] += value
+    else:
+        rows[body, r, c] = value
 
 
 @inlined
@@ -145,7 +279,7 @@ def add_contact(
 ) -> None:
     """Adds time * damping + time² * stiffness of a contact, which acts where it touches."""
     nodes, frames = forces.nodes, forces.frames
-    touches, node = modes[i, CONTACT] != 0.0, ground.contacts[i]
+    touches, node, body = modes[i, CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
     depth = -gap(nodes, ground, frames, i)
     slide, _ = sliding(nodes, modes, ground, law, frames, i)
     k_1, k_12, k_2 = friction_damping(slide, time, ground.friction)
@@ -153,7 +287,6 @@ def add_contact(
     k_12 = select(touches, k_12, 0.0)
     presses = touches & (forces.pushes[i, NORMAL] > 0.0)
     k_n = select(presses, time * (law.damping * depth + time * law.stiffness), 0.0)
-    body = node // (nodes.shape[0] // rows.shape[0])
     # The columns of the matrix in World, and from the frame's: R K, then (R K) Rᵀ.
     a = to_world(k_1, k_12, 0.0, frames, i, ground.flat)
     b = to_world(k_12, k_2, 0.0, frames, i, ground.flat)

@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK
+from tetra_drake.engines.compiled.block_sparse import BLOCK
+from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.errors import MAX_SPEED
 from tetra_drake.physics.cable import LENGTH
@@ -79,6 +80,7 @@ class Constants(NamedTuple):
     SI units."""
 
     robot: Model
+    solver: Solver
     network: Network
     senses: Senses
     sides: Table
@@ -186,7 +188,14 @@ def iterate(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
     clock[STEP], clock[END] = step, step_end
     foresee_signals(constants, walk, log, live)
     error = take_step(
-        constants.robot, walk.step, walk.modes, walk.forces, walk.end_signals, step, live
+        constants.robot,
+        constants.solver,
+        walk.step,
+        walk.modes,
+        walk.forces,
+        walk.end_signals,
+        step,
+        live,
     )
 
     accepted = walks & (error <= constants.tolerance[0])
@@ -212,11 +221,11 @@ def arrive(constants: Constants, walk: Walk) -> None:
     robot, forces, state = constants.robot, walk.forces, walk.step.state
     move_robot(robot, state, forces)
     update_modes(state, forces.nodes, robot.ground, forces.frames, walk.modes)
-    compute_forces(robot, walk.modes, walk.signals, True, forces, walk.step.force)
+    compute_forces(robot, state, walk.modes, walk.signals, True, forces, walk.step.force)
     observe(
         walk.tally,
         robot.cables,
-        robot.ground.contacts,
+        robot.ground.carriers,
         walk.clock[TIME],
         walk.signals,
         forces.pulls,
@@ -258,11 +267,7 @@ def aim(constants: Constants, walk: Walk) -> Real:
     """The step (s) to try: at most the planned one, to just after the next mode change if that is
     nearer, and to the next mark or half the way to it if that is near."""
     robot, clock = constants.robot, walk.clock
-    per_moment, per_mass = 1.0 / robot.body.moment[0], 1.0 / robot.body.mass[0]
-    for body in range(walk.acceleration.size // BLOCK):
-        for j in range(BLOCK):
-            i = BLOCK * body + j
-            walk.acceleration[i] = walk.step.force[i] * (per_moment if j < 3 else per_mass)
+    accelerate(robot, walk.forces.inertia, walk.step.force, walk.acceleration)
     planned = clock[PLANNED]
     change = time_to_mode_change(
         walk.step.state,

@@ -9,10 +9,13 @@ A an approximation of the Jacobian of y' = f(t, y):
     y(t + h) = y + 3/2 h k1 + 1/2 h k2
 
 It is of order 2 whatever A is, and stable at any step with the exact one. Here A holds the
-dampings (a symmetric matrix, block-tridiagonal since cables join neighbours) and the
+dampings (a symmetric matrix with blocks for pairs of bodies that cables join) and the
 stiffness of contacts. How forces change with positions otherwise, and with the signals, is not
 stiff, but where damping dominates it decides the motion: left out, the method falls to order 1.
 It enters by its product with the velocities, a difference of forces along the motion.
+
+The equations are multiplied by the mass matrix at the beginning of the step. Where bodies are not
+isotropic, it turns with them, and later torques are referred to it.
 """
 
 from __future__ import annotations
@@ -20,11 +23,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, factorise, solve
-from tetra_drake.engines.compiled.dynamics import implicit_matrix, inertia
+from tetra_drake.engines.compiled.block_sparse import BLOCK, factorise, solve
+from tetra_drake.engines.compiled.dynamics import Solver, implicit_matrix, momentum, refer_torques
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
-from tetra_drake.physics.kinematics import move_bodies
+from tetra_drake.physics.inertia import INERTIA_COLUMNS
+from tetra_drake.physics.kinematics import P_BN_W, move_bodies
 from tetra_drake.physics.model import Model
+from tetra_drake.physics.vectors import cross, vector_at
 from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, select
 
@@ -44,14 +49,23 @@ class Step(NamedTuple):
     k1: Table
     k2: Table
     rows: Table
-    """(bodies, 6, 12)."""
+    """(bodies, 6, the schedule's width)."""
     lines: Table
-    """(JUNCTION_CABLES, 9)."""
+    """(CABLES_AT_ONCE, LINE_COLUMNS)."""
+    inertia: Table
+    """(bodies, INERTIA_COLUMNS): at the state."""
 
 
 @merged
 def take_step(
-    robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, step: Real, keep: bool
+    robot: Model,
+    solver: Solver,
+    work: Step,
+    modes: Table,
+    forces: Forces,
+    signals: Table,
+    step: Real,
+    keep: bool,
 ) -> Real:
     """Writes the end of a step (s); `signals` are the end's. What is given of the state: `forces`,
     whose nodes and frames are overwritten, and work.force. With `keep`, all `forces` become those
@@ -64,46 +78,78 @@ def take_step(
     size, scaled = work.force.size, GAMMA * step
     bodies = size // BLOCK
     first = state.size - size
-    implicit_matrix(robot, modes, forces, scaled, work.lines, work.rows)
-    factorise(work.rows)
+    implicit_matrix(robot, solver, modes, forces, scaled, work.lines, work.rows)
+    factorise(work.rows, solver.schedule)
+    if not robot.isotropic:
+        for body in range(bodies):
+            for c in range(INERTIA_COLUMNS):
+                work.inertia[body, c] = forces.inertia[body, c]
 
     for i in range(size):
         stage[i] = end[first + i] = state[first + i]
     move_bodies(state, stage, step, end)
-    move_robot(robot, end, forces)
-    compute_forces(robot, modes, signals, False, forces, work.end_force)
+    compute_end_forces(robot, work, modes, forces, signals, False)
     for i in range(size):
         work.change[i] = GAMMA * (work.end_force[i] - work.force[i])
         k1[i] = work.force[i] + work.change[i]
-    solve(work.rows, k1)
+    solve(work.rows, solver.schedule, k1)
 
     for i in range(size):
         stage[i] = state[first + i] + scaled * k1[i]
         end[first + i] = state[first + i] + step * k1[i]
     move_bodies(state, stage, step, end)
-    move_robot(robot, end, forces)
-    compute_forces(robot, modes, signals, keep, forces, work.end_force)
+    compute_end_forces(robot, work, modes, forces, signals, keep)
     for body in range(bodies):
+        gained = momentum(robot, work.inertia, k1, body)
         for j in range(BLOCK):
             i = BLOCK * body + j
-            k2[i] = work.end_force[i] - 2.0 * (inertia(robot, j) * k1[i]) - work.change[i]
-    solve(work.rows, k2)
+            k2[i] = work.end_force[i] - 2.0 * gained[j] - work.change[i]
+    solve(work.rows, solver.schedule, k2)
 
-    turn, shift = 0.0, 0.0
-    for body in range(bodies):
-        for j in range(BLOCK):
-            i = BLOCK * body + j
-            velocity, difference = state[first + i], abs(k1[i] + k2[i])
-            # The position's second stage is stage 2's velocity - 2 (stage 1's rate) + γ h k2.
-            stage_2 = velocity + step * k1[i] - 2.0 * stage[i] + scaled * k2[i]
-            stage[i] = 1.5 * stage[i] + 0.5 * stage_2
-            end[first + i] = velocity + step * (1.5 * k1[i] + 0.5 * k2[i])
-            if j < 3:
-                turn = larger(turn, difference)
-            else:
-                shift = larger(shift, difference)
+    for i in range(size):
+        velocity = state[first + i]
+        # The position's second stage is stage 2's velocity - 2 (stage 1's rate) + γ h k2.
+        stage_2 = velocity + step * k1[i] - 2.0 * stage[i] + scaled * k2[i]
+        stage[i] = 1.5 * stage[i] + 0.5 * stage_2
+        end[first + i] = velocity + step * (1.5 * k1[i] + 0.5 * k2[i])
     move_bodies(state, stage, step, end)
-    return 0.5 * step * larger(robot.body.radius[0] * turn, shift)
+    return 0.5 * step * largest_difference(robot, forces.nodes, k1, k2)
+
+
+@inlined
+def compute_end_forces(
+    robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, keep: bool
+) -> None:
+    """Writes work.end_force, in which torques are those that the mass matrix at the beginning of
+    the step needs."""
+    move_robot(robot, work.end, forces)
+    compute_forces(robot, work.end, modes, signals, keep, forces, work.end_force)
+    if not robot.isotropic:
+        refer_torques(work.inertia, forces.inertia, work.end_force)
+
+
+@inlined
+def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real:
+    """The largest component of k1 + k2 as an acceleration (m/s²) of a body, or by rotation of its
+    nodes; NaN if one is.
+
+    The spin of a thin bar about its axis does not count, as it moves no node.
+    """
+    largest = 0.0
+    for body in range(k1.size // BLOCK):
+        i = BLOCK * body
+        for j in range(3, BLOCK):
+            largest = larger(largest, abs(k1[i + j] + k2[i + j]))
+        x, y, z = k1[i] + k2[i], k1[i + 1] + k2[i + 1], k1[i + 2] + k2[i + 2]
+        if robot.isotropic:
+            turn = larger(larger(abs(x), abs(y)), abs(z))
+            largest = larger(largest, robot.bodies.radius[body] * turn)
+        else:
+            for node in range(robot.first_node[body], robot.first_node[body + 1]):
+                v_x, v_y, v_z = cross((x, y, z), vector_at(nodes, node, P_BN_W))
+                moves = larger(larger(abs(v_x), abs(v_y)), abs(v_z))
+                largest = larger(largest, moves)
+    return largest
 
 
 @inlined

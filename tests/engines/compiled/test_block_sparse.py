@@ -1,0 +1,66 @@
+"""The linear solver, against numpy on the same matrix written out."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from tetra_drake.engines.compiled.block_sparse import BLOCK, Schedule, factorise, solve
+
+GRAPHS = {
+    "one body": (1, []),
+    "row": (5, [(0, 1), (1, 2), (2, 3), (3, 4)]),
+    "ring": (6, [(0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 0)]),
+    "all coupled": (3, [(0, 1), (0, 2), (1, 2)]),
+    "six-bar": (6, [(a, b) for a, b in itertools.combinations(range(6), 2) if a // 2 != b // 2]),
+    "two rows apart": (4, [(0, 2), (1, 3)]),
+}
+
+
+def random_matrix(bodies: int, pairs: list[tuple[int, int]]) -> np.ndarray:
+    """A random positive definite matrix, in which the pairs of bodies are coupled."""
+    generator = np.random.default_rng(bodies)
+    matrix = 0.1 * np.eye(BLOCK * bodies)
+    for body_a, body_b in [*pairs, *((body, body) for body in range(bodies))]:
+        for _ in range(6):
+            vector = np.zeros((bodies, BLOCK))
+            vector[body_a], vector[body_b] = generator.normal(size=(2, BLOCK))
+            matrix += generator.uniform(0.1, 2.0) * np.outer(vector, vector)
+    return matrix
+
+
+def rows_of(matrix: np.ndarray, schedule: Schedule) -> np.ndarray:
+    """The matrix as rows; NaN below the diagonal, which nothing may read."""
+    blocks = matrix.reshape(len(matrix) // BLOCK, BLOCK, -1, BLOCK).swapaxes(1, 2)
+    rows = np.full((len(blocks), BLOCK, schedule.width), np.nan)
+    for i, row in enumerate(rows):
+        later = schedule.later[i, : schedule.count[i]]
+        row[:, : BLOCK * (1 + len(later))] = np.hstack([blocks[i, i], *blocks[i, later]])
+        row[np.tril_indices(BLOCK, -1)] = np.nan
+    return rows
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_solves_what_it_was_made_of(graph):
+    bodies, pairs = GRAPHS[graph]
+    matrix, schedule = random_matrix(bodies, pairs), Schedule.of(bodies, pairs)
+    right_side = np.random.default_rng(1).normal(size=BLOCK * bodies)
+    rows, x = rows_of(matrix, schedule), right_side.copy()
+    factorise(rows, schedule)
+    solve(rows, schedule, x)
+    np.testing.assert_allclose(x, np.linalg.solve(matrix, right_side), rtol=1e-9, atol=1e-12)
+
+
+def test_a_row_of_bodies_fills_nothing_in():
+    schedule = Schedule.of(*GRAPHS["row"])
+    assert schedule.count.tolist() == [1, 1, 1, 1, 0]
+    assert schedule.width == 2 * BLOCK
+
+
+def test_elimination_couples_the_neighbours_of_a_body():
+    # In a ring, body 0 couples 1 and 5, then 1 couples 2 and 5, and so on.
+    schedule = Schedule.of(*GRAPHS["ring"])
+    assert [schedule.later[i, : schedule.count[i]].tolist() for i in range(6)] == [
+        [1, 5], [2, 5], [3, 5], [4, 5], [5], [],
+    ]  # fmt: skip
+    assert schedule.column_of(1, 5) == 2 * BLOCK

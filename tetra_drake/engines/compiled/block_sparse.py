@@ -1,0 +1,157 @@
+"""Symmetric positive definite systems of 6 x 6 blocks, a block per body, for any graph of bodies.
+
+Bodies are eliminated in their order, by a schedule that is made once from the pairs of bodies that
+are coupled. A system is kept as `rows`, (bodies, 6, width): row r of body i holds, from the
+diagonal on, its own block (columns 0 to 5), then one block for each later body that i is coupled
+to, those included that become coupled as bodies before i are eliminated. In a row of bodies each
+is coupled to the next one only, and the system is block-tridiagonal.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from tetra_drake.simd.compiling import inlined
+from tetra_drake.simd.lanes import Real, Table
+
+BLOCK = 6
+
+
+class Schedule(NamedTuple):
+    """The order in which a system's blocks are eliminated."""
+
+    count: Table
+    """(bodies,): the number of later bodies that each body is coupled to."""
+    later: Table
+    """(bodies, most): those bodies, ascending."""
+    column: Table
+    """(bodies, most, most): of bodies i, a, b, the column in the rows of the body later[i, a] at
+    which its block with later[i, b] begins; b is at least a."""
+
+    @classmethod
+    def of(cls, bodies: int, pairs: Iterable[tuple[int, int]]) -> Self:
+        """The schedule of so many bodies, of which pairs are coupled."""
+        coupled: list[set[int]] = [set() for _ in range(bodies)]
+        for pair in pairs:
+            coupled[min(pair)].add(max(pair))
+        for body in range(bodies):
+            # Its elimination couples all later bodies that it is coupled to with each other.
+            for first, second in itertools.combinations(sorted(coupled[body]), 2):
+                coupled[first].add(second)
+        later = [sorted(others) for others in coupled]
+        count = np.array([len(others) for others in later])
+        most = max(1, count.max())
+        schedule = cls(
+            count=count,
+            later=np.zeros((bodies, most), dtype=np.int64),
+            column=np.zeros((bodies, most, most), dtype=np.int64),
+        )
+        for body, others in enumerate(later):
+            schedule.later[body, : len(others)] = others
+            for a, b in itertools.combinations(range(len(others)), 2):
+                place = later[others[a]].index(others[b])
+                schedule.column[body, a, b] = BLOCK * (1 + place)
+        return schedule
+
+    @property
+    def width(self) -> int:
+        """Width of the rows."""
+        return BLOCK * (1 + self.later.shape[1])
+
+    @property
+    def blocks(self) -> set[tuple[int, int]]:
+        """The pairs of bodies whose block is not zero, or is filled in."""
+        return {
+            (body, int(other))
+            for body, count in enumerate(self.count)
+            for other in self.later[body, :count]
+        }
+
+    def column_of(self, first: int, second: int) -> int:
+        """The column in the rows of body `first` at which its block with `second` begins."""
+        others = self.later[first, : self.count[first]].tolist()
+        return BLOCK * (1 + others.index(second))
+
+
+@inlined
+def factorise(rows: Table, schedule: Schedule) -> None:
+    """Turns `rows` into its factors in place: L D Lᵀ with 1 / D on the diagonal."""
+    for i in range(rows.shape[0]):
+        coupled = schedule.count[i]
+        width = BLOCK * (1 + coupled)
+        for r in range(BLOCK):
+            inverse = 1.0 / rows[i, r, r]
+            rows[i, r, r] = inverse
+            for t in range(r + 1, BLOCK):
+                factor = rows[i, r, t] * inverse
+                for c in range(t, width):
+                    rows[i, t, c] -= factor * rows[i, r, c]
+            for a in range(coupled):
+                eliminate_row(rows, schedule, i, r, a, inverse)
+
+
+@inlined
+def eliminate_row(rows: Table, schedule: Schedule, i: int, r: int, a: int, inverse: Real) -> None:
+    """Takes row r of body i, whose pivot has the inverse given, out of the rows of the a-th body
+    that it is coupled to."""
+    j, first = schedule.later[i, a], BLOCK * (1 + a)
+    for t in range(BLOCK):
+        factor = rows[i, r, first + t] * inverse
+        for c in range(t, BLOCK):
+            rows[j, t, c] -= factor * rows[i, r, first + c]
+        for b in range(a + 1, schedule.count[i]):
+            target, source = schedule.column[i, a, b], BLOCK * (1 + b)
+            for c in range(BLOCK):
+                rows[j, t, target + c] -= factor * rows[i, r, source + c]
+
+
+@inlined
+def solve(rows: Table, schedule: Schedule, x: Table) -> None:
+    """Solves with the factors; `x`, (6 bodies,), holds the right-hand side, then the solution.
+
+    The numbers of a body are in variables: in a loop over x, each would wait for the memory.
+    """
+    bodies = rows.shape[0]
+    for i in range(bodies):
+        f = BLOCK * i
+        x_0, x_1, x_2, x_3, x_4, x_5 = x[f], x[f + 1], x[f + 2], x[f + 3], x[f + 4], x[f + 5]
+        x_0 = x_0 * rows[i, 0, 0]
+        x_1 = (x_1 - rows[i, 0, 1] * x_0) * rows[i, 1, 1]
+        x_2 = (x_2 - rows[i, 0, 2] * x_0 - rows[i, 1, 2] * x_1) * rows[i, 2, 2]
+        x_3 -= rows[i, 0, 3] * x_0 + rows[i, 1, 3] * x_1 + rows[i, 2, 3] * x_2
+        x_4 -= rows[i, 0, 4] * x_0 + rows[i, 1, 4] * x_1 + rows[i, 2, 4] * x_2
+        x_5 -= rows[i, 0, 5] * x_0 + rows[i, 1, 5] * x_1 + rows[i, 2, 5] * x_2
+        x_3 = x_3 * rows[i, 3, 3]
+        x_4 = (x_4 - rows[i, 3, 4] * x_3) * rows[i, 4, 4]
+        x_5 = (x_5 - rows[i, 3, 5] * x_3 - rows[i, 4, 5] * x_4) * rows[i, 5, 5]
+        x[f], x[f + 1], x[f + 2], x[f + 3], x[f + 4], x[f + 5] = x_0, x_1, x_2, x_3, x_4, x_5
+        for a in range(schedule.count[i]):
+            g, k = BLOCK * schedule.later[i, a], BLOCK * (1 + a)
+            for c in range(BLOCK):
+                before = rows[i, 0, k + c] * x_0 + rows[i, 1, k + c] * x_1
+                before += rows[i, 2, k + c] * x_2
+                after = rows[i, 3, k + c] * x_3 + rows[i, 4, k + c] * x_4
+                after += rows[i, 5, k + c] * x_5
+                x[g + c] -= before + after
+    for i in range(bodies - 1, -1, -1):
+        f = BLOCK * i
+        for a in range(schedule.count[i]):
+            g, k = BLOCK * schedule.later[i, a], BLOCK * (1 + a)
+            for r in range(BLOCK):
+                after = rows[i, r, k] * x[g]
+                for c in range(1, BLOCK):
+                    after += rows[i, r, k + c] * x[g + c]
+                x[f + r] -= rows[i, r, r] * after
+        x_0, x_1, x_2, x_3, x_4, x_5 = x[f], x[f + 1], x[f + 2], x[f + 3], x[f + 4], x[f + 5]
+        x_4 -= rows[i, 4, 4] * (rows[i, 4, 5] * x_5)
+        x_3 -= rows[i, 3, 3] * (rows[i, 3, 5] * x_5 + rows[i, 3, 4] * x_4)
+        x_2 -= rows[i, 2, 2] * (rows[i, 2, 5] * x_5 + rows[i, 2, 4] * x_4 + rows[i, 2, 3] * x_3)
+        after = rows[i, 1, 5] * x_5 + rows[i, 1, 4] * x_4 + rows[i, 1, 3] * x_3
+        x_1 -= rows[i, 1, 1] * (after + rows[i, 1, 2] * x_2)
+        after = rows[i, 0, 5] * x_5 + rows[i, 0, 4] * x_4 + rows[i, 0, 3] * x_3
+        x_0 -= rows[i, 0, 0] * (after + rows[i, 0, 2] * x_2 + rows[i, 0, 1] * x_1)
+        x[f], x[f + 1], x[f + 2], x[f + 3], x[f + 4], x[f + 5] = x_0, x_1, x_2, x_3, x_4, x_5

@@ -1,0 +1,101 @@
+"""The row of nested tetrahedra of the thesis (section 2.1) as a structure."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydrake.multibody.tree import SpatialInertia
+
+from tetra_drake.physics.cable import CABLE
+from tetra_drake.robot.actuation import Actuation
+from tetra_drake.robot.bodies import node_inertia, strut_inertia
+from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario.cable_names import CABLES
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import RobotSection
+
+NODES = ("bottom_left", "bottom_right", "top", "tip")
+"""The nodes of a tetrahedron; the first three form the base triangle."""
+
+BOTTOM_LEFT, BOTTOM_RIGHT, TOP, TIP = range(4)
+BASE = (BOTTOM_LEFT, BOTTOM_RIGHT, TOP)
+STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
+
+
+def MakeTetrahedra(scenario: Scenario) -> Structure:
+    """The robot of thesis section 2.1 with `robot.tetrahedra` tetrahedra.
+
+    Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0; the
+    tips point forward (+x) into the next tetrahedron. Junction i joins T(i+1) and T(i+2)
+    by 3 outer cables (base node to base node) and 3 inner ones (tip to base nodes); see
+    CABLES and Actuation. On an incline without start, the robot is turned with
+    the slope, about World's y axis.
+    """
+    robot, cables = scenario.robot, scenario.cables
+    n = robot.tetrahedra
+    edge = robot.strut_length
+    circumradius = edge / math.sqrt(3.0)
+    height = edge * math.sqrt(2.0 / 3.0)
+    x, z = -height / 4, -circumradius / 2
+    base = [[x, edge / 2, z], [x, -edge / 2, z], [x, 0.0, circumradius]]
+    p_BN = np.array([*base, [3 * height / 4, 0.0, 0.0]])
+    bodies = tuple(f"T{i + 1}" for i in range(n))
+    p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
+    if robot.offsets:
+        p_WB += np.array(robot.offsets)
+    slope = scenario.terrain.plane_slope or 0.0
+    # Written out, as a product of matrices is rounded differently on different processors.
+    s, c = math.sin(slope), math.cos(slope)
+    forward, left, up = p_WB.T
+    p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
+    actuation, names = Actuation.of(scenario), []
+    rows: list[tuple[float, ...]] = []
+    for i in range(n - 1):
+        for cable in CABLES:
+            role, node = cable.split()
+            outer, place = role == "outer", NODES.index(node)
+            a, b = 4 * i + (place if outer else TIP), 4 * (i + 1) + place
+            stiffness = cables.outer_stiffness if outer else cables.inner_stiffness
+            driver = actuation.drivers[len(rows)]
+            rows.append((a, b, driver, stiffness, cables.damping, cables.free_length))
+            names.append(f"{bodies[i]}-{bodies[i + 1]} {cable}")
+    bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
+    contacts = [*bottom, 4 * (n - 1) + TIP] if robot.contacts == "thesis" else range(4 * n)
+    struts = [(4 * i + a, 4 * i + b) for i in range(n) for a, b in STRUTS]
+    mass, unit_inertia = tetrahedron_inertia(p_BN, robot)
+    q_WB = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
+    return Structure(
+        bodies=bodies,
+        node_names=tuple(f"{body} {node}" for body in bodies for node in NODES),
+        first_node=4 * np.arange(n + 1),
+        p_BN=np.tile(p_BN, (n, 1)),
+        struts=np.array(struts),
+        strut_radius=np.full(len(struts), robot.strut_diameter / 2),
+        node_radius=np.full(4 * n, robot.node_diameter / 2),
+        mass=np.full(n, mass),
+        unit_inertia=np.tile(unit_inertia, (n, 1)),
+        p_WB=p_WB,
+        q_WB=np.tile(q_WB, (n, 1)),
+        cables=np.array(rows, dtype=CABLE),
+        cable_names=tuple(names),
+        actuation=actuation,
+        contacts=np.array(contacts),
+        feet=2 * n + 1,
+    )
+
+
+def tetrahedron_inertia(p_BN: np.ndarray, robot: RobotSection) -> tuple[float, np.ndarray]:
+    """Mass, and unit inertia (6,) as in Structure, of six struts and four spheres with nodes p_BN
+    (4, 3)."""
+    total = SpatialInertia.Zero()
+    for a, b in STRUTS:
+        total += strut_inertia(
+            p_BN[a], p_BN[b], radius=robot.strut_diameter / 2, density=robot.density
+        )
+    for p_BNi in p_BN:
+        total += node_inertia(p_BNi, radius=robot.node_diameter / 2, density=robot.density)
+    # The sum is isotropic about Bo but for rounding, whose last bits would break the robot's
+    # left-right symmetry and let explicit schemes amplify that up to their accuracy.
+    moments = np.diag(total.get_unit_inertia().CopyToFullMatrix3())
+    return total.get_mass(), np.concatenate([moments, np.zeros(3)])
