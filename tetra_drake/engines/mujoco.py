@@ -27,8 +27,8 @@ from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.inertia import XX
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.physics.inertia import XX
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import Gait

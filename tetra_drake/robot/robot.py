@@ -87,7 +87,7 @@ class Robot:
         per_load = 1.0 / self.weight if "load" in pathways else 0.0
         return Senses(
             drivers=drivers,
-            ahead=self.actuation.junctions + 1,
+            ahead=self.actuation.ahead,
             carriers=self.ground.carriers,
             settled=settled,
             per_length=1.0 / (settled * sizes),

@@ -11,14 +11,19 @@ from tetra_drake.physics.cable import CABLE
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.bodies import node_inertia, strut_inertia
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.cable_names import CABLES
+from tetra_drake.scenario.nesting import (
+    BOTTOM_LEFT,
+    BOTTOM_RIGHT,
+    CABLES,
+    NODES,
+    TIP,
+    TOP,
+    cable_nodes,
+    tetrahedron_nodes,
+)
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import RobotSection
 
-NODES = ("bottom_left", "bottom_right", "top", "tip")
-"""The nodes of a tetrahedron; the first three form the base triangle."""
-
-BOTTOM_LEFT, BOTTOM_RIGHT, TOP, TIP = range(4)
 BASE = (BOTTOM_LEFT, BOTTOM_RIGHT, TOP)
 STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
 
@@ -37,9 +42,7 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     edge = robot.strut_length
     circumradius = edge / math.sqrt(3.0)
     height = edge * math.sqrt(2.0 / 3.0)
-    x, z = -height / 4, -circumradius / 2
-    base = [[x, edge / 2, z], [x, -edge / 2, z], [x, 0.0, circumradius]]
-    p_BN = np.array([*base, [3 * height / 4, 0.0, 0.0]])
+    p_BN = tetrahedron_nodes(edge)
     bodies = tuple(f"T{i + 1}" for i in range(n))
     p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
     if robot.offsets:
@@ -49,17 +52,14 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     s, c = math.sin(slope), math.cos(slope)
     forward, left, up = p_WB.T
     p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
-    actuation, names = Actuation.of(scenario), []
+    actuation = Actuation.of(scenario)
     rows: list[tuple[float, ...]] = []
     for i in range(n - 1):
         for cable in CABLES:
-            role, node = cable.split()
-            outer, place = role == "outer", NODES.index(node)
-            a, b = 4 * i + (place if outer else TIP), 4 * (i + 1) + place
+            outer = cable.startswith("outer")
             stiffness = cables.outer_stiffness if outer else cables.inner_stiffness
-            driver = actuation.drivers[len(rows)]
-            rows.append((a, b, driver, stiffness, cables.damping, cables.free_length))
-            names.append(f"{bodies[i]}-{bodies[i + 1]} {cable}")
+            law = stiffness, cables.damping, cables.free_length
+            rows.append((*cable_nodes(i, cable), actuation.drivers[len(rows)], *law))
     bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
     contacts = [*bottom, 4 * (n - 1) + TIP] if robot.contacts == "thesis" else range(4 * n)
     struts = [(4 * i + a, 4 * i + b) for i in range(n) for a, b in STRUTS]
@@ -78,7 +78,7 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
         p_WB=p_WB,
         q_WB=np.tile(q_WB, (n, 1)),
         cables=np.array(rows, dtype=CABLE),
-        cable_names=tuple(names),
+        cable_names=scenario.robot.layout().cable_names,
         actuation=actuation,
         contacts=np.array(contacts),
         feet=2 * n + 1,

@@ -16,6 +16,7 @@ import pydantic
 from pydantic import Field
 
 from tetra_drake.files import read_text
+from tetra_drake.scenario.layout import Layout
 from tetra_drake.scenario.sections import Section, described, hint, quantity, refuse
 from tetra_drake.scenario.units import quantity_to_si
 from tetra_drake.scenario.yaml_text import parse_yaml
@@ -107,6 +108,29 @@ class Structure(Section):
         return tuple(_members("cables", self.cables))
 
     @cached_property
+    def ordered_cables(self) -> tuple[int, ...]:
+        """The numbers of the cables, pair by pair of bodies: the order in which they are simulated
+        and recorded."""
+        bodies = [self._bodies_joined(cable) for cable in self.all_cables]
+        return tuple(sorted(range(len(bodies)), key=bodies.__getitem__))
+
+    def layout(self) -> Layout:
+        """Cables and oscillators of the robot, cables in the order of `ordered_cables`."""
+        cables = [self.all_cables[number] for number in self.ordered_cables]
+        place = {number: place for place, number in enumerate(self.ordered_cables)}
+        ends = [[self.nodes[node] for node in cable.nodes] for cable in cables]
+        return Layout(
+            cable_names=tuple(cable.name for cable in cables),
+            ends=np.array(ends).reshape(-1, 2, 3),
+            bodies=np.array([self._bodies_joined(cable) for cable in cables]).reshape(-1, 2),
+            oscillators=tuple(self.actuated),
+            groups=tuple(
+                tuple(place[number] for number in numbers)
+                for numbers in self.cables_of_oscillator.values()
+            ),
+        )
+
+    @cached_property
     def bodies(self) -> tuple[tuple[str, ...], ...]:
         """The nodes of each rigid body, bodies and nodes in the order of the struts."""
         return _components(strut.nodes for strut in self.all_struts)
@@ -169,6 +193,11 @@ class Structure(Section):
             backward = cable._replace(nodes=(cable.nodes[1], cable.nodes[0]))
             numbers[cable.name] = numbers[backward.name] = number
         return numbers
+
+    def _bodies_joined(self, cable: Member) -> tuple[int, int]:
+        """The numbers of the bodies that a cable joins, the lower one first."""
+        first, second = (self.body_of_node[node] for node in cable.nodes)
+        return min(first, second), max(first, second)
 
     def _length(self, member: Member) -> float:
         first, second = (np.array(self.nodes[node]) for node in member.nodes)

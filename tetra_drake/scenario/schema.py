@@ -8,7 +8,6 @@ from typing import Any, Self, TypeVar
 from pydantic import PrivateAttr
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.cable_names import mirrored, side_of
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
@@ -229,16 +228,14 @@ def _check_memory(scenario: Scenario, source: object) -> None:
 
 def _check_sides(scenario: Scenario, source: object) -> None:
     """Raises InputError if gaits turn, or are mirrored, where groups of cables have no sides."""
-    groups, bounds = scenario.robot.actuation, scenario.gait_bounds
-    if bounds.turn != 0.0 and not any(side_of(group) for group in groups):
+    layout, bounds = scenario.robot.layout(), scenario.gait_bounds
+    if bounds.turn != 0.0 and not layout.sides.any():
         problem = f"found {bounds.turn}, expected 0, as no group is on one side"
         raise InputError(source, "gait_bounds.turn", problem)
-    if bounds.mirrored:
-        sets = [set(group) for group in groups]
-        for group in groups:
-            if set(mirrored(group)) not in sets:
-                problem = f"found true, expected false, as {group} has no mirror image"
-                raise InputError(source, "gait_bounds.mirrored", problem)
+    if bounds.mirrored and None in layout.images:
+        oscillator = layout.oscillators[layout.images.index(None)]
+        problem = f"found true, expected false, as '{oscillator}' has no mirror image"
+        raise InputError(source, "gait_bounds.mirrored", problem)
 
 
 def _check_disturbances(scenario: Scenario, source: object) -> None:

@@ -9,7 +9,8 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
-from tetra_drake.scenario.cable_names import Cable
+from tetra_drake.scenario.layout import Layout
+from tetra_drake.scenario.nesting import Cable, row_layout
 from tetra_drake.scenario.sections import Section, quantity, refuse
 
 Pathway = Literal["length", "load", "pitch"]
@@ -58,6 +59,15 @@ class RobotSection(Section):
             if cables.count(cable) > 1:
                 refuse("actuation", f"found '{cable}' twice, expected each cable once at most")
         return self
+
+    def layout(self) -> Layout:
+        """Cables and oscillators of the robot."""
+        return row_layout(
+            tetrahedra=self.tetrahedra,
+            strut_length=self.strut_length,
+            spacing=self.spacing,
+            groups=self.actuation,
+        )
 
 
 class GroundSection(Section):
