@@ -16,7 +16,6 @@ from tetra_drake.figures.style import OKABE_ITO, SHADE, add_grid, common_style, 
 from tetra_drake.formatting import fixed
 from tetra_drake.physics.contact import Ground
 from tetra_drake.results.measures import intervals, off_ground, share_of_time
-from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, NODES
 from tetra_drake.scenario.units import POUND_FORCE
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
@@ -37,11 +36,12 @@ def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
     One panel per oscillator, with the first of the cables that it drives.
     """
     forces = trajectory[["signal", "tension"]] / POUND_FORCE
-    groups = forces.sizes["oscillator"] // len(np.unique(forces.oscillator_junction))
-    figure, panels = _panels_over_time(forces.oscillator.values, groups=groups)
-    for oscillator, panel in panels.items():
-        driven = np.flatnonzero(forces.cable_signal == oscillator)[0]
-        panel.plot(forces.time, forces.tension[:, driven], **_FIRST)
+    oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
+    driven = [signals.index(oscillator) for oscillator in oscillators]
+    groups = len(driven) // len(np.unique(forces.cable_bodies[driven]))
+    figure, panels = _panels_over_time(oscillators, groups=groups)
+    for cable, (oscillator, panel) in zip(driven, panels.items(), strict=True):
+        panel.plot(forces.time, forces.tension[:, cable], **_FIRST)
         panel.plot(forces.time, forces.signal.sel(oscillator=oscillator), **_SECOND)
     legend_below(figure, {"cable tension": _FIRST, "signal": _SECOND})
     swing = np.ptp(forces.signal.values, axis=0).max()
@@ -56,19 +56,18 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
     """Normal force and friction along x (lbf) over the last seconds of time (s).
 
     On uneven ground, friction along the forward tangent, which is x projected on the slope. One
-    panel per tetrahedron, for its bottom left node, one for each right one that is not its mirror
-    image, and one for each other node that touches. Shaded: intervals without normal force, with
-    their share of the time shown. Triangles: landings. An impact is shorter than the time between
-    two samples, so a sample may show or miss its peak. The scale is that of the forces between
-    impacts: peaks beyond it are cut off.
+    panel per body that can touch, for the first of its nodes that can, and one for each other node
+    that touches and is not its mirror image. Shaded: intervals without normal force, with their
+    share of the time shown. Triangles: landings. An impact is shorter than the time between two
+    samples, so a sample may show or miss its peak. The scale is that of the forces between impacts:
+    peaks beyond it are cut off.
     """
     end = trajectory.sel(time=slice(trajectory.time[-1] - seconds, None))
     forces = end[["normal_force", "friction_force"]] / POUND_FORCE
     shown = _contacts_to_show(end)
     along = "along x" if ground.flat else "along the forward tangent"
-    right = sum(name.endswith(NODES[BOTTOM_RIGHT]) for name in shown)
-    both = right == trajectory.sizes["tetrahedron"]
-    figure, panels = _panels_over_time(shown, groups=2 if both else 1)
+    _, per_body = np.unique(end.contact_body.sel(contact=shown), return_counts=True)
+    figure, panels = _panels_over_time(shown, groups=per_body.min())
     for contact, panel in panels.items():
         node, off = forces.sel(contact=contact), off_ground(end.sel(contact=contact))
         lifted = intervals(off.time.values, off.values)
@@ -103,20 +102,16 @@ def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | Non
 
 
 def _contacts_to_show(trajectory: xarray.Dataset) -> list[str]:
-    """Names of the bottom left nodes, of right ones that bear something else, and of other nodes
-    that touch."""
-    shown, normal = [], trajectory.normal_force
-    for name in trajectory.contact.values:
-        body, node = name.split()
-        force = normal.sel(contact=name)
-        if node == NODES[BOTTOM_LEFT]:
-            show = True
-        elif node == NODES[BOTTOM_RIGHT]:
-            left = normal.sel(contact=f"{body} {NODES[BOTTOM_LEFT]}")
-            show = bool(abs(force - left).mean() > _MIRRORED * left.mean())
-        else:
-            show = bool((force > 0.0).any())
-        if show:
+    """Names of the first contact node of each body, and of others that touch and bear something
+    else."""
+    shown: list[str] = []
+    first_forces: dict[str, xarray.DataArray] = {}
+    for force in trajectory.normal_force.transpose("contact", "time"):
+        name, body = str(force.contact.item()), str(force.contact_body.item())
+        first = first_forces.setdefault(body, force)
+        mirrored = bool(abs(force - first).mean() <= _MIRRORED * first.mean())
+        touches = bool((force > 0.0).any())
+        if force is first or (touches and not mirrored):
             shown.append(name)
     return shown
 

@@ -85,16 +85,17 @@ def draw_trajectory(gait: GaitMotion, folder: Path) -> dict[str, str]:
 
     Raises InputError if the folder cannot be written to.
     """
-    trajectory, ground = gait.trajectory, Robot.of(gait.scenario).ground
-    return _save(
-        folder,
-        (motion.time_lapse, trajectory),
+    trajectory, robot = gait.trajectory, Robot.of(gait.scenario)
+    pictures: list[tuple[Any, ...]] = [
+        (motion.time_lapse, trajectory, robot.structure),
         (motion.path_of_the_centre, trajectory),
         (motion.relative_distances, trajectory),
-        (motion.one_step, trajectory, ground),
-        (forces.signals_and_tensions, trajectory),
-        (forces.ground_forces, trajectory, ground),
-    )
+        (motion.one_step, trajectory, robot),
+    ]
+    if robot.structure.signals:
+        pictures.append((forces.signals_and_tensions, trajectory))
+    pictures.append((forces.ground_forces, trajectory, robot.ground))
+    return _save(folder, *pictures)
 
 
 def draw_run(study: Study, folder: Path) -> dict[str, str]:
@@ -109,7 +110,8 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
     walks = [(gait.label, gait.motion.trajectory) for gait in (study.initial, study.best)]
-    pictures.append((motion.before_and_after, walks))
+    structure = Robot.of(run.manifest.scenario).structure
+    pictures.append((motion.before_and_after, walks, structure))
     captions = _save(folder, *pictures)
     return captions | draw_trajectory(study.best.motion, folder)
 

@@ -44,11 +44,16 @@ class Structure:
     """(cables,) of dtype CABLE: pair by pair of bodies, from the lower index to the higher one."""
     cable_names: tuple[str, ...]
     """Such as "T1-T2 outer bottom_left"."""
+    cable_groups: tuple[str, ...]
+    """The group of each cable, such as "outer"."""
     actuation: Actuation
     contacts: np.ndarray
     """(contacts,): the indices of the nodes that the ground can touch, ascending."""
     feet: int
     """Nodes that bear the weight at rest."""
+    markers: np.ndarray
+    """(markers,): the indices of the nodes whose paths pictures show, body by body: the bottom
+    nodes of a row of tetrahedra. None for other structures, whose centre is shown."""
 
     @property
     def signals(self) -> int:

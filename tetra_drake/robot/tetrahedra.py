@@ -79,9 +79,11 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
         q_WB=np.tile(q_WB, (n, 1)),
         cables=np.array(rows, dtype=CABLE),
         cable_names=scenario.robot.layout().cable_names,
+        cable_groups=tuple(cable.split()[0] for cable in CABLES) * (n - 1),
         actuation=actuation,
         contacts=np.array(contacts),
         feet=2 * n + 1,
+        markers=np.array(bottom),
     )
 
 
