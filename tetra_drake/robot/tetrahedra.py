@@ -75,8 +75,10 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
         q_WB=q_WB,
         cables=np.array(rows, dtype=CABLE),
         cable_names=scenario.robot.layout().cable_names,
+        slack=cables.slack,
         actuation=actuation,
         contacts=np.array(contacts),
+        thesis_nodes=(BOTTOM_LEFT, BOTTOM_RIGHT, 4 * (n - 1) + TIP),
         feet=2 * n + 1,
     )
 
