@@ -77,6 +77,7 @@ def make_standing_tetrahedron(scenario: Scenario) -> Robot:
         cable_names=(),
         cable_groups=(),
         contacts=np.array(BASE),
+        thesis_nodes=None,
         feet=len(BASE),
         markers=row.markers[:2],
     )

@@ -46,8 +46,9 @@ ROW = make_row()
 
 def arguments(draw, robot):
     """What a figure needs to know of the robot."""
-    of = {time_lapse: [robot.structure], one_step: [robot], ground_forces: [robot.ground]}
-    return of.get(draw, [])
+    if draw in (relative_distances, time_lapse):
+        return [robot.structure]
+    return [robot] if draw in (one_step, ground_forces) else []
 
 
 @functools.cache
@@ -102,7 +103,7 @@ def robots(panel):
 
 
 def test_relative_distances_are_in_inches(walk):
-    [panel] = relative_distances(walk).axes
+    [panel] = relative_distances(walk, ROW.structure).axes
     lines = {line.get_label(): line for line in panel.lines}
     for i, name in enumerate(walk.body.values):
         np.testing.assert_allclose(lines[name].get_xdata(), walk.time)
@@ -209,7 +210,7 @@ def test_a_column_shows_the_signals_of_the_same_cables():
 
 
 def test_ground_forces_are_those_of_the_last_seconds(walk):
-    panels = ground_forces(walk, ROW.ground, seconds=3.0).axes
+    panels = ground_forces(walk, ROW, seconds=3.0).axes
     names = [f"T{i} bottom left" for i in range(1, 6)]
     assert [panel.get_title("left") for panel in panels] == names
     end = walk.sel(time=slice(6.0, None))
@@ -224,7 +225,7 @@ def test_ground_forces_are_those_of_the_last_seconds(walk):
 def test_flights_are_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk):
     four = walk.sel(time=slice(0.0, 4 * PERIOD)).copy(deep=True)
     four.normal_force[int(np.argmin(np.abs(four.time.values - 5.5))), 0] = 100.0 * LOAD
-    panel, *_ = ground_forces(four, ROW.ground, seconds=4.0).axes
+    panel, *_ = ground_forces(four, ROW, seconds=4.0).axes
     spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches]
     np.testing.assert_allclose(spans, [(4.0, 5.0), (6.0, 7.0)], atol=0.011)
     assert panel.get_title(loc="right").split()[1] in ("49", "50", "51")
@@ -256,7 +257,7 @@ def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(wal
     every.normal_force.loc[{"contact": "T3 tip"}][:10] = LOAD  # before the time shown
     every.normal_force.loc[{"contact": "T4 bottom_right"}] *= 0.5
     left = [f"T{i} bottom left" for i in range(1, 6)]
-    shown = [panel.get_title("left") for panel in ground_forces(every, ROW.ground).axes]
+    shown = [panel.get_title("left") for panel in ground_forces(every, ROW).axes]
     assert shown == sorted({*left, "T2 tip", "T4 bottom right"})
 
 
@@ -271,6 +272,15 @@ def carried():
 def test_figures_of_any_structure_are_drawn_on_a_page(draw, carried):
     robot, motion = carried
     check_page(draw(motion, *arguments(draw, robot)))
+
+
+def test_bars_are_named_where_they_end(carried):
+    robot, motion = carried
+    [panel] = time_lapse(motion, robot.structure).axes
+    names = {text.get_text(): text.xy for text in panel.texts}
+    above = motion.p_WN.sel(node=["n4", "n1", "n3"])[0, :, :2] / INCH  # with the greatest y
+    assert list(names) == ["n0 n4", "n1 n5", "n2 n3"]
+    np.testing.assert_allclose(list(names.values()), above, atol=1e-9)
 
 
 def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
@@ -294,5 +304,5 @@ def test_bars_are_drawn_from_node_to_node(carried):
 
 def test_ground_forces_of_bars_are_those_of_nodes_below(carried):
     robot, motion = carried
-    shown = [panel.get_title("left") for panel in ground_forces(motion, robot.ground).axes]
+    shown = [panel.get_title("left") for panel in ground_forces(motion, robot).axes]
     assert shown == ["n0", "n1", "n2"]

@@ -62,6 +62,7 @@ def make_prism() -> Robot:
         cables=np.array(rows, dtype=CABLE),
         cable_names=tuple(CABLES),
         cable_groups=tuple(groups),
+        slack=True,
         actuation=Actuation(
             names=OSCILLATORS,
             cables=tuple(name for name, driver in CABLES.items() if driver != PASSIVE),
@@ -72,6 +73,7 @@ def make_prism() -> Robot:
             images=np.zeros(0, dtype=int),
         ),
         contacts=np.arange(6),
+        thesis_nodes=None,
         feet=3,
         markers=np.zeros(0, dtype=int),
     )

@@ -14,8 +14,8 @@ from matplotlib.patches import Patch
 
 from tetra_drake.figures.style import OKABE_ITO, SHADE, add_grid, common_style, legend_below
 from tetra_drake.formatting import fixed
-from tetra_drake.physics.contact import Ground
 from tetra_drake.results.measures import intervals, off_ground, share_of_time
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.units import POUND_FORCE
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
@@ -52,7 +52,7 @@ def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
 
 
 @common_style()
-def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float = 5.0) -> Figure:
+def ground_forces(trajectory: xarray.Dataset, robot: Robot, *, seconds: float = 5.0) -> Figure:
     """Normal force and friction along x (lbf) over the last seconds of time (s).
 
     On uneven ground, friction along the forward tangent, which is x projected on the slope. One
@@ -65,7 +65,7 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
     end = trajectory.sel(time=slice(trajectory.time[-1] - seconds, None))
     forces = end[["normal_force", "friction_force"]] / POUND_FORCE
     shown = _contacts_to_show(end)
-    along = "along x" if ground.flat else "along the forward tangent"
+    along = "along x" if robot.ground.flat else "along the forward tangent"
     _, per_body = np.unique(end.contact_body.sel(contact=shown), return_counts=True)
     figure, panels = _panels_over_time(shown, groups=per_body.min())
     for contact, panel in panels.items():
@@ -83,9 +83,10 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
         panel.set_ylim(_limits_between_impacts(forces))
     lines = {"normal force": _FIRST, f"friction force {along}": _SECOND, "landing": _LANDING}
     legend_below(figure, lines, Patch(color=SHADE, label="no normal force"))
+    body = "tetrahedron" if robot.structure.is_row else "body"
     period = 1e3 * float(end.time[1] - end.time[0])
     figure.suptitle(
-        "Forces of the ground on each tetrahedron\n"
+        f"Forces of the ground on each {body}\n"
         f"every {period:.3g} ms: peaks of impacts, which are shorter, are missed or cut off"
     )
     return figure

@@ -65,7 +65,7 @@ _FOOTPRINTS: Any = {"color": "0.45", "marker": "o", "linestyle": "", "markersize
 
 
 @common_style()
-def relative_distances(trajectory: xarray.Dataset) -> Figure:
+def relative_distances(trajectory: xarray.Dataset, structure: Structure) -> Figure:
     """Distances along x from the first body to each, between centres of mass, over time.
 
     Grey lines: the distances at the start."""
@@ -79,7 +79,7 @@ def relative_distances(trajectory: xarray.Dataset) -> Figure:
         place = {"xy": (1.01, float(line[-1])), "xycoords": ("axes fraction", "data")}
         panel.annotate(name, color=style["color"], va="center", **place)
     panel.set(xlabel="time (s)", ylabel=f"distance from {names[0]} (in)")
-    figure.suptitle("Distances between tetrahedra")
+    figure.suptitle(f"Distances between {'tetrahedra' if structure.is_row else 'bodies'}")
     return figure
 
 
@@ -130,7 +130,7 @@ def time_lapse(trajectory: xarray.Dataset, structure: Structure, *, instants: in
     _draw_rows(panel, rows, OVERHEAD, structure, width_in=width)
     panel.axvline(footprints[0, 0, X], color="0.45", linewidth=0.8)
     walker = dots = "the centre"
-    if len(structure.markers):
+    if structure.is_row:
         walker = structure.bodies[0]
         dots = f"{walker}'s bottom nodes"
     panel.set_ylabel(f"time, and distance {_distance_symbol(structure)}walked by {walker}")
@@ -212,7 +212,7 @@ def one_step(trajectory: xarray.Dataset, robot: Robot, *, instants: int = 5) -> 
             panel.axhline(-_pitch(rows) * i, **_GROUND)
     _draw_paths(below, shown, off, ground)
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
-    path = "path of the bottom nodes" if len(structure.markers) else "path of the centre"
+    path = "path of the bottom nodes" if structure.is_row else "path of the centre"
     legend_below(figure, {**lines, path: _PATH})
     figure.suptitle(title)
     return figure
@@ -229,7 +229,7 @@ def _profile(nodes: np.ndarray, sample: int, ground: Ground) -> np.ndarray:
 
 def _distance_symbol(structure: Structure) -> str:
     """The thesis's symbol of the distance walked, and a blank, where it is that of T1."""
-    return "$x_1$ " if len(structure.markers) else ""
+    return "$x_1$ " if structure.is_row else ""
 
 
 def _first_of_each_body(marked: xarray.DataArray) -> xarray.DataArray:
@@ -338,14 +338,15 @@ def _draw_rows(
 def _name_bodies(
     panel: Axes, nodes: np.ndarray, structure: Structure, per_paper_inch: float
 ) -> None:
-    """Names bodies above their highest nodes (nodes, 2), but those whose names would be too near to
-    others'."""
+    """Names bodies above their nodes (nodes, 2), bars above their upper ends, but those whose names
+    would overlap with others'."""
     longest = max(_SHORTEST_NAME, *(len(name) for name in structure.bodies))
-    room = longest * _CHARACTER_WIDTH * per_paper_inch
+    width, height = longest * _CHARACTER_WIDTH * per_paper_inch, _NAME_HEIGHT * per_paper_inch
     places: list[tuple[float, float]] = []
     for body, name in enumerate(structure.bodies):
         of_body = nodes[structure.carriers == body]
-        x, y = float(of_body[:, 0].mean()), float(of_body[:, 1].max())
-        if all(math.hypot(x - other_x, y - other_y) >= room for other_x, other_y in places):
+        upper_x, y = of_body[of_body[:, 1].argmax()].tolist()
+        x = upper_x if len(of_body) == 2 else float(of_body[:, 0].mean())
+        if all(abs(x - a) >= width or abs(y - b) >= height for a, b in places):
             panel.annotate(name, (x, y), (0, 2), textcoords="offset points", ha="center")
             places.append((x, y))

@@ -89,12 +89,12 @@ def draw_trajectory(gait: GaitMotion, folder: Path) -> dict[str, str]:
     pictures: list[tuple[Any, ...]] = [
         (motion.time_lapse, trajectory, robot.structure),
         (motion.path_of_the_centre, trajectory),
-        (motion.relative_distances, trajectory),
+        (motion.relative_distances, trajectory, robot.structure),
         (motion.one_step, trajectory, robot),
     ]
     if robot.structure.signals:
         pictures.append((forces.signals_and_tensions, trajectory))
-    pictures.append((forces.ground_forces, trajectory, robot.ground))
+    pictures.append((forces.ground_forces, trajectory, robot))
     return _save(folder, *pictures)
 
 

@@ -21,13 +21,14 @@ _PADDING = 16
 
 
 def marked_positions(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
-    """(time, node, axis): positions of the structure's markers in m; of the centre if it has none.
+    """(time, node, axis): positions of the structure's markers in m; of the mean of its nodes if it
+    has none.
 
-    The node of the centre is named "centre", and its node_body is "".
+    The node of that centre is named "centre", and its node_body is "".
     """
     if len(structure.markers):
         return trajectory.p_WN.isel(node=structure.markers)
-    centre = trajectory.p_WB.mean("body").expand_dims({"node": ["centre"]}, axis=1)
+    centre = trajectory.p_WN.mean("node").expand_dims({"node": ["centre"]}, axis=1)
     return centre.assign_coords(node_body=("node", [""]))
 
 

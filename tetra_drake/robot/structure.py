@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,7 @@ class Structure:
     p_BN: np.ndarray
     """(nodes, 3): the nodes in the frames of their bodies, whose origins are centres of mass."""
     struts: np.ndarray
-    """(struts, 2): the indices of the nodes that each joins."""
+    """(struts, 2): the indices of the nodes that each joins, body by body."""
     strut_radius: np.ndarray
     """(struts,)."""
     node_radius: np.ndarray
@@ -46,9 +47,14 @@ class Structure:
     """Such as "T1-T2 outer bottom_left"."""
     cable_groups: tuple[str, ...]
     """The group of each cable, such as "outer"."""
+    slack: bool
+    """True if a cable cannot push."""
     actuation: Actuation
     contacts: np.ndarray
     """(contacts,): the indices of the nodes that the ground can touch, ascending."""
+    thesis_nodes: tuple[int, int, int] | None
+    """T1's bottom left and bottom right nodes and the lead's tip, for the thesis's metrics; None
+    for robots that are no row of tetrahedra."""
     feet: int
     """Nodes that bear the weight at rest."""
     markers: np.ndarray
@@ -59,6 +65,11 @@ class Structure:
     def signals(self) -> int:
         """Actuation signals: one per oscillator."""
         return len(self.actuation.names)
+
+    @property
+    def is_row(self) -> bool:
+        """True for a row of tetrahedra."""
+        return self.thesis_nodes is not None
 
     @property
     def carriers(self) -> np.ndarray:
@@ -77,6 +88,21 @@ class Structure:
         """(13 bodies,): [q; v] at t = 0, at rest."""
         poses = np.hstack([self.q_WB, self.p_WB]).ravel()
         return np.concatenate([poses, np.zeros(6 * len(self.bodies))])
+
+
+def turn_with_slope(
+    p_WB: np.ndarray, q_WB: np.ndarray, slope: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (bodies, 3) and quaternions (bodies, 4), w first, of bodies that are turned about
+    World's y axis with ground that rises by `slope` (rad) along x."""
+    # Written out, as a product of matrices is rounded differently on different processors.
+    s, c = math.sin(slope), math.cos(slope)
+    forward, left, up = p_WB.T
+    turned_p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
+    s, c = math.sin(slope / 2), math.cos(slope / 2)
+    w, x, y, z = q_WB.T
+    turned_q_WB = np.stack([c * w + s * y, c * x - s * z, c * y - s * w, c * z + s * x], axis=1)
+    return turned_p_WB, turned_q_WB
 
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:

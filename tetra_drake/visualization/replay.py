@@ -81,7 +81,7 @@ def legend_of(structure: Structure) -> list[tuple[str, str]]:
     for kind, colour in cable_colours(structure).items():
         meaning = "actuated cable" if kind == "actuated" else f"passive {kind} cable"
         legend.append((colour, meaning))
-    path = "path of the bottom nodes" if len(structure.markers) else "path of the centre"
+    path = "path of the bottom nodes" if structure.is_row else "path of the centre"
     return [
         *legend,
         ("normal", "normal force"),
