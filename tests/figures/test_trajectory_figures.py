@@ -277,10 +277,11 @@ def test_figures_of_any_structure_are_drawn_on_a_page(draw, carried):
 def test_bars_are_named_where_they_end(carried):
     robot, motion = carried
     [panel] = time_lapse(motion, robot.structure).axes
-    names = {text.get_text(): text.xy for text in panel.texts}
-    above = motion.p_WN.sel(node=["n4", "n1", "n3"])[0, :, :2] / INCH  # with the greatest y
-    assert list(names) == ["n0 n4", "n1 n5", "n2 n3"]
-    np.testing.assert_allclose(list(names.values()), above, atol=1e-9)
+    assert [text.get_text() for text in panel.texts] == ["n0 n4", "n1 n5", "n2 n3"]
+    upper = motion.p_WN.sel(node=["n4", "n1", "n3"])[0, :, :2] / INCH  # with the greatest y
+    apart = np.array([text.xy for text in panel.texts]) - upper.values
+    np.testing.assert_allclose(apart[:, 1], 0.0, atol=1e-9)
+    assert np.abs(apart[:, 0]).max() < 1.0  # moved into the panel
 
 
 def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
@@ -306,3 +307,8 @@ def test_ground_forces_of_bars_are_those_of_nodes_below(carried):
     robot, motion = carried
     shown = [panel.get_title("left") for panel in ground_forces(motion, robot).axes]
     assert shown == ["n0", "n1", "n2"]
+    rolled = motion.copy(deep=True)
+    rolled.normal_force.loc[{"contact": ["n0", "n2"]}] = 0.0
+    rolled.normal_force.loc[{"contact": "n4"}] = 0.2
+    shown = [panel.get_title("left") for panel in ground_forces(rolled, robot).axes]
+    assert shown == ["n4", "n1", "n2"]

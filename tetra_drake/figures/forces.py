@@ -56,7 +56,7 @@ def ground_forces(trajectory: xarray.Dataset, robot: Robot, *, seconds: float = 
     """Normal force and friction along x (lbf) over the last seconds of time (s).
 
     On uneven ground, friction along the forward tangent, which is x projected on the slope. One
-    panel per body that can touch, for the first of its nodes that can, and one for each other node
+    panel per body that can touch, for the first of its nodes that does, and one for each other node
     that touches and is not its mirror image. Shaded: intervals without normal force, with their
     share of the time shown. Triangles: landings. An impact is shorter than the time between two
     samples, so a sample may show or miss its peak. The scale is that of the forces between impacts:
@@ -103,17 +103,19 @@ def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | Non
 
 
 def _contacts_to_show(trajectory: xarray.Dataset) -> list[str]:
-    """Names of the first contact node of each body, and of others that touch and bear something
-    else."""
+    """Names of the nodes of each body that touch and bear something else than the first of them; of
+    its first contact node if none touches."""
     shown: list[str] = []
-    first_forces: dict[str, xarray.DataArray] = {}
-    for force in trajectory.normal_force.transpose("contact", "time"):
-        name, body = str(force.contact.item()), str(force.contact_body.item())
-        first = first_forces.setdefault(body, force)
-        mirrored = bool(abs(force - first).mean() <= _MIRRORED * first.mean())
-        touches = bool((force > 0.0).any())
-        if force is first or (touches and not mirrored):
-            shown.append(name)
+    for body in dict.fromkeys(trajectory.contact_body.values):
+        normal = trajectory.normal_force[:, (trajectory.contact_body == body).values]
+        names, forces = normal.contact.values, normal.values.T
+        touching = np.flatnonzero((forces > 0.0).any(axis=1))
+        first = touching[0] if touching.size else 0
+        shown.append(names[first])
+        for other in touching[1:]:
+            apart = np.abs(forces[other] - forces[first]).mean()
+            if apart > _MIRRORED * forces[first].mean():
+                shown.append(names[other])
     return shown
 
 

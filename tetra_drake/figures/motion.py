@@ -342,11 +342,13 @@ def _name_bodies(
     would overlap with others'."""
     longest = max(_SHORTEST_NAME, *(len(name) for name in structure.bodies))
     width, height = longest * _CHARACTER_WIDTH * per_paper_inch, _NAME_HEIGHT * per_paper_inch
+    left, right = panel.get_xlim()
     places: list[tuple[float, float]] = []
     for body, name in enumerate(structure.bodies):
         of_body = nodes[structure.carriers == body]
         upper_x, y = of_body[of_body[:, 1].argmax()].tolist()
         x = upper_x if len(of_body) == 2 else float(of_body[:, 0].mean())
+        x = min(max(x, left + width / 2), right - width / 2)
         if all(abs(x - a) >= width or abs(y - b) >= height for a, b in places):
             panel.annotate(name, (x, y), (0, 2), textcoords="offset points", ha="center")
             places.append((x, y))

@@ -18,7 +18,7 @@ from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.style import save_figure
 from tetra_drake.report.result_folder import GaitMotion, simulate_gait
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.scenario.units import INCH
 
 
@@ -110,7 +110,7 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
     walks = [(gait.label, gait.motion.trajectory) for gait in (study.initial, study.best)]
-    structure = Robot.of(run.manifest.scenario).structure
+    structure = MakeStructure(run.manifest.scenario)
     pictures.append((motion.before_and_after, walks, structure))
     captions = _save(folder, *pictures)
     return captions | draw_trajectory(study.best.motion, folder)
