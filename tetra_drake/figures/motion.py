@@ -105,7 +105,7 @@ def before_and_after(walks: Sequence[tuple[str, xarray.Dataset]], structure: Str
 def time_lapse(trajectory: xarray.Dataset, structure: Structure, *, instants: int = 6) -> Figure:
     """The robot from above at some instants, to scale, with the distance walked.
 
-    Dots: places at each full second."""
+    Dots: T1's bottom nodes, or the centre of a robot that is no row, at each full second."""
     times = np.linspace(trajectory.time.values[0], trajectory.time.values[-1], instants)
     samples = _nearest(trajectory, times)
     inches = trajectory.p_WN.values / INCH
