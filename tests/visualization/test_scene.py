@@ -109,12 +109,12 @@ def test_bodies_of_any_structure_have_their_struts_and_nodes():
         (path,) = (path for path in shapes if path.endswith(f"/node {name}"))
         assert shapes[path]["radius"] == radius
         np.testing.assert_allclose(moved[path][:3, 3], p_BN, rtol=0, atol=1e-12)
-    kinds = ("actuated", "bottom", "top")
-    assert {path.split("/")[2] for path in shapes if path.startswith("/cables/")} == set(kinds)
-    assert cable_colours(structure) == {
+    colours = cable_colours(structure)
+    assert {path.split("/")[2] for path in shapes if path.startswith("/cables/")} == set(colours)
+    assert colours == {
         "actuated": "actuated",
-        "bottom": "passive_1",
-        "top": "passive_2",
+        "passive bottom": "passive_1",
+        "passive top": "passive_2",
     }
 
 

@@ -77,13 +77,10 @@ def save_replay(
 
 def legend_of(structure: Structure) -> list[tuple[str, str]]:
     """Names in COLOURS, and what has these colours."""
-    legend = []
-    for kind, colour in cable_colours(structure).items():
-        meaning = "actuated cable" if kind == "actuated" else f"passive {kind} cable"
-        legend.append((colour, meaning))
+    cables = [(colour, f"{kind} cable") for kind, colour in cable_colours(structure).items()]
     path = "path of the bottom nodes" if structure.is_row else "path of the centre"
     return [
-        *legend,
+        *cables,
         ("normal", "normal force"),
         ("friction", "friction force"),
         ("trace", path),

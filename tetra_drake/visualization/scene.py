@@ -247,18 +247,19 @@ def _body_colour(body: int) -> Rgba:
 
 
 def cable_kinds(structure: Structure) -> list[str]:
-    """Kind of each cable: "actuated", or its group if no oscillator drives it."""
+    """Kind of each cable: "actuated", or such as "passive outer", with its group."""
     kinds = []
     for cable, group in zip(structure.cables, structure.cable_groups, strict=True):
-        kinds.append(group if cable["signal"] == PASSIVE else "actuated")
+        kinds.append(f"passive {group}" if cable["signal"] == PASSIVE else "actuated")
     return kinds
 
 
 def cable_colours(structure: Structure) -> dict[str, str]:
     """Name in COLOURS of each kind of cable that the structure has."""
+    colours = {"actuated": "actuated"}
     groups = dict.fromkeys(structure.cable_groups)
-    passive = zip(groups, itertools.cycle(PASSIVE_COLOURS))
-    colours = {"actuated": "actuated", **dict(passive)}
+    for group, colour in zip(groups, itertools.cycle(PASSIVE_COLOURS)):
+        colours[f"passive {group}"] = colour
     kinds = cable_kinds(structure)
     return {kind: colour for kind, colour in colours.items() if kind in kinds}
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from helpers.forces import forces_at
 from helpers.states import disturbed
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
 
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
 from tetra_drake.engines.compiled.dynamics import implicit_matrix
 from tetra_drake.physics.contact import MODE_COLUMNS, modes_after_step
 from tetra_drake.physics.forces import Forces

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from helpers.forces import forces_at
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
 
+from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces
