@@ -21,14 +21,13 @@ def structure_text(study: RestStudy) -> str:
     """What a robot is, and how it rests: tables in g, in and lbf."""
     robot, statics = study.robot, study.statics
     structure = robot.structure
-    weightless = f"{statics.self_stress_states} states of self-stress"
-    mechanisms = f"{statics.mechanisms} infinitesimal mechanisms"
     lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
     count = f"{len(structure.bodies)} bodies, {len(structure.node_names)} nodes"
     lines = [
         f"{robot.scenario.name}: {count}, {len(structure.cables)} cables, "
         f"{structure.signals} oscillators, {1e3 * structure.mass.sum():.4g} g",
-        f"Without weight: {weightless}, {mechanisms}.",
+        f"Without weight: self-stress states {statics.self_stress_states}, "
+        f"infinitesimal mechanisms {statics.mechanisms}.",
         f"Lowest natural frequencies on the ground, undamped: {lowest or 'none'} Hz.",
         "At rest, without actuation:",
         _bodies_table(study).text(),
