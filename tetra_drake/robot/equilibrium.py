@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION
-from tetra_drake.physics.contact import MODE_COLUMNS, NormalForce, update_modes
+from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, NormalForce, update_modes
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import move_bodies
 from tetra_drake.physics.model import Model
@@ -45,6 +45,18 @@ class Rest(NamedTuple):
     lengths: np.ndarray
     """(cables,): the lengths of the cables, in whole nm."""
 
+    feet: int
+    """The number of contact nodes that bear a load."""
+
+
+class NoRest(Exception):
+    """No rest is found: forces are left, the greatest of them on a body."""
+
+    def __init__(self, body: int, force: float) -> None:
+        super().__init__(f"body {body}, {force} N")
+        self.body = body
+        self.force = force
+
 
 class Resting(NamedTuple):
     """A robot whose forces are sought, without actuation, and room to compute them in."""
@@ -61,10 +73,9 @@ class Resting(NamedTuple):
         return cls(model._replace(cables=cables), Forces.of(model))
 
 
-def find_rest(model: Model, start: np.ndarray) -> Rest | None:
-    """Rest of a robot on flat ground, let go at `start` (13 n,) without actuation:
-    the minimum of potential energy downhill from there; friction carries nothing. None if it is
-    not found."""
+def find_rest(model: Model, start: np.ndarray) -> Rest:
+    """Rest of a robot on flat ground, let go at `start` (13 n,) without actuation: the minimum of
+    potential energy downhill from there; friction carries nothing. Raises NoRest."""
     robot, state = Resting.of(model), start
     weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
     reach = FIRST_REACH * radius
@@ -72,7 +83,9 @@ def find_rest(model: Model, start: np.ndarray) -> Rest | None:
         force = force_at_rest(robot, state)
         greatest = max(np.abs(robot.forces.pulls[:, TENSION]).max(), weight)
         if np.abs(force).max() <= TOLERANCE * greatest:
-            return Rest(state, np.round(robot.forces.pulls[:, LENGTH], LENGTH_DIGITS))
+            lengths = np.round(robot.forces.pulls[:, LENGTH], LENGTH_DIGITS)
+            feet = int(np.count_nonzero(robot.forces.pushes[:, NORMAL]))
+            return Rest(state, lengths, feet)
         step = _newton_step(robot, state, force)
         step *= min(1.0, reach / np.abs(step).max())
         moved = displaced(robot, state, step)
@@ -80,7 +93,8 @@ def find_rest(model: Model, start: np.ndarray) -> Rest | None:
             reach = 0.5 * np.abs(step).max()
         else:
             state, reach = moved, min(2.0 * reach, LONGEST_REACH * radius)
-    return None
+    forces = np.abs(force.reshape(-1, 6)).max(axis=1)
+    raise NoRest(int(forces.argmax()), float(forces.max()))
 
 
 def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.ndarray:

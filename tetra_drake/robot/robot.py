@@ -15,13 +15,13 @@ from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, modes_after_step
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.physics.model import Bodies, Couplings, Model
+from tetra_drake.physics.model import Model
 from tetra_drake.physics.oscillator import Network, steered_input
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.actuation import Actuation
-from tetra_drake.robot.equilibrium import Rest, find_rest
+from tetra_drake.robot.equilibrium import NoRest, Rest, find_rest
 from tetra_drake.robot.gait import Gait, check_gait
-from tetra_drake.robot.ground import make_ground
+from tetra_drake.robot.laws import make_model
 from tetra_drake.robot.structure import Structure
 from tetra_drake.robot.tetrahedra import MakeTetrahedra
 from tetra_drake.scenario.schema import Scenario
@@ -48,7 +48,7 @@ class Robot:
         Raises InputError if it would start in the ground, or off its terrain.
         """
         structure = structure or MakeTetrahedra(scenario)
-        return cls(scenario, structure, _make_model(scenario, structure))
+        return cls(scenario, structure, make_model(scenario, structure))
 
     @property
     def actuation(self) -> Actuation:
@@ -71,12 +71,12 @@ class Robot:
         offsets; raises InputError if it finds no rest."""
         undisturbed = self.scenario.robot.model_copy(update={"offsets": []})
         robot = Robot.of(self.scenario.with_sections(terrain=Flat(), robot=undisturbed))
-        rest = find_rest(robot.model, robot.structure.initial_state)
-        if rest is None:
-            count = len(robot.structure.bodies)
-            problem = f"{count} tetrahedra come to no rest on flat ground without actuation"
-            raise InputError(self.scenario.name, "robot", problem)
-        return rest
+        try:
+            return find_rest(robot.model, robot.structure.initial_state)
+        except NoRest as error:
+            body = robot.structure.bodies[error.body]
+            problem = f"finds no rest; the greatest force left, {error.force:.3g} N, is on '{body}'"
+            raise InputError(self.scenario.name, "robot", problem) from error
 
     @functools.cached_property
     def senses(self) -> Senses:
@@ -158,38 +158,3 @@ def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:
     u = np.full(2 * oscillators, inner_state)
     v = np.tile([extensor_self_inhibition, flexor_self_inhibition], oscillators)
     return np.concatenate([u, v])
-
-
-def _make_model(scenario: Scenario, structure: Structure) -> Model:
-    """The structure and its laws as the kernels take them; cables are records."""
-    distances = np.linalg.norm(structure.p_BN, axis=1)
-    return Model(
-        p_BN=structure.p_BN,
-        first_node=structure.first_node,
-        cables=structure.cables,
-        couplings=_couplings(structure),
-        ground=make_ground(scenario, structure),
-        bodies=Bodies(
-            mass=structure.mass,
-            inertia=structure.mass[:, np.newaxis] * structure.unit_inertia,
-            radius=np.maximum.reduceat(distances, structure.first_node[:-1]),
-            weight=structure.mass * scenario.robot.gravity,
-        ),
-        isotropic=structure.isotropic,
-        slack=scenario.cables.slack,
-    )
-
-
-def _couplings(structure: Structure) -> Couplings:
-    """The pairs of bodies in the order of the cables; ValueError if they are in no such order."""
-    carriers, cables = structure.carriers, structure.cables
-    pairs = np.column_stack([carriers[cables["node_a"]], carriers[cables["node_b"]]])
-    begins = np.flatnonzero(np.any(np.diff(pairs, axis=0, prepend=-1), axis=1))
-    distinct = pairs[begins]
-    if (distinct[:, 0] >= distinct[:, 1]).any() or len(np.unique(distinct, axis=0)) < len(begins):
-        raise ValueError("the cables are not in the order of the pairs of bodies that they join")
-    return Couplings(
-        first=distinct[:, 0].copy(),
-        second=distinct[:, 1].copy(),
-        first_cable=np.append(begins, len(cables)),
-    )

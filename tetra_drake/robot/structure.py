@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,6 +73,21 @@ class Structure:
         """(13 bodies,): [q; v] at t = 0, at rest."""
         poses = np.hstack([self.q_WB, self.p_WB]).ravel()
         return np.concatenate([poses, np.zeros(6 * len(self.bodies))])
+
+
+def turn_with_slope(
+    p_WB: np.ndarray, q_WB: np.ndarray, slope: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (bodies, 3) and quaternions (bodies, 4), w first, of bodies that are turned about
+    World's y axis with ground that rises by `slope` (rad) along x."""
+    # Written out, as a product of matrices is rounded differently on different processors.
+    s, c = math.sin(slope), math.cos(slope)
+    forward, left, up = p_WB.T
+    turned_p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
+    s, c = math.sin(slope / 2), math.cos(slope / 2)
+    w, x, y, z = q_WB.T
+    turned_q_WB = np.stack([c * w + s * y, c * x - s * z, c * y - s * w, c * z + s * x], axis=1)
+    return turned_p_WB, turned_q_WB
 
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from pydrake.multibody.tree import SpatialInertia
 from tetra_drake.physics.cable import CABLE
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.bodies import node_inertia, strut_inertia
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, turn_with_slope
 from tetra_drake.scenario.nesting import (
     BOTTOM_LEFT,
     BOTTOM_RIGHT,
@@ -47,11 +47,8 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
     if robot.offsets:
         p_WB += np.array(robot.offsets)
-    slope = scenario.terrain.plane_slope or 0.0
-    # Written out, as a product of matrices is rounded differently on different processors.
-    s, c = math.sin(slope), math.cos(slope)
-    forward, left, up = p_WB.T
-    p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+    p_WB, q_WB = turn_with_slope(p_WB, upright, scenario.terrain.plane_slope or 0.0)
     actuation = Actuation.of(scenario)
     rows: list[tuple[float, ...]] = []
     for i in range(n - 1):
@@ -64,7 +61,6 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     contacts = [*bottom, 4 * (n - 1) + TIP] if robot.contacts == "thesis" else range(4 * n)
     struts = [(4 * i + a, 4 * i + b) for i in range(n) for a, b in STRUTS]
     mass, unit_inertia = tetrahedron_inertia(p_BN, robot)
-    q_WB = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
     return Structure(
         bodies=bodies,
         node_names=tuple(f"{body} {node}" for body in bodies for node in NODES),
@@ -76,7 +72,7 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
         mass=np.full(n, mass),
         unit_inertia=np.tile(unit_inertia, (n, 1)),
         p_WB=p_WB,
-        q_WB=np.tile(q_WB, (n, 1)),
+        q_WB=q_WB,
         cables=np.array(rows, dtype=CABLE),
         cable_names=scenario.robot.layout().cable_names,
         actuation=actuation,

@@ -96,6 +96,8 @@ class Structure(Section):
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
     gravity: float = quantity("m/s^2", default=9.80665, ge=0)
+    offsets: list[Point] = quantity("m", default=[])
+    """Displacement [x, y, z] of each body at t = 0; none if empty."""
 
     @cached_property
     def all_struts(self) -> tuple[Member, ...]:

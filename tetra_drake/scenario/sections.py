@@ -190,11 +190,13 @@ def _each_number(
     if isinstance(value, list):
         items = enumerate(value)
         return [_each_number(item, unit, change, f"{key}[{i}]") for i, item in items]
-    if isinstance(unit, str):
-        return change(value, unit, key) if unit else value
-    if isinstance(value, dict):
-        return {name: _each_number(item, unit[name], change, name) for name, item in value.items()}
-    return value
+    if isinstance(value, dict) and unit:
+        units = dict.fromkeys(value, unit) if isinstance(unit, str) else unit
+        return {
+            name: _each_number(item, units[name], change, f"{key}.{name}".strip("."))
+            for name, item in value.items()
+        }
+    return change(value, unit, key) if unit and isinstance(unit, str) else value
 
 
 def _read_number(value: Any, unit: str, key: str, *, needs_unit: bool) -> Any:

@@ -1,0 +1,45 @@
+"""The laws of a structure and their constants, as the kernels of every engine take them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tetra_drake.physics.model import Bodies, Couplings, Model
+from tetra_drake.robot.ground import make_ground
+from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario.schema import Scenario
+
+
+def make_model(scenario: Scenario, structure: Structure) -> Model:
+    """The structure and its laws as the kernels take them; cables are records."""
+    distances = np.linalg.norm(structure.p_BN, axis=1)
+    return Model(
+        p_BN=structure.p_BN,
+        first_node=structure.first_node,
+        cables=structure.cables,
+        couplings=_couplings(structure),
+        ground=make_ground(scenario, structure),
+        bodies=Bodies(
+            mass=structure.mass,
+            inertia=structure.mass[:, np.newaxis] * structure.unit_inertia,
+            radius=np.maximum.reduceat(distances, structure.first_node[:-1]),
+            weight=structure.mass * scenario.robot.gravity,
+        ),
+        isotropic=structure.isotropic,
+        slack=scenario.cables.slack,
+    )
+
+
+def _couplings(structure: Structure) -> Couplings:
+    """The pairs of bodies in the order of the cables; ValueError if they are in no such order."""
+    carriers, cables = structure.carriers, structure.cables
+    pairs = np.column_stack([carriers[cables["node_a"]], carriers[cables["node_b"]]])
+    begins = np.flatnonzero(np.any(np.diff(pairs, axis=0, prepend=-1), axis=1))
+    distinct = pairs[begins]
+    if (distinct[:, 0] >= distinct[:, 1]).any() or len(np.unique(distinct, axis=0)) < len(begins):
+        raise ValueError("the cables are not in the order of the pairs of bodies that they join")
+    return Couplings(
+        first=distinct[:, 0].copy(),
+        second=distinct[:, 1].copy(),
+        first_cable=np.append(begins, len(cables)),
+    )
