@@ -210,7 +210,7 @@ def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("cables.slack", True),
+        ("robot.cables.slack", True),
         ("cpg.feedback", ["load"]),
         ("friction.static", 0.6),
         ("friction.stiffness", 1e3),

@@ -13,15 +13,15 @@ IN = 0.0254
 
 
 def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
-    changed = scenario.with_changes({"cables.outer_stiffness": "45 N/m", "robot.tetrahedra": 7})
-    assert (changed.cables.outer_stiffness, changed.oscillators) == (45.0, 6)
+    changed = scenario.with_changes({"robot.cables.outer_stiffness": "45 N/m", "robot.tetrahedra": 7})
+    assert (changed.robot.cables.outer_stiffness, changed.oscillators) == (45.0, 6)
     assert scenario == load_scenario()
     assert scenario.with_changes({}) == scenario
 
 
 # Balanced spacing
 
-STIFF = "cables: {outer_stiffness: 0.4 lbf/in}"
+STIFF = "robot: {cables: {outer_stiffness: 0.4 lbf/in}}"
 
 
 def axial_force(scenario: Scenario) -> float:
@@ -52,7 +52,7 @@ def test_what_a_file_changes_decides_on_the_spacing(load_text, text, balanced):
 
 
 def test_what_python_changes_decides_on_the_spacing_as_in_a_file(load_text, scenario):
-    stiff = {"cables.outer_stiffness": "0.4 lbf/in"}
+    stiff = {"robot.cables.outer_stiffness": "0.4 lbf/in"}
     balanced = scenario.with_changes(stiff).robot.spacing
     assert balanced == load_text(STIFF).robot.spacing != scenario.robot.spacing
     assert scenario.with_changes(stiff | {"robot.spacing": "2.5 in"}).robot.spacing == 2.5 * IN

@@ -173,13 +173,13 @@ def test_a_dumped_scenario_keeps_every_bit_and_needs_no_base(tmp_path, scenario)
 
 
 def test_differences_are_keys_and_readable_values(scenario):
-    changes = {"cables.slack": True, "cpg.signals": "live", "optimizer.stop_rise": 0.1 + 0.2}
+    changes = {"robot.cables.slack": True, "cpg.signals": "live", "optimizer.stop_rise": 0.1 + 0.2}
     changes |= {"name": "other", "friction.stiction_damping": "0.3 lbf*s/in"}
     changed = scenario.with_changes(changes | {"robot.offsets": [["1 mm", 0, 0]] * 5})
     assert differences(changed, scenario) == [
         ("robot.offsets", f"[{', '.join(['[0.001 m, 0 m, 0 m]'] * 5)}]"),
         ("friction.stiction_damping", "52.5381 N*s/m"),
-        ("cables.slack", "true"),
+        ("robot.cables.slack", "true"),
         ("cpg.signals", "live"),
         ("optimizer.stop_rise", "0.3"),
     ]
@@ -233,9 +233,9 @@ def test_a_bad_file_is_refused(tmp_path, text, key, found, refused):
 @pytest.mark.parametrize(
     ("key", "spread", "found"),
     [
-        ("cables.dampin", 0.1, "'cables.damping'"),
+        ("robot.cables.dampin", 0.1, "'robot.cables.damping'"),
         ("robot.tetrahedra", 0.1, "no number"),
-        ("cables.damping", 0.7, "0.7"),
+        ("robot.cables.damping", 0.7, "0.7"),
         ("optimizer.mutation_probability", 0.5, "at most 1"),
         ("friction.kinetic", 0.1, "at most static"),
     ],

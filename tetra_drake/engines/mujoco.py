@@ -79,9 +79,9 @@ class MujocoEngine(Engine):
             kind = type(scenario.terrain).__name__
             problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline"
             raise InputError(scenario.name, "terrain", problem)
-        if scenario.cables.slack:
+        if scenario.robot.slack:
             problem = "found true, which mujoco cannot simulate"
-            raise InputError(scenario.name, "cables.slack", problem)
+            raise InputError(scenario.name, "robot.cables.slack", problem)
         scenario.friction.cone(scenario.name)
 
     def simulate(

@@ -26,7 +26,7 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
             weight=structure.mass * scenario.robot.gravity,
         ),
         isotropic=structure.isotropic,
-        slack=scenario.cables.slack,
+        slack=scenario.robot.slack,
     )
 
 

@@ -37,7 +37,7 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     CABLES and Actuation. On an incline without start, the robot is turned with
     the slope, about World's y axis.
     """
-    robot, cables = scenario.robot, scenario.cables
+    robot, cables = scenario.robot, scenario.robot.cables
     n = robot.tetrahedra
     edge = robot.strut_length
     circumradius = edge / math.sqrt(3.0)
@@ -54,8 +54,8 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     for i in range(n - 1):
         for cable in CABLES:
             outer = cable.startswith("outer")
-            stiffness = cables.outer_stiffness if outer else cables.inner_stiffness
-            law = stiffness, cables.damping, cables.free_length
+            stiffness = robot.cables.outer_stiffness if outer else robot.cables.inner_stiffness
+            law = stiffness, robot.cables.damping, robot.cables.free_length
             rows.append((*cable_nodes(i, cable), actuation.drivers[len(rows)], *law))
     bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
     contacts = [*bottom, 4 * (n - 1) + TIP] if robot.contacts == "thesis" else range(4 * n)

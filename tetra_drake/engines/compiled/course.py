@@ -73,9 +73,9 @@ class PreparedGait:
         scenario, ground = self.robot.scenario, self.robot.ground
         drivers = tuple(self.robot.actuation.drivers.tolist())
         return (
-            scenario.robot.tetrahedra,
+            scenario.robot.body_count,
             len(ground.contacts),
-            scenario.cables.slack,
+            scenario.robot.slack,
             drivers,
             self.live,
             ground.flat,
