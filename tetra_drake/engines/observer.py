@@ -67,4 +67,4 @@ def observe_states(
         compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
         cables, carriers = robot.cables, robot.ground.carriers
         observe(tally, cables, carriers, times[k], signals[k], forces.pulls, forces.pushes)
-        look(tally, forces.nodes)
+        look(tally, robot.struts, robot.bodies.radius, states[k], forces.nodes)

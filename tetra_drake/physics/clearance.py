@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 from tetra_drake.physics.kinematics import P_WN
-from tetra_drake.physics.vectors import Vector, difference, dot, vector_at
+from tetra_drake.physics.vectors import difference, dot, vector_at
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, any_lane, maximum, minimum
-
-CORNERS = 4
-"""The nodes of a tetrahedron: three of the base, then the tip."""
 
 _MARGIN = 1.0 + 1e-9
 """So that what is rounded decides nothing where a bound equals a distance."""
@@ -17,84 +17,88 @@ _PARALLEL = 1e-12
 """Square of the sine of an angle that is none."""
 
 
-@inlined
-def least_strut_distance(nodes: Table, least: Real) -> Real:
-    """Square of the least distance (m²) between struts of different tetrahedra, or `least` if that
-    is less; `nodes` of physics.kinematics.
+class Struts(NamedTuple):
+    """The struts of all bodies, body by body."""
 
-    A pair of tetrahedra is split into tip and base struts of the first with all struts of the
-    second. Where a plane across the line between their centres has the two on its sides, with more
-    room than `least`, no distance is computed.
+    node_a: Table
+    """(struts,): the index of the node at one end."""
+    node_b: Table
+    """(struts,): and of that at the other."""
+    first_strut: Table
+    """(bodies + 1,): the index of each body's first strut, and the number of struts."""
+    length: Table
+    """(struts,): in m."""
+
+
+@inlined
+def least_strut_distance(
+    struts: Struts, radius: Table, state: Table, nodes: Table, least: Real
+) -> Real:
+    """Square of the least distance (m²) between struts of different bodies, or `least` if that is
+    less.
+
+    `radius`, (bodies,), is that of the spheres in which the bodies are; `nodes` those of
+    physics.kinematics at a state (13 bodies,).
     """
-    strut = difference(vector_at(nodes, 1, P_WN), vector_at(nodes, 0, P_WN))
-    per_square = 1.0 / dot(strut, strut)  # all struts are alike
-    for first in range(0, nodes.shape[0], CORNERS):
-        for second in range(first + CORNERS, nodes.shape[0], CORNERS):
-            base, tip, square = room_between(nodes, first, second)
-            bound = _MARGIN * least * square
-            if any_lane((tip <= 0.0) | (tip * tip <= bound)):
-                for a in range(first, first + 3):
-                    least = minimum(least, nearest_strut(nodes, a, first + 3, second, per_square))
-            if any_lane((base <= 0.0) | (base * base <= bound)):
-                for k in range(3):
-                    a, b = first + k, first + (k + 1) % 3
-                    least = minimum(least, nearest_strut(nodes, a, b, second, per_square))
+    for first in range(radius.size):
+        for second in range(first + 1, radius.size):
+            apart = difference(origin(state, first), origin(state, second))
+            if may_be_nearer(apart, radius[first] + radius[second], least):
+                for a in range(struts.first_strut[first], struts.first_strut[first + 1]):
+                    least = nearest_strut(struts, nodes, a, second, least)
     return least
 
 
 @inlined
-def room_between(nodes: Table, first: int, second: int) -> tuple[Real, Real, Real]:
-    """Distances along the vector between two centres, times its length, at which the second
-    tetrahedron begins behind the base, and behind all nodes, of the first; and its square."""
-    u_x = u_y = u_z = 0.0
-    for k in range(CORNERS):
-        p = difference(vector_at(nodes, second + k, P_WN), vector_at(nodes, first + k, P_WN))
-        u_x += p[0]
-        u_y += p[1]
-        u_z += p[2]
-    u = u_x, u_y, u_z
-    begin, base = along(nodes, second, u), along(nodes, first, u)
-    for k in range(1, 3):
-        begin = minimum(begin, along(nodes, second + k, u))
-        base = maximum(base, along(nodes, first + k, u))
-    begin = minimum(begin, along(nodes, second + 3, u))
-    tip = maximum(base, along(nodes, first + 3, u))
-    return begin - base, begin - tip, dot(u, u)
+def origin(state: Table, body: int) -> tuple[Real, Real, Real]:
+    """The position of a body's origin (m)."""
+    return state[7 * body + 4], state[7 * body + 5], state[7 * body + 6]
 
 
 @inlined
-def along(nodes: Table, node: int, u: Vector) -> Real:
-    """The product of a node's position and a vector."""
-    return dot(u, vector_at(nodes, node, P_WN))
+def may_be_nearer(apart: tuple[Real, Real, Real], reach: Real, least: Real) -> bool:
+    """True unless what reaches so far (m) from two points that are `apart` is surely farther away
+    from each other than the square root of `least`, in all lanes."""
+    bound = reach + math.sqrt(least)
+    return any_lane(dot(apart, apart) <= _MARGIN * bound * bound)
 
 
 @inlined
-def nearest_strut(nodes: Table, a: int, b: int, second: int, per_square: Real) -> Real:
-    """Square of the least distance (m²) of the strut from node a to b to those of the tetrahedron
-    that begins with node `second`; see segment_distance."""
-    least = segment_distance(nodes, a, b, second, second + 1, per_square)
-    for c in range(second, second + 2):
-        for d in range(second + 2, second + 4):
-            least = minimum(least, segment_distance(nodes, a, b, c, d, per_square))
-    return minimum(least, segment_distance(nodes, a, b, second + 2, second + 3, per_square))
+def nearest_strut(struts: Struts, nodes: Table, a: int, body: int, least: Real) -> Real:
+    """Square of the least distance (m²) of a strut to those of a body, or `least`."""
+    middle_a = middle(struts, nodes, a)
+    for b in range(struts.first_strut[body], struts.first_strut[body + 1]):
+        apart = difference(middle_a, middle(struts, nodes, b))
+        if may_be_nearer(apart, 0.5 * (struts.length[a] + struts.length[b]), least):
+            least = minimum(least, strut_distance(struts, nodes, a, b))
+    return least
 
 
 @inlined
-def segment_distance(nodes: Table, a: int, b: int, c: int, d: int, per_square: Real) -> Real:
-    """Square of the distance (m²) between the segments from node a to b and from c to d, which have
-    the same length; `per_square` is 1 over its square.
+def middle(struts: Struts, nodes: Table, i: int) -> tuple[Real, Real, Real]:
+    """The middle of a strut (m)."""
+    a_x, a_y, a_z = vector_at(nodes, struts.node_a[i], P_WN)
+    b_x, b_y, b_z = vector_at(nodes, struts.node_b[i], P_WN)
+    return 0.5 * (a_x + b_x), 0.5 * (a_y + b_y), 0.5 * (a_z + b_z)
 
-    The nearest points of the lines; where one is beyond its segment, the end there, and what is
+
+@inlined
+def strut_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
+    """Square of the distance (m²) between two struts.
+
+    The nearest points of the lines; where one is beyond its strut, the end there, and what is
     nearest to that (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9).
     """
-    u = difference(vector_at(nodes, b, P_WN), vector_at(nodes, a, P_WN))
-    v = difference(vector_at(nodes, d, P_WN), vector_at(nodes, c, P_WN))
-    r = difference(vector_at(nodes, a, P_WN), vector_at(nodes, c, P_WN))
-    # Products of u, v and r, in lengths of u and v.
-    uv, ur, vr = per_square * dot(u, v), per_square * dot(u, r), per_square * dot(v, r)
-    s = share((uv * vr - ur) / maximum(1.0 - uv * uv, _PARALLEL))
-    t = share(uv * s + vr)
-    s = share(uv * t - ur)
+    start_i = vector_at(nodes, struts.node_a[i], P_WN)
+    start_j = vector_at(nodes, struts.node_a[j], P_WN)
+    u = difference(vector_at(nodes, struts.node_b[i], P_WN), start_i)
+    v = difference(vector_at(nodes, struts.node_b[j], P_WN), start_j)
+    r = difference(start_i, start_j)
+    uu, vv = struts.length[i] * struts.length[i], struts.length[j] * struts.length[j]
+    uv, ur, vr = dot(u, v), dot(u, r), dot(v, r)
+    s = share((uv * vr - ur * vv) / maximum(uu * vv - uv * uv, _PARALLEL * uu * vv))
+    t = share((uv * s + vr) / vv)
+    s = share((uv * t - ur) / uu)
     apart = (
         r[0] + s * u[0] - t * v[0],
         r[1] + s * u[1] - t * v[1],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.contact import Ground
 from tetra_drake.simd.lanes import Table
 
@@ -45,6 +46,7 @@ class Model(NamedTuple):
     couplings: Couplings
     ground: Ground
     bodies: Bodies
+    struts: Struts
     isotropic: bool
     """True if each body has the same moment of inertia about all axes."""
     slack: bool

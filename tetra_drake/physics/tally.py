@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION, Cables
-from tetra_drake.physics.clearance import least_strut_distance
+from tetra_drake.physics.clearance import Struts, least_strut_distance
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
@@ -80,6 +80,7 @@ def add_lifted(tally: Tally, carriers: Table, passed: Real, pushes: Table) -> No
 
 
 @inlined
-def look(tally: Tally, nodes: Table) -> None:
-    """Notes the clearance of struts; `nodes` of physics.kinematics."""
-    tally.clearance[0] = least_strut_distance(nodes, tally.clearance[0])
+def look(tally: Tally, struts: Struts, radius: Table, state: Table, nodes: Table) -> None:
+    """Notes the clearance of struts; see least_strut_distance()."""
+    least = least_strut_distance(struts, radius, state, nodes, tally.clearance[0])
+    tally.clearance[0] = least

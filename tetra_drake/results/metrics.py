@@ -12,7 +12,6 @@ from tetra_drake.physics.tally import Tally
 from tetra_drake.results.measures import travelling_index
 from tetra_drake.results.path import CentrePath, curvature
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, TIP
 from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
@@ -52,9 +51,16 @@ def compute_metrics(
     steady stretch.
     """
     structure, steady_from = robot.structure, robot.scenario.simulation.steady_from
-    tip = 4 * (len(structure.bodies) - 1) + TIP
-    x1, x2, x3 = end[BOTTOM_LEFT, 0], end[BOTTOM_RIGHT, 0], end[tip, 0]
     x_way, y_way, _ = (end.mean(axis=0) - steady.mean(axis=0)).tolist()  # of the centre
+    twist = lead = math.nan
+    if structure.thesis_nodes is None:
+        marker_start, marker_steady = start.mean(axis=0), steady.mean(axis=0)
+        marker = end.mean(axis=0)
+    else:
+        left, right, tip = structure.thesis_nodes
+        marker_start, marker_steady, marker = start[left], steady[left], end[left]
+        twist = float(abs(end[left, 0] - end[right, 0]))
+        lead = float(end[tip, 0] - end[left, 0])
     steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
     work = float(totals.work[0])
     carried = robot.weight * max(math.hypot(x_way, y_way), LEAST_WAY)
@@ -62,12 +68,12 @@ def compute_metrics(
     per_time = 1.0 / (steady_time or 1)
     lifted = (per_time * totals.lifted).tolist()
     return Metrics(
-        distance=float(x1 - start[BOTTOM_LEFT, 0]),
-        steady_distance=float(x1 - steady[BOTTOM_LEFT, 0]),
+        distance=float(marker[0] - marker_start[0]),
+        steady_distance=float(marker[0] - marker_steady[0]),
         speed=float(x_way / (path.times[-1] - steady_from)),
-        twist=float(abs(x1 - x2)),
-        lead=float(x3 - x1),
-        lateral_drift=float(abs(end[BOTTOM_LEFT, 1] - start[BOTTOM_LEFT, 1])),
+        twist=twist,
+        lead=lead,
+        lateral_drift=float(abs(marker[1] - marker_start[1])),
         heading_change=float(path.heading[-1] - path.heading[0]),
         path_curvature=curvature(steady_path),
         actuator_work=work,

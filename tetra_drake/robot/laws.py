@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.model import Bodies, Couplings, Model
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure
@@ -25,9 +26,18 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
             radius=np.maximum.reduceat(distances, structure.first_node[:-1]),
             weight=structure.mass * scenario.robot.gravity,
         ),
+        struts=_struts(structure),
         isotropic=structure.isotropic,
-        slack=scenario.robot.slack,
+        slack=structure.slack,
     )
+
+
+def _struts(structure: Structure) -> Struts:
+    node_a, node_b = structure.struts.T
+    bodies = structure.carriers[node_a]
+    first = np.searchsorted(bodies, np.arange(len(structure.bodies) + 1))
+    along = structure.p_BN[node_b] - structure.p_BN[node_a]
+    return Struts(node_a.copy(), node_b.copy(), first, length=np.linalg.norm(along, axis=1))
 
 
 def _couplings(structure: Structure) -> Couplings:

@@ -23,7 +23,9 @@ from tetra_drake.robot.equilibrium import NoRest, Rest, find_rest
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.laws import make_model
 from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.tensegrity import MakeTensegrity
 from tetra_drake.robot.tetrahedra import MakeTetrahedra
+from tetra_drake.scenario import robot_kinds
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import CpgSection
 from tetra_drake.scenario.terrain_kinds import Flat
@@ -47,7 +49,7 @@ class Robot:
 
         Raises InputError if it would start in the ground, or off its terrain.
         """
-        structure = structure or MakeTetrahedra(scenario)
+        structure = structure or MakeStructure(scenario)
         return cls(scenario, structure, make_model(scenario, structure))
 
     @property
@@ -142,6 +144,13 @@ class Robot:
         start, points = structure.initial_state, (structure.p_BN, structure.first_node)
         modes_after_step(start, *points, self.ground, nodes, frames, modes)
         return modes
+
+
+def MakeStructure(scenario: Scenario) -> Structure:
+    """The structure of a scenario's robot, of any kind. Raises InputError if it cannot start."""
+    if isinstance(scenario.robot, robot_kinds.Structure):
+        return MakeTensegrity(scenario, scenario.robot)
+    return MakeTetrahedra(scenario, scenario.robot)
 
 
 def constant_steering(turn: float) -> SteeringSignal:

@@ -27,7 +27,7 @@ class Structure:
     p_BN: np.ndarray
     """(nodes, 3): the nodes in the frames of their bodies, whose origins are centres of mass."""
     struts: np.ndarray
-    """(struts, 2): the indices of the nodes that each joins."""
+    """(struts, 2): the indices of the nodes that each joins, body by body."""
     strut_radius: np.ndarray
     """(struts,)."""
     node_radius: np.ndarray
@@ -45,9 +45,14 @@ class Structure:
     """(cables,) of dtype CABLE: pair by pair of bodies, from the lower index to the higher one."""
     cable_names: tuple[str, ...]
     """Such as "T1-T2 outer bottom_left"."""
+    slack: bool
+    """True if a cable cannot push."""
     actuation: Actuation
     contacts: np.ndarray
     """(contacts,): the indices of the nodes that the ground can touch, ascending."""
+    thesis_nodes: tuple[int, int, int] | None
+    """T1's bottom left and bottom right nodes and the lead's tip, for the thesis's metrics; None for
+    robots that are no row of tetrahedra."""
     feet: int
     """Nodes that bear the weight at rest."""
 

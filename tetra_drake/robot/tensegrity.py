@@ -57,6 +57,7 @@ def _placed(scenario: Scenario, kind: kinds.Structure) -> Structure:
         problem = f"starts {depth:.3g} m below the ground, expected on it or above"
         raise InputError(scenario.name, f"robot.nodes.{names[lowest]}", problem)
     p_WN[:, 2] += depth
+    struts = sorted(kind.all_struts, key=lambda strut: kind.body_of_node[strut.nodes[0]])
     inertias = [_inertia_in_world(kind, body, number, p_WN) for body in kind.bodies]
     p_WB = np.array([inertia.get_com() for inertia in inertias])
     first_node = np.append(0, np.cumsum([len(body) for body in kind.bodies]))
@@ -65,8 +66,8 @@ def _placed(scenario: Scenario, kind: kinds.Structure) -> Structure:
         node_names=tuple(names),
         first_node=first_node,
         p_BN=p_WN - np.repeat(p_WB, np.diff(first_node), axis=0),
-        struts=np.array([[number[node] for node in strut.nodes] for strut in kind.all_struts]),
-        strut_radius=np.array([kind.struts[s.group].diameter / 2 for s in kind.all_struts]),
+        struts=np.array([[number[node] for node in strut.nodes] for strut in struts]),
+        strut_radius=np.array([kind.struts[strut.group].diameter / 2 for strut in struts]),
         node_radius=np.array([kind.sphere_of_node[node].node_diameter / 2 for node in names]),
         mass=np.array([inertia.get_mass() for inertia in inertias]),
         unit_inertia=np.array([_unit_inertia(inertia) for inertia in inertias]),
@@ -74,8 +75,10 @@ def _placed(scenario: Scenario, kind: kinds.Structure) -> Structure:
         q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (len(inertias), 1)),
         cables=_cables(kind, number, Actuation.of(scenario)),
         cable_names=kind.layout().cable_names,
+        slack=True,
         actuation=Actuation.of(scenario),
         contacts=contacts,
+        thesis_nodes=None,
         feet=len(contacts),
     )
 

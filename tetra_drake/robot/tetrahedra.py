@@ -18,17 +18,17 @@ from tetra_drake.scenario.nesting import (
     NODES,
     TIP,
     TOP,
+    Tetrahedra,
     cable_nodes,
     tetrahedron_nodes,
 )
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.settings import RobotSection
 
 BASE = (BOTTOM_LEFT, BOTTOM_RIGHT, TOP)
 STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
 
 
-def MakeTetrahedra(scenario: Scenario) -> Structure:
+def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
     """The robot of thesis section 2.1 with `robot.tetrahedra` tetrahedra.
 
     Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0; the
@@ -37,8 +37,7 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     CABLES and Actuation. On an incline without start, the robot is turned with
     the slope, about World's y axis.
     """
-    robot, cables = scenario.robot, scenario.robot.cables
-    n = robot.tetrahedra
+    n, cables = robot.tetrahedra, robot.cables
     edge = robot.strut_length
     circumradius = edge / math.sqrt(3.0)
     height = edge * math.sqrt(2.0 / 3.0)
@@ -54,8 +53,8 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     for i in range(n - 1):
         for cable in CABLES:
             outer = cable.startswith("outer")
-            stiffness = robot.cables.outer_stiffness if outer else robot.cables.inner_stiffness
-            law = stiffness, robot.cables.damping, robot.cables.free_length
+            stiffness = cables.outer_stiffness if outer else cables.inner_stiffness
+            law = stiffness, cables.damping, cables.free_length
             rows.append((*cable_nodes(i, cable), actuation.drivers[len(rows)], *law))
     bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
     contacts = [*bottom, 4 * (n - 1) + TIP] if robot.contacts == "thesis" else range(4 * n)
@@ -74,14 +73,16 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
         p_WB=p_WB,
         q_WB=q_WB,
         cables=np.array(rows, dtype=CABLE),
-        cable_names=scenario.robot.layout().cable_names,
+        cable_names=robot.layout().cable_names,
+        slack=robot.slack,
         actuation=actuation,
         contacts=np.array(contacts),
+        thesis_nodes=(BOTTOM_LEFT, BOTTOM_RIGHT, 4 * (n - 1) + TIP),
         feet=2 * n + 1,
     )
 
 
-def tetrahedron_inertia(p_BN: np.ndarray, robot: RobotSection) -> tuple[float, np.ndarray]:
+def tetrahedron_inertia(p_BN: np.ndarray, robot: Tetrahedra) -> tuple[float, np.ndarray]:
     """Mass, and unit inertia (6,) as in Structure, of six struts and four spheres with nodes p_BN
     (4, 3)."""
     total = SpatialInertia.Zero()

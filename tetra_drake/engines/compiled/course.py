@@ -70,13 +70,14 @@ class PreparedGait:
     @property
     def kind(self) -> tuple[object, ...]:
         """Properties that simulations on one engine must share."""
-        scenario, ground = self.robot.scenario, self.robot.ground
-        drivers = tuple(self.robot.actuation.drivers.tolist())
+        structure, ground = self.robot.structure, self.robot.ground
+        joins = structure.cables[["node_a", "node_b", "signal"]].tobytes()
         return (
-            scenario.robot.body_count,
-            len(ground.contacts),
-            scenario.robot.slack,
-            drivers,
+            structure.first_node.tobytes(),
+            structure.contacts.tobytes(),
+            joins,
+            structure.isotropic,
+            self.robot.model.slack,
             self.live,
             ground.flat,
             ground.friction.kind,

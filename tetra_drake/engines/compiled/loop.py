@@ -166,8 +166,9 @@ def advance(constants: Constants, walk: Walk, log: Log, live: bool, rounds: int)
         ended = False
         for _ in range(ROUND):
             ended |= iterate(constants, walk, log, live)
-        move_robot(constants.robot, walk.step.state, walk.forces)
-        look(walk.tally, walk.forces.nodes)
+        robot, state, nodes = constants.robot, walk.step.state, walk.forces.nodes
+        move_robot(robot, state, walk.forces)
+        look(walk.tally, robot.struts, robot.bodies.radius, state, nodes)
         if ended:
             return
 
