@@ -47,7 +47,11 @@ def test_rests_where_the_independent_simulation_does(robot, data):
             "robot.offsets": [[0, 0, 0], ["2 mm", "1 mm", "1 mm"], [0, 0, "3 mm"]],
         },
         # Base triangles so near that the robot tips forward, onto the lead's tip.
-        {"robot.tetrahedra": 2, "robot.spacing": "0.055 m", "robot.cables.inner_stiffness": "26.0 N/m"},
+        {
+            "robot.tetrahedra": 2,
+            "robot.spacing": "0.055 m",
+            "robot.cables.inner_stiffness": "26.0 N/m",
+        },
     ],
 )
 def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
@@ -67,7 +71,14 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     [
         ({"robot.strut_length": "0.25 m", "robot.gravity": "1.6 m/s^2"}, 0),
         # Cables of 0.12 m: the tetrahedra lean forward, and only those from tips to tops hold them.
-        ({"robot.spacing": "0.08 m", "robot.cables.free_length": "0.12 m", "robot.contacts": "all"}, 20),
+        (
+            {
+                "robot.spacing": "0.08 m",
+                "robot.cables.free_length": "0.12 m",
+                "robot.contacts": "all",
+            },
+            20,
+        ),
     ],
 )
 def test_no_force_is_left_on_any_body(scenario, changes, slack):

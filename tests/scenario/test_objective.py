@@ -50,7 +50,8 @@ def test_a_draw_changes_what_it_names_within_its_spread(load_text):
         assert np.ptp(factors) > 1.9 * spread
     draw, changed = draws[0], disturbed(scenario, draws[0])
     ours, theirs = changed.friction, scenario.friction
-    assert changed.robot.cables.damping == draw.factors["robot.cables.damping"] * scenario.robot.cables.damping
+    damping = draw.factors["robot.cables.damping"] * scenario.robot.cables.damping
+    assert changed.robot.cables.damping == damping
     ratio = draw.factors[joined]
     assert ours.stiction_range == approx(ratio * theirs.stiction_range, rel=1e-15)
     assert ours.stiction_damping == approx(ratio * theirs.stiction_damping, rel=1e-15)

@@ -242,21 +242,23 @@ class Structure(Section):
     @classmethod
     def _read_nodes(cls, tree: Any) -> Any:
         """The tree with a unit at every coordinate, if it has the key `unit`, and without that."""
-        if not isinstance(tree, dict) or not isinstance(tree.get("nodes"), dict):
+        if not isinstance(tree, dict):
+            return tree
+        tree = dict(tree)
+        unit = tree.pop("unit", None)
+        if not isinstance(tree.get("nodes"), dict):
             return tree
         for node in tree["nodes"]:
             if not isinstance(node, str):
                 refuse(f"nodes.{node}", f"found the name {node}, expected a text, such as n{node}")
-        if "unit" not in tree:
+        if unit is None:
             return tree
-        tree = dict(tree)
-        unit = tree.pop("unit")
         try:
             quantity_to_si(f"1 {unit}", "m")
         except ValueError:
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
-        nodes = {node: _with_unit(point, unit) for node, point in tree["nodes"].items()}
-        return tree | {"nodes": nodes}
+        tree["nodes"] = {node: _with_unit(point, unit) for node, point in tree["nodes"].items()}
+        return tree
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Structure:
@@ -363,8 +365,8 @@ class Structure(Section):
 Robot = Annotated[Tetrahedra | Structure, Kinds()]
 """The tagged kinds of robots; without a tag it is the first.
 
-All have `gravity`, `offsets` (one for each body), `body_count`, `oscillator_count`, `slack`, `size`,
-`lacking` metrics, a `layout()`, and changes that are `following` from others.
+All have `gravity`, `offsets` (one for each body), `body_count`, `oscillator_count`, `slack`,
+`size`, `lacking` (metrics), `layout()` and `following()`.
 """
 
 

@@ -46,7 +46,8 @@ class CpgSection(Section):
     integrated with the robot. Feedback needs `live`."""
     listing_step: float = quantity("s", ge=1e-6)
     reach: int | None = Field(default=None, ge=0)
-    """Oscillators at most this far apart inhibit each other; see Layout.distances. The default is all."""
+    """Oscillators at most this far apart inhibit each other (see Layout.distances). The default is
+    all."""
     feedback: list[Pathway] = Field(default=[])
     """Pathways of feedback; their gains are parameters of the gait."""
 
@@ -127,8 +128,8 @@ class Disturbances(Section):
     """Spreads by scenario keys. Each draw multiplies the number by a factor from 1 - spread to
     1 + spread. Keys joined by commas get the same factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)
-    """Each draw displaces every body at t = 0 along x, y and up, by up to this share of the spacing of
-    tetrahedra, or of the shortest strut of a structure."""
+    """Each draw displaces every body at t = 0 along x, y and up, by up to this share of the
+    spacing of tetrahedra, or of the shortest strut of a structure."""
     tail: float = Field(default=1.0, gt=0, le=1)
     """Share of the draws, the worst ones, over which the fitness is the mean (the conditional value
     at risk). 1 is the mean over all draws. At least one draw counts."""

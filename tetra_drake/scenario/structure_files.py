@@ -40,18 +40,18 @@ def structure_file(name: str, folder: Path) -> Path:
 
 
 def with_structure(tree: Tree, source: object) -> Tree:
-    """The tree of a scenario with the content of the file that its robot names, if it does.
+    """The tree of a scenario with the content of the structure file that its robot may name.
 
-    The file must be a structure by itself. What stands beside `file` overrides its content, and
-    `actuated` replaces that as a whole. Raises InputError that names the file, or `source`, and key.
+    The file must be a structure by itself. What stands beside `file` overrides its content;
+    `actuated` is replaced as a whole. Raises InputError that names file, or `source`, and key.
     """
     robot = tree.get("robot")
     if not isinstance(robot, dict) or "file" not in robot:
         return tree
     if robot.get(TAG, Structure.__name__) != Structure.__name__:
         return tree  # which has an unknown key
-    changes = dict(robot)
-    name = changes.pop("file")
+    changes = {key: value for key, value in robot.items() if key not in (TAG, "file")}
+    name = robot["file"]
     if not isinstance(name, str) or not os.path.exists(structure_file(name, Path())):
         expected = f"structure file (shipped: {', '.join(shipped_structures())})"
         raise InputError(source, "robot.file", f"{described(name)}: no such {expected}")
@@ -64,7 +64,7 @@ def with_structure(tree: Tree, source: object) -> Tree:
 
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
-    """Content of a structure file; that of a file of NTRT by the unit given at `key` of `source`."""
+    """Content of a structure file, or of a file of NTRT by the unit that `source` has at `key`."""
     content = parse_yaml(read_text(file, "structure file", most=MOST_BYTES), file)
     if not isinstance(content, dict) or not KEYS_OF_NTRT & content.keys():
         return content
