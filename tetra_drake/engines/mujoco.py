@@ -25,7 +25,7 @@ import numpy as np
 from tetra_drake.engines.interface import Engine, Outcome, Viewer
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
+from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.physics.inertia import XX
@@ -47,7 +47,7 @@ _IMPEDANCE = 0.5
 """Damping of contacts. Nothing at rest depends on it, nor do converged distances by over 0.01 in;
 with a smaller one friction chatters in steps beyond 0.06 ms, with a larger one errors grow."""
 
-_POINT = 1e-5  # radius (m) of the spheres that touch the floor, which acts on the nodes' centres
+_POINT = 1e-8  # radius (m) of the spheres that touch the floor; a larger one spins thin bars
 
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs of `contact` touch each other
 
@@ -79,9 +79,6 @@ class MujocoEngine(Engine):
             kind = type(scenario.terrain).__name__
             problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline"
             raise InputError(scenario.name, "terrain", problem)
-        if scenario.robot.slack:
-            problem = "found true, which mujoco cannot simulate"
-            raise InputError(scenario.name, "robot.cables.slack", problem)
         scenario.friction.cone(scenario.name)
 
     def simulate(
@@ -106,11 +103,15 @@ class MujocoEngine(Engine):
         started = time.perf_counter()
         states = simulator.run(signals, steps_kept, observer)
         wall_time = time.perf_counter() - started
+        totals = observer.totals()
+        if robot.model.slack and totals.tension[0] <= 0.0:
+            reason = "a cable went slack, where MuJoCo's tendon pushes"
+            raise SimulationFailure(time=float(totals.time[0]), reason=reason)
         signals_kept = signals_at(robot, gait, times, steering=steering)
         return make_result(
             robot,
             simulator.motion(times, states, signals_kept),
-            totals=observer.totals(),
+            totals=totals,
             work=IntegratorWork(INTEGRATOR, step, steps, steps),
             wall_time=wall_time,
             record=record,

@@ -51,8 +51,8 @@ class Structure:
     contacts: np.ndarray
     """(contacts,): the indices of the nodes that the ground can touch, ascending."""
     thesis_nodes: tuple[int, int, int] | None
-    """T1's bottom left and bottom right nodes and the lead's tip, for the thesis's metrics; None for
-    robots that are no row of tetrahedra."""
+    """T1's bottom left and bottom right nodes and the lead's tip, for the thesis's metrics. None
+    for robots that are no row of tetrahedra."""
     feet: int
     """Nodes that bear the weight at rest."""
 

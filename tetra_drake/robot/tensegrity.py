@@ -42,7 +42,7 @@ def MakeTensegrity(scenario: Scenario, kind: kinds.Structure) -> Structure:
     p_WB = poses[:, 4:] + np.array(kind.offsets or [[0.0, 0.0, 0.0]])
     slope = scenario.terrain.plane_slope or 0.0
     turned_p_WB, turned_q_WB = turn_with_slope(p_WB, poses[:, :4], slope)
-    return dataclasses.replace(placed, p_WB=turned_p_WB, q_WB=turned_q_WB, feet=rest.feet)
+    return dataclasses.replace(placed, p_WB=turned_p_WB, q_WB=turned_q_WB, feet=max(1, rest.feet))
 
 
 def _placed(scenario: Scenario, kind: kinds.Structure) -> Structure:
