@@ -24,7 +24,7 @@ from PIL import Image, ImageChops
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
-from tetra_drake.visualization.scene import ASPECT, COLOURS
+from tetra_drake.visualization.scene import ASPECT, COLOURS, PASSIVE_COLOURS
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -128,7 +128,7 @@ def save(images: Sequence[Image.Image], path: Path) -> None:
 def _palette(image: Image.Image, count: int) -> Image.Image:
     """The colours of the robot, those half faded into the floor, and `count` of an image."""
     rgb = {name: np.array(list(bytes.fromhex(code[1:]))) for name, code in COLOURS.items()}
-    drawn = [rgb[name] for name in ("odd", "even", "actuated", "outer", "inner", "trace")]
+    drawn = [rgb[name] for name in ("odd", "even", "actuated", *PASSIVE_COLOURS, "trace")]
     faded = [(colour + rgb["floor"]) // 2 for colour in drawn]
     others = image.quantize(count).getpalette() or []
     palette = Image.new("P", (1, 1))

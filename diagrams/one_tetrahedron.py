@@ -23,17 +23,10 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
-from tetra_drake.robot.bodies import AddTetrahedra
-from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import (
-    BASE,
-    BOTTOM_LEFT,
-    TOP,
-    MakeStructure,
-    Structure,
-    node_positions,
-    node_velocities,
-)
+from tetra_drake.robot.bodies import AddBodies
+from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.structure import Structure, node_positions, node_velocities
+from tetra_drake.robot.tetrahedra import BASE, BOTTOM_LEFT, STRUTS, TOP
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import GroundContact
 
@@ -65,22 +58,35 @@ def make_standing_tetrahedron(scenario: Scenario) -> Robot:
     Its body frame is turned with it, which its inertia, the same about all axes, allows.
     """
     row = MakeStructure(scenario)
-    p_BN = row.p_BN @ R_WB.T
+    count = row.first_node[1]  # of its nodes
+    p_BN = row.p_BN[:count] @ R_WB.T
     tetrahedron = dataclasses.replace(
         row,
-        bodies=("T1",),
+        bodies=row.bodies[:1],
+        node_names=row.node_names[:count],
+        first_node=row.first_node[:2],
         p_BN=p_BN,
+        struts=np.array(STRUTS),
+        strut_radius=row.strut_radius[: len(STRUTS)],
+        node_radius=row.node_radius[:count],
+        mass=row.mass[:1],
+        unit_inertia=row.unit_inertia[:1],
         p_WB=-p_BN[TRAILING, 2] * start_axes(row)[None, 2],
+        q_WB=row.q_WB[:1],
         cables=row.cables[:0],
         cable_names=(),
+        cable_groups=(),
         contacts=np.array(BASE),
+        thesis_nodes=None,
+        feet=len(BASE),
+        markers=row.markers[:2],
     )
     return Robot.of(scenario, tetrahedron)
 
 
 def start_axes(structure: Structure) -> np.ndarray:
     """(3, 3): the tangents t1 and t2 and the normal of the ground at the start, as rows."""
-    return RotationMatrix(Quaternion(structure.q_WB)).matrix().T
+    return RotationMatrix(Quaternion(structure.q_WB[0])).matrix().T
 
 
 def make_diagram(scenario: Scenario, *, witness: bool = True) -> Diagram:
@@ -89,7 +95,7 @@ def make_diagram(scenario: Scenario, *, witness: bool = True) -> Diagram:
     tetrahedron = make_standing_tetrahedron(scenario)
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
-    AddTetrahedra(plant, tetrahedron.structure)
+    AddBodies(plant, tetrahedron.structure)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
     ground = builder.AddNamedSystem("ground", GroundContact(tetrahedron, witness=witness))

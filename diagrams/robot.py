@@ -57,9 +57,9 @@ def main(gait_file: Path = BEST_GAIT, *, duration: float = 15.0, out: Path = DIA
     simulator.AdvanceTo(duration)
 
     trajectory = make_dataset(robot, sampler.motion())
-    inches = float(distance_walked(trajectory)[-1]) / INCH
+    inches = float(distance_walked(trajectory, robot.structure)[-1]) / INCH
     title = f"{gait.name}: {inches:.2f} inches in {duration:g} s"
-    save_replay(out / "robot.html", scenario=scenario, trajectory=trajectory, title=title)
+    save_replay(out / "robot.html", robot=robot, trajectory=trajectory, title=title)
     print(title)
     print(f"open {out / 'robot.html'} in a browser to see it walk")
 

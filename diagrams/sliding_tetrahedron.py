@@ -20,7 +20,7 @@ from one_tetrahedron import LEADING, TRAILING, Samples, let_go, weight
 
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
 from tetra_drake.results.measures import intervals
-from tetra_drake.robot.structure import BASE, NODES
+from tetra_drake.robot.tetrahedra import BASE, NODES
 from tetra_drake.scenario.friction_kinds import ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario

@@ -177,7 +177,7 @@ def test_the_result_holds_what_was_asked_for_and_done(simulated, result, scenari
     expected = result["steady_distance_in"] - 10 * result["twist_in"] - result["lateral_drift_in"]
     assert result["fitness"] == pytest.approx(expected, abs=1e-12)
     trajectory = xarray.load_dataset(simulated[0] / "trajectory.nc", engine="h5netcdf")
-    x1 = trajectory.p_WN.sel(tetrahedron="T1", node="bottom_left", axis="x") / INCH
+    x1 = trajectory.p_WN.sel(node="T1 bottom_left", axis="x") / INCH
     assert float(x1[-1] - x1[0]) == pytest.approx(result["distance_in"], abs=1e-12)
 
 

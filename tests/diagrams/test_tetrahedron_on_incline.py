@@ -25,8 +25,7 @@ from tetrahedron_on_incline import (
     simulate,
 )
 
-from tetra_drake.robot.bodies import tetrahedron_inertia
-from tetra_drake.robot.structure import BASE
+from tetra_drake.robot.tetrahedra import BASE
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.units import INCH
@@ -45,13 +44,13 @@ def slips(motion):
 def energy(motion, scenario):
     """(samples,): of motion, weight, ground, and the bristles that stick."""
     structure = make_standing_tetrahedron(scenario).structure
-    inertia, law = tetrahedron_inertia(structure), scenario.friction
+    mass, law = structure.mass[0], scenario.friction
     t1, t2, n = start_axes(structure)
     v_WB, p_WB = motion.v_WN.mean(axis=1), motion.p_WN.mean(axis=1)
     # The angular velocity from the nodes: sum |w x r|^2 = 2/3 |w|^2 sum r^2.
-    moment = inertia.get_unit_inertia().get_moments()[0] / (structure.p_BN**2).sum() * 3 / 2
+    moment = structure.unit_inertia[0, 0] / (structure.p_BN**2).sum() * 3 / 2
     turning = moment * ((motion.v_WN - v_WB[:, None]) ** 2).sum(axis=(1, 2))
-    kinetic = 0.5 * inertia.get_mass() * ((v_WB**2).sum(axis=1) + turning)
+    kinetic = 0.5 * mass * ((v_WB**2).sum(axis=1) + turning)
     depth = np.maximum(-motion.p_WN[:, BASE] @ n, 0.0)
     ground = 0.5 * scenario.ground.stiffness * (depth**2).sum(axis=1)
     total = kinetic + weight(scenario) * p_WB[:, 2] + ground

@@ -1,5 +1,7 @@
 """A walk made up for tests of figures and measures, of which everything is known."""
 
+from typing import Any
+
 import numpy as np
 import xarray
 
@@ -14,15 +16,18 @@ HEIGHT = 0.02  # m, to which a tetrahedron is lifted
 LOAD = 0.2  # N, on a contact node that stands
 
 
+def make_row(bodies: int = 5, changes: dict[str, Any] | None = None) -> Robot:
+    """A robot of so many tetrahedra."""
+    scenario = load_scenario("thesis").with_changes({"robot.tetrahedra": bodies})
+    return Robot.of(scenario.with_changes(changes or {}))
+
+
 def make_walk(
-    *, bodies: int = 5, duration: float = 9.0, actuation: list[list[str]] | None = None
+    *, bodies: int = 5, duration: float = 9.0, changes: dict[str, Any] | None = None
 ) -> xarray.Dataset:
     """Tetrahedra that move on at SPEED; T1, T3 ... are lifted in the first half of each PERIOD
     and T2, T4 ... in the second. The tip of the lead never touches the ground."""
-    scenario = load_scenario("thesis")
-    groups = actuation or scenario.robot.actuation
-    scenario = scenario.with_changes({"robot.tetrahedra": bodies, "robot.actuation": groups})
-    robot = Robot.of(scenario)
+    robot = make_row(bodies, changes)
     structure = robot.structure
     times = np.linspace(0.0, duration, round(duration / 0.01) + 1)
     phase = 2.0 * np.pi * times / PERIOD

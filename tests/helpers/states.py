@@ -9,9 +9,10 @@ from tetra_drake.robot.structure import Structure
 def body_velocities(walk: xarray.Dataset, structure: Structure) -> tuple[np.ndarray, np.ndarray]:
     """(time, n, 3) each: velocity (m/s) and angular velocity (rad/s) of the bodies, from the nodes:
     sum r x (w x r) = 8/3 r^2 w."""
-    v_WB = walk.v_WN.mean("node").values
-    p_BN = walk.p_WN.values - walk.p_WB.values[:, :, None]
-    v_BN = walk.v_WN.values - v_WB[:, :, None]
+    bodies = len(structure.bodies)
+    p_WN, v_WN = (walk[name].values.reshape(-1, bodies, 4, 3) for name in ("p_WN", "v_WN"))
+    v_WB = v_WN.mean(axis=2)
+    p_BN, v_BN = p_WN - walk.p_WB.values[:, :, None], v_WN - v_WB[:, :, None]
     return v_WB, np.cross(p_BN, v_BN).sum(axis=2) / (8 / 3 * (structure.p_BN[0] ** 2).sum())
 
 

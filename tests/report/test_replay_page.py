@@ -76,7 +76,7 @@ def test_missing_and_damaged_files_are_refused_by_name(folder, name, damage):
 @pytest.mark.parametrize(
     ("key", "change"),
     [
-        ("tetrahedron", lambda dataset: dataset.isel(tetrahedron=slice(2))),
+        ("body", lambda dataset: dataset.isel(body=slice(2))),
         ("tension", lambda dataset: dataset.drop_vars("tension")),
         ("p_WN", lambda dataset: dataset.transpose(..., "time")),
         ("p_WB", lambda dataset: dataset.assign(p_WB=dataset.p_WB.where(False))),

@@ -4,13 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from helpers.made_up_walk import HEIGHT, PERIOD, make_walk
+from helpers import prism
+from helpers.made_up_walk import HEIGHT, PERIOD, make_row, make_walk
 
 from tetra_drake.results.measures import (
+    distance_walked,
     dominant_frequency,
     intervals,
     last_step,
     lifted,
+    relative_distances,
     share_of_time,
     travelling_index,
 )
@@ -26,13 +29,31 @@ def walk():
 
 def test_a_tetrahedron_is_lifted_when_none_of_its_nodes_bears_a_force(walk):
     eleven = make_walk(bodies=11)  # T1 and T11 begin alike
-    heights = eleven.p_WN.sel(node="bottom_left", axis="z")
+    heights = eleven.p_WN.sel(node=[f"{body} bottom_left" for body in eleven.body.values], axis="z")
     np.testing.assert_array_equal(lifted(eleven), heights > 1e-9)
     assert float(heights.max()) == pytest.approx(HEIGHT, rel=1e-3)
     on_its_tip = walk.copy(deep=True)
     on_its_tip.normal_force.loc[{"contact": "T5 tip"}] = 0.1
-    assert lifted(walk).sel(tetrahedron="T5").any()
-    assert not lifted(on_its_tip).sel(tetrahedron="T5").any()
+    assert lifted(walk).sel(body="T5").any()
+    assert not lifted(on_its_tip).sel(body="T5").any()
+
+
+def test_the_distance_is_that_of_the_first_marker_or_of_the_centre(walk):
+    structure = make_row().structure
+    turned = walk.copy(deep=True)
+    turned.p_WN.loc[{"node": "T1 bottom_left", "axis": "x"}] = walk.time.values**2
+    np.testing.assert_allclose(distance_walked(turned, structure), walk.time**2)
+    robot = prism.make_prism()
+    motion = prism.slide_prism(robot, duration=1.0)
+    way = prism.SPEED * motion.time
+    np.testing.assert_allclose(distance_walked(motion, robot.structure), way, atol=1e-15)
+    # From (n0 + n4) / 2 to (n1 + n5) / 2 and (n2 + n3) / 2, in m.
+    apart = relative_distances(motion)[0]
+    np.testing.assert_allclose(apart, [0.0, -0.0316987, 0.0116025], atol=1e-6)
+
+
+def test_without_oscillators_there_is_no_step(walk):
+    assert last_step(walk.isel(oscillator=[])) is None
 
 
 @pytest.mark.parametrize(

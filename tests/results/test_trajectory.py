@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from helpers import prism
 from helpers.made_up_walk import make_walk
 
 from tetra_drake.engines.simulate import simulate
@@ -27,7 +28,8 @@ def trajectory(request: pytest.FixtureRequest, data: Path) -> xarray.Dataset:
 
 
 def test_every_variable_has_a_unit_and_named_dimensions(trajectory: xarray.Dataset) -> None:
-    assert trajectory.p_WN.dims == ("time", "tetrahedron", "node", "axis")
+    assert trajectory.p_WN.dims == ("time", "node", "axis")
+    assert trajectory.p_WB.dims == ("time", "body", "axis")
     assert trajectory.tension.dims == ("time", "cable")
     assert trajectory.friction_mode.dims == ("time", "contact", "horizontal")
     assert all(v.attrs["units"] for v in trajectory.data_vars.values())
@@ -52,17 +54,18 @@ def test_positions_and_velocities_agree_between_samples(trajectory: xarray.Datas
 
 def test_body_poses_carry_the_nodes(trajectory: xarray.Dataset, structure: Structure) -> None:
     # R r = r + 2 w (e x r) + 2 e x (e x r) for the unit quaternion (w, e).
-    q_WB = trajectory.q_WB.values[:, :, None]
+    carriers = structure.carriers
+    q_WB = trajectory.q_WB.values[:, carriers]
     w, e = q_WB[..., :1], q_WB[..., 1:]
     turned = 2.0 * np.cross(e, structure.p_BN)
     rotated = structure.p_BN + w * turned + np.cross(e, turned)
-    p_WN = trajectory.p_WB.values[:, :, None] + rotated
+    p_WN = trajectory.p_WB.values[:, carriers] + rotated
     # Drake does not keep quaternions at length 1; it is left by the accuracy of its steps.
     np.testing.assert_allclose(p_WN, trajectory.p_WN.values, atol=1e-6)
 
 
 def test_cables_reach_from_node_to_node(trajectory: xarray.Dataset, structure: Structure) -> None:
-    p_WN, cables = trajectory.p_WN.values.reshape(201, 20, 3), structure.cables
+    p_WN, cables = trajectory.p_WN.values, structure.cables
     distance = np.linalg.norm(p_WN[:, cables["node_b"]] - p_WN[:, cables["node_a"]], axis=-1)
     np.testing.assert_allclose(trajectory.length, distance, rtol=1e-12)
     assert trajectory.cable.values.tolist() == list(structure.cable_names)
@@ -73,7 +76,13 @@ def test_cables_say_where_they_are_and_what_drives_them(trajectory: xarray.Datas
     assert driven == ["T2-T3 outer bottom_left", "T2-T3 outer bottom_right"]
     assert (trajectory.cable_signal == "").sum() == 16
     inner = trajectory.sel(cable="T1-T2 inner top")
-    assert (inner.cable_junction.item(), inner.cable_role.item()) == ("T1-T2", "inner")
+    assert (inner.cable_bodies.item(), inner.cable_group.item()) == ("T1-T2", "inner")
+
+
+def test_nodes_say_of_which_bodies_they_are(trajectory: xarray.Dataset) -> None:
+    assert trajectory.node_body.sel(node="T4 tip") == "T4"
+    assert trajectory.contact_body.sel(contact="T5 tip") == "T5"
+    assert trajectory.body.values.tolist() == ["T1", "T2", "T3", "T4", "T5"]
 
 
 def test_forces_belong_to_the_recorded_states(
@@ -83,12 +92,24 @@ def test_forces_belong_to_the_recorded_states(
     assert (abs(trajectory.signal.sel(time=slice(1.3, 2.0))) > 0.0).any()
     # Normal force only where a node is below the ground, friction only in contact (modes are
     # those of the step, so a node just lifting or landing may differ at single samples).
-    above = trajectory.p_WN.values[..., 2].reshape(201, 20)[:, structure.contacts] > 0.0
+    above = trajectory.p_WN.values[:, structure.contacts, 2] > 0.0
     normal = trajectory.normal_force.values
     assert (normal[above] == 0.0).all() and (normal[~above] > 0.0).any()
     airborne = trajectory.in_contact.values == 0
     assert (trajectory.friction_force.values[airborne] == 0.0).all()
     assert np.mean(airborne != above) < 0.05
+
+
+def test_bodies_nodes_and_cables_of_any_structure_have_names() -> None:
+    robot = prism.make_prism()
+    motion = prism.slide_prism(robot, duration=0.1)
+    p_WN = motion.p_WN.sel(node="n5", time=0.0)
+    np.testing.assert_allclose(p_WN, [0.0, -0.1, 0.16], atol=1e-12)
+    assert motion.node_body.sel(node="n5") == "n1 n5"
+    assert motion.body.values.tolist() == ["n0 n4", "n1 n5", "n2 n3"]
+    cable = motion.sel(cable="side n0 n3")
+    assert (cable.cable_bodies.item(), cable.cable_group.item()) == ("n0 n4-n2 n3", "side")
+    assert cable.cable_signal.item() == "second"
 
 
 def test_what_is_saved_is_what_is_read(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from matplotlib.image import imread
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.report.run_page import write_report
 from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.visualization.replay import frame_samples, save_replay
 from tetra_drake.visualization.scene import COLOURS
@@ -49,7 +50,8 @@ def trajectory(data):
 def replay(trajectory, tmp_path_factory):
     path = tmp_path_factory.mktemp("replay") / "replay.html"
     title = "a gait: 1.00 inches"
-    save_replay(path, scenario=load_scenario("thesis"), trajectory=trajectory, title=title)
+    robot = Robot.of(load_scenario("thesis"))
+    save_replay(path, robot=robot, trajectory=trajectory, title=title)
     return path
 
 
@@ -112,10 +114,10 @@ def test_cables_are_seen_and_move_to_the_right(page):
         png = base64.b64decode(url.removeprefix("data:image/png;base64,"))
         pixels = {
             name: pixels_of(imread(io.BytesIO(png), format="png")[..., :3], name)
-            for name in ("actuated", "outer", "inner")
+            for name in ("actuated", "passive_1", "passive_2")
         }
         assert min(map(len, pixels.values())) > 20
-        columns.append(pixels["inner"][:, 1].mean())
+        columns.append(pixels["passive_2"][:, 1].mean())
     assert columns[1] > columns[0] + 10
 
 
@@ -126,7 +128,7 @@ def test_bodies_are_where_they_were(page, trajectory):
         shown = page.evaluate(
             "bodies => bodies.map(body => "
             "viewer.scene_tree.find(['robot', body]).object.position.toArray())",
-            frames["tetrahedron"].values.tolist(),
+            frames["body"].values.tolist(),
         )
         # Times of key frames are rounded to 0.01 ms, and nothing moves at 1 m/s.
         np.testing.assert_allclose(shown, frames["p_WB"].values[frame], rtol=0, atol=1e-5)

@@ -81,7 +81,7 @@ def test_shows_where_the_robot_is(short, meshcat, visitor, monkeypatch):
         command["path"]: command["matrix"]
         for command in commands(meshcat.StaticHtml(), "set_transform")
     }
-    for i, body in enumerate(shown[-1]["tetrahedron"].values):
+    for i, body in enumerate(shown[-1]["body"].values):
         position = matrices[f"/robot/{body}"][12:15]
         np.testing.assert_array_equal(position, shown[-1]["p_WB"].values[0, i])
     times = np.array([frame["time"].values[0] for frame in shown])

@@ -7,22 +7,24 @@ import re
 
 import numpy as np
 import pytest
+from helpers import prism
 from helpers.meshcat_page import commands, read_page
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.scenario.cable_names import CABLES
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.nesting import CABLES
 from tetra_drake.visualization.replay import (
-    LEGEND,
     RESOLUTION,
     frame_samples,
+    legend_of,
     pack_page,
     save_replay,
 )
-from tetra_drake.visualization.scene import ARROW_LENGTH, CABLE_KINDS, CABLE_RADIUS, HIDDEN
+from tetra_drake.visualization.scene import ARROW_LENGTH, CABLE_RADIUS, HIDDEN
 
 ROUNDING = 0.51 * RESOLUTION
 
@@ -54,7 +56,7 @@ def frames(trajectory):
 @pytest.fixture(scope="module")
 def page(scenario, trajectory, tmp_path_factory):
     path = tmp_path_factory.mktemp("replay") / "new" / "replay.html"
-    save_replay(path, scenario=scenario, trajectory=trajectory, title=TITLE)
+    save_replay(path, robot=Robot.of(scenario), trajectory=trajectory, title=TITLE)
     return read_page(path)
 
 
@@ -98,7 +100,7 @@ def test_frames_are_evenly_spread_over_the_samples(samples, period, frames):
 
 
 def test_bodies_move_as_recorded(frames, tracks):
-    for i, body in enumerate(frames["tetrahedron"].values):
+    for i, body in enumerate(frames["body"].values):
         times, positions = tracks[f"/robot/{body}"]["position"]
         np.testing.assert_allclose(times, frames["time"], rtol=0, atol=1e-5)
         np.testing.assert_allclose(positions, frames["p_WB"][:, i], rtol=0, atol=ROUNDING)
@@ -113,20 +115,38 @@ def test_traces_show_only_what_has_been_walked(frames, page, tracks):
     assert shown[1:].all()
     end = frames["time"].values[-1]
     np.testing.assert_allclose(times, np.where(shown, end, 0.0), rtol=0, atol=1e-5)
-    (trace,) = (one for one in commands(page, "/traces/") if one["type"] == "set_object")
-    (geometry,) = trace["object"]["geometries"]
-    points = np.array(geometry["data"]["attributes"]["position"]["array"])
-    start, end = points.reshape(-1, 2, 3).swapaxes(0, 1)
-    bottom = frames["p_WN"].values[:, :, :2].reshape(frames.sizes["time"], -1, 3)
+    start, end = trace_of(page)
+    bottom = frames["p_WN"][:, frames.node.str.contains("bottom").values].values
     np.testing.assert_allclose(start, bottom[:-1].reshape(-1, 3), rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(end, bottom[1:].reshape(-1, 3), rtol=0, atol=ROUNDING)
 
 
+def trace_of(page):
+    """Starts and ends (2, lines, 3) of the lines of the one trace."""
+    (trace,) = (one for one in commands(page, "/traces/") if one["type"] == "set_object")
+    (geometry,) = trace["object"]["geometries"]
+    points = np.array(geometry["data"]["attributes"]["position"]["array"])
+    return points.reshape(-1, 2, 3).swapaxes(0, 1)
+
+
+def test_a_structure_that_is_no_row_leaves_the_path_of_its_centre(tmp_path):
+    robot = prism.make_prism()
+    motion = prism.slide_prism(robot, duration=0.2)
+    save_replay(tmp_path / "prism.html", robot=robot, trajectory=motion, title="a prism")
+    page = read_page(tmp_path / "prism.html")
+    assert "path of the centre" in page and "passive top cable" in page
+    start, end = trace_of(page)
+    np.testing.assert_allclose(start[0], [0.0, 0.0, 0.08], rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(end[-1], [0.2 * prism.SPEED, 0.0, 0.08], rtol=0, atol=ROUNDING)
+    positions = film_tracks(page)["/robot/n2 n3"]["position"][1]
+    np.testing.assert_allclose(positions[0], robot.structure.p_WB[2], rtol=0, atol=ROUNDING)
+
+
 def test_cables_reach_from_node_to_node_and_swell_with_tension(structure, frames, tracks):
-    p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
+    p_WN = frames["p_WN"].values
     expected = set()
     for c, (name, cable) in enumerate(zip(structure.cable_names, structure.cables, strict=True)):
-        kind = "actuated" if cable["signal"] >= 0 else name.split()[1]
+        kind = "actuated" if cable["signal"] >= 0 else f"passive {name.split()[1]}"
         expected.add(f"/cables/{kind}/{name}")
         track = tracks[f"/cables/{kind}/{name}"]
         middle, xyzw, scale = (track[key][1] for key in ("position", "quaternion", "scale"))
@@ -145,8 +165,7 @@ def test_cables_reach_from_node_to_node_and_swell_with_tension(structure, frames
 
 def test_arrows_stand_on_their_nodes_and_are_as_long_as_the_force(frames, tracks):
     for contact in frames["contact"].values:
-        body, node = contact.split()
-        p_WN = frames["p_WN"].sel(tetrahedron=body, node=node).values
+        p_WN = frames["p_WN"].sel(node=contact).values
         normal = frames["normal_force"].sel(contact=contact).values
         friction = frames["friction_force"].sel(contact=contact).values
         sizes = {"normal": normal, "friction": np.linalg.norm(friction, axis=1)}
@@ -173,7 +192,8 @@ def test_pages_share_a_viewer_of_which_there_is_one_version(
     scenario, trajectory, page, tmp_path, refused
 ):
     viewer, path = tmp_path / "shared" / "viewer #1.js", tmp_path / "runs" / "a" / "replay.html"
-    save = functools.partial(save_replay, scenario=scenario, trajectory=trajectory, title=TITLE)
+    robot = Robot.of(scenario)
+    save = functools.partial(save_replay, robot=robot, trajectory=trajectory, title=TITLE)
     save(path, viewer=viewer)
     script = viewer.read_text(encoding="utf-8")
     shared = read_page(path)
@@ -196,11 +216,9 @@ def test_pages_share_a_viewer_of_which_there_is_one_version(
     assert not (tmp_path / "other.html").exists()
 
 
-def test_the_legend_names_kinds_of_cables_that_the_robot_has(scenario, page, tmp_path):
-    kinds = {name: LEGEND[name] for name in CABLE_KINDS}
-    assert all(meaning in page for meaning in kinds.values())
-    groups = [[cable] for cable in CABLES]
-    driven = scenario.with_changes({"robot.actuation": groups, "engine": "!Compiled"})
-    save_replay(tmp_path / "all.html", scenario=driven, trajectory=recorded(driven), title="all")
-    shown = read_page(tmp_path / "all.html")
-    assert [name for name, meaning in kinds.items() if meaning in shown] == ["actuated"]
+def test_the_legend_names_kinds_of_cables_that_the_robot_has(scenario, structure, page):
+    legend = legend_of(structure)
+    assert [colour for colour, _ in legend[:3]] == ["actuated", "passive_1", "passive_2"]
+    assert all(meaning in page for _, meaning in legend)
+    driven = scenario.with_changes({"robot.actuation": [[cable] for cable in CABLES]})
+    assert legend_of(Robot.of(driven).structure) == [legend[0], *legend[3:]]

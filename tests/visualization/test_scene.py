@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers import prism
 from helpers.made_up_walk import make_walk
 from helpers.meshcat_page import commands
 from pydrake.common.eigen_geometry import Quaternion
@@ -17,7 +18,9 @@ from tetra_drake.visualization.replay import quiet_meshcat
 from tetra_drake.visualization.scene import (
     MOST_POINTS,
     UNEVEN_MARGIN,
+    add_robot,
     aligning_quaternions,
+    cable_colours,
     floor_corners,
     floor_points,
     set_surroundings,
@@ -47,7 +50,7 @@ def test_aligning_quaternions_turn_z_into_the_direction():
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
 def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
     robot = robot_on(terrain)
-    ground, radius = robot.ground, robot.structure.node_radius
+    ground, radius = robot.ground, robot.structure.node_radius[0]
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     points = make_walk().p_WN.values
     set_surroundings(meshcat, robot, points)
@@ -87,6 +90,32 @@ def test_the_drawn_floor_is_as_fine_as_the_ground_and_bounded(terrain):
     assert np.abs(error).max() < 0.01 * INCH
     if isinstance(terrain, Incline):
         assert floor.shape[:2] == (67, 19)  # nothing between whole inches
+
+
+def test_bodies_of_any_structure_have_their_struts_and_nodes():
+    structure = prism.make_prism().structure
+    meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
+    add_robot(meshcat, structure)
+    page = meshcat.StaticHtml()
+    shapes = {c["path"]: c["object"]["geometries"][0] for c in commands(page, "set_object")}
+    moved = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in commands(page, "set_transform")}
+    for i, body in enumerate(structure.bodies):
+        ends = structure.p_BN[2 * i : 2 * i + 2]
+        (path,) = (path for path in shapes if path.startswith(f"/robot/{body}/strut "))
+        along = (ends[1] - ends[0]) / shapes[path]["height"]
+        np.testing.assert_allclose(moved[path][:3, 2], along, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(moved[path][:3, 3], ends.mean(axis=0), rtol=0, atol=1e-12)
+    for name, radius, p_BN in zip(prism.NODES, prism.RADII, structure.p_BN, strict=True):
+        (path,) = (path for path in shapes if path.endswith(f"/node {name}"))
+        assert shapes[path]["radius"] == radius
+        np.testing.assert_allclose(moved[path][:3, 3], p_BN, rtol=0, atol=1e-12)
+    colours = cable_colours(structure)
+    assert {path.split("/")[2] for path in shapes if path.startswith("/cables/")} == set(colours)
+    assert colours == {
+        "actuated": "actuated",
+        "passive bottom": "passive_1",
+        "passive top": "passive_2",
+    }
 
 
 def test_force_arrows_stand_on_the_slope():

@@ -14,9 +14,8 @@ from matplotlib.patches import Patch
 
 from tetra_drake.figures.style import OKABE_ITO, SHADE, add_grid, common_style, legend_below
 from tetra_drake.formatting import fixed
-from tetra_drake.physics.contact import Ground
 from tetra_drake.results.measures import intervals, off_ground, share_of_time
-from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, NODES
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.units import POUND_FORCE
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
@@ -37,11 +36,12 @@ def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
     One panel per oscillator, with the first of the cables that it drives.
     """
     forces = trajectory[["signal", "tension"]] / POUND_FORCE
-    groups = forces.sizes["oscillator"] // len(np.unique(forces.oscillator_junction))
-    figure, panels = _panels_over_time(forces.oscillator.values, groups=groups)
-    for oscillator, panel in panels.items():
-        driven = np.flatnonzero(forces.cable_signal == oscillator)[0]
-        panel.plot(forces.time, forces.tension[:, driven], **_FIRST)
+    oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
+    driven = [signals.index(oscillator) for oscillator in oscillators]
+    groups = len(driven) // len(np.unique(forces.cable_bodies[driven]))
+    figure, panels = _panels_over_time(oscillators, groups=groups)
+    for cable, (oscillator, panel) in zip(driven, panels.items(), strict=True):
+        panel.plot(forces.time, forces.tension[:, cable], **_FIRST)
         panel.plot(forces.time, forces.signal.sel(oscillator=oscillator), **_SECOND)
     legend_below(figure, {"cable tension": _FIRST, "signal": _SECOND})
     swing = np.ptp(forces.signal.values, axis=0).max()
@@ -52,23 +52,22 @@ def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
 
 
 @common_style()
-def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float = 5.0) -> Figure:
+def ground_forces(trajectory: xarray.Dataset, robot: Robot, *, seconds: float = 5.0) -> Figure:
     """Normal force and friction along x (lbf) over the last seconds of time (s).
 
     On uneven ground, friction along the forward tangent, which is x projected on the slope. One
-    panel per tetrahedron, for its bottom left node, one for each right one that is not its mirror
-    image, and one for each other node that touches. Shaded: intervals without normal force, with
-    their share of the time shown. Triangles: landings. An impact is shorter than the time between
-    two samples, so a sample may show or miss its peak. The scale is that of the forces between
-    impacts: peaks beyond it are cut off.
+    panel per body that can touch, for the first of its nodes that does, and one for each other node
+    that touches and is not its mirror image. Shaded: intervals without normal force, with their
+    share of the time shown. Triangles: landings. An impact is shorter than the time between two
+    samples, so a sample may show or miss its peak. The scale is that of the forces between impacts:
+    peaks beyond it are cut off.
     """
     end = trajectory.sel(time=slice(trajectory.time[-1] - seconds, None))
     forces = end[["normal_force", "friction_force"]] / POUND_FORCE
     shown = _contacts_to_show(end)
-    along = "along x" if ground.flat else "along the forward tangent"
-    right = sum(name.endswith(NODES[BOTTOM_RIGHT]) for name in shown)
-    both = right == trajectory.sizes["tetrahedron"]
-    figure, panels = _panels_over_time(shown, groups=2 if both else 1)
+    along = "along x" if robot.ground.flat else "along the forward tangent"
+    _, per_body = np.unique(end.contact_body.sel(contact=shown), return_counts=True)
+    figure, panels = _panels_over_time(shown, groups=per_body.min())
     for contact, panel in panels.items():
         node, off = forces.sel(contact=contact), off_ground(end.sel(contact=contact))
         lifted = intervals(off.time.values, off.values)
@@ -84,9 +83,10 @@ def ground_forces(trajectory: xarray.Dataset, ground: Ground, *, seconds: float 
         panel.set_ylim(_limits_between_impacts(forces))
     lines = {"normal force": _FIRST, f"friction force {along}": _SECOND, "landing": _LANDING}
     legend_below(figure, lines, Patch(color=SHADE, label="no normal force"))
+    body = "tetrahedron" if robot.structure.is_row else "body"
     period = 1e3 * float(end.time[1] - end.time[0])
     figure.suptitle(
-        "Forces of the ground on each tetrahedron\n"
+        f"Forces of the ground on each {body}\n"
         f"every {period:.3g} ms: peaks of impacts, which are shorter, are missed or cut off"
     )
     return figure
@@ -103,21 +103,19 @@ def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | Non
 
 
 def _contacts_to_show(trajectory: xarray.Dataset) -> list[str]:
-    """Names of the bottom left nodes, of right ones that bear something else, and of other nodes
-    that touch."""
-    shown, normal = [], trajectory.normal_force
-    for name in trajectory.contact.values:
-        body, node = name.split()
-        force = normal.sel(contact=name)
-        if node == NODES[BOTTOM_LEFT]:
-            show = True
-        elif node == NODES[BOTTOM_RIGHT]:
-            left = normal.sel(contact=f"{body} {NODES[BOTTOM_LEFT]}")
-            show = bool(abs(force - left).mean() > _MIRRORED * left.mean())
-        else:
-            show = bool((force > 0.0).any())
-        if show:
-            shown.append(name)
+    """Names of the nodes of each body that touch and bear something else than the first of them; of
+    its first contact node if none touches."""
+    shown: list[str] = []
+    for body in dict.fromkeys(trajectory.contact_body.values):
+        normal = trajectory.normal_force[:, (trajectory.contact_body == body).values]
+        names, forces = normal.contact.values, normal.values.T
+        touching = np.flatnonzero((forces > 0.0).any(axis=1))
+        first = touching[0] if touching.size else 0
+        shown.append(names[first])
+        for other in touching[1:]:
+            apart = np.abs(forces[other] - forces[first]).mean()
+            if apart > _MIRRORED * forces[first].mean():
+                shown.append(names[other])
     return shown
 
 

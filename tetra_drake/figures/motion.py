@@ -25,7 +25,8 @@ from tetra_drake.formatting import fixed, signed
 from tetra_drake.physics.contact import Ground
 from tetra_drake.results import measures
 from tetra_drake.robot.ground import ground_heights
-from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, STRUTS, TOP
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.units import INCH
 
 X, Y, Z = range(3)
@@ -38,7 +39,8 @@ _MARGIN_IN = 0.6  # free space around a time lapse
 _PROFILE_IN = 0.05  # distance between points of the ground's profile
 
 # Inches on paper.
-_NAME_WIDTH, _NAME_HEIGHT = 0.33, 0.2  # room for the name of a tetrahedron
+_CHARACTER_WIDTH, _NAME_HEIGHT = 0.11, 0.2  # room for the name of a body
+_SHORTEST_NAME = 3  # characters for which there is room, at least
 _PATH_WIDTH, _PATH_HEIGHT = 6.0, 5.0  # largest size of the path of the centre
 
 _PATHS = 12  # largest number of panels of paths side by side
@@ -63,52 +65,54 @@ _FOOTPRINTS: Any = {"color": "0.45", "marker": "o", "linestyle": "", "markersize
 
 
 @common_style()
-def relative_distances(trajectory: xarray.Dataset) -> Figure:
-    """Distances along x from T1 to each tetrahedron, between centres of mass, over time.
+def relative_distances(trajectory: xarray.Dataset, structure: Structure) -> Figure:
+    """Distances along x from the first body to each, between centres of mass, over time.
 
     Grey lines: the distances at the start."""
     inches = measures.relative_distances(trajectory) / INCH
-    names = inches.tetrahedron.values
+    names = inches.body.values
     figure, [[panel]] = make_figure(width_in=7.0, height_in=1.5 + min(0.7 * len(names), 7.0))
     for i, name in enumerate(names):
-        line, style = inches.sel(tetrahedron=name), line_style(i)
+        line, style = inches.sel(body=name), line_style(i)
         panel.axhline(float(line[0]), color="0.6", linewidth=0.7)
         panel.plot(line.time, line, label=name, **style)
         place = {"xy": (1.01, float(line[-1])), "xycoords": ("axes fraction", "data")}
         panel.annotate(name, color=style["color"], va="center", **place)
-    panel.set(xlabel="time (s)", ylabel="distance from T1 (in)")
-    figure.suptitle("Distances between tetrahedra")
+    panel.set(xlabel="time (s)", ylabel=f"distance from {names[0]} (in)")
+    figure.suptitle(f"Distances between {'tetrahedra' if structure.is_row else 'bodies'}")
     return figure
 
 
 @common_style()
-def before_and_after(walks: Sequence[tuple[str, xarray.Dataset]]) -> Figure:
+def before_and_after(walks: Sequence[tuple[str, xarray.Dataset]], structure: Structure) -> Figure:
     """Distance walked over time by a run's best gait and the best initial one of its trial."""
     # `walks`: label and trajectory of the initial gait and of the best one.
     figure, [panels] = make_figure(width_in=8.0, height_in=4.0, columns=2, sharey=True)
     kinds = ("best initial gait of the trial", "best evolved gait")
     for panel, kind, (label, trajectory) in zip(panels, kinds, walks, strict=True):
-        walked = measures.distance_walked(trajectory) / INCH
+        walked = measures.distance_walked(trajectory, structure) / INCH
         panel.plot(walked.time, walked, color=OKABE_ITO["blue"])
         title = f"{kind}: {fixed(float(walked[-1]))} in\n{textwrap.shorten(label, 60)}"
         panel.set_title(title, parse_math=False)  # a name may hold a dollar sign
         panel.set_xlabel("time (s)")
     panels[0].margins(y=0.08)
-    panels[0].set_ylabel("distance $x_1$ (in)")
+    panels[0].set_ylabel(f"distance {_distance_symbol(structure)}(in)")
     figure.suptitle("Distance walked before and after evolution")
     return figure
 
 
 @common_style()
-def time_lapse(trajectory: xarray.Dataset, *, instants: int = 6) -> Figure:
-    """The robot from above at some instants, to scale, with the distance walked by T1.
+def time_lapse(trajectory: xarray.Dataset, structure: Structure, *, instants: int = 6) -> Figure:
+    """The robot from above at some instants, to scale, with the distance walked.
 
-    Dots: T1's bottom nodes at each full second."""
+    Dots: T1's bottom nodes, or the centre of a robot that is no row, at each full second."""
     times = np.linspace(trajectory.time.values[0], trajectory.time.values[-1], instants)
     samples = _nearest(trajectory, times)
     inches = trajectory.p_WN.values / INCH
-    walked = measures.distance_walked(trajectory).values / INCH
-    styles = [{**line_style(i), "linestyle": "-"} for i in range(inches.shape[1])]
+    marked = measures.marked_positions(trajectory, structure) / INCH
+    footprints = marked[:, (marked.node_body == marked.node_body[0]).values].values
+    walked = measures.distance_walked(trajectory, structure).values / INCH
+    styles = [{**line_style(i), "linestyle": "-"} for i in range(len(structure.bodies))]
     rows = []
     for time, sample in zip(times, samples, strict=True):
         seconds = _nearest(trajectory, np.arange(times[0], time))
@@ -116,17 +120,21 @@ def time_lapse(trajectory: xarray.Dataset, *, instants: int = 6) -> Figure:
             label=f"{time:.4g} s\n{signed(walked[sample])} in",
             nodes=inches[sample],
             styles=styles,
-            paths=inches[seconds, 0, :TOP],
+            paths=footprints[seconds],
             path_style=_FOOTPRINTS,
         )
         rows.append(row)
     width, height = _size(rows, width_in=5.8, height_in=8.5)
     # Wide enough for the title.
     figure, [[panel]] = make_figure(width_in=max(width + 1.0, 4.8), height_in=height + 1.0)
-    _draw_rows(panel, rows, OVERHEAD, trajectory.tetrahedron.values, width_in=width)
-    panel.axvline(inches[0, 0, BOTTOM_LEFT, X], color="0.45", linewidth=0.8)
-    panel.set_ylabel("time, and distance $x_1$ walked by T1")
-    figure.suptitle("Time lapse from above\ndots: T1's bottom nodes at each full second")
+    _draw_rows(panel, rows, OVERHEAD, structure, width_in=width)
+    panel.axvline(footprints[0, 0, X], color="0.45", linewidth=0.8)
+    walker = dots = "the centre"
+    if structure.is_row:
+        walker = structure.bodies[0]
+        dots = f"{walker}'s bottom nodes"
+    panel.set_ylabel(f"time, and distance {_distance_symbol(structure)}walked by {walker}")
+    figure.suptitle(f"Time lapse from above\ndots: {dots} at each full second")
     return figure
 
 
@@ -161,12 +169,13 @@ def path_of_the_centre(trajectory: xarray.Dataset, *, instants: int = 9) -> Figu
 
 
 @common_style()
-def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -> Figure:
-    """One step from above and from the side, to scale; lifted tetrahedra stand out.
+def one_step(trajectory: xarray.Dataset, robot: Robot, *, instants: int = 5) -> Figure:
+    """One step from above and from the side, to scale; lifted bodies stand out.
 
-    Below, the path of one bottom node per tetrahedron, enlarged. Grey: the ground, where it is not
-    flat along the middle of the robot, and below the node. If no signal has two periods in the
-    second half of the trajectory, its last quarter is shown."""
+    Below, the path of one bottom node per body, or of the centre, enlarged. Grey: the ground, where
+    it is not flat along the middle of the robot, and below the node. If no signal has two periods
+    in the second half of the trajectory, its last quarter is shown."""
+    structure, ground = robot.structure, robot.ground
     ends = measures.last_step(trajectory)
     start, end = ends or (float(trajectory.time.quantile(0.75)), float(trajectory.time[-1]))
     title = f"Time lapse of one step, {start:.2f} to {end:.2f} s"
@@ -175,40 +184,42 @@ def one_step(trajectory: xarray.Dataset, ground: Ground, *, instants: int = 5) -
         title += "no step, as no signal has two periods in the second half"
     step = trajectory.sel(time=slice(start, end))
     inches, off, since = step.p_WN.values / INCH, measures.lifted(step), step.time - step.time[0]
+    marked = measures.marked_positions(step, structure) / INCH
     rows = []
     for sample in _nearest(step, np.linspace(start, end, instants)):
         row = _Row(
             label=f"{since.values[sample]:.2f} s",
             nodes=inches[sample],
             styles=[_LIFTED if up else _ON_GROUND for up in off.values[sample]],
-            paths=inches[: sample + 1, :, :TOP].reshape(sample + 1, -1, 3),
+            paths=marked.values[: sample + 1],
             path_style=_PATH,
             profile=None if ground.flat else _profile(inches, sample, ground),
         )
         rows.append(row)
     width, height = _size(rows, width_in=3.6, height_in=6.0)
-    names = step.tetrahedron.values
-    heights = [height + 0.8, 0.7 + 1.2 * math.ceil(len(names) / _PATHS)]
+    shown = _first_of_each_body(marked)
+    heights = [height + 0.8, 0.7 + 1.2 * math.ceil(shown.sizes["node"] / _PATHS)]
     legend = 0.4
     figure = Figure(figsize=(max(2 * width + 1.2, 5.8), sum(heights) + legend))
     above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
     panels: Any = above.subplots(1, 2)
     for panel, view, place in zip(panels, (OVERHEAD, SIDE), ("above", "the side"), strict=True):
-        _draw_rows(panel, rows, view, names, width_in=width)
+        _draw_rows(panel, rows, view, structure, width_in=width)
         panel.set_title(f"from {place}")
     panel.tick_params(left=False, labelleft=False)
     if ground.flat:
         for i in range(instants):
             panel.axhline(-_pitch(rows) * i, **_GROUND)
-    _draw_paths(below, step, off, ground)
+    _draw_paths(below, shown, off, ground)
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
-    legend_below(figure, {**lines, "path of the bottom nodes": _PATH})
+    path = "path of the bottom nodes" if structure.is_row else "path of the centre"
+    legend_below(figure, {**lines, path: _PATH})
     figure.suptitle(title)
     return figure
 
 
 def _profile(nodes: np.ndarray, sample: int, ground: Ground) -> np.ndarray:
-    """Points (points, 3) of the ground along x, in inches, wherever nodes (samples, n, 4, 3) are,
+    """Points (points, 3) of the ground along x, in inches, wherever nodes (samples, nodes, 3) are,
     at their mean y in a sample."""
     x = np.arange(nodes[..., X].min() - _MARGIN_IN, nodes[..., X].max() + _MARGIN_IN, _PROFILE_IN)
     y = np.full_like(x, nodes[sample, ..., Y].mean())
@@ -216,25 +227,41 @@ def _profile(nodes: np.ndarray, sample: int, ground: Ground) -> np.ndarray:
     return np.column_stack([x, y, z])
 
 
+def _distance_symbol(structure: Structure) -> str:
+    """The thesis's symbol of the distance walked, and a blank, where it is that of T1."""
+    return "$x_1$ " if structure.is_row else ""
+
+
+def _first_of_each_body(marked: xarray.DataArray) -> xarray.DataArray:
+    """The first marker of each body; marked positions (time, node, axis)."""
+    _, first = np.unique(marked.node_body, return_index=True)
+    return marked.isel(node=np.sort(first))
+
+
 def _draw_paths(
-    figure: SubFigure, step: xarray.Dataset, off: xarray.DataArray, ground: Ground
+    figure: SubFigure, marked: xarray.DataArray, off: xarray.DataArray, ground: Ground
 ) -> None:
-    """The path of the bottom left node of each tetrahedron in the step, enlarged."""
-    names = step.tetrahedron.values
-    for name, panel in add_grid(figure, names, columns=min(len(names), _PATHS)).items():
-        node = step.p_WN.sel(tetrahedron=name).isel(node=BOTTOM_LEFT) / INCH
+    """The paths in the step of marked positions (time, node, axis) in inches, enlarged.
+
+    `off` (time, body) says which bodies are lifted."""
+    bodies = [str(body) for body in marked.node_body.values]
+    names = [body or "centre" for body in bodies]
+    panels = add_grid(figure, names, columns=min(len(names), _PATHS)).values()
+    for i, (body, panel) in enumerate(zip(bodies, panels, strict=True)):
+        node = marked[:, i]
         x, z = node.sel(axis="x") - node.sel(axis="x")[0], node.sel(axis="z")
         if not ground.flat:
             below = ground_heights(node.values[:, :2] * INCH, ground) / INCH
             z, below = z - below[0], below - below[0]
             panel.plot(x, below, **_GROUND)
-        up = off.sel(tetrahedron=name)
+        up = off.sel(body=body) if body else off.all("body")
         panel.plot(x, z, **_PATH)
         panel.plot(x.where(up), z.where(up), **_LIFTED)
         panel.plot(x[0], z[0], "o", color="black")
         panel.margins(0.08)
         panel.update_datalim([(-0.1, 0.0), (0.1, 0.1)])  # even if nothing moves
-    figure.supxlabel("displacement of the bottom left node since the start of the time shown (in)")
+    place = "bottom left node" if all(bodies) else "centre"
+    figure.supxlabel(f"displacement of the {place} since the start of the time shown (in)")
     figure.supylabel("height (in)" if ground.flat else "height above the\nground at 0 (in)")
 
 
@@ -249,9 +276,9 @@ class _Row:
 
     label: str
     nodes: np.ndarray
-    """Positions (n, 4, 3)."""
+    """Positions (nodes, 3)."""
     styles: Sequence[Any]
-    """Line style of each tetrahedron."""
+    """Line style of each body."""
     paths: np.ndarray
     """Earlier positions (samples, nodes, 3) of some nodes."""
     path_style: Any
@@ -261,7 +288,7 @@ class _Row:
 
 def _heights(rows: Sequence[_Row]) -> np.ndarray:
     """All heights of nodes and ground, in inches."""
-    nodes = [row.nodes.reshape(-1, 3) for row in rows]
+    nodes = [row.nodes for row in rows]
     profiles = [row.profile for row in rows if row.profile is not None]
     return np.concatenate(nodes + profiles)[:, Z]
 
@@ -282,18 +309,18 @@ def _size(rows: Sequence[_Row], *, width_in: float, height_in: float) -> tuple[f
 
 
 def _draw_rows(
-    panel: Axes, rows: Sequence[_Row], view: int, names: Sequence[str], width_in: float
+    panel: Axes, rows: Sequence[_Row], view: int, structure: Structure, width_in: float
 ) -> None:
-    """Draws a time lapse, `width_in` inches wide on paper, and names tetrahedra of its first row,
-    only each second or third, ... where there is no room for all names."""
+    """Draws a time lapse, `width_in` inches wide on paper."""
     pitch = _pitch(rows)
+    body_of_strut = structure.carriers[structure.struts[:, 0]]
     for i, row in enumerate(rows):
         down = pitch * i
         if row.profile is not None and view == SIDE:
             panel.plot(row.profile[:, X], row.profile[:, Z] - down, **_GROUND)
         panel.plot(row.paths[..., X], row.paths[..., view] - down, **row.path_style)
-        for nodes, style in zip(row.nodes, row.styles, strict=True):
-            ends = nodes[np.array(STRUTS)]
+        for body, style in enumerate(row.styles):
+            ends = row.nodes[structure.struts[body_of_strut == body]]
             panel.plot(ends[..., X].T, ends[..., view].T - down, **style)
     nodes = np.array([row.nodes for row in rows])
     heights = _heights(rows) if view == SIDE else nodes[..., Y]
@@ -305,8 +332,23 @@ def _draw_rows(
     panel.set(xlabel="x (in)", xlim=(left, right), ylim=(bottom, top), aspect="equal")
     panel.set_yticks(middle - pitch * np.arange(len(rows)), [row.label for row in rows])
     panel.grid(visible=False, axis="y")
-    x, y = nodes[0, ..., X].mean(axis=1), nodes[0, ..., view].max(axis=1)
-    apart = float(np.hypot(np.diff(x), np.diff(y)).mean())
-    every = math.ceil(_NAME_WIDTH * per_paper_inch / apart)
-    for i in range(0, len(names), every):
-        panel.annotate(names[i], (x[i], y[i]), (0, 2), textcoords="offset points", ha="center")
+    _name_bodies(panel, nodes[0][:, [X, view]], structure, per_paper_inch)
+
+
+def _name_bodies(
+    panel: Axes, nodes: np.ndarray, structure: Structure, per_paper_inch: float
+) -> None:
+    """Names bodies above their nodes (nodes, 2), bars above their upper ends, but those whose names
+    would overlap with others'."""
+    longest = max(_SHORTEST_NAME, *(len(name) for name in structure.bodies))
+    width, height = longest * _CHARACTER_WIDTH * per_paper_inch, _NAME_HEIGHT * per_paper_inch
+    left, right = panel.get_xlim()
+    places: list[tuple[float, float]] = []
+    for body, name in enumerate(structure.bodies):
+        of_body = nodes[structure.carriers == body]
+        upper_x, y = of_body[of_body[:, 1].argmax()].tolist()
+        x = upper_x if len(of_body) == 2 else float(of_body[:, 0].mean())
+        x = min(max(x, left + width / 2), right - width / 2)
+        if all(abs(x - a) >= width or abs(y - b) >= height for a, b in places):
+            panel.annotate(name, (x, y), (0, 2), textcoords="offset points", ha="center")
+            places.append((x, y))

@@ -18,7 +18,7 @@ from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.style import save_figure
 from tetra_drake.report.result_folder import GaitMotion, simulate_gait
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.scenario.units import INCH
 
 
@@ -85,16 +85,17 @@ def draw_trajectory(gait: GaitMotion, folder: Path) -> dict[str, str]:
 
     Raises InputError if the folder cannot be written to.
     """
-    trajectory, ground = gait.trajectory, Robot.of(gait.scenario).ground
-    return _save(
-        folder,
-        (motion.time_lapse, trajectory),
+    trajectory, robot = gait.trajectory, Robot.of(gait.scenario)
+    pictures: list[tuple[Any, ...]] = [
+        (motion.time_lapse, trajectory, robot.structure),
         (motion.path_of_the_centre, trajectory),
-        (motion.relative_distances, trajectory),
-        (motion.one_step, trajectory, ground),
-        (forces.signals_and_tensions, trajectory),
-        (forces.ground_forces, trajectory, ground),
-    )
+        (motion.relative_distances, trajectory, robot.structure),
+        (motion.one_step, trajectory, robot),
+    ]
+    if robot.structure.signals:
+        pictures.append((forces.signals_and_tensions, trajectory))
+    pictures.append((forces.ground_forces, trajectory, robot))
+    return _save(folder, *pictures)
 
 
 def draw_run(study: Study, folder: Path) -> dict[str, str]:
@@ -109,7 +110,8 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
     walks = [(gait.label, gait.motion.trajectory) for gait in (study.initial, study.best)]
-    pictures.append((motion.before_and_after, walks))
+    structure = MakeStructure(run.manifest.scenario)
+    pictures.append((motion.before_and_after, walks, structure))
     captions = _save(folder, *pictures)
     return captions | draw_trajectory(study.best.motion, folder)
 

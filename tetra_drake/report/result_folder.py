@@ -45,7 +45,7 @@ class GaitMotion:
     scenario: Scenario
     gait: Gait
     trajectory: xarray.Dataset
-    """Motion and forces; see results.trajectory.assemble_dataset."""
+    """Motion and forces; see results.trajectory.make_dataset."""
     metrics: Mapping[str, float]
     """Values in SI of all METRICS."""
 
@@ -60,7 +60,7 @@ class GaitMotion:
 
         save_replay(
             path,
-            scenario=self.scenario,
+            robot=Robot.of(self.scenario),
             trajectory=self.trajectory,
             title=self.title,
             viewer=viewer,

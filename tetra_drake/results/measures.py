@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetra_drake.results.path import CentrePath, follow
-from tetra_drake.robot.tetrahedra import BOTTOM_LEFT
+from tetra_drake.robot.structure import Structure
 
 if TYPE_CHECKING:
     import xarray
@@ -20,16 +20,29 @@ _PADDING = 16
 """Length of a zero-padded signal over its own: how many times finer its spectrum is sampled."""
 
 
-def distance_walked(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """(time,): x1, the displacement of T1's bottom left node along x since the start, in m."""
-    x = trajectory.p_WN.isel(tetrahedron=0, node=BOTTOM_LEFT).sel(axis="x")
+def marked_positions(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
+    """(time, node, axis): positions of the structure's markers in m; of the mean of its nodes if it
+    has none.
+
+    The node of that centre is named "centre", and its node_body is "".
+    """
+    if len(structure.markers):
+        return trajectory.p_WN.isel(node=structure.markers)
+    centre = trajectory.p_WN.mean("node").expand_dims({"node": ["centre"]}, axis=1)
+    return centre.assign_coords(node_body=("node", [""]))
+
+
+def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
+    """(time,): displacement of the first marker along x since the start, in m: x1 of T1's bottom
+    left node, or that of the centre."""
+    x = marked_positions(trajectory, structure).isel(node=0).sel(axis="x")
     return x - x.isel(time=0)
 
 
 def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """(time, tetrahedron): x of each tetrahedron's centre of mass less that of T1, in m."""
-    x = trajectory.p_WN.sel(axis="x").mean("node")
-    return x - x.isel(tetrahedron=0)
+    """(time, body): x of each body's centre of mass less that of the first body, in m."""
+    x = trajectory.p_WB.sel(axis="x")
+    return x - x.isel(body=0)
 
 
 def path_of_centre(trajectory: xarray.Dataset) -> CentrePath:
@@ -44,13 +57,13 @@ def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:
 
 
 def lifted(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """(time, tetrahedron): whether no contact node of the tetrahedron bears a normal force."""
+    """(time, body): whether no contact node of the body bears a normal force."""
     import xarray
 
-    off, bodies = off_ground(trajectory), trajectory.tetrahedron
+    off, bodies = off_ground(trajectory), trajectory.body
     of_bodies = []
     for body in bodies.values:
-        nodes = off.contact.str.startswith(f"{body} ").values
+        nodes = (off.contact_body == body).values
         of_bodies.append(off[:, nodes].all("contact"))
     return xarray.concat(of_bodies, dim=bodies).T
 
@@ -111,6 +124,8 @@ def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:
     the step ends where this signal last rises through its mean. None if no signal oscillates, or
     if the second half is shorter than two periods.
     """
+    if not trajectory.sizes["oscillator"]:
+        return None
     late = trajectory.signal.sel(time=slice(trajectory.time.values.mean(), None))
     times, signal = late.time.values, late.values[:, np.ptp(late.values, axis=0).argmax()]
     frequency = dominant_frequency(times, signal)

@@ -13,20 +13,19 @@ from tetra_drake.files import write_whole
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION
 from tetra_drake.physics.contact import PUSH_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces, forces_along
-from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN
+from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, moved_nodes
-from tetra_drake.robot.tetrahedra import NODES
 
 if TYPE_CHECKING:
     import xarray
 
 
 DIMENSIONS = {
-    "p_WN": ("time", "tetrahedron", "node", "axis"),
-    "v_WN": ("time", "tetrahedron", "node", "axis"),
-    "p_WB": ("time", "tetrahedron", "axis"),
-    "q_WB": ("time", "tetrahedron", "quaternion"),
+    "p_WN": ("time", "node", "axis"),
+    "v_WN": ("time", "node", "axis"),
+    "p_WB": ("time", "body", "axis"),
+    "q_WB": ("time", "body", "quaternion"),
     "tension": ("time", "cable"),
     "length": ("time", "cable"),
     "signal": ("time", "oscillator"),
@@ -75,16 +74,16 @@ class Motion:
 def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     """A trajectory: a motion with the lengths and forces that follow from it.
 
-    Dimensions: time, tetrahedron, node, cable, contact, oscillator, axis, horizontal, quaternion.
-    Every variable has a `units` attribute. Coordinates along `cable`: cable_junction, cable_role
-    (outer or inner) and cable_signal, the oscillator that drives the cable ("" if none); along
-    `oscillator`: oscillator_junction and oscillator_side (1 left, -1 right, else 0).
+    Dimensions: time, body, node, cable, contact, oscillator, axis, horizontal, quaternion. Every
+    variable has a `units` attribute. Coordinates along `node` and `contact`, the nodes that the
+    ground can touch: node_body and contact_body; along `cable`: cable_bodies, the two that it joins
+    ("T1-T2"), cable_group and cable_signal, the oscillator that drives the cable ("" if none);
+    along `oscillator`: oscillator_side (1 left, -1 right, else 0).
     """
     import xarray
 
     structure, bodies = robot.structure, len(robot.structure.bodies)
     nodes = np.array([moved_nodes(structure, state) for state in motion.states])
-    nodes = nodes.reshape(-1, bodies, len(NODES), NODE_COLUMNS)
     poses = motion.states[:, : 7 * bodies].reshape(-1, bodies, 7)
     pulls, pushes = _forces(robot, motion)
     modes = np.sign(motion.modes[:, :, :STICK_POINT]).astype(np.int8)
@@ -123,20 +122,23 @@ def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
     """Dimension and values of each coordinate but the time."""
-    oscillators = structure.actuation.names
-    driving = ["" if i == PASSIVE else oscillators[i] for i in structure.cables["signal"]]
-    contacts = [structure.node_names[node] for node in structure.contacts]
+    oscillators, cables = structure.actuation.names, structure.cables
+    driving = ["" if i == PASSIVE else oscillators[i] for i in cables["signal"]]
+    body_of_node = [structure.bodies[body] for body in structure.carriers]
+    joined = [f"{body_of_node[a]}-{body_of_node[b]}" for a, b in cables[["node_a", "node_b"]]]
+    contacts = structure.contacts
     return {
-        "tetrahedron": ("tetrahedron", list(structure.bodies)),
-        "node": ("node", list(NODES)),
+        "body": ("body", list(structure.bodies)),
+        "node": ("node", list(structure.node_names)),
+        "node_body": ("node", body_of_node),
+        "contact": ("contact", [structure.node_names[node] for node in contacts]),
+        "contact_body": ("contact", [body_of_node[node] for node in contacts]),
         "cable": ("cable", list(structure.cable_names)),
-        "contact": ("contact", contacts),
-        "cable_junction": ("cable", [name.split()[0] for name in structure.cable_names]),
-        "cable_role": ("cable", [name.split()[1] for name in structure.cable_names]),
+        "cable_bodies": ("cable", joined),
+        "cable_group": ("cable", list(structure.cable_groups)),
         "cable_signal": ("cable", driving),
         "oscillator": ("oscillator", list(oscillators)),
         "oscillator_side": ("oscillator", list(structure.actuation.sides)),
-        "oscillator_junction": ("oscillator", [name.split()[0] for name in oscillators]),
         "axis": ("axis", ["x", "y", "z"]),
         "horizontal": ("horizontal", ["x", "y"]),
         "quaternion": ("quaternion", ["w", "x", "y", "z"]),

@@ -45,6 +45,8 @@ class Structure:
     """(cables,) of dtype CABLE: pair by pair of bodies, from the lower index to the higher one."""
     cable_names: tuple[str, ...]
     """Such as "T1-T2 outer bottom_left"."""
+    cable_groups: tuple[str, ...]
+    """The group of each cable, such as "outer"."""
     slack: bool
     """True if a cable cannot push."""
     actuation: Actuation
@@ -55,11 +57,19 @@ class Structure:
     for robots that are no row of tetrahedra."""
     feet: int
     """Nodes that bear the weight at rest."""
+    markers: np.ndarray
+    """(markers,): the indices of the nodes whose paths pictures show, body by body: the bottom
+    nodes of a row of tetrahedra. None for other structures, whose centre is shown."""
 
     @property
     def signals(self) -> int:
         """Actuation signals: one per oscillator."""
         return len(self.actuation.names)
+
+    @property
+    def is_row(self) -> bool:
+        """True for a row of tetrahedra."""
+        return self.thesis_nodes is not None
 
     @property
     def carriers(self) -> np.ndarray:

@@ -75,11 +75,13 @@ def _placed(scenario: Scenario, kind: kinds.Structure) -> Structure:
         q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (len(inertias), 1)),
         cables=_cables(kind, number, Actuation.of(scenario)),
         cable_names=kind.layout().cable_names,
+        cable_groups=tuple(kind.all_cables[number].group for number in kind.ordered_cables),
         slack=True,
         actuation=Actuation.of(scenario),
         contacts=contacts,
         thesis_nodes=None,
         feet=len(contacts),
+        markers=np.array([], dtype=int),
     )
 
 

@@ -74,11 +74,13 @@ def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
         q_WB=q_WB,
         cables=np.array(rows, dtype=CABLE),
         cable_names=robot.layout().cable_names,
+        cable_groups=tuple(cable.split()[0] for cable in CABLES) * (n - 1),
         slack=robot.slack,
         actuation=actuation,
         contacts=np.array(contacts),
         thesis_nodes=(BOTTOM_LEFT, BOTTOM_RIGHT, 4 * (n - 1) + TIP),
         feet=2 * n + 1,
+        markers=np.array(bottom),
     )
 
 

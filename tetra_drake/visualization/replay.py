@@ -8,7 +8,7 @@ import html
 import logging
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -19,16 +19,15 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import render
+from tetra_drake.results.measures import marked_positions
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.robot.structure import Structure
 from tetra_drake.visualization.scene import (
     ASPECT,
-    CABLE_KINDS,
     COLOURS,
     Track,
     add_robot,
-    cable_kind,
+    cable_colours,
     rgba,
     set_surroundings,
     tracks,
@@ -48,26 +47,16 @@ _TRACE_FRAMES = 5  # key frames per piece of the traces, which becomes visible w
 _TICKS_PER_SECOND = 100_000  # resolution of time: Meshcat counts in integers
 _REPETITIONS = 1_000_000  # number of times that the motion is played before it stops
 
-LEGEND = {
-    "actuated": "actuated cable",
-    "outer": "passive outer cable",
-    "inner": "passive inner cable",
-    "normal": "normal force",
-    "friction": "friction force",
-    "trace": "path of the bottom nodes",
-    "forward": "arrow on the floor: forward (+x)",
-}
-
 
 def save_replay(
     path: str | Path,
     *,
-    scenario: Scenario,
+    robot: Robot,
     trajectory: xarray.Dataset,
     title: str,
     viewer: str | Path | None = None,
 ) -> None:
-    """Writes the page that replays a trajectory.
+    """Writes the page that replays a robot's trajectory.
 
     Every key frame is a sample of the trajectory; browsers interpolate between key frames. With
     `viewer`, the page reads Meshcat's script, which is most of it, from that file, so that pages
@@ -76,16 +65,27 @@ def save_replay(
     Raises InputError if `path` or `viewer` cannot be written, or `viewer` holds anything else.
     """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
-    robot = Robot.of(scenario)
     film = _add_film(meshcat, robot, trajectory)
-    absent = set(CABLE_KINDS) - {cable_kind(cable) for cable in robot.structure.cables}
-    legend = {name: meaning for name, meaning in LEGEND.items() if name not in absent}
+    legend = legend_of(robot.structure)
     page = meshcat.StaticHtml()
     if viewer is not None:
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
         page, script = _without_viewer(page, address=address)
         _write_once(Path(viewer), script)
     write_whole(path, pack_page(_with_overlay(page, title, legend, film), title=title))
+
+
+def legend_of(structure: Structure) -> list[tuple[str, str]]:
+    """Names in COLOURS, and what has these colours."""
+    cables = [(colour, f"{kind} cable") for kind, colour in cable_colours(structure).items()]
+    path = "path of the bottom nodes" if structure.is_row else "path of the centre"
+    return [
+        *cables,
+        ("normal", "normal force"),
+        ("friction", "friction force"),
+        ("trace", path),
+        ("forward", "arrow on the floor: forward (+x)"),
+    ]
 
 
 def _add_film(meshcat: Meshcat, robot: Robot, trajectory: xarray.Dataset) -> dict[str, Any]:
@@ -102,19 +102,19 @@ def _add_film(meshcat: Meshcat, robot: Robot, trajectory: xarray.Dataset) -> dic
     moving = list(tracks(robot, frames))
     for track in moving:
         meshcat.SetTransform(track.path, track.matrix(0))
-    bottom = _rounded(frames["p_WN"].values[:, :, [BOTTOM_LEFT, BOTTOM_RIGHT]]) * RESOLUTION
+    marked = _rounded(marked_positions(frames, robot.structure).values) * RESOLUTION
     return {
         "per_second": _TICKS_PER_SECOND,
         "resolution": RESOLUTION,
         "repetitions": _REPETITIONS,
         "ticks": ticks,
         "motions": {track.path: _steps(track) for track in moving},
-        "traces": _add_traces(meshcat, bottom, ticks),
+        "traces": _add_traces(meshcat, marked, ticks),
     }
 
 
 def _add_traces(meshcat: Meshcat, paths: np.ndarray, ticks: list[int]) -> dict[str, int]:
-    """Adds paths (frames, ..., 3) in m in pieces; returns the tick at which a piece is walked."""
+    """Adds paths (frames, paths, 3) in m in pieces; returns the tick at which a piece is walked."""
     steps = np.stack([paths[:-1], paths[1:]]).reshape(2, len(paths) - 1, -1, 3)
     traces = {}
     for first in range(0, len(paths) - 1, _TRACE_FRAMES):
@@ -170,13 +170,15 @@ def pack_page(page: str, *, title: str) -> str:
     return render("visualization/packed_page.html.jinja", title=title, packed=packed)
 
 
-def _with_overlay(page: str, title: str, legend: Mapping[str, str], film: Mapping[str, Any]) -> str:
+def _with_overlay(
+    page: str, title: str, legend: Sequence[tuple[str, str]], film: Mapping[str, Any]
+) -> str:
     """Meshcat's page that plays a film, with a title, and over the scene a heading, a legend and a
     clock."""
     overlay = render(
         "visualization/overlay.html.jinja",
         title=title,
-        legend=[(COLOURS[name], meaning) for name, meaning in legend.items()],
+        legend=[(COLOURS[name], meaning) for name, meaning in legend],
         aspect=ASPECT,
         film=film,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,7 +18,6 @@ from tetra_drake.robot.bodies import strut_pose
 from tetra_drake.robot.ground import ground_axes, ground_heights
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
-from tetra_drake.robot.tetrahedra import NODES, STRUTS, TIP
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 if TYPE_CHECKING:
@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 
 COLOURS = {
     "actuated": "#d55e00",
-    "outer": "#56b4e9",
-    "inner": "#009e73",
+    "passive_1": "#56b4e9",
+    "passive_2": "#009e73",
+    "passive_3": "#e69f00",
+    "passive_4": "#f0e442",
     "normal": "#0072b2",
     "friction": "#cc79a7",
     "trace": "#222222",
@@ -41,11 +43,11 @@ COLOURS = {
     "six_inches": "#8f8e87",
 }
 """Colours of what is drawn (those of cables and forces are Okabe and Ito's, for colour-blind
-people); neighbouring tetrahedra alternate between odd and even. Uneven ground goes from low to
+people); neighbouring bodies alternate between odd and even. Uneven ground goes from low to
 high."""
 
-CABLE_KINDS = "actuated", "outer", "inner"
-"""Colours of cables; outer and inner ones are those that no oscillator drives."""
+PASSIVE_COLOURS = "passive_1", "passive_2", "passive_3", "passive_4"
+"""Colours of the groups of cables, in turn, for those cables that no oscillator drives."""
 
 CABLE_RADIUS = 0.0003
 """Drawn radius of a cable, in m per N of tension."""
@@ -106,12 +108,11 @@ class Track:
 
 
 def add_robot(meshcat: Meshcat, structure: Structure) -> None:
-    """Adds the objects that tracks() move: tetrahedra, cables, and arrows for forces."""
-    for i, body in enumerate(structure.bodies):
-        _add_tetrahedron(meshcat, structure, f"/robot/{body}", rgba("even" if i % 2 else "odd"))
-    for cable, name in zip(structure.cables, structure.cable_names, strict=True):
-        kind = cable_kind(cable)
-        meshcat.SetObject(_cable_path(cable, name), Cylinder(1.0, 1.0), rgba(kind))
+    """Adds the objects that tracks() move: bodies, cables, and arrows for forces."""
+    _add_bodies(meshcat, structure)
+    colours = cable_colours(structure)
+    for kind, path in zip(cable_kinds(structure), _cable_paths(structure), strict=True):
+        meshcat.SetObject(path, Cylinder(1.0, 1.0), rgba(colours[kind]))
     for node in structure.contacts:
         for kind in ("normal", "friction"):
             path = f"/forces/{kind}/{structure.node_names[node]}"
@@ -120,7 +121,7 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
 
 def tracks(robot: Robot, frames: xarray.Dataset) -> Iterator[Track]:
     """Tracks of all objects over `frames`, samples of a trajectory."""
-    yield from _tetrahedron_tracks(robot.structure, frames)
+    yield from _body_tracks(robot.structure, frames)
     yield from _cable_tracks(robot.structure, frames)
     yield from _force_tracks(robot, frames)
 
@@ -144,11 +145,12 @@ def aligning_quaternions(directions: np.ndarray) -> np.ndarray:
 def set_surroundings(meshcat: Meshcat, robot: Robot, points: np.ndarray) -> None:
     """Sets floor, light and camera for a robot whose nodes stay around `points` (..., 3), in m.
 
-    The floor is the ground lowered by the radius of a node, as the ground acts on node centres.
+    The floor is the ground lowered by the least radius of a node, as the ground acts on node
+    centres.
     """
     ground = robot.ground
     corners = floor_corners(points, MARGIN if ground.flat else UNEVEN_MARGIN)
-    floor = floor_points(ground, corners) - [0.0, 0.0, robot.structure.node_radius]
+    floor = floor_points(ground, corners) - [0.0, 0.0, robot.structure.node_radius.min()]
     if ground.flat:
         _add_slab(meshcat, floor)
     else:
@@ -221,26 +223,50 @@ def _rgb(name: str) -> np.ndarray:
     return np.frombuffer(bytes.fromhex(COLOURS[name][1:]), dtype=np.uint8) / 255
 
 
-def _add_tetrahedron(meshcat: Meshcat, structure: Structure, path: str, colour: Rgba) -> None:
-    for a, b in STRUTS:
-        strut = f"{path}/strut_{NODES[a]}_{NODES[b]}"
-        length = float(np.linalg.norm(structure.p_BN[b] - structure.p_BN[a]))
-        meshcat.SetObject(strut, Cylinder(structure.strut_radius, length), colour)
-        meshcat.SetTransform(strut, strut_pose(structure, (a, b)))
-    for name, p_BNi in zip(NODES, structure.p_BN, strict=True):
-        meshcat.SetObject(f"{path}/{name}", Sphere(structure.node_radius), colour)
-        meshcat.SetTransform(f"{path}/{name}", RigidTransform(p_BNi))
+def _add_bodies(meshcat: Meshcat, structure: Structure) -> None:
+    """Adds struts and nodes below the paths of their bodies, in the frames of these."""
+    carriers, names = structure.carriers, structure.node_names
+    for (a, b), radius in zip(structure.struts, structure.strut_radius, strict=True):
+        path = f"{_body_path(structure, carriers[a])}/strut {names[a]} to {names[b]}"
+        p_BA, p_BC = structure.p_BN[a], structure.p_BN[b]
+        strut = Cylinder(radius, float(np.linalg.norm(p_BC - p_BA)))
+        meshcat.SetObject(path, strut, _body_colour(carriers[a]))
+        meshcat.SetTransform(path, strut_pose(p_BA, p_BC))
+    for node, (name, radius) in enumerate(zip(names, structure.node_radius, strict=True)):
+        path = f"{_body_path(structure, carriers[node])}/node {name}"
+        meshcat.SetObject(path, Sphere(radius), _body_colour(carriers[node]))
+        meshcat.SetTransform(path, RigidTransform(structure.p_BN[node]))
 
 
-def cable_kind(cable: np.void) -> str:
-    """Kind of a cable: one of CABLE_KINDS."""
-    if cable["signal"] != PASSIVE:
-        return "actuated"
-    return "inner" if cable["node_a"] % len(NODES) == TIP else "outer"
+def _body_path(structure: Structure, body: int) -> str:
+    return f"/robot/{structure.bodies[body]}"
 
 
-def _cable_path(cable: np.void, name: str) -> str:
-    return f"/cables/{cable_kind(cable)}/{name}"
+def _body_colour(body: int) -> Rgba:
+    return rgba("even" if body % 2 else "odd")
+
+
+def cable_kinds(structure: Structure) -> list[str]:
+    """Kind of each cable: "actuated", or such as "passive outer", with its group."""
+    kinds = []
+    for cable, group in zip(structure.cables, structure.cable_groups, strict=True):
+        kinds.append(f"passive {group}" if cable["signal"] == PASSIVE else "actuated")
+    return kinds
+
+
+def cable_colours(structure: Structure) -> dict[str, str]:
+    """Name in COLOURS of each kind of cable that the structure has."""
+    colours = {"actuated": "actuated"}
+    groups = dict.fromkeys(structure.cable_groups)
+    for group, colour in zip(groups, itertools.cycle(PASSIVE_COLOURS)):
+        colours[f"passive {group}"] = colour
+    kinds = cable_kinds(structure)
+    return {kind: colour for kind, colour in colours.items() if kind in kinds}
+
+
+def _cable_paths(structure: Structure) -> list[str]:
+    named = zip(cable_kinds(structure), structure.cable_names, strict=True)
+    return [f"/cables/{kind}/{name}" for kind, name in named]
 
 
 def _add_unit_arrow(meshcat: Meshcat, path: str, colour: Rgba) -> None:
@@ -255,22 +281,23 @@ def _add_unit_arrow(meshcat: Meshcat, path: str, colour: Rgba) -> None:
     )
 
 
-def _tetrahedron_tracks(structure: Structure, frames: xarray.Dataset) -> Iterator[Track]:
+def _body_tracks(structure: Structure, frames: xarray.Dataset) -> Iterator[Track]:
     q_WB = frames["q_WB"].values
     q_WB = q_WB / np.linalg.norm(q_WB, axis=-1, keepdims=True)
-    for i, body in enumerate(structure.bodies):
-        yield Track(f"/robot/{body}", frames["p_WB"].values[:, i], q_WB[:, i])
+    for body in range(len(structure.bodies)):
+        path = _body_path(structure, body)
+        yield Track(path, frames["p_WB"].values[:, body], q_WB[:, body])
 
 
 def _cable_tracks(structure: Structure, frames: xarray.Dataset) -> Iterator[Track]:
     """Unit cylinders scaled to reach from node to node, with radii proportional to tension."""
-    p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
+    p_WN = frames["p_WN"].values
     radius = (CABLE_RADIUS * frames["tension"].values).clip(min=_HAIRLINE)
-    for c, (cable, name) in enumerate(zip(structure.cables, structure.cable_names, strict=True)):
+    for c, (cable, path) in enumerate(zip(structure.cables, _cable_paths(structure), strict=True)):
         p_WA, p_WB = p_WN[:, cable["node_a"]], p_WN[:, cable["node_b"]]
         length = np.linalg.norm(p_WB - p_WA, axis=1)
         yield Track(
-            _cable_path(cable, name),
+            path,
             (p_WA + p_WB) / 2,
             aligning_quaternions(p_WB - p_WA),
             np.column_stack([radius[:, c], radius[:, c], length]),
@@ -280,7 +307,7 @@ def _cable_tracks(structure: Structure, frames: xarray.Dataset) -> Iterator[Trac
 def _force_tracks(robot: Robot, frames: xarray.Dataset) -> Iterator[Track]:
     """Unit arrows on the contact nodes, scaled to the forces there, along the ground's normal and
     in its tangent plane."""
-    p_WN = frames["p_WN"].values.reshape(frames.sizes["time"], -1, 3)
+    p_WN = frames["p_WN"].values
     normal, friction = frames["normal_force"].values, frames["friction_force"].values
     for c, node in enumerate(robot.structure.contacts):
         name = robot.structure.node_names[node]
