@@ -24,9 +24,9 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
 from tetra_drake.robot.bodies import AddBodies
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import Structure, node_positions, node_velocities
-from tetra_drake.robot.tetrahedra import BASE, BOTTOM_LEFT, STRUTS, TOP, MakeTetrahedra
+from tetra_drake.robot.tetrahedra import BASE, BOTTOM_LEFT, STRUTS, TOP
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import GroundContact
 
@@ -57,7 +57,7 @@ def make_standing_tetrahedron(scenario: Scenario) -> Robot:
 
     Its body frame is turned with it, which its inertia, the same about all axes, allows.
     """
-    row = MakeTetrahedra(scenario)
+    row = MakeStructure(scenario)
     count = row.first_node[1]  # of its nodes
     p_BN = row.p_BN[:count] @ R_WB.T
     tetrahedron = dataclasses.replace(

@@ -10,9 +10,8 @@ from helpers.widths import WIDEST
 
 from tetra_drake.engines.compiled import lane_pool
 from tetra_drake.errors import InputError
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import Structure
-from tetra_drake.robot.tetrahedra import MakeTetrahedra
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -46,7 +45,7 @@ def scenario() -> Scenario:
 @pytest.fixture
 def structure(scenario: Scenario) -> Structure:
     """That of the thesis's robot."""
-    return MakeTetrahedra(scenario)
+    return MakeStructure(scenario)
 
 
 @pytest.fixture

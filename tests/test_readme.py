@@ -13,6 +13,7 @@ from record import EXPERIMENTS
 
 import tetra_drake as td
 from tetra_drake.cli import main, make_parser
+from tetra_drake.scenario.structure_files import read_structure
 
 CHECKOUT = Path(__file__).parents[1]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
@@ -103,16 +104,20 @@ def test_the_scenario_loads(work: Path) -> None:
     (work / "stiff.yaml").write_text(snippet)
     scenario = td.load_scenario("stiff.yaml")
     assert scenario.robot.tetrahedra == 7
-    assert scenario.cables.outer_stiffness == 45.0
+    assert scenario.robot.cables.outer_stiffness == 45.0
     assert scenario.robot.spacing != td.load_scenario("thesis").robot.spacing, "balanced"
 
 
 def test_the_scenarios_and_the_gait_of_their_page_load(work: Path) -> None:
-    files = snippets("yaml", SCENARIOS)
-    for i, file in enumerate(files):
-        (work / f"{i}.yaml").write_text(file)
-        assert td.load_scenario(f"{i}.yaml").name == re.findall(r"^name: (.*)$", file, re.M)[0]
-    assert td.load_scenario("1.yaml").oscillators == 12  # three groups at four junctions
+    for file in snippets("yaml", SCENARIOS):
+        if "base:" in file:
+            (name,) = re.findall(r"^name: (.*)$", file, re.M)
+            (work / f"{name}.yaml").write_text(file)
+            assert td.load_scenario(f"{name}.yaml").name == name
+        else:
+            (work / "structure.yaml").write_text(file)
+            assert len(read_structure("structure.yaml").bodies) == 3
+    assert td.load_scenario("snake.yaml").oscillators == 12  # three groups at four junctions
     (gait,) = snippets("json", SCENARIOS)
     (work / "gait.json").write_text(gait)
     small = td.load_scenario("feedback").with_changes({"robot.tetrahedra": 3})

@@ -32,7 +32,8 @@ SPREAD = (
     *("robot.spacing", "friction.stiction_range", "friction.stiction_damping"),
     *("friction.stiction_switch", "friction.proportional_stiction"),
     *("friction.static, friction.kinetic", "friction.damping"),
-    *("cables.outer_stiffness", "cables.inner_stiffness", "ground.stiffness", "ground.damping"),
+    *("robot.cables.outer_stiffness", "robot.cables.inner_stiffness"),
+    *("ground.stiffness", "ground.damping"),
 )
 """The keys that the default disturbances spread, where the scenario has them."""
 
@@ -80,17 +81,12 @@ class Judgement:
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
     """Default disturbances: so many percent for keys of SPREAD in the scenario, and for starts."""
-    share = percent / 100.0
+    share, numbers = percent / 100.0, scenario.numbers()
     return Disturbances(
         draws=1,
-        spreads={joined: share for joined in SPREAD if _has(scenario, separate(joined)[0])},
+        spreads={joined: share for joined in SPREAD if separate(joined)[0] in numbers},
         start=share,
     )
-
-
-def _has(scenario: Scenario, key: str) -> bool:
-    section, _, name = key.partition(".")
-    return hasattr(getattr(scenario, section), name)
 
 
 def judge(
