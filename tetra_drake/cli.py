@@ -21,6 +21,7 @@ from tetra_drake.files import check_folder
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import hint
+from tetra_drake.scenario.structure_files import shipped_structures
 
 if TYPE_CHECKING:
     from tetra_drake.robot.gait import Gait
@@ -332,6 +333,40 @@ def _cpg(options: Options) -> None:
     save_signals(options.out, Robot.of(scenario), gait)
 
 
+def _structure_options(command: Command) -> None:
+    names = ", ".join(shipped_structures())
+    command.add_argument("source", metavar="NAME|FILE", help=f"a structure file, or one of {names}")
+    unit = "the unit of length of a file of NTRT, as dm"
+    command.add_argument("--unit", metavar="UNIT", help=unit)
+    _add_path(command, "--out", "FILE", "write an HTML page that shows the structure at rest")
+    _add_path(command, "--mjcf", "FILE", "write a model for MuJoCo, with its tendons")
+
+
+def _structure(options: Options) -> None:
+    """Tell what a structure is, and how it rests.
+
+    Reads a structure file, or one of NTRT, and finds its rest on flat ground without actuation.
+    Prints bodies, cables, states of self-stress, infinitesimal mechanisms, natural frequencies,
+    tensions and heights.
+    """
+    from tetra_drake.analysis.rest import study_rest
+    from tetra_drake.report.structure_page import robot_of_file, save_mjcf, structure_text
+
+    robot = robot_of_file(options.source, unit=options.unit)
+    for file in filter(None, (options.out, options.mjcf)):
+        check_folder(file.parent)
+    study = study_rest(robot)
+    print(structure_text(study))
+    if options.out:
+        from tetra_drake.report.structure_page import save_structure_page
+
+        save_structure_page(study, options.out)
+        print(f"to see the structure, open in a browser: {options.out}")
+    if options.mjcf:
+        save_mjcf(robot, options.mjcf)
+        print(f"wrote {options.mjcf}")
+
+
 def _add_scenario(command: Command, *, default: str) -> None:
     names = ", ".join(shipped_scenarios())
     what = f"a shipped scenario ({names}) or a YAML file (default: {default})"
@@ -412,5 +447,6 @@ _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ..
     (_robustness, _robustness_options),
     (_compare, _compare_options),
     (_cpg, _cpg_options),
+    (_structure, _structure_options),
 )
 """Each command, whose docstring is its help, and what adds its options."""

@@ -2,19 +2,45 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 
 from tetra_drake.analysis.rest import RestStudy
+from tetra_drake.engines.mujoco import make_mjcf
+from tetra_drake.files import write_whole
 from tetra_drake.formatting import Table, fixed
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NORMAL
 from tetra_drake.results.trajectory import Motion, make_dataset
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.engine_kinds import Mujoco
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.visualization.replay import save_replay
 
 _FREQUENCIES = 5
 """Number of natural frequencies that are printed."""
+
+
+_SURROUNDINGS = "prism"
+"""The shipped scenario whose ground and friction a structure file gets."""
+
+
+def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
+    """The robot of a structure file, or a file of NTRT with a `unit` of length, on flat ground with
+    Coulomb friction. Raises InputError that names file and key."""
+    structure = read_structure(name_or_file, unit=unit)
+    name = Path(name_or_file).stem
+    scenario = load_scenario(_SURROUNDINGS).with_sections(name=name, robot=structure)
+    return Robot.of(scenario)
+
+
+def save_mjcf(robot: Robot, path: Path) -> None:
+    """Writes a robot as a model for MuJoCo; raises InputError if it cannot be written."""
+    scenario = robot.scenario.with_sections(engine=Mujoco())
+    write_whole(path, make_mjcf(dataclasses.replace(robot, scenario=scenario)))
 
 
 def structure_text(study: RestStudy) -> str:

@@ -66,7 +66,9 @@ def with_structure(tree: Tree, source: object) -> Tree:
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
     """Content of a structure file, or of a file of NTRT by the unit that `source` has at `key`."""
     content = parse_yaml(read_text(file, "structure file", most=MOST_BYTES), file)
-    if not isinstance(content, dict) or not KEYS_OF_NTRT & content.keys():
+    if not isinstance(content, dict):  # which may be any file: nothing of it is shown
+        raise InputError(file, "", "holds no mapping of keys, expected a structure")
+    if not KEYS_OF_NTRT & content.keys():
         return content
     if unit is None:
         raise InputError(source, key, f"is missing; give the unit of length of '{file}', as dm")
