@@ -100,7 +100,7 @@ def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario, robot)
 
     elsewhere = scenario.with_changes(
         {
-            "terrain": Incline(slope=0.2, start=None),
+            "terrain": Incline(slope=0.2),
             "friction": Coulomb(stiffness=100.0),
             "robot.offsets": with_unit([[0.01 * i, 0.01, 0.1] for i in range(5)], "m"),
         }

@@ -76,7 +76,7 @@ class MujocoEngine(Engine):
             raise InputError(scenario.name, "cpg.feedback", problem)
         if scenario.terrain.plane_slope is None:
             kind = type(scenario.terrain).__name__
-            problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline without start"
+            problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline"
             raise InputError(scenario.name, "terrain", problem)
         if scenario.cables.slack:
             problem = "found true, which mujoco cannot simulate"
