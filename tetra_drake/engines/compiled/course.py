@@ -1,4 +1,4 @@
-"""What goes into a lane of the compiled engine, a prepared gait, and what comes out, its course."""
+"""Input and output of a lane of the compiled engine: a prepared gait, and its course."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class PreparedGait:
     turns: np.ndarray
     """The turns that Robot.turns() gives."""
     constants: Constants
-    """Those of the ground are without heights."""
+    """Constants of all laws; those of the ground are without heights."""
     start: Walk
     """State at t = 0, and room for what is computed on the way."""
 
