@@ -45,7 +45,7 @@ class FrictionKind(Section):
         raise NotImplementedError
 
     def cone(self, source: object) -> Cone:
-        """MuJoCo's friction for it; raises InputError, naming `source` and key, if there is none."""
+        """MuJoCo's friction for it; InputError, naming `source` and key, if there is none."""
         problem = f"found !{type(self).__name__}, which mujoco cannot simulate"
         raise InputError(source, "friction", problem)
 
