@@ -43,7 +43,7 @@ class Engine:
     """
 
     can_be_watched: ClassVar[bool] = False
-    """Whether a viewer sees the robot while it is simulated."""
+    """True if a viewer sees the robot while it is simulated."""
 
     lane_pool: type[LanePool] | None = None
     """The class of a pool that simulates gaits side by side in lanes, if the engine can."""

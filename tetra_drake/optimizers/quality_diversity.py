@@ -47,7 +47,7 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
         self._roots: Matrix = np.empty((0, self._ranges.size))
         """Roots of the points drawn last; see Ranges.from_roots()."""
         self._told: dict[str, npt.NDArray[Any]] = {}
-        """What the emitters are told: roots as `solution`, fitnesses as `objective`, `measures`."""
+        """Arguments of tell() of the emitters: `solution` (roots), `objective`, `measures`."""
         self._added: dict[str, npt.NDArray[Any]] = {}
         """The archive's `status` and `value` of each."""
         self._archive = GridArchive(

@@ -34,8 +34,7 @@ class Struts(NamedTuple):
 def least_strut_distance(
     struts: Struts, radius: Table, state: Table, nodes: Table, least: Real
 ) -> Real:
-    """Square of the least distance (m²) between struts of different bodies, or `least` if that is
-    less.
+    """The least distance (m) between struts of different bodies, or `least` if that is less.
 
     `radius`, (bodies,), is that of the spheres in which the bodies are; `nodes` those of
     physics.kinematics at a state (13 bodies,).
@@ -58,14 +57,14 @@ def origin(state: Table, body: int) -> tuple[Real, Real, Real]:
 @inlined
 def may_be_nearer(apart: tuple[Real, Real, Real], reach: Real, least: Real) -> bool:
     """True unless what reaches so far (m) from two points that are `apart` is surely farther away
-    from each other than the square root of `least`, in all lanes."""
-    bound = reach + math.sqrt(least)
+    from each other than `least`, in all lanes."""
+    bound = reach + least
     return any_lane(dot(apart, apart) <= _MARGIN * bound * bound)
 
 
 @inlined
 def nearest_strut(struts: Struts, nodes: Table, a: int, body: int, least: Real) -> Real:
-    """Square of the least distance (m²) of a strut to those of a body, or `least`."""
+    """The least distance (m) of a strut to those of a body, or `least` if that is less."""
     middle_a = middle(struts, nodes, a)
     for b in range(struts.first_strut[body], struts.first_strut[body + 1]):
         apart = difference(middle_a, middle(struts, nodes, b))
@@ -84,7 +83,7 @@ def middle(struts: Struts, nodes: Table, i: int) -> tuple[Real, Real, Real]:
 
 @inlined
 def strut_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
-    """Square of the distance (m²) between two struts.
+    """The distance (m) between two struts.
 
     The nearest points of the lines; where one is beyond its strut, the end there, and what is
     nearest to that (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.9).
@@ -104,7 +103,7 @@ def strut_distance(struts: Struts, nodes: Table, i: int, j: int) -> Real:
         r[1] + s * u[1] - t * v[1],
         r[2] + s * u[2] - t * v[2],
     )
-    return dot(apart, apart)
+    return math.sqrt(dot(apart, apart))
 
 
 @inlined

@@ -255,7 +255,9 @@ def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> Pair:
     u_1, u_2 = pull.u_1, pull.u_2
     beyond = pull.size > pull.limit
     breaks = pull.stuck & beyond & (u_1 * slide.t1.velocity + u_2 * slide.t2.velocity > 0.0)
-    length = math.sqrt(u_1 * u_1 + u_2 * u_2)
+    # A sum of products would be rounded differently in one lane and in several.
+    square_1, square_2 = select(breaks, u_1 * u_1, 1.0), select(breaks, u_2 * u_2, 0.0)
+    length = math.sqrt(square_1 + square_2)
     return (
         select(breaks, u_1 / length, select(beyond, slide.t1.mode, STICK)),
         select(breaks, u_2 / length, select(beyond, slide.t2.mode, STICK)),

@@ -31,7 +31,7 @@ class Tally(NamedTuple):
     tension: Table
     """(1,): the least tension of a cable, in N."""
     clearance: Table
-    """(1,): the square of the least distance between struts, in m²; see physics.clearance."""
+    """(1,): the least distance between struts, in m; see physics.clearance."""
 
 
 @inlined

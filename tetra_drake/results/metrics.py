@@ -80,7 +80,7 @@ def compute_metrics(
         cost_of_transport=work / carried if carried else math.inf,
         signal_rate=math.sqrt(per_time * float(totals.roughness[0]) / structure.signals),
         lifted=sum(lifted) / len(lifted),
-        clearance=math.sqrt(totals.clearance[0]),
+        clearance=float(totals.clearance[0]),
         tension=float(totals.tension[0]),
         travelling_index=travelling_index(signals),
         lifted_shares=tuple(lifted),

@@ -89,6 +89,10 @@ def make_result(
     instants = sample_times(simulation.duration, PERIOD)
     way = motion.at(instants)
     ends = motion.at(np.array([0.0, simulation.steady_from, simulation.duration]))
+    trajectory = None
+    if record:
+        samples = sample_times(simulation.duration, simulation.sample_period)
+        trajectory = make_dataset(robot, motion.at(samples))
     poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
     path = follow(instants, poses)
     start, steady, end = (node_positions(structure, state) for state in ends.states)
@@ -101,10 +105,6 @@ def make_result(
         totals=totals,
         signals=way.signals[instants >= simulation.steady_from],
     )
-    trajectory = None
-    if record:
-        samples = sample_times(simulation.duration, simulation.sample_period)
-        trajectory = make_dataset(robot, motion.at(samples))
     return SimulationResult(
         metrics=metrics,
         fitness=compute_fitness(metrics, robot.scenario.objective),

@@ -63,7 +63,7 @@ class Resting(NamedTuple):
 
     model: Model
     forces: Forces
-    """Those at the state that was last computed."""
+    """Forces at the state that was last computed."""
 
     @classmethod
     def of(cls, model: Model) -> Self:

@@ -50,7 +50,7 @@ class Gait:
     tau_b: float
     """Time constant of self-inhibition, in s."""
     turn: float = 0.0
-    """From -1 to 1. Left oscillators have the input u0 (1 + turn), right ones u0 (1 - turn)."""
+    """Turn, -1 to 1. Left oscillators have the input u0 (1 + turn), right ones u0 (1 - turn)."""
     gains: Gains = field(default_factory=Gains)
     scenario: str = field(default="", compare=False)
     """Name of the scenario that the gait was made for; "" if that is not known."""

@@ -57,6 +57,7 @@ def _placed(scenario: Scenario, kind: kinds.Structure) -> Structure:
         problem = f"starts {depth:.3g} m below the ground, expected on it or above"
         raise InputError(scenario.name, f"robot.nodes.{names[lowest]}", problem)
     p_WN[:, 2] += depth
+    actuation = Actuation.of(scenario)
     struts = sorted(kind.all_struts, key=lambda strut: kind.body_of_node[strut.nodes[0]])
     inertias = [_inertia_in_world(kind, body, number, p_WN) for body in kind.bodies]
     p_WB = np.array([inertia.get_com() for inertia in inertias])
@@ -73,11 +74,11 @@ def _placed(scenario: Scenario, kind: kinds.Structure) -> Structure:
         unit_inertia=np.array([_unit_inertia(inertia) for inertia in inertias]),
         p_WB=p_WB,
         q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (len(inertias), 1)),
-        cables=_cables(kind, number, Actuation.of(scenario)),
-        cable_names=kind.layout().cable_names,
+        cables=_cables(kind, number, actuation),
+        cable_names=actuation.layout.cable_names,
         cable_groups=tuple(kind.all_cables[number].group for number in kind.ordered_cables),
         slack=True,
-        actuation=Actuation.of(scenario),
+        actuation=actuation,
         contacts=contacts,
         thesis_nodes=None,
         feet=len(contacts),

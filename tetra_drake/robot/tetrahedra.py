@@ -73,7 +73,7 @@ def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
         p_WB=p_WB,
         q_WB=q_WB,
         cables=np.array(rows, dtype=CABLE),
-        cable_names=robot.layout().cable_names,
+        cable_names=actuation.layout.cable_names,
         cable_groups=tuple(cable.split()[0] for cable in CABLES) * (n - 1),
         slack=robot.slack,
         actuation=actuation,

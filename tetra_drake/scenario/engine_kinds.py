@@ -21,7 +21,7 @@ class EngineSettings(Section):
 
     @property
     def precision(self) -> str:
-        """How finely the engine simulates, as "accuracy 0.005"."""
+        """Precision of the engine, as "accuracy 0.005"."""
         raise NotImplementedError
 
     def friction_text(self, friction: FrictionKind) -> str:

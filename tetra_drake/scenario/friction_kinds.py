@@ -45,13 +45,13 @@ class FrictionKind(Section):
         raise NotImplementedError
 
     def cone(self, source: object) -> Cone:
-        """What MuJoCo simulates for it; raises InputError, naming `source` and key, if nothing."""
+        """MuJoCo's friction for it; InputError, naming `source` and key, if there is none."""
         problem = f"found !{type(self).__name__}, which mujoco cannot simulate"
         raise InputError(source, "friction", problem)
 
     @property
     def cone_text(self) -> str:
-        """What MuJoCo simulates for it, in words."""
+        """MuJoCo's friction for it, in words."""
         return self.text
 
 

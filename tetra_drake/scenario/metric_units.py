@@ -40,7 +40,7 @@ class Metrics:
     distance: float = _metric("m")
     """Way along x of T1's bottom left node, x₁."""
     steady_distance: float = _metric("m")
-    """The same from `simulation.steady_from` on: Δx₁ of Eq. 10."""
+    """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
     speed: float = _metric("m/s")
     """Mean speed of the centre along x from `simulation.steady_from` on."""
     twist: float = _metric("m", of_a_row=True)

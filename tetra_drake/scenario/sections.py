@@ -253,10 +253,10 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
     elif "actual_length" in context:
         length = context.get("min_length", context.get("max_length"))
         expected = f"{length} items, not {context['actual_length']}"
-    found = tree  # as it was written, with its unit
+    value = tree  # as it was written, with its unit
     for part in place:
-        found = found[part]
-    return key, f"found {described(found)}, expected {expected}"
+        value = value[part]
+    return key, f"found {described(value)}, expected {expected}"
 
 
 _LIMITS = {

@@ -1,8 +1,7 @@
-"""What goes into a lane of the compiled engine, a prepared gait, and what comes out, its course."""
+"""Input and output of a lane of the compiled engine: a prepared gait, and its course."""
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK
-from tetra_drake.engines.compiled.dynamics import CABLES_AT_ONCE, LINE_COLUMNS, Solver
+from tetra_drake.engines.compiled.dynamics import CABLES_AT_ONCE, LINE_COLUMNS, Solver, make_solver
 from tetra_drake.engines.compiled.loop import (
     ASKED_ROWS,
     CLOCK_ROWS,
@@ -38,19 +37,22 @@ from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.schema import Scenario
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PreparedGait:
-    """A gait on a scenario, prepared for a lane."""
+    """A gait on a scenario, prepared for a lane: arrays without lanes."""
 
     robot: Robot
-    gait: Gait
     record: bool
-    steering: SteeringSignal | None
-    """Steering signal, in place of the gait's turn."""
     times: np.ndarray
     """The times (s) of the samples to keep, those of motion_times()."""
     marks: np.ndarray
     """The times (s) at which steps end."""
+    turns: np.ndarray
+    """The turns that Robot.turns() gives."""
+    constants: Constants
+    """Constants of all laws; those of the ground are without heights."""
+    start: Walk
+    """State at t = 0, and room for what is computed on the way."""
 
     @classmethod
     def of(
@@ -61,11 +63,19 @@ class PreparedGait:
         record: bool,
         steering: SteeringSignal | None = None,
     ) -> PreparedGait:
-        """Prepares a gait."""
+        """Prepares a gait; raises InputError if it or the steering does not fit the scenario."""
         simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
-        times = motion_times(simulation, record=record)
         marks = np.unique([0.0, simulation.steady_from, simulation.duration, start_up])
-        return cls(robot, gait, record, steering, times, marks[marks <= simulation.duration])
+        turns, solver = robot.turns(gait, steering), make_solver(robot.model)
+        return cls(
+            robot=robot,
+            record=record,
+            times=motion_times(simulation, record=record),
+            marks=marks[marks <= simulation.duration],
+            turns=turns,
+            constants=_constants(robot, gait, solver),
+            start=_start(robot, turns, solver),
+        )
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -74,6 +84,7 @@ class PreparedGait:
         joins = structure.cables[["node_a", "node_b", "signal"]].tobytes()
         return (
             structure.first_node.tobytes(),
+            structure.struts.tobytes(),
             structure.contacts.tobytes(),
             joins,
             structure.isotropic,
@@ -88,11 +99,6 @@ class PreparedGait:
         """True if the network is integrated with the robot."""
         return self.robot.scenario.cpg.signals == "live"
 
-    @functools.cached_property
-    def turns(self) -> np.ndarray:
-        """The turns that Robot.turns() gives; raises InputError as it does."""
-        return self.robot.turns(self.gait, self.steering)
-
     @property
     def recent_signals(self) -> int:
         """Number of signal samples that an engine holds: those within a step, and as many
@@ -101,66 +107,65 @@ class PreparedGait:
         within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
         return 1 << math.ceil(math.log2(2.0 * within + 32.0))
 
-    def constants(self) -> Constants:
-        """Constants as arrays without lanes; of the ground without heights."""
-        robot, gait = self.robot, self.gait
-        scenario, model = robot.scenario, robot.model
-        cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
-        cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
-        ground = model.ground._replace(heights=None)  # of which lanes have different numbers
-        return Constants(
-            robot=model._replace(cables=cables, ground=ground),
-            solver=Solver.of(model),
-            network=robot.network(gait),
-            senses=robot.senses,
-            sides=np.repeat(robot.actuation.sides, 2).astype(float),
-            external_input=np.array([cpg.external_input]),
-            gains=np.array([gain for _, gain in gait.gains]),
-            gain=np.array([cpg.gain]),
-            period=np.array([cpg.listing_step]),
-            samples=np.array([sample_count(scenario)], dtype=float),
-            start_up=np.array([cpg.start_up]),
-            tolerance=np.array([engine.tolerance]),
-            max_step=np.array([engine.max_step]),
-            look_ahead=np.array([engine.look_ahead]),
-            max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
-        )
 
-    def start(self) -> Walk:
-        """State at t = 0, and room for what is computed on the way, as arrays without lanes."""
-        robot, scenario, structure = self.robot, self.robot.scenario, self.robot.structure
-        bodies, signals = len(structure.bodies), structure.signals
-        contacts, cables = len(structure.contacts), len(structure.cables)
-        velocities = np.zeros(BLOCK * bodies)
-        return Walk(
-            clock=np.zeros(CLOCK_ROWS),
-            asked=np.zeros(ASKED_ROWS),
-            step=Step(
-                state=structure.initial_state,
-                end=np.zeros(13 * bodies),
-                force=velocities,
-                end_force=velocities,
-                change=velocities,
-                stage=velocities,
-                k1=velocities,
-                k2=velocities,
-                rows=np.zeros((bodies, BLOCK, Solver.of(robot.model).schedule.width)),
-                lines=np.zeros((CABLES_AT_ONCE, LINE_COLUMNS)),
-                inertia=np.zeros((bodies, INERTIA_COLUMNS)),
-            ),
-            forces=Forces.of(robot.model),
-            modes=robot.starting_modes(),
-            acceleration=velocities,
-            signals=np.zeros(signals),
-            end_signals=np.zeros(signals),
-            neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
-            output=np.zeros(signals),
-            tonic=robot.tonic_input(self.turns)[0],
-            inputs=np.zeros(2 * signals),
-            lengths=np.zeros(cables),
-            normal_forces=np.zeros(contacts),
-            tally=empty_tally(robot),
-        )
+def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
+    scenario, model = robot.scenario, robot.model
+    cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
+    cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
+    ground = model.ground._replace(heights=None)  # of which lanes have different numbers
+    return Constants(
+        robot=model._replace(cables=cables, ground=ground),
+        solver=solver,
+        network=robot.network(gait),
+        senses=robot.senses,
+        sides=np.repeat(robot.actuation.sides, 2).astype(float),
+        external_input=np.array([cpg.external_input]),
+        gains=np.array([gain for _, gain in gait.gains]),
+        gain=np.array([cpg.gain]),
+        period=np.array([cpg.listing_step]),
+        samples=np.array([sample_count(scenario)], dtype=float),
+        start_up=np.array([cpg.start_up]),
+        tolerance=np.array([engine.tolerance]),
+        max_step=np.array([engine.max_step]),
+        look_ahead=np.array([engine.look_ahead]),
+        max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
+    )
+
+
+def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
+    scenario, structure = robot.scenario, robot.structure
+    bodies, signals = len(structure.bodies), structure.signals
+    contacts, cables = len(structure.contacts), len(structure.cables)
+    velocities = np.zeros(BLOCK * bodies)
+    return Walk(
+        clock=np.zeros(CLOCK_ROWS),
+        asked=np.zeros(ASKED_ROWS),
+        step=Step(
+            state=structure.initial_state,
+            end=np.zeros(13 * bodies),
+            force=velocities,
+            end_force=velocities,
+            change=velocities,
+            stage=velocities,
+            k1=velocities,
+            k2=velocities,
+            rows=np.zeros((bodies, BLOCK, solver.schedule.width)),
+            lines=np.zeros((CABLES_AT_ONCE, LINE_COLUMNS)),
+            inertia=np.zeros((bodies, INERTIA_COLUMNS)),
+        ),
+        forces=Forces.of(robot.model),
+        modes=robot.starting_modes(),
+        acceleration=velocities,
+        signals=np.zeros(signals),
+        end_signals=np.zeros(signals),
+        neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
+        output=np.zeros(signals),
+        tonic=robot.tonic_input(turns)[0],
+        inputs=np.zeros(2 * signals),
+        lengths=np.zeros(cables),
+        normal_forces=np.zeros(contacts),
+        tally=empty_tally(robot),
+    )
 
 
 class Course(NamedTuple):

@@ -5,6 +5,7 @@ Vectors over bodies hold 6 numbers per body, rotation before translation, in Wor
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from typing import NamedTuple, Self
 
@@ -45,11 +46,10 @@ class Solver(NamedTuple):
     """(blocks,): their columns."""
 
     @classmethod
-    def of(cls, robot: Model) -> Self:
-        """The solver of a robot."""
-        first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
-        pairs = list(zip(first, second, strict=True))
-        schedule = Schedule.of(len(robot.bodies.mass), pairs)
+    @functools.lru_cache(maxsize=8)  # as most robots of a run are coupled alike
+    def of(cls, bodies: int, pairs: tuple[tuple[int, int], ...]) -> Self:
+        """The solver for so many bodies, of which pairs are coupled."""
+        schedule = Schedule.of(bodies, pairs)
         fill = sorted(schedule.blocks - set(pairs))
         return cls(
             schedule,
@@ -57,6 +57,12 @@ class Solver(NamedTuple):
             fill_bodies=_indices(body for body, _ in fill),
             fill_columns=_indices(schedule.column_of(*pair) for pair in fill),
         )
+
+
+def make_solver(robot: Model) -> Solver:
+    """The solver of a robot."""
+    first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
+    return Solver.of(len(robot.bodies.mass), tuple(zip(first, second, strict=True)))
 
 
 def _indices(numbers: Iterable[int]) -> np.ndarray:

@@ -46,7 +46,7 @@ class LaneEngine:
         structure, points = first.robot.structure, first.robot.ground.heights.size
         self._bodies = len(structure.bodies)
         self._heights = np.zeros((width, points))
-        constants = in_lanes(first.constants(), width)
+        constants = in_lanes(first.constants, width)
         ground = constants.robot.ground._replace(heights=FieldArray(self._heights.ravel()))
         shape = constants.network.inhibition.shape
         inhibition = lane_table(shape, width, any_size=True)  # compiled once for robots of any size
@@ -54,7 +54,7 @@ class LaneEngine:
             robot=constants.robot._replace(ground=ground),
             network=constants.network._replace(inhibition=inhibition),
         )
-        self._walk = in_lanes(first.start(), width)
+        self._walk = in_lanes(first.start, width)
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
             marks=np.full((width, 5), math.inf),
@@ -97,7 +97,7 @@ class LaneEngine:
 
     def load(self, lane: int, prepared: PreparedGait) -> None:
         """Starts a gait in a lane; raises InputError if it does not fit its scenario."""
-        constants, walk = prepared.constants(), prepared.start()
+        constants, walk = prepared.constants, prepared.start
         fill_lane(self._constants, constants, lane)
         fill_lane(self._walk, walk, lane)
         network, given = self._constants.network, constants.network
