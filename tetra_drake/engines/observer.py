@@ -67,4 +67,5 @@ def observe_states(
         compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
         cables, carriers = robot.cables, robot.ground.carriers
         observe(tally, cables, carriers, times[k], signals[k], forces.pulls, forces.pushes)
-        look(tally, robot.struts, robot.bodies.radius, states[k], forces.nodes)
+        radius, first_node = robot.bodies.radius, robot.first_node
+        look(tally, robot.struts, radius, first_node, states[k], forces.nodes)

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from tetra_drake.physics.kinematics import P_WN
-from tetra_drake.physics.vectors import difference, dot, vector_at
+from tetra_drake.physics.vectors import Vector, difference, dot, vector_at
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, any_lane, maximum, minimum
 
@@ -32,30 +32,56 @@ class Struts(NamedTuple):
 
 @inlined
 def least_strut_distance(
-    struts: Struts, radius: Table, state: Table, nodes: Table, least: Real
+    struts: Struts, radius: Table, first_node: Table, state: Table, nodes: Table, least: Real
 ) -> Real:
     """The least distance (m) between struts of different bodies, or `least` if that is less.
 
     `radius`, (bodies,), is that of the spheres in which the bodies are; `nodes` those of
-    physics.kinematics at a state (13 bodies,).
+    physics.kinematics at a state (13 bodies,), and `first_node` as in Model.
     """
     for first in range(radius.size):
         for second in range(first + 1, radius.size):
-            apart = difference(origin(state, first), origin(state, second))
+            apart = difference(origin(state, second), origin(state, first))
             if may_be_nearer(apart, radius[first] + radius[second], least):
-                for a in range(struts.first_strut[first], struts.first_strut[first + 1]):
-                    least = nearest_strut(struts, nodes, a, second, least)
+                least = nearest_struts(struts, first_node, nodes, first, second, apart, least)
     return least
 
 
 @inlined
-def origin(state: Table, body: int) -> tuple[Real, Real, Real]:
+def nearest_struts(
+    struts: Struts,
+    first_node: Table,
+    nodes: Table,
+    first: int,
+    second: int,
+    apart: Vector,
+    least: Real,
+) -> Real:
+    """The least distance (m) between struts of two bodies, whose origins are `apart`, or `least`.
+
+    Struts of the first body that a plane across the line between the origins parts from the second
+    one, with more room than `least`, are left out.
+    """
+    begin = dot(apart, vector_at(nodes, first_node[second], P_WN))
+    for node in range(first_node[second] + 1, first_node[second + 1]):
+        begin = minimum(begin, dot(apart, vector_at(nodes, node, P_WN)))
+    length = math.sqrt(dot(apart, apart))
+    for a in range(struts.first_strut[first], struts.first_strut[first + 1]):
+        end_a = dot(apart, vector_at(nodes, struts.node_a[a], P_WN))
+        end_b = dot(apart, vector_at(nodes, struts.node_b[a], P_WN))
+        if any_lane(begin - maximum(end_a, end_b) <= _MARGIN * least * length):
+            least = nearest_strut(struts, nodes, a, second, least)
+    return least
+
+
+@inlined
+def origin(state: Table, body: int) -> Vector:
     """The position of a body's origin (m)."""
     return state[7 * body + 4], state[7 * body + 5], state[7 * body + 6]
 
 
 @inlined
-def may_be_nearer(apart: tuple[Real, Real, Real], reach: Real, least: Real) -> bool:
+def may_be_nearer(apart: Vector, reach: Real, least: Real) -> bool:
     """True unless what reaches so far (m) from two points that are `apart` is surely farther away
     from each other than `least`, in all lanes."""
     bound = reach + least
@@ -74,7 +100,7 @@ def nearest_strut(struts: Struts, nodes: Table, a: int, body: int, least: Real) 
 
 
 @inlined
-def middle(struts: Struts, nodes: Table, i: int) -> tuple[Real, Real, Real]:
+def middle(struts: Struts, nodes: Table, i: int) -> Vector:
     """The middle of a strut (m)."""
     a_x, a_y, a_z = vector_at(nodes, struts.node_a[i], P_WN)
     b_x, b_y, b_z = vector_at(nodes, struts.node_b[i], P_WN)

@@ -80,7 +80,14 @@ def add_lifted(tally: Tally, carriers: Table, passed: Real, pushes: Table) -> No
 
 
 @inlined
-def look(tally: Tally, struts: Struts, radius: Table, state: Table, nodes: Table) -> None:
+def look(
+    tally: Tally,
+    struts: Struts,
+    radius: Table,
+    first_node: Table,
+    state: Table,
+    nodes: Table,
+) -> None:
     """Notes the clearance of struts; see least_strut_distance()."""
-    least = least_strut_distance(struts, radius, state, nodes, tally.clearance[0])
+    least = least_strut_distance(struts, radius, first_node, state, nodes, tally.clearance[0])
     tally.clearance[0] = least

@@ -168,7 +168,8 @@ def advance(constants: Constants, walk: Walk, log: Log, live: bool, rounds: int)
             ended |= iterate(constants, walk, log, live)
         robot, state, nodes = constants.robot, walk.step.state, walk.forces.nodes
         move_robot(robot, state, walk.forces)
-        look(walk.tally, robot.struts, robot.bodies.radius, state, nodes)
+        radius, first_node = robot.bodies.radius, robot.first_node
+        look(walk.tally, robot.struts, radius, first_node, state, nodes)
         if ended:
             return
 
