@@ -10,8 +10,8 @@ from helpers.widths import WIDEST
 
 from tetra_drake.engines.compiled import lane_pool
 from tetra_drake.errors import InputError
-from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import MakeStructure, Structure
+from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 

@@ -5,12 +5,17 @@ import pytest
 from helpers.forces import forces_at
 from helpers.states import disturbed
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.dynamics import implicit_matrix
+from tetra_drake.engines.compiled.block_sparse import BLOCK
+from tetra_drake.engines.compiled.dynamics import (
+    CABLES_AT_ONCE,
+    LINE_COLUMNS,
+    Solver,
+    implicit_matrix,
+)
 from tetra_drake.physics.contact import MODE_COLUMNS, modes_after_step
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.kinematics import move_bodies
-from tetra_drake.physics.model import JUNCTION_CABLES, Model
+from tetra_drake.physics.model import Model
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
@@ -39,7 +44,7 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
     forces = Forces.of(robot)
-    modes_after_step(state, robot.p_BN, robot.ground, forces.nodes, forces.frames, modes)
+    modes_after_step(state, robot.p_BN, robot.first_node, robot.ground, forces.nodes, forces.frames, modes)
     assert np.count_nonzero(modes[:, 0]) > 0, "some nodes touch the ground"
     return robot, state, modes
 

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from helpers.forces import forces_at
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
+from tetra_drake.engines.compiled.block_sparse import BLOCK
+from tetra_drake.engines.compiled.dynamics import CABLES_AT_ONCE, LINE_COLUMNS, Solver
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces
-from tetra_drake.physics.model import JUNCTION_CABLES
+from tetra_drake.physics.inertia import INERTIA_COLUMNS
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.schema import Scenario
@@ -24,6 +25,7 @@ class Stepper:
     def __init__(self, scenario: Scenario) -> None:
         robot = Robot.of(scenario)
         self.structure, self.robot = robot.structure, robot.model
+        self.solver = Solver.of(self.robot)
         bodies, contacts = len(self.structure.bodies), self.structure.contacts
         self.modes = np.zeros((len(contacts), MODE_COLUMNS))
         self.modes[:-1, CONTACT] = 1.0
@@ -36,8 +38,9 @@ class Stepper:
             state=np.empty(13 * bodies),
             end=np.empty(13 * bodies),
             **{n: np.empty(size) for n in ("force", "end_force", "change", "stage", "k1", "k2")},
-            rows=np.empty((bodies, BLOCK, ROW)),
-            lines=np.empty((JUNCTION_CABLES, 9)),
+            rows=np.empty((bodies, BLOCK, self.solver.schedule.width)),
+            lines=np.empty((CABLES_AT_ONCE, LINE_COLUMNS)),
+            inertia=np.empty((bodies, INERTIA_COLUMNS)),
         )
         self.forces = Forces.of(self.robot)
 
@@ -93,7 +96,7 @@ def test_the_estimate_is_the_error_of_a_solution_of_first_order(stepper):
         end, estimate = stepper.walk(h, 1)
         estimates.append(estimate)
         speeds = (end - exact)[35:].reshape(5, 6)
-        speeds[:, :3] *= stepper.robot.body.radius[0]
+        speeds[:, :3] *= stepper.robot.bodies.radius[0]
         true.append(np.abs(speeds).max())
     assert estimates[0] / estimates[1] == pytest.approx(4.0, rel=0.1)
     assert 0.0 < true[0] < estimates[0] and 0.0 < true[1] < estimates[1]
