@@ -53,7 +53,7 @@ ENGINES = {
 }
 """Engines of a table, as a scenario has them."""
 
-CONVERGED = "!Compiled {tolerance: 0.001 mm/s, max_step: 0.5 ms, look_ahead: 0.001 ms}"
+CONVERGED = "!Compiled {tolerance: 0.001 mm/s, max_step: 0.5 ms}"
 CONVERGED_MUJOCO = "!Mujoco {step: 0.0625 ms}"
 
 

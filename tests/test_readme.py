@@ -103,7 +103,7 @@ def test_the_scenario_loads(work: Path) -> None:
     (work / "stiff.yaml").write_text(snippet)
     scenario = td.load_scenario("stiff.yaml")
     assert scenario.robot.tetrahedra == 7
-    assert scenario.cables.outer_stiffness == 45.0
+    assert scenario.robot.cables.outer_stiffness == 45.0
     assert scenario.robot.spacing != td.load_scenario("thesis").robot.spacing, "balanced"
 
 

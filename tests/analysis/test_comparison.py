@@ -99,8 +99,8 @@ def test_only_search_may_differ_without_a_note(run):
     base = run("a", trial(1.0))
     searches = run("b", trial(1.0), trial(2.0), changes={"evolution.evaluations": 99})
     assert compare([base, searches]).notes == []
-    (note,) = compare([base, run("c", trial(1.0), changes={"cables.slack": True})]).notes
-    assert "cables.slack" in note
+    (note,) = compare([base, run("c", trial(1.0), changes={"robot.cables.slack": True})]).notes
+    assert "robot.cables.slack" in note
 
 
 def test_different_objectives_and_runs_given_twice_are_refused(run, refused):

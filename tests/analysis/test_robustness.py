@@ -106,11 +106,11 @@ def test_a_judgement_does_not_depend_on_workers_and_other_gaits(scenario, gaits,
 
 
 def test_the_scenarios_own_disturbances_are_used_unless_a_percentage_is_given(scenario, gaits):
-    damping = Disturbances(draws=4, spreads={"cables.damping": 0.2})
+    damping = Disturbances(draws=4, spreads={"robot.cables.damping": 0.2})
     disturbing = scenario.with_changes({"disturbances": damping, "require": {"distance": "1 m"}})
     judged = judge(disturbing, gaits, draws=2)
-    assert set(judged.alone["what"]) == {"cables.damping", TERRAIN}
-    assert judged.draws["cables.damping"].between(0.8, 1.2).all()
+    assert set(judged.alone["what"]) == {"robot.cables.damping", TERRAIN}
+    assert judged.draws["robot.cables.damping"].between(0.8, 1.2).all()
     assert by_gait(judged)["missed"].tolist() == [2, 2]  # no gait walks a metre
     given = judge(disturbing, {"a": gaits["a"]}, percent=3.0, draws=1, alone=False)
     assert given.scenario.disturbances == default_disturbances(scenario, 3.0)

@@ -17,7 +17,7 @@ FALLING = {
     "robot.offsets": with_unit(np.random.default_rng(0).normal([0, 0, 1], 0.005, (3, 3)), "m"),
     "robot.tetrahedra": 3,
     "robot.gravity": with_unit(G, "m/s^2"),
-    "cables.damping": 0.0,
+    "robot.cables.damping": 0.0,
     "cpg.gain": 0.0,
     "simulation.duration": "0.2 s",
     "simulation.steady_from": "0.1 s",

@@ -147,7 +147,7 @@ def test_a_mode_change_is_due_until_it_is_made(scenario, robot, gait):
 
 @pytest.mark.slow
 def test_random_gaits_walk_as_far_as_converged_ones(scenario):
-    fine = {"engine": Compiled(tolerance=1e-6, max_step=5e-4, look_ahead=1e-6)}
+    fine = {"engine": Compiled(tolerance=1e-6, max_step=5e-4)}
     errors = []
     for seed in (7, 10, 14, 22, 24, 26, 30, 31):  # where a late mode change costs 0.1 in or more
         walked, exact = (

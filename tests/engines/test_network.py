@@ -208,7 +208,7 @@ def test_feedback_is_refused_where_signals_are_computed_beforehand(scenario, ref
 def test_random_gaits_with_feedback_end_where_the_diagrams_do(scenario):
     live = scenario.with_changes({"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)})
     gaits = [seeded_gait(live, seed) for seed in range(20)]
-    fine = {"engine": Compiled(tolerance=1e-6, max_step=3e-4, look_ahead=1e-6)}
+    fine = {"engine": Compiled(tolerance=1e-6, max_step=3e-4)}
     ours = simulate_many(scenario=live.with_changes(fine), gaits=gaits)
     diagram = live.with_changes({"engine": WITNESSED})
     errors = [

@@ -30,7 +30,7 @@ from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.settings import Disturbances
 from tetra_drake.scenario.terrain_kinds import Steps
 
-STIFFNESS = {"cables.outer_stiffness": 0.05}
+STIFFNESS = {"robot.cables.outer_stiffness": 0.05}
 SEED = (5, 0, 3)
 BOWL = DrawnBowl()
 

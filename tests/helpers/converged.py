@@ -5,7 +5,7 @@ from tetra_drake.scenario.schema import Scenario
 
 CONVERGED: dict[str, Drake | Compiled] = {
     "drake": Drake(scheme="runge_kutta3", accuracy=1e-6, max_step=1e-4, mode_changes="witness"),
-    "compiled": Compiled(tolerance=1e-8, max_step=3e-5, look_ahead=1e-8),
+    "compiled": Compiled(tolerance=1e-8, max_step=3e-5),
 }
 """Engines that have converged, with mode changes placed to 2e-8 s, for short walks."""
 

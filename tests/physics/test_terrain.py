@@ -42,11 +42,11 @@ def test_a_plane_is_exact(ground, tmp_path):
 def test_a_lonely_height_is_a_biquadratic_spline(ground, tmp_path):
     # The quadratic B-spline is 3/4 at its control point, 1/2 half a cell away, 1/8 a cell away.
     heights = np.zeros((101, 9))
-    heights[50, 4] = -1.0
-    made = ground(HeightField(file=saved(heights, tmp_path), cell=0.4, corner=[-19.0, -1.0]))
+    heights[53, 5] = -1.0
+    made = ground(HeightField(file=saved(heights, tmp_path), cell=0.4))
     for dx, dy, expected in [(0, 0, 0.75 * 0.75), (0.2, 0, 0.5 * 0.75), (-0.4, 0.4, 1 / 64)]:
-        assert at(made, 1.0 + dx, 0.6 + dy)[0] == pytest.approx(-expected, abs=1e-13)
-    assert at(made, 1.0 + 0.61, 0.6) == (0.0, 0.0, 0.0), "one and a half cells away"
+        assert at(made, 1.2 + dx, 0.4 + dy)[0] == pytest.approx(-expected, abs=1e-13)
+    assert at(made, 1.2 + 0.61, 0.4) == (0.0, 0.0, 0.0), "one and a half cells away"
 
 
 @pytest.mark.parametrize(

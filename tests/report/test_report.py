@@ -138,7 +138,7 @@ def test_each_trial_and_each_setting_that_differs_from_the_thesis_has_a_row(page
         assert cells[place : place + len(row)] == row
     assert page.row("robot.tetrahedra") == ["3"]
     assert page.row("simulation.duration") == ["0.3 s"]
-    assert page.row("cables.damping") is None
+    assert page.row("robot.cables.damping") is None
 
 
 def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page):

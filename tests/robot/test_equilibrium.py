@@ -48,7 +48,11 @@ def test_rests_where_the_independent_simulation_does(robot, data):
             "robot.offsets": [[0, 0, 0], ["2 mm", "1 mm", "1 mm"], [0, 0, "3 mm"]],
         },
         # Base triangles so near that the robot tips forward, onto the lead's tip.
-        {"robot.tetrahedra": 2, "robot.spacing": "0.055 m", "cables.inner_stiffness": "26.0 N/m"},
+        {
+            "robot.tetrahedra": 2,
+            "robot.spacing": "0.055 m",
+            "robot.cables.inner_stiffness": "26.0 N/m",
+        },
     ],
 )
 def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
@@ -68,11 +72,18 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     [
         ({"robot.strut_length": "0.25 m", "robot.gravity": "1.6 m/s^2"}, 0),
         # Cables of 0.12 m: the tetrahedra lean forward, and only those from tips to tops hold them.
-        ({"robot.spacing": "0.08 m", "cables.free_length": "0.12 m", "robot.contacts": "all"}, 20),
+        (
+            {
+                "robot.spacing": "0.08 m",
+                "robot.cables.free_length": "0.12 m",
+                "robot.contacts": "all",
+            },
+            20,
+        ),
     ],
 )
 def test_no_force_is_left_on_any_body(scenario, changes, slack):
-    robot = Robot.of(scenario.with_changes(changes | {"cables.slack": True}))
+    robot = Robot.of(scenario.with_changes(changes | {"robot.cables.slack": True}))
     structure, state, p_WN = robot.structure, robot.rest.state, resting_nodes(robot)
     bodies, cables = len(structure.bodies), structure.cables
     force = np.zeros_like(p_WN)
@@ -101,7 +112,7 @@ def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario, robot)
 
     elsewhere = scenario.with_changes(
         {
-            "terrain": Incline(slope=0.2, start=None),
+            "terrain": Incline(slope=0.2),
             "friction": Coulomb(stiffness=100.0),
             "robot.offsets": with_unit([[0.01 * i, 0.01, 0.1] for i in range(5)], "m"),
         }

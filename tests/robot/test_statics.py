@@ -10,7 +10,8 @@ import pytest
 import tetra_drake
 from tetra_drake.robot.statics import cable_wrenches, statics_of
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import Structure, read_structure
+from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.structure_files import read_structure
 
 SHIPPED = Path(tetra_drake.__file__).parent / "scenario" / "structures"
 

@@ -123,7 +123,7 @@ def test_signal_i_drives_the_two_bottom_outer_cables_of_junction_i(row):
 def test_outer_and_inner_cables_have_their_own_stiffness_and_length(row, scenario):
     # Outer: the spacing s. Inner: from the tip, on the axis at height h = sqrt(2/3) L over its
     # base, to nodes at s and R = L / sqrt(3) off the axis.
-    L, s, law = scenario.robot.strut_length, scenario.robot.spacing, scenario.cables
+    L, s, law = scenario.robot.strut_length, scenario.robot.spacing, scenario.robot.cables
     inner_length = math.hypot(math.sqrt(2 / 3) * L - s, L / math.sqrt(3))
     p_WN = start(row).reshape(-1, 3)
     for name, cable in zip(row.cable_names, row.cables, strict=True):

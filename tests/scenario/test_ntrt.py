@@ -96,12 +96,12 @@ def read(file: Path, unit: float = 0.1) -> Structure:
 
 def test_a_prism_in_decimetres(tmp_path: Path) -> None:
     given = read(write(tmp_path, PRISM))
-    rod, side = given.struts["prism_rod"], given.cables["vertical.string"]
+    rod, side = given.struts["prism_rod"], given.cables["vertical/string"]
     assert (rod.diameter, rod.density, rod.node_diameter) == pytest.approx((0.05, 500.0, 0.0))
     assert (side.stiffness, side.damping, side.tension) == pytest.approx((800.0, 5.0, 120.0))
-    default = given.cables["horizontal.string"]
+    default = given.cables["horizontal/string"]
     assert (default.stiffness, default.damping, default.tension) == (1000.0, 10.0, 0.0)
-    assert given.all_cables[6].name == "vertical.string low1 high1"
+    assert given.all_cables[6].name == "vertical/string low1 high1"
     assert len(given.bodies) == 3
     statics = statics_of(given)
     assert (statics.self_stress_states, statics.mechanisms) == (1, 1)
@@ -126,12 +126,12 @@ def test_a_spine_by_substructures(tmp_path: Path) -> None:
     write(tmp_path, VERTEBRA, "vertebra.yaml")
     given = read(write(tmp_path, SPINE))
     assert len(given.bodies) == 3
-    assert given.nodes["v1.front"] == pytest.approx([0.1, 0.1, 0.2])
-    assert given.nodes["v2.front"] == pytest.approx([0.05, -0.1, 0.2])
-    assert given.nodes["v3.left"] == pytest.approx([0.4, -0.1, 0.0])
+    assert given.nodes["v1/front"] == pytest.approx([0.1, 0.1, 0.2])
+    assert given.nodes["v2/front"] == pytest.approx([0.05, -0.1, 0.2])
+    assert given.nodes["v3/left"] == pytest.approx([0.4, -0.1, 0.0])
     names = [cable.name for cable in given.all_cables]
     assert len(names) == 8
-    assert names[:5:4] == ["string v1.front v2.front", "string v2.front v3.front"]
+    assert names[:5:4] == ["string v1/front v2/front", "string v2/front v3/front"]
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_places_of_substructures(entry: str, front: list[float], tmp_path: Path)
     write(tmp_path, VERTEBRA, "vertebra.yaml")
     file = write(tmp_path, f"substructures: {{v: {{path: vertebra.yaml, {entry}}}}}")
     x, y, z = front
-    assert read(file, unit=1.0).nodes["v.front"] == pytest.approx([z, x, y])
+    assert read(file, unit=1.0).nodes["v/front"] == pytest.approx([z, x, y])
 
 
 def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> None:
@@ -167,9 +167,9 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
     """
     given = read(write(tmp_path, text))
     assert [cable.name for cable in given.all_cables[8:]] == [
-        "string b.left a.v2.left",
-        "string b.front a.v3.back",
-        "string a.v3.right b.right",
+        "string b/left a/v2/left",
+        "string b/front a/v3/back",
+        "string a/v3/right b/right",
     ]
     assert given.cables["string"].stiffness == 7.0
     builder = "builders: {string: {class: tgBasicActuatorInfo, parameters: {stiffness: 9}}}"

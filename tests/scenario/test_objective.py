@@ -34,7 +34,7 @@ def test_objective_and_requirements_have_units_and_replace_the_base(
 SPREADS = """
 disturbances:
   draws: 4
-  spreads: {cables.damping: 0.1, "friction.stiction_range, friction.stiction_damping": 0.05}
+  spreads: {robot.cables.damping: 0.1, "friction.stiction_range, friction.stiction_damping": 0.05}
   start: 0.02
 """
 
@@ -43,14 +43,15 @@ def test_a_draw_changes_what_it_names_within_its_spread(load_text):
     scenario = load_text(SPREADS)
     draws = [draw_disturbances(scenario, (7, k)) for k in range(200)]
     joined = "friction.stiction_range, friction.stiction_damping"
-    for key, spread in (("cables.damping", 0.1), (joined, 0.05)):
+    for key, spread in (("robot.cables.damping", 0.1), (joined, 0.05)):
         factors = np.array([draw.factors[key] for draw in draws])
         assert np.abs(factors - 1.0).max() <= spread
         # Uniform: the extremes of 200 miss the ends by 1 % of the width on average.
         assert np.ptp(factors) > 1.9 * spread
     draw, changed = draws[0], disturbed(scenario, draws[0])
     ours, theirs = changed.friction, scenario.friction
-    assert changed.cables.damping == draw.factors["cables.damping"] * scenario.cables.damping
+    damping = draw.factors["robot.cables.damping"] * scenario.robot.cables.damping
+    assert changed.robot.cables.damping == damping
     ratio = draw.factors[joined]
     assert ours.stiction_range == approx(ratio * theirs.stiction_range, rel=1e-15)
     assert ours.stiction_damping == approx(ratio * theirs.stiction_damping, rel=1e-15)

@@ -5,15 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tetra_drake
 from tetra_drake.errors import InputError
 from tetra_drake.scenario import robot_kinds
-from tetra_drake.scenario.robot_kinds import Member, Structure, read_structure
+from tetra_drake.scenario.robot_kinds import Member, Structure
 from tetra_drake.scenario.sections import Tree, merge, tree_of
+from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 IN = 0.0254
-SHIPPED = Path(tetra_drake.__file__).parent / "scenario" / "structures"
 
 # A bent body of two groups, b-a-c, a bar d-e, and a bar f-g.
 FILE = """
@@ -116,7 +115,7 @@ def test_one_rigid_body_needs_no_cables() -> None:
 def test_shipped_structures(
     name: str, first: str, bodies: int, cables: int, oscillators: int
 ) -> None:
-    given = read_structure(SHIPPED / f"{name}.yaml")
+    given = read_structure(name)
     assert given.body_names[0] == first
     assert len(given.bodies) == bodies
     assert len(given.all_cables) == cables
@@ -126,7 +125,7 @@ def test_shipped_structures(
 @pytest.mark.parametrize("name", ["prism", "six_bar"])
 def test_struts_of_the_shipped_true_tensegrities(name: str) -> None:
     """The struts of the independent simulation's robots, 0.2508 m long."""
-    given = read_structure(SHIPPED / f"{name}.yaml")
+    given = read_structure(name)
     for first, second in (strut.nodes for strut in given.all_struts):
         length = np.linalg.norm(np.subtract(given.nodes[second], given.nodes[first]))
         assert length == pytest.approx(0.25083960627398694, rel=1e-12)
@@ -155,6 +154,9 @@ def test_struts_of_the_shipped_true_tensegrities(name: str) -> None:
         ("nodes: {e: [2, 2]}", "nodes.e", ["3 items"]),
         ("nodes: {e: [2, 2, up]}", "nodes.e[2]", ["'up'"]),
         ("nodes: {7: [2, 2, 1]}", "nodes.7", ["n7"]),
+        ("{nodes: {h.i: [2, 2, 1]}}", "nodes.h.i", ["'h.i'", "dots"]),
+        ("actuated: {_tag: [side c d]}", "actuated._tag", ["_tag"]),
+        ("offsets: [[1 cm, 0, 0]]", "offsets", ["1 items", "3"]),
         ("{nodes: {h i: [2, 2, 1]}}", "nodes.h i", ["'h i'", "blanks"]),
         ("unit: kg", "unit", ["'kg'"]),
         ("masses: {q: 1 g}", "masses.q", ["'q'"]),

@@ -32,6 +32,6 @@ def test_ports_tell_the_tensions_and_lengths_of_equation_6(robot):
 
 @pytest.mark.parametrize(("slack", "least"), [(True, 0.0), (False, -97.4)])
 def test_slack_cables_do_not_push(scenario, slack, least):
-    robot = Robot.of(scenario.with_changes({"cables.slack": slack}))
+    robot = Robot.of(scenario.with_changes({"robot.cables.slack": slack}))
     tensions = evaluate(robot, "tensions", signals=[-100.0] * 4)
     assert tensions.min() == pytest.approx(least, abs=0.1)

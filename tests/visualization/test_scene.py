@@ -27,7 +27,7 @@ from tetra_drake.visualization.scene import (
 UNEVEN = {
     "incline": Incline(slope=0.2),
     "steps": Steps(height=0.3 * INCH, depth=6.0 * INCH, count=3),
-    "rough": Rough(amplitude=0.3 * INCH, wavelength=4.0 * INCH, start=15.0 * INCH),
+    "rough": Rough(amplitude=0.3 * INCH, wavelength=4.0 * INCH),
 }
 
 

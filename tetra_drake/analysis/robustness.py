@@ -32,7 +32,8 @@ SPREAD = (
     *("robot.spacing", "friction.stiction_range", "friction.stiction_damping"),
     *("friction.stiction_switch", "friction.proportional_stiction"),
     *("friction.static, friction.kinetic", "friction.damping"),
-    *("cables.outer_stiffness", "cables.inner_stiffness", "ground.stiffness", "ground.damping"),
+    *("robot.cables.outer_stiffness", "robot.cables.inner_stiffness"),
+    *("ground.stiffness", "ground.damping"),
 )
 """The keys that the default disturbances spread, where the scenario has them."""
 

@@ -77,7 +77,7 @@ class MujocoEngine(Engine):
             raise InputError(scenario.name, "cpg.feedback", problem)
         if scenario.terrain.plane_slope is None:
             kind = type(scenario.terrain).__name__
-            problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline without start"
+            problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline"
             raise InputError(scenario.name, "terrain", problem)
         scenario.friction.cone(scenario.name)
 

@@ -58,8 +58,8 @@ def simulate_many(
 
     On the compiled engine, `workers` threads (one per core by default) simulate several gaits side
     by side in the registers of each core: the same numbers, bit for bit, several times as fast.
-    Scenarios may differ; those with the same number of tetrahedra, `cables.slack` and kind of
-    signals share a core.
+    Scenarios may differ; those with the same bodies, cables, `robot.cables.slack` and kind
+    of signals share a core.
 
     On the engine `mujoco`, each of `workers` threads simulates one gait at a time. On the diagram,
     or if the scenarios name several engines, one gait is simulated after another.

@@ -150,7 +150,7 @@ def MakeStructure(scenario: Scenario) -> Structure:
     """The structure of a scenario's robot, of any kind. Raises InputError if it cannot start."""
     if isinstance(scenario.robot, robot_kinds.Structure):
         return MakeTensegrity(scenario, scenario.robot)
-    return MakeTetrahedra(scenario)
+    return MakeTetrahedra(scenario, scenario.robot)
 
 
 def constant_steering(turn: float) -> SteeringSignal:

@@ -18,17 +18,17 @@ from tetra_drake.scenario.nesting import (
     NODES,
     TIP,
     TOP,
+    Tetrahedra,
     cable_nodes,
     tetrahedron_nodes,
 )
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.settings import RobotSection
 
 BASE = (BOTTOM_LEFT, BOTTOM_RIGHT, TOP)
 STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
 
 
-def MakeTetrahedra(scenario: Scenario) -> Structure:
+def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
     """The robot of thesis section 2.1 with `robot.tetrahedra` tetrahedra.
 
     Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0; the
@@ -37,8 +37,7 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     CABLES and Actuation. On an incline without start, the robot is turned with
     the slope, about World's y axis.
     """
-    robot, cables = scenario.robot, scenario.cables
-    n = robot.tetrahedra
+    n, cables = robot.tetrahedra, robot.cables
     edge = robot.strut_length
     circumradius = edge / math.sqrt(3.0)
     height = edge * math.sqrt(2.0 / 3.0)
@@ -74,8 +73,8 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
         p_WB=p_WB,
         q_WB=q_WB,
         cables=np.array(rows, dtype=CABLE),
-        cable_names=scenario.robot.layout().cable_names,
-        slack=cables.slack,
+        cable_names=robot.layout().cable_names,
+        slack=robot.slack,
         actuation=actuation,
         contacts=np.array(contacts),
         thesis_nodes=(BOTTOM_LEFT, BOTTOM_RIGHT, 4 * (n - 1) + TIP),
@@ -83,7 +82,7 @@ def MakeTetrahedra(scenario: Scenario) -> Structure:
     )
 
 
-def tetrahedron_inertia(p_BN: np.ndarray, robot: RobotSection) -> tuple[float, np.ndarray]:
+def tetrahedron_inertia(p_BN: np.ndarray, robot: Tetrahedra) -> tuple[float, np.ndarray]:
     """Mass, and unit inertia (6,) as in Structure, of six struts and four spheres with nodes p_BN
     (4, 3)."""
     total = SpatialInertia.Zero()

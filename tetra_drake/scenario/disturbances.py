@@ -25,7 +25,7 @@ class Draw:
     factors: Mapping[str, float]
     """Factors by the keys of `disturbances.spreads`."""
     moves: np.ndarray | None = None
-    """(n, 3): the displacement of each tetrahedron at t = 0, in m."""
+    """(n, 3): the displacement of each body at t = 0, in m."""
     terrain_seed: int | None = None
 
 
@@ -35,10 +35,10 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
     if settings is None:
         return Draw({})
     # All that can be drawn is drawn, so that no change of one setting changes another's numbers.
-    moves = generator.uniform(-1.0, 1.0, (scenario.robot.tetrahedra, 3))
+    moves = generator.uniform(-1.0, 1.0, (scenario.robot.body_count, 3))
     terrain_seed = int(generator.integers(2**31))
     moves[:, 2] = np.abs(moves[:, 2])  # not into the ground
-    reach = settings.start * scenario.robot.spacing
+    reach = settings.start * scenario.robot.size
     sizes = {key: generator.uniform(-size, size) for key, size in settings.spreads.items()}
     return Draw(
         factors={key: 1.0 + size for key, size in sizes.items()},

@@ -9,6 +9,8 @@ from tetra_drake.scenario.sections import Kinds, Section, quantity
 
 SHORTEST_STEP = 1e-9
 """Lower limit (s) of the steps of !Compiled."""
+LONGEST_LOOK_AHEAD = 2e-5
+"""Upper limit (s) of the look-ahead of !Compiled; a longer one costs evaluations."""
 
 
 class EngineSettings(Section):
@@ -53,8 +55,12 @@ class Compiled(EngineSettings):
     tolerance: float = quantity("m/s", default=1e-4, gt=0)
     """Error of a body's velocity, or of its strut tips' by rotation, allowed per step."""
     max_step: float = quantity("s", default=0.003, gt=SHORTEST_STEP, le=1)
-    look_ahead: float = quantity("s", default=2e-5, gt=SHORTEST_STEP, le=1)
-    """Time from a predicted mode change to the end of the step that aims at it."""
+
+    @property
+    def look_ahead(self) -> float:
+        """Time (s) from a predicted mode change to the end of the step that aims at it: 0.2 s per
+        m/s of tolerance, within limits."""
+        return min(LONGEST_LOOK_AHEAD, max(2.0 * SHORTEST_STEP, 0.2 * self.tolerance))
 
     @property
     def precision(self) -> str:

@@ -10,6 +10,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import TAG, Tree, tree_of
+from tetra_drake.scenario.structure_files import structure_file
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 MOST_BYTES = 2**20
@@ -24,8 +25,8 @@ def shipped_scenarios() -> list[str]:
 def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     """Loads a shipped scenario by its name, or a scenario file by its path.
 
-    Raises InputError, naming file and key, for whatever is wrong in the file, or in the height
-    file that it names.
+    Raises InputError, naming file and key, for whatever is wrong in the file, or in the structure
+    or height file that it names.
     """
     file = _file(str(name_or_file), Path())
     scenario = _load(file)
@@ -77,7 +78,7 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
     given = parse_yaml(content, file)
     if not isinstance(given, dict):  # which may be any file: nothing of it is shown
         raise InputError(file, "", "holds no mapping of keys, expected a scenario")
-    _resolve_height_file(given.get("terrain"), file)
+    _resolve_files(given, file)
     base = given.pop("base", None)
     if base is None:
         return Scenario.from_tree(given, file)
@@ -89,7 +90,10 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
     return _load(base_file, (*seen, file.resolve())).with_file(given, file)
 
 
-def _resolve_height_file(terrain: object, file: Path) -> None:
-    """Makes the path of a height file absolute: it starts at the scenario file that names it."""
+def _resolve_files(given: Tree, file: Path) -> None:
+    """Makes the paths of height and structure file absolute: they start at the scenario file."""
+    terrain, robot = given.get("terrain"), given.get("robot")
     if isinstance(terrain, dict) and isinstance(terrain.get("file"), str):
         terrain["file"] = os.path.abspath(file.parent / terrain["file"])
+    if isinstance(robot, dict) and isinstance(robot.get("file"), str):
+        robot["file"] = os.path.abspath(structure_file(robot["file"], file.parent))

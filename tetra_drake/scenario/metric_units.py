@@ -18,12 +18,13 @@ LEAST_WAY = 1e-3
 """m: a robot that goes less far counts as gone so far in its cost of transport."""
 
 
-def _metric(unit: str, *, least: bool = False) -> Any:
+def _metric(unit: str, *, least: bool = False, of_a_row: bool = False) -> Any:
     """A field of Metrics in the SI unit `unit`, "" for none.
 
     least: True if of several simulations the least value is recorded, in place of the mean.
+    of_a_row: True if only the row of tetrahedra has the metric.
     """
-    return field(metadata={"unit": unit, "least": least})
+    return field(metadata={"unit": unit, "least": least, "of_a_row": of_a_row})
 
 
 @dataclass(frozen=True)
@@ -42,9 +43,9 @@ class Metrics:
     """The same from `simulation.steady_from` on: Δx₁ of Eq. 10."""
     speed: float = _metric("m/s")
     """Mean speed of the centre along x from `simulation.steady_from` on."""
-    twist: float = _metric("m")
+    twist: float = _metric("m", of_a_row=True)
     """abs(x₁ - x₂) at the end."""
-    lead: float = _metric("m")
+    lead: float = _metric("m", of_a_row=True)
     """x₃ - x₁ at the end."""
     lateral_drift: float = _metric("m")
     """abs(y₁): sideways way of T1's bottom left node."""
@@ -102,6 +103,9 @@ _FIELDS = [field for field in dataclasses.fields(Metrics) if field.metadata]
 
 METRICS: dict[str, str] = {field.name: field.metadata["unit"] for field in _FIELDS}
 """The SI unit of each metric that is a number, by name."""
+
+METRICS_OF_A_ROW = tuple(field.name for field in _FIELDS if field.metadata["of_a_row"])
+"""Metrics that only the row of tetrahedra has."""
 
 LEAST = tuple(field.name for field in _FIELDS if field.metadata["least"])
 """Metrics of which the least of several simulations is recorded, in place of their mean."""

@@ -1,14 +1,16 @@
-"""The nested tetrahedra of the thesis (section 2.1): names and places of nodes and cables."""
+"""The row of nested tetrahedra of the thesis (section 2.1): its settings, nodes and cables."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from tetra_drake.scenario.layout import Layout
+from tetra_drake.scenario.sections import Section, Tree, quantity, refuse
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
 """The nodes of a tetrahedron; the first three form the base triangle."""
@@ -67,4 +69,143 @@ def row_layout(
         bodies=nodes // len(NODES),
         oscillators=tuple(oscillators),
         groups=tuple(driven),
+    )
+
+
+class RowCables(Section):
+    """The cables of a row (Table 3). A slack cable has tension 0 where it would push."""
+
+    outer_stiffness: float = quantity("N/m", gt=0)
+    inner_stiffness: float = quantity("N/m", gt=0)
+    damping: float = quantity("N*s/m", ge=0)
+    free_length: float = quantity("m", ge=0)
+    slack: bool
+
+
+class Tetrahedra(Section):
+    """The tetrahedra and where they stand (thesis section 2.1, appendix C.1)."""
+
+    lacking: ClassVar[tuple[str, ...]] = ()
+    """Metrics that the robot does not have."""
+
+    tetrahedra: int = Field(ge=2, le=200)
+    strut_length: float = quantity("m", gt=0)
+    strut_diameter: float = quantity("m", gt=0)
+    node_diameter: float = quantity("m", gt=0)
+    density: float = quantity("kg/m^3", gt=0)
+    cables: RowCables
+    spacing: float = quantity("m", ge=0)
+    """Distance of base triangles at t = 0. `balanced`, or 0, is the one at which outer and inner
+    cables balance. So is the spacing of a file that changes strut length or the cables' stiffness
+    or free length of its base and gives no spacing."""
+    gravity: float = quantity("m/s^2", ge=0)
+    offsets: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = quantity(
+        "m", default=[]
+    )
+    """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
+    contacts: Literal["thesis", "all"] = "thesis"
+    """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
+    tip of the foremost, as no others reach flat ground. `all`: all four of every tetrahedron."""
+    actuation: list[list[Cable]] = Field(default=[["outer bottom_left", "outer bottom_right"]])
+    """Groups of a junction's cables that share an oscillator, the same for every junction."""
+
+    @property
+    def body_count(self) -> int:
+        """The number of rigid bodies."""
+        return self.tetrahedra
+
+    @property
+    def oscillator_count(self) -> int:
+        """One neural oscillator for each group of cables of each junction between tetrahedra."""
+        return len(self.actuation) * (self.tetrahedra - 1)
+
+    @property
+    def slack(self) -> bool:
+        """True if the cables never push."""
+        return self.cables.slack
+
+    @property
+    def size(self) -> float:
+        """Length in m of which `disturbances.start` is a share."""
+        return self.spacing
+
+    def layout(self) -> Layout:
+        """Cables and oscillators of the robot."""
+        return row_layout(
+            tetrahedra=self.tetrahedra,
+            strut_length=self.strut_length,
+            spacing=self.spacing,
+            groups=self.actuation,
+        )
+
+    def following(self, base: Section, changes: Tree) -> Tree:
+        """What changes, too, where `changes` made this robot of a base: the spacing, unless it is
+        given or nothing has changed on which the balanced one depends."""
+        if "spacing" in changes or not isinstance(base, Tetrahedra):
+            return {}
+        if _deciding_numbers(self) == _deciding_numbers(base):
+            return {}
+        return {"spacing": "balanced"}
+
+    @field_validator("spacing", mode="before")
+    @classmethod
+    def _read_spacing(cls, value: object) -> object:
+        return 0.0 if value == "balanced" else value
+
+    @field_validator("spacing")
+    @classmethod
+    def _balance(cls, spacing: float, info: ValidationInfo) -> float:
+        if spacing > 0.0 or not {"strut_length", "cables"} <= info.data.keys():
+            return spacing
+        return balanced_spacing(info.data["strut_length"], info.data["cables"])
+
+    @model_validator(mode="after")
+    def _check(self) -> Tetrahedra:
+        if len(self.offsets) not in (0, self.tetrahedra):
+            problem = f"found {len(self.offsets)} items, expected none or {self.tetrahedra}"
+            refuse("offsets", f"{problem}, one for each tetrahedron")
+        if not self.actuation or not all(self.actuation):
+            refuse("actuation", f"found {self.actuation}, expected groups of at least one cable")
+        cables = [cable for group in self.actuation for cable in group]
+        for cable in cables:
+            if cables.count(cable) > 1:
+                refuse("actuation", f"found '{cable}' twice, expected each cable once at most")
+        return self
+
+
+def balanced_spacing(strut_length: float, cables: RowCables) -> float:
+    """The spacing (m) at which the cables of a junction balance along x.
+
+    Three outer cables of length s pull two tetrahedra together. Three inner ones, from a tip at
+    height h to base nodes at s along and R across, push them apart while s < h. The weight does not
+    count: twice the density moves T1 by less than 0.003 in. Refused if there is no such spacing.
+    """
+    height = strut_length * math.sqrt(2.0 / 3.0)
+    radius = strut_length / math.sqrt(3.0)
+
+    def pull(s: float) -> float:
+        length = math.hypot(radius, height - s)
+        inner = cables.inner_stiffness * (length - cables.free_length) * (height - s) / length
+        return cables.outer_stiffness * (s - cables.free_length) - inner
+
+    near, far = 0.0, height + cables.free_length
+    if pull(near) >= 0.0:
+        refuse("", "the cables balance at no spacing; give one")
+    middle = 0.5 * (near + far)
+    while near < middle < far:
+        if pull(middle) > 0.0:
+            far = middle
+        else:
+            near = middle
+        middle = 0.5 * (near + far)
+    return far
+
+
+def _deciding_numbers(robot: Tetrahedra) -> tuple[float, ...]:
+    """The numbers on which the balanced spacing depends."""
+    return (
+        robot.strut_length,
+        robot.cables.outer_stiffness,
+        robot.cables.inner_stiffness,
+        robot.cables.free_length,
     )

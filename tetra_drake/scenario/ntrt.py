@@ -18,9 +18,12 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.scenario.robot_kinds import MOST_BYTES, MOST_NODES, Pair, Point
+from tetra_drake.scenario.robot_kinds import MOST_NODES, Pair, Point
 from tetra_drake.scenario.sections import Section, Tree, hint
 from tetra_drake.scenario.yaml_text import parse_yaml
+
+MOST_BYTES = 2**20
+"""Upper limit of the size of a file."""
 
 UNUSED = {
     *("friction", "roll_friction", "restitution"),
@@ -119,7 +122,8 @@ def ntrt_tree(file: str | Path, *, unit: float) -> Tree:
     """The tree of a structure file for a file of NTRT.
 
     unit: length of NTRT's unit in m. The axes z, x, y of NTRT are x (forward), y (left), z (up).
-    A substructure's nodes are named "SUBSTRUCTURE.NODE", groups by their tags joined by dots.
+    A substructure's nodes are named "SUBSTRUCTURE/NODE", groups by their tags joined by slashes, as
+    dots separate keys.
     Raises InputError that names file and key, for substructures too.
     """
     part = _read(Path(file), ())
@@ -127,7 +131,7 @@ def ntrt_tree(file: str | Path, *, unit: float) -> Tree:
     cables: Tree = {}
     for tags, pairs in part.pairs.items():
         builder = _builder_of(tags, part.builders, file)
-        name = ".".join(tags.split())
+        name = _name("/".join(tags.split()))
         if isinstance(builder, Rod):
             group = struts.setdefault(name, {"pairs": []})
             group["diameter"] = f"{2.0 * builder.radius * unit!r} m"
@@ -138,9 +142,16 @@ def ntrt_tree(file: str | Path, *, unit: float) -> Tree:
             group["stiffness"] = f"{builder.stiffness!r} N/m"
             group["damping"] = f"{builder.damping!r} N*s/m"
             group["tension"] = f"{builder.pretension * unit!r} N"
-        group["pairs"] += [list(pair) for pair in pairs]
-    nodes = {name: (unit * p[[2, 0, 1]]).tolist() for name, p in part.nodes.items()}
-    return {"unit": "m", "nodes": nodes, "struts": struts, "cables": cables}
+        group["pairs"] += [[_name(node) for node in pair] for pair in pairs]
+    nodes = {}
+    for node, p in part.nodes.items():
+        nodes[_name(node)] = [f"{x!r} m" for x in (unit * p[[2, 0, 1]]).tolist()]
+    return {"nodes": nodes, "struts": struts, "cables": cables}
+
+
+def _name(path: str) -> str:
+    """A name or path of NTRT as a name of a structure file."""
+    return path.replace(".", "/")
 
 
 def _read(file: Path, above: tuple[Path, ...]) -> Part:

@@ -55,9 +55,6 @@ class CmaEs(Section):
 class RandomSearch(Section):
     """Random gaits: a baseline."""
 
-    population: int = Field(default=50, ge=1, le=MOST_GAITS)
-    """Gaits per iteration."""
-
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
 Count = Annotated[int, Field(ge=2, le=1000)]

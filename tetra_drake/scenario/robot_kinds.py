@@ -1,28 +1,33 @@
-"""Structures: any tensegrity as data, read from a structure file.
+"""Kinds of robots: the row of tetrahedra, and structures, which are any tensegrity as data.
 
-Struts that share a node are one rigid body; cables join bodies. Coordinates are in World (x
-forward, y left, z up) and need only be near a static equilibrium.
+Struts of a structure that share a node are one rigid body; cables join bodies. Coordinates are in
+World (x forward, y left, z up) and need only be near a static equilibrium.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 import pydantic
 from pydantic import Field
 
-from tetra_drake.files import read_text
 from tetra_drake.scenario.layout import Layout
-from tetra_drake.scenario.sections import Section, described, hint, quantity, refuse
+from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
+from tetra_drake.scenario.nesting import Tetrahedra
+from tetra_drake.scenario.sections import (
+    TAG,
+    Kinds,
+    Section,
+    Tree,
+    described,
+    hint,
+    quantity,
+    refuse,
+)
 from tetra_drake.scenario.units import quantity_to_si
-from tetra_drake.scenario.yaml_text import parse_yaml
-
-MOST_BYTES = 2**20
-"""Upper limit of the size of a structure file."""
 
 MOST_NODES, MOST_BODIES, MOST_CABLES = 1000, 200, 2000
 
@@ -81,11 +86,15 @@ class Member(NamedTuple):
 class Structure(Section):
     """A tensegrity: nodes, struts and cables between them, and what actuates the cables.
 
-    Nodes, bodies and cables are numbered in the order of `nodes`, `bodies` and `all_cables`.
+    Nodes, bodies and cables are numbered in the order of `nodes`, `bodies` and `all_cables`. A file
+    may give the `unit` of coordinates that are bare numbers; once read, they are in m.
     """
 
-    unit: str = "m"
-    """Unit of coordinates that are bare numbers in a file. Once read, they are in m."""
+    lacking: ClassVar[tuple[str, ...]] = METRICS_OF_A_ROW
+    """Metrics that the robot does not have."""
+    slack: ClassVar[bool] = True
+    """Cables never push."""
+
     nodes: dict[str, Point] = quantity("m")
     struts: dict[str, StrutGroup] = Field(min_length=1)
     cables: dict[str, CableGroup] = Field(default={})
@@ -98,6 +107,30 @@ class Structure(Section):
     gravity: float = quantity("m/s^2", default=9.80665, ge=0)
     offsets: list[Point] = quantity("m", default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty."""
+
+    def __copy__(self) -> Self:
+        # Without the cached properties, as a copy may get other values.
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return self.model_construct(**fields)
+
+    @property
+    def body_count(self) -> int:
+        """The number of rigid bodies."""
+        return len(self.bodies)
+
+    @property
+    def oscillator_count(self) -> int:
+        """The number of neural oscillators."""
+        return len(self.actuated)
+
+    @property
+    def size(self) -> float:
+        """Length in m of the shortest strut, of which `disturbances.start` is a share."""
+        return min(map(self._length, self.all_struts))
+
+    def following(self, base: Section, changes: Tree) -> Tree:
+        """What changes, too, where `changes` made this robot of a base: nothing."""
+        return {}
 
     @cached_property
     def all_struts(self) -> tuple[Member, ...]:
@@ -208,21 +241,24 @@ class Structure(Section):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _read_nodes(cls, tree: Any) -> Any:
-        """The tree with a unit at every coordinate, if it has the key `unit`."""
-        if not isinstance(tree, dict) or not isinstance(tree.get("nodes"), dict):
+        """The tree with a unit at every coordinate, if it has the key `unit`, and without that."""
+        if not isinstance(tree, dict):
+            return tree
+        tree = dict(tree)
+        unit = tree.pop("unit", None)
+        if not isinstance(tree.get("nodes"), dict):
             return tree
         for node in tree["nodes"]:
             if not isinstance(node, str):
                 refuse(f"nodes.{node}", f"found the name {node}, expected a text, such as n{node}")
-        if "unit" not in tree:
+        if unit is None:
             return tree
-        unit = tree["unit"]
         try:
             quantity_to_si(f"1 {unit}", "m")
         except ValueError:
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
-        nodes = {node: _with_unit(point, unit) for node, point in tree["nodes"].items()}
-        return tree | {"unit": "m", "nodes": nodes}
+        tree["nodes"] = {node: _with_unit(point, unit) for node, point in tree["nodes"].items()}
+        return tree
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Structure:
@@ -237,13 +273,18 @@ class Structure(Section):
         if self.contacts != "all":
             for place, node in enumerate(self.contacts):
                 self._check_node(f"contacts[{place}]", node)
+        if len(self.offsets) not in (0, self.body_count):
+            problem = f"found {len(self.offsets)} items, expected none or {self.body_count}"
+            refuse("offsets", f"{problem}, one for each body")
         return self
 
     def _check_names(self) -> None:
         for key in ("nodes", "struts", "cables", "actuated"):
             for name in getattr(self, key):
-                if name.split() != [name]:
-                    refuse(f"{key}.{name}", f"found the name '{name}', expected one without blanks")
+                # Blanks separate the names of a cable, dots those of a key, commas keys.
+                if name in ("", TAG) or any(c.isspace() or c in ".," for c in name):
+                    expected = "expected one without blanks, dots and commas"
+                    refuse(f"{key}.{name}", f"found the name '{name}', {expected}")
 
     def _check_node(self, key: str, node: str) -> None:
         if node not in self.nodes:
@@ -273,16 +314,16 @@ class Structure(Section):
         for strut in self.all_struts:
             if self._length(strut) == 0.0:
                 refuse(strut.key, "is a strut of length 0, expected nodes at two places")
-        shortest = min(map(self._length, self.all_struts))
+        least = LEAST_DISTANCE * self.size
         p_WN = np.array(list(self.nodes.values()))
         distances = np.linalg.norm(p_WN[:, None] - p_WN, axis=2)
         np.fill_diagonal(distances, np.inf)
-        if distances.min() < LEAST_DISTANCE * shortest:
+        if distances.min() < least:
             names = list(self.nodes)
             first, second = divmod(int(distances.argmin()), len(names))
             problem = f"found the place of '{names[first]}', too"
-            least = f"{LEAST_DISTANCE * shortest:.3g} m"
-            refuse(f"nodes.{names[second]}", f"{problem}, expected nodes at least {least} apart")
+            expected = f"expected nodes at least {least:.3g} m apart"
+            refuse(f"nodes.{names[second]}", f"{problem}, {expected}")
 
     def _check_bodies(self) -> None:
         if len(self.bodies) > MOST_BODIES:
@@ -321,10 +362,12 @@ class Structure(Section):
                 oscillators[numbers[name]] = oscillator
 
 
-def read_structure(file: str | Path) -> Structure:
-    """The structure of a structure file; raises InputError that names file and key."""
-    content = read_text(file, "structure file", most=MOST_BYTES)
-    return Structure.from_tree(parse_yaml(content, file), file)
+Robot = Annotated[Tetrahedra | Structure, Kinds()]
+"""The tagged kinds of robots; without a tag it is the first.
+
+All have `gravity`, `offsets` (one for each body), `body_count`, `oscillator_count`, `slack`,
+`size`, `lacking` (metrics), `layout()` and `following()`.
+"""
 
 
 def _with_unit(point: Any, unit: str) -> Any:

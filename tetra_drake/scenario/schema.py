@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any, Self, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, ClassVar, Self, TypeVar
 
 from pydantic import PrivateAttr
 
@@ -11,7 +11,8 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
-from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
+from tetra_drake.scenario.optimizer_kinds import OptimizerKind, QualityDiversity, SteadyState
+from tetra_drake.scenario.robot_kinds import Robot
 from tetra_drake.scenario.sections import (
     TAG,
     Section,
@@ -24,17 +25,15 @@ from tetra_drake.scenario.sections import (
     tree_of_changes,
 )
 from tetra_drake.scenario.settings import (
-    CableSection,
     CpgSection,
     Disturbances,
     EvolutionSection,
     GaitBounds,
     GroundSection,
-    RobotSection,
     SimulationSection,
     separate,
 )
-from tetra_drake.scenario.spacing import balanced_spacing, deciding_numbers
+from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.yaml_text import dump_yaml
 
@@ -44,18 +43,19 @@ MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
 """Upper limits of the values of all signals in one simulation: some 3 GB."""
 
 MOST_SAMPLES = 2_000_000
-"""Upper limit of the recorded poses of all tetrahedra in one simulation: some 2 GB."""
+"""Upper limit of the recorded poses of all bodies in one simulation: some 2 GB."""
 
 
 class Scenario(Section):
     """Everything that defines an experiment but the gait."""
 
+    has_base: ClassVar[bool] = True
+
     name: str
-    robot: RobotSection
+    robot: Robot
     ground: GroundSection
     friction: Friction
     terrain: Terrain = Flat()
-    cables: CableSection
     cpg: CpgSection
     gait_bounds: GaitBounds
     simulation: SimulationSection
@@ -86,8 +86,8 @@ class Scenario(Section):
 
     @property
     def oscillators(self) -> int:
-        """One neural oscillator for each group of cables of each junction between tetrahedra."""
-        return len(self.robot.actuation) * (self.robot.tetrahedra - 1)
+        """The number of neural oscillators."""
+        return self.robot.oscillator_count
 
     @property
     def engine_name(self) -> str:
@@ -108,19 +108,14 @@ class Scenario(Section):
     @classmethod
     def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
         """The scenario of a complete tree; raises InputError that names `source` and key."""
+        tree = merge({}, with_structure(tree, source))
         scenario = super().from_tree(tree, source, key=key)
-        if scenario.robot.spacing == 0.0:
-            try:
-                spacing = balanced_spacing(scenario.robot, scenario.cables)
-            except ValueError as error:
-                raise InputError(source, "robot.spacing", str(error)) from None
-            scenario = scenario.with_numbers({"robot.spacing": spacing})
         scenario._tree = _with_tags(tree, scenario)
         check_relations(scenario, source)
         return scenario
 
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
-        """A checked copy with other values: {"robot.tetrahedra": 7, "cables.damping": "8 N*s/m"}.
+        """A checked copy with other values: {"robot.tetrahedra": 7, "friction": "!Coulomb"}.
 
         The same rules hold as in a file that is based on this scenario: quantities have units,
         mappings are merged, and the spacing follows what is changed. A kind may be given by its tag
@@ -135,13 +130,13 @@ class Scenario(Section):
         return self._merged(_replacing(tree, tree), source)
 
     def _merged(self, changes: Tree, source: object) -> Self:
+        changes = with_structure(changes, source)
         tree = merge(self.tree, changes)
         changed = self.from_tree(tree, source)
-        is_spacing_given = "spacing" in changes.get("robot", {})
-        before = deciding_numbers(self.robot, self.cables)
-        if is_spacing_given or deciding_numbers(changed.robot, changed.cables) == before:
+        following = changed.robot.following(self.robot, changes.get("robot", {}))
+        if not following:
             return changed
-        return self.from_tree(merge(tree, {"robot": {"spacing": "balanced"}}), source)
+        return self.from_tree(merge(tree, {"robot": following}), source)
 
     def with_sections(self, **sections: Any) -> Self:
         """A copy with other sections, which are not checked."""
@@ -153,35 +148,64 @@ class Scenario(Section):
         """A copy with other SI numbers by dotted keys, which are not checked."""
         changed = self
         for key, number in numbers.items():
-            section, _, name = key.partition(".")
-            copy = getattr(changed, section).model_copy(update={name: number})
+            section, *names = key.split(".")
+            copy = _with_number(getattr(changed, section), names, number)
             changed = changed.with_sections(**{section: copy})
         return changed
 
     def numbers(self) -> dict[str, float]:
-        """The SI numbers of the sections, by their dotted keys."""
-        return {
-            f"{key}.{name}": value
-            for key, section in self
-            if isinstance(section, Section)
-            for name, value in section
-            if type(value) is float
-        }
+        """The SI numbers of the sections but `disturbances`, by their dotted keys."""
+        numbers: dict[str, float] = {}
+        for name in type(self).model_fields:
+            section = getattr(self, name)
+            if isinstance(section, Section) and name != "disturbances":
+                _collect_numbers(section, name, numbers)
+        return numbers
+
+
+def _with_number(
+    value: Section | Mapping[str, Any], names: Sequence[str], number: float
+) -> Section | Mapping[str, Any]:
+    """A copy of a section, or of a mapping by names, with another number where names lead."""
+    name, *rest = names
+    if isinstance(value, Section):
+        item = _with_number(getattr(value, name), rest, number) if rest else number
+        return value.model_copy(update={name: item})
+    item = _with_number(value[name], rest, number) if rest else number
+    return {**value, name: item}
+
+
+def _collect_numbers(
+    value: Section | Mapping[str, Any], key: str, numbers: dict[str, float]
+) -> None:
+    """Adds the numbers of a section, or of a mapping by names, by their dotted keys."""
+    if isinstance(value, Section):
+        value = {name: getattr(value, name) for name in type(value).model_fields}
+    for name, item in value.items():
+        if type(item) is float:
+            numbers[f"{key}.{name}"] = item
+        elif isinstance(item, (Section, dict)):
+            _collect_numbers(item, f"{key}.{name}", numbers)
 
 
 def _replacing(tree: Tree, keys: Iterable[str]) -> Tree:
-    """A tree whose objective and requirements replace those of a base, if they are in `keys`."""
-    whole = {}
+    """A tree whose objective, requirements and actuated cables replace those of a base, if they, or
+    the robot, are in `keys`."""
+    whole: Tree = {}
     for name in ("objective", "require"):
         if name in keys and isinstance(tree[name], dict):
             whole[name] = Whole(tree[name])
+    robot = tree.get("robot")
+    is_given = "robot" in keys or "robot.actuated" in keys
+    if is_given and type(robot) is dict and isinstance(robot.get("actuated"), dict):
+        whole["robot"] = robot | {"actuated": Whole(robot["actuated"])}
     return tree | whole
 
 
 def _with_tags(tree: Tree, scenario: Scenario) -> Tree:
     """The tree with the tags of all kinds, so that another kind does not merge with them."""
     tagged = {}
-    for name in ("friction", "terrain", "engine", "optimizer"):
+    for name in ("robot", "friction", "terrain", "engine", "optimizer"):
         if name in tree:
             tagged[name] = {TAG: type(getattr(scenario, name)).__name__} | tree[name]
     return tree | tagged
@@ -202,9 +226,26 @@ def check_relations(scenario: Scenario, source: object) -> None:
     if "load" in scenario.cpg.feedback and scenario.robot.gravity == 0.0:
         problem = "found 0 m/s^2, expected a weight, for feedback of the load"
         raise InputError(source, "robot.gravity", problem)
+    _check_metrics(scenario, source)
     _check_memory(scenario, source)
     _check_sides(scenario, source)
     _check_disturbances(scenario, source)
+
+
+def _check_metrics(scenario: Scenario, source: object) -> None:
+    """Raises InputError for a metric that the robot does not have."""
+    metrics: dict[str, Iterable[str]] = {
+        "objective": scenario.objective,
+        "require": scenario.require,
+    }
+    if isinstance(scenario.optimizer, QualityDiversity):
+        metrics["optimizer.measures"] = scenario.optimizer.measures
+    for key, names in metrics.items():
+        for name in names:
+            if name in scenario.robot.lacking:
+                kind = f"!{type(scenario.robot).__name__}"
+                problem = f"{kind} does not have this metric; give `{key}` without it"
+                raise InputError(source, f"{key}.{name}", problem)
 
 
 def _check_memory(scenario: Scenario, source: object) -> None:
@@ -213,7 +254,7 @@ def _check_memory(scenario: Scenario, source: object) -> None:
     is_drake = isinstance(scenario.engine, Drake)
     most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
     least_step = simulation.duration * scenario.oscillators / most_signals
-    least_sample = simulation.duration * scenario.robot.tetrahedra / MOST_SAMPLES
+    least_sample = simulation.duration * scenario.robot.body_count / MOST_SAMPLES
     periods = [
         ("cpg.listing_step", scenario.cpg.listing_step, least_step),
         ("simulation.sample_period", simulation.sample_period, least_sample),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NoReturn, Self
+from typing import Any, ClassVar, NoReturn, Self
 
 import pydantic
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -23,8 +23,6 @@ Tree = dict[str, Any]
 Show = Callable[[float, str], str]
 
 TAG = "_tag"
-FROM_FILE = {"units": True}
-"""Context of a validation in which quantities need units. Without it, numbers are SI."""
 
 
 def quantity(unit: str | Mapping[str, str], **settings: Any) -> Any:
@@ -46,9 +44,17 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
+    has_base: ClassVar[bool] = False
+    """True if a file may give what another file, its `base`, does not."""
+
     @pydantic.model_validator(mode="wrap")
     @classmethod
-    def _explain(cls, tree: Any, validate: pydantic.ModelWrapValidatorHandler[Self]) -> Self:
+    def _explain(
+        cls,
+        tree: Any,
+        validate: pydantic.ModelWrapValidatorHandler[Self],
+        info: pydantic.ValidationInfo,
+    ) -> Self:
         """Puts pydantic's first error into words."""
         try:
             return validate(tree)
@@ -58,6 +64,8 @@ class Section(BaseModel):
             of_field = [one for one in errors if one["loc"][:1] == errors[0]["loc"][:1]]
             first = max(of_field, key=lambda one: len(_place(one, tree)))
         key, problem = _in_words(first, cls, tree)
+        if first["type"] == "missing" and info.context and info.context["has_base"]:
+            problem += ", or name a `base` that has it"
         refuse(key, problem)
 
     @pydantic.model_validator(mode="before")
@@ -114,8 +122,9 @@ class Section(BaseModel):
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
         """The section of a tree, found at `key`; raises InputError that names `source` and key."""
+        # A context means that quantities need units. Without one, numbers are SI.
         try:
-            return cls.model_validate(tree, context=FROM_FILE)
+            return cls.model_validate(tree, context={"has_base": cls.has_base})
         except ValidationError as error:
             refused = error.errors(include_url=False)[0]["ctx"]
             raise InputError(source, _joined(key, refused["key"]), refused["problem"]) from None
@@ -235,7 +244,7 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
     if error["type"] == "refused":
         return _joined(key, error["ctx"]["key"]), error["ctx"]["problem"]
     if error["type"] == "missing":
-        return key, "is missing; give it, or name a `base` that has it"
+        return key, "is missing; give it"
     expected, context = error["msg"].removeprefix("Input should be "), error.get("ctx", {})
     if error["type"] in _LIMITS:
         words, name = _LIMITS[error["type"]]
@@ -299,12 +308,12 @@ class Whole(Tree):
 
 def merge(base: Any, changes: Any) -> Any:
     """The base with what `changes` gives; lists, and kinds of another tag, are replaced."""
-    if isinstance(changes, Whole):
-        return dict(changes)
-    if not isinstance(base, dict) or not isinstance(changes, dict):
+    if not isinstance(changes, dict):
         return changes
+    if not isinstance(base, dict) or isinstance(changes, Whole):
+        base = {}
     if TAG in changes and changes[TAG] != base.get(TAG):
-        return changes
+        base = {}
     merged = dict(base)
     for name, value in changes.items():
         merged[name] = merge(base.get(name), value)

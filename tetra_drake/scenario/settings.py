@@ -7,67 +7,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, get_args
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
-from tetra_drake.scenario.layout import Layout
-from tetra_drake.scenario.nesting import Cable, row_layout
 from tetra_drake.scenario.sections import Section, quantity, refuse
 
 Pathway = Literal["length", "load", "pitch"]
 """A signal that can be fed back to the oscillators; see physics.feedback."""
 
 PATHWAYS: tuple[str, ...] = get_args(Pathway)
-
-
-class RobotSection(Section):
-    """The tetrahedra and where they stand (thesis section 2.1, appendix C.1)."""
-
-    tetrahedra: int = Field(ge=2, le=200)
-    strut_length: float = quantity("m", gt=0)
-    strut_diameter: float = quantity("m", gt=0)
-    node_diameter: float = quantity("m", gt=0)
-    density: float = quantity("kg/m^3", gt=0)
-    spacing: float = quantity("m", ge=0)
-    """Distance of base triangles at t = 0. `balanced`, or 0, is the one at which outer and inner
-    cables balance. So is the spacing of a file that changes strut length or the cables' stiffness
-    or free length of its base and gives no spacing."""
-    gravity: float = quantity("m/s^2", ge=0)
-    offsets: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = quantity(
-        "m", default=[]
-    )
-    """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
-    contacts: Literal["thesis", "all"] = "thesis"
-    """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
-    tip of the foremost, as no others reach flat ground. `all`: all four of every tetrahedron."""
-    actuation: list[list[Cable]] = Field(default=[["outer bottom_left", "outer bottom_right"]])
-    """Groups of a junction's cables that share an oscillator, the same for every junction."""
-
-    @field_validator("spacing", mode="before")
-    @classmethod
-    def _read_spacing(cls, value: object) -> object:
-        return 0.0 if value == "balanced" else value
-
-    @model_validator(mode="after")
-    def _check(self) -> RobotSection:
-        if len(self.offsets) not in (0, self.tetrahedra):
-            problem = f"found {len(self.offsets)} items, expected none or {self.tetrahedra}"
-            refuse("offsets", f"{problem}, one for each tetrahedron")
-        if not self.actuation or not all(self.actuation):
-            refuse("actuation", f"found {self.actuation}, expected groups of at least one cable")
-        cables = [cable for group in self.actuation for cable in group]
-        for cable in cables:
-            if cables.count(cable) > 1:
-                refuse("actuation", f"found '{cable}' twice, expected each cable once at most")
-        return self
-
-    def layout(self) -> Layout:
-        """Cables and oscillators of the robot."""
-        return row_layout(
-            tetrahedra=self.tetrahedra,
-            strut_length=self.strut_length,
-            spacing=self.spacing,
-            groups=self.actuation,
-        )
 
 
 class GroundSection(Section):
@@ -77,16 +24,6 @@ class GroundSection(Section):
     damping: float = quantity("N*s/m^2", ge=0)
     """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
     speed v: e = 1 - alpha v (Eq. 2)."""
-
-
-class CableSection(Section):
-    """The tension members (Table 3). A slack cable has tension 0 where it would push."""
-
-    outer_stiffness: float = quantity("N/m", gt=0)
-    inner_stiffness: float = quantity("N/m", gt=0)
-    damping: float = quantity("N*s/m", ge=0)
-    free_length: float = quantity("m", ge=0)
-    slack: bool
 
 
 class CpgSection(Section):
@@ -109,7 +46,8 @@ class CpgSection(Section):
     integrated with the robot. Feedback needs `live`."""
     listing_step: float = quantity("s", ge=1e-6)
     reach: int | None = Field(default=None, ge=0)
-    """Oscillators of junctions at most this far apart inhibit each other. The default is all."""
+    """Oscillators at most this far apart inhibit each other (see Layout.distances). The default is
+    all."""
     feedback: list[Pathway] = Field(default=[])
     """Pathways of feedback; their gains are parameters of the gait."""
 
@@ -190,8 +128,8 @@ class Disturbances(Section):
     """Spreads by scenario keys. Each draw multiplies the number by a factor from 1 - spread to
     1 + spread. Keys joined by commas get the same factor."""
     start: float = Field(default=0.0, ge=0, le=0.5)
-    """Each draw displaces every tetrahedron at t = 0 by up to this share of the spacing along x, y
-    and up."""
+    """Each draw displaces every body at t = 0 along x, y and up, by up to this share of the
+    spacing of tetrahedra, or of the shortest strut of a structure."""
     tail: float = Field(default=1.0, gt=0, le=1)
     """Share of the draws, the worst ones, over which the fitness is the mean (the conditional value
     at risk). 1 is the mean over all draws. At least one draw counts."""

@@ -75,27 +75,21 @@ class Flat(Relief):
 
 
 class Incline(Relief):
-    """A plane that rises along +x.
+    """A plane that rises along +x: h = tan(slope) x. A negative slope goes down.
 
-    Without `start`, h = tan(slope) x everywhere, and the robot starts on it, turned with it; with
-    it, h = tan(slope) max(0, x - start). A negative slope goes down.
+    The robot starts on it, turned with it.
     """
 
     slope: float = quantity("rad", ge=-STEEPEST, le=STEEPEST)  # 60 deg either way
-    start: float | None = quantity("m", default=None)
 
     @property
-    def plane_slope(self) -> float | None:
-        return self.slope if self.start is None else None
+    def plane_slope(self) -> float:
+        return self.slope
 
     def grid(self, *, ahead: float, source: object) -> Grid:
-        rise = math.tan(self.slope)
-        cell = 0.5 * INCH, ASIDE
-        if self.start is None:
-            cell = 2.0 * AHEAD, 2.0 * AHEAD  # three heights make a plane one cell wide
-        x, y = _axes(cell, self.start or 0.0)
-        along = x if self.start is None else np.maximum(0.0, x - self.start)
-        return _grid(x, y, rise * along, cell)
+        cell = 2.0 * AHEAD, 2.0 * AHEAD  # three heights make a plane one cell wide
+        x, y = _axes(cell, 0.0)
+        return _grid(x, y, math.tan(self.slope) * x, cell)
 
 
 class Steps(Relief):
@@ -125,14 +119,13 @@ class Steps(Relief):
 class Rough(Relief):
     """Heights drawn uniformly between -2 amplitude and 0, independent, every half wavelength.
 
-    So the mean is -amplitude, and a robot that stands at 0 touches but does not sink in. Flat, at
-    0, before `start` if that is given. The same seed is the same ground.
+    So the mean is -amplitude, and a robot that stands at 0 touches but does not sink in. The same
+    seed is the same ground.
     """
 
     amplitude: float = quantity("m", ge=0)
     wavelength: float = quantity("m", gt=0)
     seed: int = Field(ge=0, default=0)
-    start: float | None = quantity("m", default=None)
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         half = 0.5 * self.wavelength
@@ -140,8 +133,6 @@ class Rough(Relief):
         x, y = _axes((half, half), 0.0)
         generator = np.random.default_rng(self.seed)
         heights = generator.uniform(-2.0 * self.amplitude, 0.0, (len(x), len(y)))
-        if self.start is not None:
-            heights[x < self.start + 1.5 * half] = 0.0  # how far a control point reaches
         return _grid(x, y, heights, (half, half))
 
 
@@ -185,14 +176,12 @@ class Obstacles(Relief):
 class HeightField(Relief):
     """Heights in m from a file: rows along x, columns along y, both upward.
 
-    The file is numpy's `.npy`, or text of numbers separated by blanks or commas; at least 3 x 3.
-    A relative path starts at the scenario file that names it.
+    The grid's centre is the origin. The file is numpy's `.npy`, or text of numbers separated by
+    blanks or commas; at least 3 x 3. A relative path starts at the scenario file that names it.
     """
 
     file: str
     cell: float = quantity("m", gt=0)  # between neighbours, along x and y
-    corner: list[float] | None = quantity("m", default=None, min_length=2, max_length=2)
-    """x and y of the first height; the grid's centre is the origin if not given."""
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         heights = _read_heights(self.file, source)
@@ -205,8 +194,7 @@ class HeightField(Relief):
             row, column = bad[0]
             found = f"{heights[row, column]} in row {row + 1}, column {column + 1}"
             raise _file_error(source, f"'{self.file}' has {found}, expected finite heights in m")
-        middle = [-0.5 * (size - 1) * self.cell for size in heights.shape]
-        x, y = middle if self.corner is None else self.corner
+        x, y = (-0.5 * (size - 1) * self.cell for size in heights.shape)
         return Grid(heights, (x, y), (self.cell, self.cell))
 
 

@@ -21,7 +21,7 @@ class CableNetwork(LeafSystem):
     | tensions          | (6 (n - 1),)   | N      | tension of each cable                    |
     | lengths           | (6 (n - 1),)   | m      | length of each cable                     |
 
-    With `cables.slack`, a cable that would have to push goes slack.
+    With `robot.cables.slack`, a cable that would have to push goes slack.
     """
 
     def __init__(self, robot: Robot) -> None:

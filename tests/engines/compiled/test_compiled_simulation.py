@@ -13,7 +13,7 @@ from tetra_drake.engines.time_limit import time_limit
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.robot.gait import WALKING_SEED, load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.engine_kinds import SHORTEST_STEP, Compiled, Drake
 from tetra_drake.scenario.schema import Scenario
 
 
@@ -60,9 +60,6 @@ def trajectories_on_both(scenario: Scenario, seed: int = WALKING_SEED) -> list[x
 @pytest.mark.parametrize(
     ("setting", "value", "failure"),
     [
-        ("look_ahead", "0.2 s", None),
-        ("look_ahead", "1 s", None),
-        ("look_ahead", "2e-9 s", None),
         ("max_step", "1 s", None),
         ("max_step", "2e-9 s", StepBudgetExceeded),
         ("tolerance", "1e-200 m/s", Diverged),
@@ -78,13 +75,21 @@ def test_extreme_settings_come_to_an_end(compiled, setting, value, failure):
         simulate(scenario=extreme, gait=seeded_gait(extreme))
 
 
+@pytest.mark.parametrize(
+    ("tolerance", "look_ahead"),
+    [(1e-3, 2e-5), (Compiled().tolerance, 2e-5), (1e-6, 2e-7), (1e-200, 2.0 * SHORTEST_STEP)],
+)
+def test_steps_end_sooner_after_a_mode_change_if_the_tolerance_is_finer(tolerance, look_ahead):
+    assert Compiled(tolerance=tolerance).look_ahead == look_ahead
+
+
 @pytest.mark.slow
 def test_nine_of_ten_well_conditioned_random_gaits_end_where_the_diagrams_do(compiled):
     # The diagram's default settings are themselves off by 0.2 in and more in every fourth gait.
     fine = Drake(scheme="runge_kutta3", accuracy=1e-5, max_step=5e-5, look_ahead=0.0)
     diagram = compiled.with_changes({"engine": fine})
-    coarser = compiled.with_changes({"engine.tolerance": "5e-6 m/s", "engine.look_ahead": "2e-6 s"})
-    finer = compiled.with_changes({"engine.tolerance": "2e-6 m/s", "engine.look_ahead": "1e-6 s"})
+    coarser = compiled.with_changes({"engine.tolerance": "5e-6 m/s"})
+    finer = compiled.with_changes({"engine.tolerance": "2e-6 m/s"})
     well_conditioned = [
         seed
         for seed in range(200, 230)

@@ -118,7 +118,7 @@ def test_the_implicit_matrix_is_the_derivative_of_the_forces(scenario, terrain, 
 def test_the_implicit_matrix_has_the_stiffness_of_contacts(scenario):
     # At rest and without other stiffness, forces change with positions by the normal forces only.
     for key in ("outer_stiffness", "inner_stiffness"):
-        scenario = scenario.with_numbers({f"cables.{key}": 1e-12})
+        scenario = scenario.with_numbers({f"robot.cables.{key}": 1e-12})
     robot, state, modes = disturbed_robot(scenario, 0)
     state[35:] = 0.0
 

@@ -134,12 +134,12 @@ def without_cost(result: SimulationResult | SimulationFailure) -> SimulationResu
 def test_every_gait_may_have_a_scenario_of_its_own(short):
     scenarios = [
         short,
-        short.with_changes({"cables.outer_stiffness": "0.21 lbf/in"}),
+        short.with_changes({"robot.cables.outer_stiffness": "0.21 lbf/in"}),
         short.with_changes({"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}),
         short.with_changes({"simulation.duration": "0.8 s", "engine.tolerance": "5e-5 m/s"}),
         short.with_changes({"robot.tetrahedra": 3}),
         short.with_changes({"cpg.signals": "live", "cpg.gain": "1 lbf"}),
-        short.with_changes({"cables.slack": True, "cpg.listing_step": "0.1 ms"}),
+        short.with_changes({"robot.cables.slack": True, "cpg.listing_step": "0.1 ms"}),
         short.with_changes({"robot.gravity": "1.6 m/s^2", "ground.stiffness": "20 lbf/in"}),
     ]
     gaits = [seeded_gait(each, 3) for each in scenarios]

@@ -71,7 +71,7 @@ def stepper(scenario: Scenario) -> Stepper:
     # With a fortieth of the damping of cables and ground: the stiffer an equation, the shorter the
     # steps from which on a method shows its order.
     soft = {
-        "cables.damping": "0.2 N*s/m",
+        "robot.cables.damping": "0.2 N*s/m",
         "friction.stiction_damping": "2.0 N*s/m",
         "ground.damping": "5e3 N*s/m^2",
     }

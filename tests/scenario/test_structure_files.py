@@ -1,0 +1,230 @@
+"""Scenarios whose robot is a structure from a file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pytest import approx
+
+from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
+from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
+from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.structure_files import read_structure, shipped_structures
+
+BAR = """
+unit: cm
+nodes: {a: [0, 0, 0], b: [10, 0, 0], c: [0, 10, 0], d: [10, 10, 0], e: [0, 0, 10], f: [0, 10, 10]}
+struts:
+  bar:
+    pairs: [[a, b], [c, d], [e, f]]
+    diameter: 8 mm
+    density: 1.2 g/cm^3
+    node_diameter: 0 m
+cables:
+  side: {pairs: [[a, c], [b, d]], stiffness: 2 N/cm, damping: 3 N*s/m, free_length: 20 mm}
+  rise: {pairs: [[a, e], [c, f]], stiffness: 100 N/m, damping: 0 N*s/m, tension: 2 N}
+actuated: {left: [side c a], right: [side b d]}
+masses: {b: 20 g}
+"""
+
+NTRT = """
+nodes: {a: [0, 0, 0], b: [1, 0, 0], c: [0, 0, 1], d: [1, 0, 1]}
+pair_groups: {rod: [[a, b], [c, d]], fast string: [[a, c], [b, d]]}
+"""
+
+
+def load(folder: Path, robot: str, *, more: str = "") -> Scenario:
+    """The scenario mine.yaml, on the thesis's."""
+    text = f"base: thesis\nname: mine\nobjective: {{speed: 1 s/m}}\nrobot: {robot}\n{more}\n"
+    (folder / "mine.yaml").write_text(text)
+    return load_scenario(folder / "mine.yaml")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a structure file, bar.yaml, and one of NTRT."""
+    (tmp_path / "bar.yaml").write_text(BAR)
+    (tmp_path / "ntrt.yaml").write_text(NTRT)
+    return tmp_path
+
+
+def test_a_scenario_holds_what_its_file_holds(folder: Path) -> None:
+    scenario = load(folder, "!Structure {file: bar.yaml}")
+    assert scenario.robot == read_structure(folder / "bar.yaml")
+    assert (scenario.robot.body_count, scenario.oscillators) == (3, 2)
+    assert scenario.robot.size == approx(0.1)
+    assert scenario.robot.slack
+    written = folder / "elsewhere.yaml"
+    for text in (dump_scenario(scenario), str(scenario)):
+        written.write_text(text)
+        assert load_scenario(written) == scenario
+
+
+@pytest.mark.parametrize("name", shipped_structures())
+def test_a_shipped_scenario_has_the_shipped_structure(name: str) -> None:
+    assert load_scenario(name).robot == read_structure(name)
+
+
+def test_what_stands_beside_the_file_overrides_it(folder: Path) -> None:
+    robot = """!Structure
+      file: bar.yaml
+      nodes: {d: [11, 10, 0]}
+      cables: {side: {stiffness: 50 N/m}, rise: {tension: null, free_length: 5 cm}}
+      actuated: {both: [side a c, side b d]}
+      contacts: [a]
+      offsets: [[0, 0, 1 mm], [0, 0, 0], [0, 0, 0]]
+    """
+    given = load(folder, robot).robot
+    assert isinstance(given, Structure)
+    assert given.nodes["d"] == approx([0.11, 0.1, 0.0])
+    side, rise = given.cables["side"], given.cables["rise"]
+    assert (side.stiffness, side.damping, rise.free_length) == (50.0, 3.0, 0.05)
+    assert given.cables_of_oscillator == {"both": (0, 1)}
+    assert (given.contact_nodes, given.offsets[0]) == (("a",), [0.0, 0.0, 0.001])
+
+
+def test_another_file_replaces_the_structure_of_the_base(folder: Path) -> None:
+    text = "base: prism\nname: other\nrobot: {file: mine/bar.yaml, gravity: 0}\n"
+    (folder / "mine").mkdir()
+    (folder / "bar.yaml").rename(folder / "mine" / "bar.yaml")
+    (folder / "other.yaml").write_text(text)
+    given = load_scenario(folder / "other.yaml").robot
+    expected = read_structure(folder / "mine" / "bar.yaml")
+    assert given == expected.model_copy(update={"gravity": 0.0})
+
+
+def test_python_names_and_changes_structures_as_a_file_does(folder: Path) -> None:
+    scenario = load(folder, "!Structure {file: bar.yaml}")
+    file = str(folder / "bar.yaml")
+    changes = {"objective": {"speed": "1 s/m"}, "name": "mine"}
+    for robot in ({"robot.file": file}, {"robot": read_structure(file)}):
+        assert load_scenario("thesis").with_changes(changes | robot) == scenario
+    changed = scenario.with_changes({"robot.cables.side.stiffness": "250 N/m"})
+    assert changed.robot.cables["side"].stiffness == 250.0
+    assert changed.with_changes({"robot.cables.side.stiffness": "200 N/m"}) == scenario
+    assert differences(changed, scenario) == [("robot.cables.side.stiffness", "250 N/m")]
+    actuated = scenario.with_changes({"robot.actuated": {"all": ["side a c"]}})
+    assert list(actuated.robot.actuated) == ["all"]
+    added = scenario.with_changes({"robot.actuated.rise": ["rise a e"]})
+    assert list(added.robot.actuated) == ["left", "right", "rise"]
+
+
+def test_numbers_of_groups_have_dotted_keys(folder: Path) -> None:
+    scenario = load(folder, "!Structure {file: bar.yaml}")
+    numbers = scenario.numbers()
+    assert numbers["robot.cables.rise.tension"] == 2.0
+    assert numbers["robot.masses.b"] == approx(0.02)
+    assert numbers["robot.struts.bar.density"] == approx(1200.0)
+    assert scenario.robot.free_lengths == approx([0.02, 0.02, 0.08, 0.08])
+    changed = scenario.with_numbers({"robot.cables.rise.tension": 4.0, "robot.masses.b": 1.0})
+    assert changed.robot.free_lengths == approx([0.02, 0.02, 0.06, 0.06])
+    assert changed.robot.masses == {"b": 1.0}
+    assert scenario.robot.free_lengths == approx([0.02, 0.02, 0.08, 0.08])
+
+
+SPREADS = """
+disturbances:
+  draws: 2
+  start: 0.1
+  spreads: {"robot.cables.side.stiffness, robot.cables.rise.stiffness": 0.2}
+"""
+
+
+def test_a_draw_changes_groups_and_moves_every_body(folder: Path) -> None:
+    scenario = load(folder, "!Structure {file: bar.yaml}", more=SPREADS)
+    draw = draw_disturbances(scenario, (3,))
+    (factor,) = draw.factors.values()
+    assert draw.moves is not None
+    assert draw.moves.shape == (3, 3)
+    assert 0.005 < np.abs(draw.moves).max() <= 0.01
+    changed = disturbed(scenario, draw).robot
+    stiffness = [changed.cables[group].stiffness for group in ("side", "rise")]
+    assert stiffness == approx([200.0 * factor, 100.0 * factor])
+    assert changed.offsets == draw.moves.tolist()
+
+
+def test_a_file_of_ntrt_needs_a_unit(folder: Path) -> None:
+    robot = "!Structure {file: ntrt.yaml, unit: dm, actuated: {one: [fast/string b d]}}"
+    given = load(folder, robot).robot
+    assert isinstance(given, Structure)
+    assert given.nodes["d"] == approx([0.1, 0.1, 0.0])
+    assert given.cables_of_oscillator == {"one": (1,)}
+    again = read_structure(folder / "ntrt.yaml", unit="dm")
+    assert again.nodes == given.nodes
+
+
+@pytest.mark.parametrize(
+    ("robot", "key", "fact"),
+    [
+        ("!Structure {file: none.yaml}", "robot.file", "none.yaml"),
+        ("!Structure {file: none.yaml}", "robot.file", "prism"),
+        ("!Structure {file: 7}", "robot.file", "7"),
+        ("!Tetrahedra {file: bar.yaml}", "robot.file", "unknown"),
+        ("!Structure {file: ntrt.yaml}", "robot.unit", "missing"),
+        ("!Structure {file: ntrt.yaml, unit: kg}", "robot.unit", "kg"),
+        ("!Structure {file: bar.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
+        ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.struts", "`base`"),
+        (
+            "!Structure {file: bar.yaml, cables: {side: {stiffness: 0 N/m}}}",
+            "robot.cables.side.stiffness",
+            "more than 0",
+        ),
+        ("!Structure {file: bar.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
+        ("{masses: {b: 1 g}}", "robot.masses", "!Structure"),
+    ],
+)
+def test_a_fault_of_the_scenario_names_it(
+    folder: Path, robot: str, key: str, fact: str, refused
+) -> None:
+    with refused(folder / "mine.yaml", key, fact):
+        load(folder, robot)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "fact"),
+    [
+        ("stiffness: 2 N/cm, ", "", "cables.side.stiffness", "is missing; give it"),
+        ("[b, d]]", "[b, x]]", "cables.side.pairs[1]", "'x'"),
+        ("unit: cm", "unit: [", "", "YAML"),
+    ],
+)
+def test_a_fault_of_a_structure_file_names_that(
+    folder: Path, old: str, new: str, key: str, fact: str, refused
+) -> None:
+    file = folder / "bar.yaml"
+    file.write_text(BAR.replace(old, new))
+    with refused(file, key, fact):
+        load(folder, "!Structure {file: bar.yaml, cables: {side: {stiffness: 1 N/m}}}")
+
+
+def test_only_a_scenario_is_told_of_a_base(folder: Path) -> None:
+    file = folder / "bar.yaml"
+    file.write_text(BAR.replace("density: 1.2 g/cm^3", ""))
+    with pytest.raises(ValueError) as caught:
+        read_structure(file)
+    assert "base" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "key"),
+    [
+        ("require: {lead: 0 m}", "require.lead"),
+        ("objective: {twist: 1 /m}", "objective.twist"),
+        (
+            "optimizer: !QualityDiversity {measures: {twist: [0 m, 1 m], lifted: [0, 1]}}",
+            "optimizer.measures.twist",
+        ),
+    ],
+)
+def test_metrics_of_a_row_are_refused(folder: Path, more: str, key: str, refused) -> None:
+    (folder / "mine.yaml").write_text(f"base: prism\nname: mine\n{more}\n")
+    with refused(folder / "mine.yaml", key, "!Structure"):
+        load_scenario(folder / "mine.yaml")
+
+
+def test_memory_limits_count_bodies(folder: Path, refused) -> None:
+    more = "simulation: {sample_period: 2e-5 s}"
+    assert load(folder, "!Tetrahedra {tetrahedra: 2}", more=more)
+    with refused(folder / "mine.yaml", "simulation.sample_period", "2.25e-05"):
+        load(folder, "!Structure {file: bar.yaml}", more=more)

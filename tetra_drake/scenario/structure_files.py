@@ -1,0 +1,77 @@
+"""Structure files: found, read and merged with what stands beside them in a scenario."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from tetra_drake.errors import InputError
+from tetra_drake.files import read_text
+from tetra_drake.scenario.ntrt import MOST_BYTES, ntrt_tree
+from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.sections import TAG, Tree, Whole, described, merge
+from tetra_drake.scenario.units import quantity_to_si
+from tetra_drake.scenario.yaml_text import parse_yaml
+
+FOLDER = Path(__file__).parent / "structures"
+
+KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
+"""Keys that only files of NTRT have."""
+
+
+def shipped_structures() -> list[str]:
+    """The names of the structures that come with the package."""
+    return sorted(file.stem for file in FOLDER.glob("*.yaml"))
+
+
+def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Structure:
+    """A shipped structure by its name, or that of a structure file or a file of NTRT by its path.
+
+    unit: length of NTRT's unit, such as "dm". Raises InputError that names file and key.
+    """
+    file = structure_file(str(name_or_file), Path())
+    return Structure.from_tree(_tree_of_file(file, unit, source=file, key="unit"), file)
+
+
+def structure_file(name: str, folder: Path) -> Path:
+    """The file of a shipped structure, or of a path from `folder`."""
+    return FOLDER / f"{name}.yaml" if name in shipped_structures() else folder / name
+
+
+def with_structure(tree: Tree, source: object) -> Tree:
+    """The tree of a scenario with the content of the structure file that its robot may name.
+
+    The file must be a structure by itself. What stands beside `file` overrides its content;
+    `actuated` is replaced as a whole. Raises InputError that names file, or `source`, and key.
+    """
+    robot = tree.get("robot")
+    if not isinstance(robot, dict) or "file" not in robot:
+        return tree
+    if robot.get(TAG, Structure.__name__) != Structure.__name__:
+        return tree  # which has an unknown key
+    changes = {key: value for key, value in robot.items() if key not in (TAG, "file")}
+    name = robot["file"]
+    if not isinstance(name, str) or not os.path.exists(structure_file(name, Path())):
+        expected = f"structure file (shipped: {', '.join(shipped_structures())})"
+        raise InputError(source, "robot.file", f"{described(name)}: no such {expected}")
+    file = structure_file(name, Path())
+    content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
+    Structure.from_tree(content, file)
+    if isinstance(changes.get("actuated"), dict):
+        changes["actuated"] = Whole(changes["actuated"])
+    return tree | {"robot": Whole({TAG: Structure.__name__} | merge(content, changes))}
+
+
+def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
+    """Content of a structure file, or of a file of NTRT by the unit that `source` has at `key`."""
+    content = parse_yaml(read_text(file, "structure file", most=MOST_BYTES), file)
+    if not isinstance(content, dict) or not KEYS_OF_NTRT & content.keys():
+        return content
+    if unit is None:
+        raise InputError(source, key, f"is missing; give the unit of length of '{file}', as dm")
+    try:
+        length = quantity_to_si(f"1 {unit}", "m")
+    except ValueError as error:
+        raise InputError(source, key, str(error)) from None
+    return ntrt_tree(file, unit=length)
