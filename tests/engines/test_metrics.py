@@ -63,7 +63,9 @@ def test_tallied_metrics_are_those_of_the_trajectory(short, walk):
         ]
     )
     squares = [
-        least_strut_distance(model.struts, model.bodies.radius, s, moved_nodes(structure, s), np.inf)
+        least_strut_distance(
+            model.struts, model.bodies.radius, s, moved_nodes(structure, s), np.inf
+        )
         for s in states
     ]
     # Looked at every 40 ms or so.
