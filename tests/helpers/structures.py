@@ -55,6 +55,12 @@ def poses_of(states: np.ndarray) -> np.ndarray:
     return states[:, : 7 * bodies].reshape(-1, bodies, 7)
 
 
+def unit_inertias(structure: Structure) -> np.ndarray:
+    """(bodies, 3, 3): the inertias over the masses, in the frames of the bodies (m²)."""
+    xx, yy, zz, xy, xz, yz = structure.unit_inertia.T
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+
+
 def recorded_structure(data: Path, name: str) -> dict[str, Any]:
     """A structure of the independent simulation; its nodes are those of the shipped structure."""
     recorded = json.loads((data / "structures.json").read_text())["structures"]

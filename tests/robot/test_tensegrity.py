@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.structures import recorded_structure
+from helpers.structures import recorded_structure, unit_inertias
 
 from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import TENSION
@@ -10,7 +10,7 @@ from tetra_drake.physics.contact import NORMAL
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.equilibrium import Resting, force_at_rest
 from tetra_drake.robot.robot import MakeStructure, Robot
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
 
 
@@ -43,15 +43,9 @@ def test_bars_have_the_mass_and_the_moments_of_the_independent_simulation(name, 
     recorded, structure = recorded_structure(data, name), MakeStructure(load_scenario(name))
     np.testing.assert_allclose(structure.mass, recorded["bar_mass"], rtol=1e-12)
     across, axial = recorded["moment_across"], recorded["moment_axial"]
-    for matrix in inertias(structure):
-        moments = np.linalg.eigvalsh(matrix)
+    for mass, inertia in zip(structure.mass, unit_inertias(structure), strict=True):
+        moments = mass * np.linalg.eigvalsh(inertia)
         np.testing.assert_allclose(moments, [axial, across, across], rtol=1e-9)
-
-
-def inertias(structure: Structure) -> np.ndarray:
-    """(bodies, 3, 3): about the centres of mass in the bodies' frames."""
-    xx, yy, zz, xy, xz, yz = (structure.mass[:, np.newaxis] * structure.unit_inertia).T
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
 
 
 def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
@@ -76,7 +70,8 @@ def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
     total = sum(
         inertia + mass * ((p @ p) * np.eye(3) - np.outer(p, p)) for mass, p, inertia in parts
     )
-    np.testing.assert_allclose(inertias(structure)[1], total, rtol=1e-9, atol=1e-15)
+    found = structure.mass[1] * unit_inertias(structure)[1]
+    np.testing.assert_allclose(found, total, rtol=1e-9, atol=1e-15)
     centre = sum(mass * p for mass, p, _ in parts)
     np.testing.assert_allclose(centre, 0.0, atol=1e-15)  # kg m
 

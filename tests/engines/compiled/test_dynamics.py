@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 from helpers.forces import forces_at
-from helpers.states import disturbed
+from helpers.states import disturbed, mass_matrix
 from helpers.steps import make_lines, make_rows
-from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RotationMatrix
-from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate, implicit_matrix
@@ -30,18 +27,6 @@ def forces_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Force
     signals = np.zeros(1 + robot.cables["signal"].max())
     forces_at(robot, state, modes, signals, forces, generalized)
     return forces, generalized
-
-
-def mass_matrix(robot: Model, state: np.ndarray) -> np.ndarray:
-    """(6 n, 6 n), of inertias that Drake has turned into World."""
-    bodies = robot.bodies
-    matrix = np.zeros((6 * len(bodies.mass), 6 * len(bodies.mass)))
-    for i, (mass, inertia) in enumerate(zip(bodies.mass, bodies.inertia, strict=True)):
-        R_WB = Quaternion(state[7 * i : 7 * i + 4]).rotation()
-        turned = RotationalInertia(*inertia).ReExpress(RotationMatrix(R_WB))
-        matrix[6 * i : 6 * i + 3, 6 * i : 6 * i + 3] = turned.CopyToFullMatrix3()
-        matrix[6 * i + 3 : 6 * i + 6, 6 * i + 3 : 6 * i + 6] = mass * np.eye(3)
-    return matrix
 
 
 def damping_matrix_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> np.ndarray:
