@@ -6,6 +6,7 @@ from helpers.quantities import with_unit
 from helpers.states import body_velocities
 
 from tetra_drake.engines.simulate import simulate
+from tetra_drake.physics.inertia import XX
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
@@ -34,8 +35,8 @@ FALLING = {
 def test_a_falling_robot_keeps_momentum_and_energy(scenario, engine):
     falling = scenario.with_changes({**FALLING, "engine": engine})
     robot = Robot.of(falling)
-    structure, body = robot.structure, robot.model.body
-    mass, moment = body.mass[0], body.moment[0]
+    structure, bodies = robot.structure, robot.model.bodies
+    mass, moment = bodies.mass[0], bodies.inertia[0, XX]
     flight = simulate(scenario=falling, gait=seeded_gait(falling), record=True).trajectory
     assert flight is not None
     t, p_WB = flight.time.values, flight.p_WB.values

@@ -15,7 +15,8 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.results.trajectory import make_dataset
 from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import BOTTOM_LEFT, BOTTOM_RIGHT, TIP, node_positions
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, TIP
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Rough

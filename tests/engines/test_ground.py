@@ -10,11 +10,12 @@ from pydrake.systems.analysis import Simulator
 
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.physics.inertia import XX
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.ground import ground_frames
-from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import MakeStructure, node_positions
+from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
@@ -105,13 +106,14 @@ def test_contact_never_gives_energy(scenario, friction):
     rough = Rough(amplitude=0.25 * INCH, wavelength=4.0 * INCH, seed=5)
     falling = shortly(scenario, 0.6, terrain=rough, friction=friction, **fall)
     robot, gravity = Robot.of(falling), falling.robot.gravity
-    structure, body = robot.structure, robot.model.body
+    structure, bodies = robot.structure, robot.model.bodies
+    mass, moment = bodies.mass[0], bodies.inertia[0, XX]
     walk = trajectory(
         falling.with_changes({"simulation.sample_period": "2e-3 s"}), CONVERGED["compiled"]
     )
     v_WB, w_WB = body_velocities(walk, structure)
-    energy = 0.5 * (body.mass[0] * v_WB**2 + body.moment[0] * w_WB**2).sum(axis=(1, 2))
-    energy += body.mass[0] * gravity * walk.p_WB.values[:, :, 2].sum(axis=1)
+    energy = 0.5 * (mass * v_WB**2 + moment * w_WB**2).sum(axis=(1, 2))
+    energy += mass * gravity * walk.p_WB.values[:, :, 2].sum(axis=1)
     stretch = walk.length.values - structure.cables["free_length"]
     energy += 0.5 * stretch**2 @ structure.cables["stiffness"]
     p_WN = walk.p_WN.values.reshape(-1, 3)
@@ -119,7 +121,7 @@ def test_contact_never_gives_energy(scenario, friction):
     energy += 0.5 * falling.ground.stiffness * (np.minimum(gaps, 0.0) ** 2).sum(axis=1)
     lost = energy[0] - energy[-1]
     assert np.diff(energy).max() < 1e-4 * lost
-    assert lost > 0.5 * 5 * body.mass[0] * gravity * 0.005
+    assert lost > 0.5 * 5 * mass * gravity * 0.005
 
 
 def test_the_robot_stands_on_what_is_under_it(scenario):

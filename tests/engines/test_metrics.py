@@ -9,7 +9,8 @@ from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.results.measures import lifted, travelling_index
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.structure import MakeStructure, moved_nodes
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import moved_nodes
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metric_units import METRICS
@@ -33,7 +34,8 @@ def walk(short):
 
 
 def test_tallied_metrics_are_those_of_the_trajectory(short, walk):
-    structure, metrics = MakeStructure(short), walk.metrics
+    robot, metrics = Robot.of(short), walk.metrics
+    structure, model = robot.structure, robot.model
     steady = walk.trajectory.sel(time=slice(0.5, None))
     driven = structure.cables["signal"] != PASSIVE
     driver = structure.cables["signal"][driven]
@@ -60,7 +62,12 @@ def test_tallied_metrics_are_those_of_the_trajectory(short, walk):
             np.zeros((2001, 18)),
         ]
     )
-    squares = [least_strut_distance(moved_nodes(structure, s), np.inf) for s in states]
+    squares = [
+        least_strut_distance(
+            model.struts, model.bodies.radius, s, moved_nodes(structure, s), np.inf
+        )
+        for s in states
+    ]
     # Looked at every 40 ms or so.
     assert metrics.clearance == pytest.approx(np.sqrt(min(squares)), abs=1e-4)
     assert metrics.clearance >= np.sqrt(min(squares)) - 1e-9

@@ -10,7 +10,7 @@ import xarray
 from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as engine
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.errors import Diverged, InputError, StepBudgetExceeded
+from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -201,6 +201,16 @@ def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure
 
 
 @needs_mujoco
+def test_cables_that_cannot_push_are_simulated_while_they_are_taut(short):
+    taut = short.with_changes({"robot.cables.slack": True})
+    gait = seeded_gait(short)
+    assert simulate(scenario=taut, gait=gait).metrics == simulate(scenario=short, gait=gait).metrics
+    loose = taut.with_changes({"robot.spacing": "0.08 m", "robot.cables.free_length": "0.12 m"})
+    with pytest.raises(SimulationFailure, match="went slack"):
+        simulate(scenario=loose, gait=gait)
+
+
+@needs_mujoco
 def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
     light = short.with_changes({"robot.density": "1e-200 kg/m^3"})
     with refused("thesis", "robot", "mjMINVAL"):
@@ -210,7 +220,6 @@ def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("robot.cables.slack", True),
         ("cpg.feedback", ["load"]),
         ("friction.static", 0.6),
         ("friction.stiffness", 1e3),

@@ -12,4 +12,4 @@ def forces_at(
 ) -> None:
     """Writes the `forces` and the generalized force (6 bodies,) in the modes of contacts."""
     move_robot(robot, state, forces)
-    compute_forces(robot, modes, signals, True, forces, generalized)
+    compute_forces(robot, state, modes, signals, True, forces, generalized)

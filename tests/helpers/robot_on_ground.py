@@ -13,7 +13,7 @@ from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.ground import make_ground
-from tetra_drake.robot.structure import MakeStructure
+from tetra_drake.robot.robot import MakeStructure
 from tetra_drake.scenario.schema import Scenario
 
 REST = (0.0, 0.0, 0.0)
@@ -30,6 +30,7 @@ class RobotOnGround:
 
     def __init__(self, scenario: Scenario, R: np.ndarray) -> None:
         self.structure, self.R = MakeStructure(scenario), R
+        self.points = self.structure.p_BN, self.structure.first_node
         self.ground = make_ground(scenario, self.structure)
         self.modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
 
@@ -43,7 +44,7 @@ class RobotOnGround:
         """The nodes and frames of a state."""
         nodes = np.empty((len(self.structure.node_names), NODE_COLUMNS))
         frames = np.empty((len(self.modes), FRAME_COLUMNS))
-        meet_ground(state, self.structure.p_BN, self.ground, nodes, frames)
+        meet_ground(state, *self.points, self.ground, nodes, frames)
         return nodes, frames
 
     def update_at(self, state: np.ndarray) -> bool:
@@ -71,7 +72,7 @@ class RobotOnGround:
 
     def margin_at(self, state: np.ndarray) -> float:
         nodes, frames = self.meet(state)
-        return mode_margin(state, self.modes, self.structure.p_BN, self.ground, nodes, frames)
+        return mode_margin(state, self.modes, *self.points, self.ground, nodes, frames)
 
     def margin(self, v=REST, p=TOUCHING) -> float:
         return self.margin_at(self.state(v, p))

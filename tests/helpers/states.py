@@ -2,7 +2,11 @@
 
 import numpy as np
 import xarray
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RotationMatrix
+from pydrake.multibody.tree import RotationalInertia
 
+from tetra_drake.physics.model import Model
 from tetra_drake.robot.structure import Structure
 
 
@@ -26,3 +30,15 @@ def disturbed(structure: Structure, seed: int, *, pose: float, speed: float) -> 
     quaternions = state[: 7 * bodies].reshape(bodies, 7)[:, :4]
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
     return state
+
+
+def mass_matrix(robot: Model, state: np.ndarray) -> np.ndarray:
+    """(6 n, 6 n), of inertias that Drake has turned into World."""
+    bodies = robot.bodies
+    matrix = np.zeros((6 * len(bodies.mass), 6 * len(bodies.mass)))
+    for i, (mass, inertia) in enumerate(zip(bodies.mass, bodies.inertia, strict=True)):
+        R_WB = Quaternion(state[7 * i : 7 * i + 4]).rotation()
+        turned = RotationalInertia(*inertia).ReExpress(RotationMatrix(R_WB))
+        matrix[6 * i : 6 * i + 3, 6 * i : 6 * i + 3] = turned.CopyToFullMatrix3()
+        matrix[6 * i + 3 : 6 * i + 6, 6 * i + 3 : 6 * i + 6] = mass * np.eye(3)
+    return matrix

@@ -8,7 +8,7 @@ from pydrake.multibody.tree import LinearSpringDamper
 
 from tetra_drake.physics.cable import PULL_COLUMNS, TENSION, cable_forces, cable_tension
 from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.robot.bodies import AddTetrahedra
+from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.structure import Structure, node_positions, node_velocities
 
 
@@ -23,8 +23,9 @@ def forces_of_cables(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The generalized force and the tensions."""
     nodes, pulls, force = np.empty((20, NODE_COLUMNS)), np.empty((24, PULL_COLUMNS)), np.empty(30)
-    p_BN, cables = structure.p_BN, structure.cables
-    cable_forces(state, np.array(signals), p_BN, cables, False, nodes, pulls, force)
+    points = structure.p_BN, structure.first_node
+    law = structure.cables, False
+    cable_forces(state, np.array(signals), *points, *law, nodes, pulls, force)
     return force, pulls[:, TENSION]
 
 
@@ -54,11 +55,11 @@ def test_power_of_the_cables_is_tension_times_shortening(structure, state):
 def test_passive_cables_are_drakes_linear_spring_dampers(structure, state):
     def acceleration(*, springs: bool, force: np.ndarray) -> np.ndarray:
         plant = MultibodyPlant(time_step=0.0)
-        bodies = AddTetrahedra(plant, structure)
+        bodies = AddBodies(plant, structure)
         for cable in structure.cables if springs else []:
             ends = []
             for node in (cable["node_a"], cable["node_b"]):
-                ends += [bodies[node // 4], structure.p_BN[node % 4]]
+                ends += [bodies[structure.carriers[node]], structure.p_BN[node]]
             law = [cable[name] for name in ("free_length", "stiffness", "damping")]
             plant.AddForceElement(LinearSpringDamper(*ends, *law))
         plant.Finalize()

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.states import disturbed
+from pydrake.common.eigen_geometry import Quaternion
 from pydrake.geometry import (
     Capsule,
     FramePoseVector,
@@ -12,9 +14,16 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 
-from tetra_drake.physics.clearance import least_strut_distance, segment_distance
+from tetra_drake.physics.clearance import Struts, least_strut_distance, strut_distance
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
-from tetra_drake.robot.structure import STRUTS
+from tetra_drake.robot.laws import make_model
+from tetra_drake.robot.robot import MakeStructure
+from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+
+PAIR = Struts(np.array([0, 2]), np.array([1, 3]), np.array([0, 1, 2]), np.array([2.0, 2.0]))
+"""Two struts of length 2, of two bodies."""
 
 
 def nodes_at(p_WN: np.ndarray) -> np.ndarray:
@@ -40,27 +49,26 @@ def test_segments_are_as_far_apart_as_their_nearest_points(first, second, distan
     for turned in (first, first[::-1]):
         for other in (second, second[::-1]):
             nodes = nodes_at(np.array([*turned, *other], dtype=float))
-            for pair in ((0, 1, 2, 3), (2, 3, 0, 1)):  # of length 2
-                square = segment_distance(nodes, *pair, 1.0 / 4.0)
+            for i, j in ((0, 1), (1, 0)):
+                square = strut_distance(PAIR, nodes, i, j)
                 assert square == pytest.approx(distance**2, abs=1e-12)
 
 
-def drake_distance(p_BN: np.ndarray, poses: list[RigidTransform], radius: float) -> float:
+def drake_distance(structure: Structure, poses: list[RigidTransform], radius: float) -> float:
     """The least distance between struts of different bodies as Drake finds it: that of capsules,
     and their two radii."""
     scene = SceneGraph()
     source = scene.RegisterSource("robot")
-    frames, owner = [], {}
-    for i in range(len(poses)):
-        frames.append(scene.RegisterFrame(source, GeometryFrame(f"T{i + 1}")))
-        for a, b in STRUTS:
-            along = p_BN[b] - p_BN[a]
-            turn = RotationMatrix.MakeFromOneVector(along, 2)
-            pose = RigidTransform(turn, (p_BN[a] + p_BN[b]) / 2)
-            shape = Capsule(radius, float(np.linalg.norm(along)))
-            strut = GeometryInstance(pose, shape, f"T{i + 1} {a} {b}")
-            strut.set_proximity_properties(ProximityProperties())
-            owner[scene.RegisterGeometry(source, frames[i], strut)] = i
+    frames = [scene.RegisterFrame(source, GeometryFrame(name)) for name in structure.bodies]
+    owner = {}
+    for a, b in structure.struts:
+        start, end = structure.p_BN[a], structure.p_BN[b]
+        turn = RotationMatrix.MakeFromOneVector(end - start, 2)
+        shape = Capsule(radius, float(np.linalg.norm(end - start)))
+        strut = GeometryInstance(RigidTransform(turn, (start + end) / 2), shape, f"{a} {b}")
+        strut.set_proximity_properties(ProximityProperties())
+        body = structure.carriers[a]
+        owner[scene.RegisterGeometry(source, frames[body], strut)] = body
     context = scene.CreateDefaultContext()
     vector = FramePoseVector()
     for frame, pose in zip(frames, poses, strict=True):
@@ -75,30 +83,37 @@ def drake_distance(p_BN: np.ndarray, poses: list[RigidTransform], radius: float)
     )
 
 
-def test_the_clearance_is_that_of_drakes_geometry(structure):
+def least_distance(scenario: Scenario, structure: Structure, state: np.ndarray) -> float:
+    model = make_model(scenario, structure)
+    nodes = moved_nodes(structure, state)
+    return np.sqrt(least_strut_distance(model.struts, model.bodies.radius, state, nodes, np.inf))
+
+
+@pytest.mark.parametrize("name", ["thesis", "six_bar", "mast"])
+def test_the_clearance_is_that_of_drakes_geometry(name):
     # The robot as it starts, then bodies that are turned and moved more and more: in the end,
     # they are all over each other, and any strut may be the nearest.
-    generator = np.random.default_rng(3)
+    scenario = load_scenario(name)
+    structure, generator = MakeStructure(scenario), np.random.default_rng(3)
     for size in [0.0, *np.repeat([0.01, 0.02, 0.04, 0.1], 6)]:
+        state = disturbed(structure, int(generator.integers(1000)), pose=size, speed=0.0)
         poses = [
-            RigidTransform(
-                RotationMatrix.MakeXRotation(30.0 * size * generator.normal())
-                @ RotationMatrix.MakeYRotation(30.0 * size * generator.normal())
-                @ RotationMatrix.MakeZRotation(30.0 * size * generator.normal()),
-                p_WB + size * generator.normal(size=3),
-            )
-            for p_WB in structure.p_WB
+            RigidTransform(Quaternion(pose[:4]), pose[4:])
+            for pose in state[: 7 * len(structure.bodies)].reshape(-1, 7)
         ]
-        p_WN = np.vstack([(pose.multiply(structure.p_BN.T)).T for pose in poses])
-        ours = np.sqrt(least_strut_distance(nodes_at(p_WN), np.inf))
         # Within what Drake's iterations for capsules leave; struts that are nearer than two radii
         # overlap, where it is less sure.
-        theirs = drake_distance(structure.p_BN, poses, 1e-4)
-        assert ours == pytest.approx(theirs, abs=1e-5)
+        theirs = drake_distance(structure, poses, 1e-4)
+        assert least_distance(scenario, structure, state) == pytest.approx(theirs, abs=1e-5)
 
 
-def test_what_is_farther_than_the_least_so_far_changes_nothing(structure):
-    p_WN = (structure.p_WB[:, None] + structure.p_BN).reshape(-1, 3)
-    least = least_strut_distance(nodes_at(p_WN), np.inf)
-    assert least_strut_distance(nodes_at(p_WN), 0.99 * least) == 0.99 * least
-    assert least_strut_distance(nodes_at(p_WN), 1.01 * least) == least
+def test_what_is_farther_than_the_least_so_far_changes_nothing(robot):
+    state, model = robot.structure.initial_state, robot.model
+    nodes = moved_nodes(robot.structure, state)
+
+    def square(least: float) -> float:
+        return least_strut_distance(model.struts, model.bodies.radius, state, nodes, least)
+
+    least = square(np.inf)
+    assert square(0.99 * least) == 0.99 * least
+    assert square(1.01 * least) == least

@@ -11,8 +11,8 @@ from tetra_drake.physics.tally import Tally, observe
 CABLES = Cables([3, 3], [4, 5], [0, PASSIVE], [1.0, 1.0], [0.0, 0.0], [0.0, 0.0])
 """The first is driven."""
 
-CONTACTS = np.array([0, 1, 4])
-"""Two nodes of the first body and one of the second."""
+CARRIERS = np.array([0, 0, 1])
+"""Two contacts of the first body and one of the second."""
 
 
 def tallied(times, *, lengths, signals, tensions=None, loads=None, begins=0.0) -> Tally:
@@ -29,7 +29,7 @@ def tallied(times, *, lengths, signals, tensions=None, loads=None, begins=0.0) -
         pushes[:, 2] = 0.0 if loads is None else loads[k]
         # The rate of signals is 0 / 0 where no time has passed, which counts for nothing.
         with np.errstate(divide="ignore", invalid="ignore"):
-            observe(tally, CABLES, CONTACTS, time, np.array([signals[k]]), pulls, pushes)
+            observe(tally, CABLES, CARRIERS, time, np.array([signals[k]]), pulls, pushes)
     return tally
 
 

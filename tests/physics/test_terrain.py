@@ -6,9 +6,11 @@ import pytest
 from tetra_drake.physics.contact import Ground
 from tetra_drake.physics.terrain import GAP, N_X, T1_X, T2_Y, SurfaceGrid, surface
 from tetra_drake.robot.ground import ground_frames, ground_heights, make_ground
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.terrain_kinds import HeightField, Rough, Steps
+from tetra_drake.scenario.terrain_kinds import HeightField, Incline, Rough, Steps
 
 INCH = 0.0254
 ROUGH = Rough(amplitude=0.5 * INCH, wavelength=5.0 * INCH, seed=3)
@@ -105,3 +107,16 @@ def test_a_robot_that_starts_in_the_ground_or_off_the_grid_is_refused(ground, re
     ):
         with refused("thesis", "terrain", found):
             ground(terrain)
+
+
+@pytest.mark.parametrize(
+    "terrain",
+    [Incline(slope=0.1), Steps(height=INCH, depth=6.0 * INCH, count=3)],
+    ids=["incline", "steps"],
+)
+def test_a_robot_that_starts_at_rest_may_be_pressed_into_the_ground(terrain):
+    robot = Robot.of(load_scenario("six_bar").with_changes({"terrain": terrain}))
+    start = node_positions(robot.structure, robot.structure.initial_state)
+    gaps = ground_frames(start[robot.structure.contacts], robot.ground)[:, GAP]
+    depth = robot.weight / 3.0 / robot.scenario.ground.stiffness  # three feet bear it
+    assert gaps.min() == pytest.approx(-depth, rel=1e-3)

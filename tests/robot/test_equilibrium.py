@@ -10,7 +10,8 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import BOTTOM_LEFT, TIP, node_positions
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, TIP
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE

@@ -62,7 +62,7 @@ def test_the_csv_holds_what_the_cables_are_fed(robot, gait, tmp_path):
     save_signals(tmp_path / "lbf.csv", robot, gait)
     lines = (tmp_path / "lbf.csv").read_text().splitlines()
     head = [line for line in lines if line.startswith("#")]
-    assert head[2] == "# signal_1: T1-T2 outer bottom_left + outer bottom_right"
+    assert head[2] == "# signal_1: T1-T2 outer bottom_left + T1-T2 outer bottom_right"
     assert lines[len(head)].split(",") == ["time_s", *(f"signal_{i}" for i in (1, 2, 3, 4))]
     table = np.loadtxt(lines[len(head) + 1 :], delimiter=",")
     assert table[0, 0] == 0.0 and table[-1, 0] == 15.0 and len(table) == 30_001

@@ -10,18 +10,11 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
 
 from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.robot.bodies import (
-    AddTetrahedra,
-    tetrahedron_inertia,
-)
-from tetra_drake.robot.structure import (
-    NODES,
-    STRUTS,
-    MakeStructure,
-    Structure,
-    node_positions,
-    node_velocities,
-)
+from tetra_drake.robot.bodies import AddBodies
+from tetra_drake.robot.robot import MakeStructure
+from tetra_drake.robot.structure import Structure, node_positions, node_velocities
+from tetra_drake.robot.tetrahedra import NODES, STRUTS
+from tetra_drake.scenario.load import load_scenario
 
 IN = 0.0254
 
@@ -51,8 +44,8 @@ def tumbling(structure: Structure) -> np.ndarray:
 def test_struts_of_six_inches_join_all_nodes_base_vertical_and_tip_forward(structure):
     edges = [np.linalg.norm(structure.p_BN[i] - structure.p_BN[j]) for i, j in STRUTS]
     assert edges == pytest.approx([6 * IN] * 6, rel=1e-14)
-    assert structure.p_BN.mean(axis=0) == pytest.approx(np.zeros(3), abs=1e-17)
-    left, right, top, tip = structure.p_BN
+    assert structure.p_BN[:4].mean(axis=0) == pytest.approx(np.zeros(3), abs=1e-17)
+    left, right, top, tip = structure.p_BN[:4]
     assert left[0] == right[0] == top[0] < tip[0]
     assert left[1] == -right[1] > 0  # y points left
     assert left[2] == right[2] < top[2]
@@ -71,12 +64,12 @@ def test_mass_and_inertia_are_those_of_six_cylinders_and_four_spheres(structure)
     node_integral = node * (3 / 8 * L**2 + 3 / 5 * R**2)
     moment = (6 * strut_integral + 4 * node_integral) * 2 / 3
 
-    inertia = tetrahedron_inertia(structure)
-    assert inertia.get_mass() == pytest.approx(6 * strut + 4 * node, rel=1e-14)
-    assert inertia.get_mass() == pytest.approx(20.29e-3, abs=0.005e-3)
-    matrix = inertia.CalcRotationalInertia().CopyToFullMatrix3()
-    assert inertia.get_com() == pytest.approx(np.zeros(3), abs=0)
-    assert matrix == pytest.approx(moment * np.eye(3), rel=1e-14, abs=0)
+    mass = structure.mass
+    assert mass == pytest.approx([6 * strut + 4 * node] * 5, rel=1e-14)
+    assert mass == pytest.approx([20.29e-3] * 5, abs=0.005e-3)
+    inertia = mass[:, np.newaxis] * structure.unit_inertia
+    assert inertia == pytest.approx(np.array([[*[moment] * 3, 0.0, 0.0, 0.0]] * 5), rel=1e-14)
+    assert structure.isotropic
     assert moment == pytest.approx(6.74e-5, abs=0.005e-5)
 
 
@@ -143,27 +136,24 @@ def test_the_ground_touches_all_bottom_nodes_and_the_lead_tip(row):
 # The bodies in a plant
 
 
-def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(row):
-    # This needs the plant's state to run body by body, T1 first.
+@pytest.mark.parametrize("name", ["thesis", "prism", "mast"])
+def test_node_motion_agrees_with_frames_fixed_to_the_plants_bodies(name):
+    # This needs the plant's state to run body by body, in the structure's order.
+    structure = MakeStructure(load_scenario(name))
     plant = MultibodyPlant(time_step=0.0)
-    bodies = AddTetrahedra(plant, row)
+    bodies = AddBodies(plant, structure)
+    nodes = zip(structure.carriers, structure.node_names, structure.p_BN, strict=True)
     frames = [
-        plant.AddFrame(FixedOffsetFrame(f"{body.name()} {node}", body, RigidTransform(p_BNi)))
-        for body in bodies
-        for node, p_BNi in zip(NODES, row.p_BN, strict=True)
+        plant.AddFrame(FixedOffsetFrame(node, bodies[body], RigidTransform(p_BNi)))
+        for body, node, p_BNi in nodes
     ]
     plant.Finalize()
-    assert tuple(frame.name() for frame in frames) == row.node_names
-
-    context, state = plant.CreateDefaultContext(), tumbling(row)
+    context, state = plant.CreateDefaultContext(), tumbling(structure)
     plant.SetPositionsAndVelocities(context, state)
     p_WN = [frame.CalcPoseInWorld(context).translation() for frame in frames]
     v_WN = [frame.CalcSpatialVelocityInWorld(context).translational() for frame in frames]
-    assert node_positions(row, state) == pytest.approx(np.array(p_WN), abs=1e-12)
-    assert node_velocities(row, state) == pytest.approx(np.array(v_WN), abs=1e-12)
-    inertia = tetrahedron_inertia(row).CopyToFullMatrix6()
-    for body in bodies:
-        assert np.array_equal(body.default_spatial_inertia().CopyToFullMatrix6(), inertia)
+    assert node_positions(structure, state) == pytest.approx(np.array(p_WN), abs=1e-12)
+    assert node_velocities(structure, state) == pytest.approx(np.array(v_WN), abs=1e-12)
 
 
 def test_a_quaternion_that_drifted_off_unit_length_still_is_a_rotation(structure):

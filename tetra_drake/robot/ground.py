@@ -31,7 +31,8 @@ STEP_AHEAD = 1.0 * INCH
 """Distance from the robot's foremost contact node to a terrain that begins ahead of it."""
 
 START_DEPTH = 1e-6
-"""Depth (m) in the ground from which on a node counts as placed there by mistake."""
+"""Depth (m) in the ground from which on a node counts as placed there by mistake, beyond that to
+which the whole weight would press it: a robot may start at rest."""
 
 
 def make_ground(scenario: Scenario, structure: Structure) -> Ground:
@@ -53,7 +54,9 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
         heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
     )
     if not made.flat:
-        _check_start(structure, made, start, grid, scenario.name)
+        weight = float(structure.mass.sum()) * scenario.robot.gravity
+        allowed = START_DEPTH + weight / scenario.ground.stiffness
+        _check_start(structure, made, start, grid, allowed, scenario.name)
     return made
 
 
@@ -74,9 +77,15 @@ def _surface_grid(grid: Grid) -> SurfaceGrid:
 
 
 def _check_start(
-    structure: Structure, ground: Ground, start: np.ndarray, grid: Grid, source: str
+    structure: Structure,
+    ground: Ground,
+    start: np.ndarray,
+    grid: Grid,
+    allowed: float,
+    source: str,
 ) -> None:
-    """Raises InputError if a contact node, at `start` (contacts, 3), is off the grid or too low."""
+    """Raises InputError if a contact node, at `start` (contacts, 3), is off the grid, or deeper in
+    the ground than is allowed (m)."""
     corner, cells = np.array(grid.corner), np.array(grid.heights.shape) - 1
     low, high = start[:, :2].min(axis=0), start[:, :2].max(axis=0)
     if (low < corner).any() or (high > corner + cells * grid.cell).any():
@@ -84,7 +93,7 @@ def _check_start(
         problem = f"the robot starts off its grid, which goes from x, y = {reach[0]}, {reach[1]} "
         raise InputError(source, "terrain", problem + f"to {reach[2]}, {reach[3]}")
     gaps = ground_frames(start, ground)[:, GAP]
-    if gaps.min() < -START_DEPTH:
+    if gaps.min() < -allowed:
         node = structure.node_names[structure.contacts[gaps.argmin()]]
         problem = f"the robot starts with node {node} {-gaps.min() / INCH:.3g} in below the ground"
         raise InputError(source, "terrain", f"{problem}; move what is there, or robot.offsets")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from pydrake.multibody.tree import SpatialInertia
+from pydrake.multibody.tree import SpatialInertia, UnitInertia
 
 from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import CABLE
@@ -101,7 +101,7 @@ def _inertia_in_world(
         if sphere.node_diameter > 0.0:
             total += node_inertia(p_WNi, radius=sphere.node_diameter / 2, density=sphere.density)
         if node in kind.masses:
-            total += SpatialInertia.PointMass(kind.masses[node], p_WNi)
+            total += SpatialInertia(kind.masses[node], p_WNi, UnitInertia.PointMass(p_WNi))
     return total
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from helpers.forces import forces_at
+from helpers.steps import make_step
 
-from tetra_drake.engines.compiled.block_tridiagonal import BLOCK, ROW
-from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
+from tetra_drake.engines.compiled.dynamics import Solver
+from tetra_drake.engines.compiled.rosenbrock import larger, take_step
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces
-from tetra_drake.physics.model import JUNCTION_CABLES
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.schema import Scenario
@@ -24,21 +24,15 @@ class Stepper:
     def __init__(self, scenario: Scenario) -> None:
         robot = Robot.of(scenario)
         self.structure, self.robot = robot.structure, robot.model
-        bodies, contacts = len(self.structure.bodies), self.structure.contacts
+        self.solver = Solver.of(self.robot)
+        contacts = self.structure.contacts
         self.modes = np.zeros((len(contacts), MODE_COLUMNS))
         self.modes[:-1, CONTACT] = 1.0
         self.modes[:4, MODE] = [1.0, 0.0, -1.0, 1.0]
         self.modes[3:6, MODE + 1] = [-1.0, 1.0, 0.0]
         places = node_positions(self.structure, self.structure.initial_state)[contacts, :2]
         self.modes[:, STICK_POINT : STICK_POINT + 2] = places
-        size = BLOCK * bodies
-        self.work = Step(
-            state=np.empty(13 * bodies),
-            end=np.empty(13 * bodies),
-            **{n: np.empty(size) for n in ("force", "end_force", "change", "stage", "k1", "k2")},
-            rows=np.empty((bodies, BLOCK, ROW)),
-            lines=np.empty((JUNCTION_CABLES, 9)),
-        )
+        self.work = make_step(self.robot)
         self.forces = Forces.of(self.robot)
 
     def start(self) -> np.ndarray:
@@ -58,7 +52,8 @@ class Stepper:
             robot, modes, forces = self.robot, self.modes, self.forces
             forces_at(robot, work.state, modes, 1e2 * PULL * i * h, forces, work.force)
             signals = 1e2 * PULL * (i + 1) * h
-            estimates.append(take_step(robot, work, modes, forces, signals, h, False))
+            estimate = take_step(robot, self.solver, work, modes, forces, signals, h, False)
+            estimates.append(estimate)
             work.state[:] = work.end
         return work.state.copy(), estimates[0]
 
@@ -93,7 +88,7 @@ def test_the_estimate_is_the_error_of_a_solution_of_first_order(stepper):
         end, estimate = stepper.walk(h, 1)
         estimates.append(estimate)
         speeds = (end - exact)[35:].reshape(5, 6)
-        speeds[:, :3] *= stepper.robot.body.radius[0]
+        speeds[:, :3] *= stepper.robot.bodies.radius[0]
         true.append(np.abs(speeds).max())
     assert estimates[0] / estimates[1] == pytest.approx(4.0, rel=0.1)
     assert 0.0 < true[0] < estimates[0] and 0.0 < true[1] < estimates[1]

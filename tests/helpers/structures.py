@@ -1,0 +1,82 @@
+"""Structures in motion, and the independent simulation's in tests/data/structures.json."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tetra_drake.engines.compiled.course import Course, PreparedGait
+from tetra_drake.engines.compiled.lane_engine import LaneEngine
+from tetra_drake.engines.compiled.loop import DONE
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import Structure
+
+
+@dataclasses.dataclass(frozen=True)
+class Thrown(Structure):
+    """A structure whose bodies move at t = 0."""
+
+    v_WB: np.ndarray
+    """(bodies, 6): their angular velocities (rad/s) and velocities (m/s)."""
+
+    @property
+    def initial_state(self) -> np.ndarray:
+        state = super().initial_state
+        state[7 * len(self.bodies) :] = self.v_WB.ravel()
+        return state
+
+
+def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
+    """The robot whose bodies move at t = 0."""
+    fields = {f.name: getattr(robot.structure, f.name) for f in dataclasses.fields(Structure)}
+    return dataclasses.replace(robot, structure=Thrown(**fields, v_WB=v_WB))
+
+
+def course_of(robot: Robot, *, seed: int = 1) -> Course:
+    """How a seeded gait goes on the compiled engine, without what results make of it."""
+    prepared = PreparedGait.of(robot, seeded_gait(robot.scenario, seed), record=True)
+    engine = LaneEngine(prepared, width=1)
+    engine.load(0, prepared)
+    while not (ended := engine.advance(100_000)):
+        pass
+    course = ended[0][2]
+    assert course.status == DONE
+    return course
+
+
+def poses_of(states: np.ndarray) -> np.ndarray:
+    """(times, bodies, 7): quaternions and positions in states (times, 13 bodies)."""
+    bodies = states.shape[1] // 13
+    return states[:, : 7 * bodies].reshape(-1, bodies, 7)
+
+
+def unit_inertias(structure: Structure) -> np.ndarray:
+    """(bodies, 3, 3): the inertias over the masses, in the frames of the bodies (m²)."""
+    xx, yy, zz, xy, xz, yz = structure.unit_inertia.T
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+
+
+def recorded_structure(data: Path, name: str) -> dict[str, Any]:
+    """A structure of the independent simulation; its nodes are those of the shipped structure."""
+    recorded = json.loads((data / "structures.json").read_text())["structures"]
+    structure: dict[str, Any] = recorded[name.replace("_", "-")]
+    return structure
+
+
+def onto_recorded(recorded: dict[str, Any], names: tuple[str, ...], p_WN: np.ndarray) -> np.ndarray:
+    """(3, 4): the turn about z and the shift that bring nodes p_WN (nodes, 3) nearest to where the
+    recorded structure rests."""
+    theirs = np.array([recorded["nodes_at_rest"][name] for name in names])
+    centre, their_centre = p_WN.mean(axis=0), theirs.mean(axis=0)
+    x, y, _ = (p_WN - centre).T
+    their_x, their_y, _ = (theirs - their_centre).T
+    angle = np.arctan2((x * their_y - y * their_x).sum(), (x * their_x + y * their_y).sum())
+    s, c = np.sin(angle), np.cos(angle)
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    shift = (their_centre - R @ centre) * [1.0, 1.0, 0.0]
+    return np.column_stack([R, shift])

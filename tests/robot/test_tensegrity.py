@@ -1,0 +1,112 @@
+"""Structures from files at rest: against an independent simulation, and inertia by hand."""
+
+import numpy as np
+import pytest
+from helpers.structures import recorded_structure, unit_inertias
+
+from tetra_drake.errors import InputError
+from tetra_drake.physics.cable import TENSION
+from tetra_drake.physics.contact import NORMAL
+from tetra_drake.robot import equilibrium
+from tetra_drake.robot.equilibrium import Resting, force_at_rest
+from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.load import load_scenario
+
+
+@pytest.mark.parametrize("name", ["prism", "six_bar"])
+def test_rests_where_the_independent_simulation_does(name, data):
+    recorded, robot = recorded_structure(data, name), Robot.of(load_scenario(name))
+    structure = robot.structure
+    ours = node_positions(structure, structure.initial_state)
+    theirs = np.array([recorded["nodes_at_rest"][node] for node in structure.node_names])
+    np.testing.assert_allclose(ours[:, 2], theirs[:, 2], atol=1e-6)
+    np.testing.assert_allclose(distances(ours), distances(theirs), atol=1e-6)
+
+    resting = Resting.of(robot.model)
+    force_at_rest(resting, structure.initial_state)
+    tension = {cable["ends"][0] + cable["ends"][1]: i for i, cable in enumerate(recorded["cables"])}
+    places = [tension["".join(name.split()[1:])] for name in structure.cable_names]
+    expected = np.array(recorded["tensions_at_rest"])[places]
+    np.testing.assert_allclose(resting.forces.pulls[:, TENSION], expected, rtol=1e-6)
+    assert resting.forces.pushes[:, NORMAL].sum() == pytest.approx(robot.weight, rel=1e-9)
+    assert structure.feet == np.count_nonzero(theirs[:, 2] < 0.0) == 3
+
+
+def distances(p_WN: np.ndarray) -> np.ndarray:
+    """Of all nodes from each other."""
+    return np.linalg.norm(p_WN[:, np.newaxis] - p_WN, axis=2)
+
+
+@pytest.mark.parametrize("name", ["prism", "six_bar"])
+def test_bars_have_the_mass_and_the_moments_of_the_independent_simulation(name, data):
+    recorded, structure = recorded_structure(data, name), MakeStructure(load_scenario(name))
+    np.testing.assert_allclose(structure.mass, recorded["bar_mass"], rtol=1e-12)
+    across, axial = recorded["moment_across"], recorded["moment_axial"]
+    for mass, inertia in zip(structure.mass, unit_inertias(structure), strict=True):
+        moments = mass * np.linalg.eigvalsh(inertia)
+        np.testing.assert_allclose(moments, [axial, across, across], rtol=1e-9)
+
+
+def test_a_bent_body_with_a_motor_has_the_inertia_of_its_parts():
+    scenario = load_scenario("mast").with_changes({"robot.masses": {"v2_front_low": "35 g"}})
+    structure, group = MakeStructure(scenario), scenario.robot.struts["v2"]
+    nodes = np.flatnonzero(structure.carriers == 1)
+    radius, ball_radius = group.diameter / 2, group.node_diameter / 2
+    parts = []  # of mass, place of the centre, inertia about it
+    for a, b in structure.struts[np.isin(structure.struts[:, 0], nodes)]:
+        along = structure.p_BN[b] - structure.p_BN[a]
+        length = np.linalg.norm(along)
+        mass, u = group.density * np.pi * radius**2 * length, along / length
+        axial, across = mass * radius**2 / 2, mass * (radius**2 / 4 + length**2 / 12)
+        inertia = across * np.eye(3) + (axial - across) * np.outer(u, u)
+        parts.append((mass, structure.p_BN[a] + along / 2, inertia))
+    ball = group.density * 4 / 3 * np.pi * ball_radius**3
+    for node in nodes:
+        parts.append((ball, structure.p_BN[node], 0.4 * ball * ball_radius**2 * np.eye(3)))
+    motor = structure.node_names.index("v2_front_low")
+    parts.append((0.035, structure.p_BN[motor], np.zeros((3, 3))))
+    assert structure.mass[1] == pytest.approx(sum(mass for mass, _, _ in parts), rel=1e-12)
+    total = sum(
+        inertia + mass * ((p @ p) * np.eye(3) - np.outer(p, p)) for mass, p, inertia in parts
+    )
+    found = structure.mass[1] * unit_inertias(structure)[1]
+    np.testing.assert_allclose(found, total, rtol=1e-9, atol=1e-15)
+    centre = sum(mass * p for mass, p, _ in parts)
+    np.testing.assert_allclose(centre, 0.0, atol=1e-15)  # kg m
+
+
+def test_offsets_move_the_bodies_of_the_robot_at_rest():
+    scenario = load_scenario("prism")
+    shift = [[0.0, 0.0, 0.01], [0.02, 0.0, 0.01], [0.0, -0.03, 0.01]]
+    moved = scenario.with_sections(robot=scenario.robot.model_copy(update={"offsets": shift}))
+    difference = MakeStructure(moved).p_WB - MakeStructure(scenario).p_WB
+    np.testing.assert_allclose(difference, shift, atol=1e-15)
+
+
+def test_nodes_placed_in_the_ground_are_refused(refused):
+    scenario = load_scenario("prism")
+    sunk = scenario.with_changes({"robot.nodes.n1": [-0.05, 0.0866, "-1 mm"]})
+    with refused("prism", "robot.nodes.n1", "0.001 m below"):
+        MakeStructure(sunk)
+
+
+def test_a_structure_without_rest_is_refused_with_the_body_that_is_left(monkeypatch):
+    monkeypatch.setattr(equilibrium, "ITERATIONS", 2)
+    with pytest.raises(InputError) as caught:
+        MakeStructure(load_scenario("six_bar"))
+    assert caught.value.key == "robot"
+    assert any(f"'n{2 * i} n{2 * i + 1}'" in str(caught.value) for i in range(6))
+
+
+def test_a_structure_in_another_order_rests_alike():
+    # Bodies, nodes and cables are numbered by the file; what is simulated is not.
+    scenario = load_scenario("six_bar")
+    backward = scenario.robot.struts["bar"].pairs[::-1]
+    turned = scenario.with_changes({"robot.struts.bar.pairs": backward})
+    one, other = MakeStructure(scenario), MakeStructure(turned)
+    assert other.node_names != one.node_names
+    place = [other.node_names.index(name) for name in one.node_names]
+    there = node_positions(other, other.initial_state)[place]
+    here = node_positions(one, one.initial_state)
+    np.testing.assert_allclose(distances(there), distances(here), atol=1e-9)
