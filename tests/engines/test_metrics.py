@@ -43,7 +43,7 @@ def test_tallied_metrics_are_those_of_the_trajectory(short, walk):
     shortening = -np.diff(length, axis=0)
     work = np.maximum(0.0, 0.5 * (force[1:] + force[:-1]) * shortening).sum()
     assert metrics.actuator_work == pytest.approx(work, rel=1e-3)
-    way = steady.p_WB.mean("tetrahedron").isel(time=[0, -1]).diff("time").values[0, :2]
+    way = steady.p_WB.mean("body").isel(time=[0, -1]).diff("time").values[0, :2]
     # Six rods and four balls of aluminium.
     rod = np.pi / 4 * 0.003175**2 * 0.1524 * 2700.0
     ball = np.pi / 6 * 0.00508**3 * 2700.0

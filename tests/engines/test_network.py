@@ -44,9 +44,9 @@ def walk(
 
 def mirrored(trajectory: xarray.Dataset) -> np.ndarray:
     """p_WN of the walk's image in the plane y = 0: left nodes are right ones."""
-    p_WN = trajectory.p_WN.values[:, :, [1, 0, 2, 3]].copy()
-    p_WN[..., 1] *= -1.0
-    return p_WN
+    p_WN = trajectory.p_WN.values
+    bodies = p_WN.reshape(len(p_WN), -1, 4, 3)[:, :, [1, 0, 2, 3]]
+    return bodies.reshape(p_WN.shape) * [1.0, -1.0, 1.0]
 
 
 def image(gait: Gait, scenario: Scenario) -> Gait:

@@ -9,6 +9,7 @@ from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario.layout import Layout
 from tetra_drake.scenario.load import load_scenario
 
 SPEED = 0.01  # m/s
@@ -47,6 +48,14 @@ def make_prism() -> Robot:
         group, a, b = name.split()
         rows.append((NODES.index(a), NODES.index(b), driver, 100.0, 0.5, 0.1))
         groups.append(group)
+    ends = np.array([row[:2] for row in rows])
+    layout = Layout(
+        cable_names=tuple(CABLES),
+        ends=p_WN[ends],
+        bodies=ends // 2,
+        oscillators=OSCILLATORS,
+        groups=tuple((list(CABLES.values()).index(k),) for k in range(3)),
+    )
     structure = Structure(
         bodies=("n0 n4", "n1 n5", "n2 n3"),
         node_names=NODES,
@@ -63,15 +72,7 @@ def make_prism() -> Robot:
         cable_names=tuple(CABLES),
         cable_groups=tuple(groups),
         slack=True,
-        actuation=Actuation(
-            names=OSCILLATORS,
-            cables=tuple(name for name, driver in CABLES.items() if driver != PASSIVE),
-            drivers=np.array(list(CABLES.values())),
-            ahead=np.array([1, 2, 2]),
-            sides=np.zeros(3),
-            couplings=np.zeros((0, 2), dtype=int),
-            images=np.zeros(0, dtype=int),
-        ),
+        actuation=Actuation(layout, reach=None),
         contacts=np.arange(6),
         thesis_nodes=None,
         feet=3,

@@ -16,5 +16,5 @@ def make_totals(bodies: int = 5) -> Tally:
         roughness=np.array([48.0]),
         lifted=np.arange(float(bodies)),
         tension=np.array([1.0]),
-        clearance=np.array([0.01**2]),
+        clearance=np.array([0.01]),
     )

@@ -16,6 +16,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from tetra_drake.physics.clearance import Struts, least_strut_distance, strut_distance
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
+from tetra_drake.physics.model import Model
 from tetra_drake.robot.laws import make_model
 from tetra_drake.robot.robot import MakeStructure
 from tetra_drake.robot.structure import Structure, moved_nodes
@@ -50,8 +51,8 @@ def test_segments_are_as_far_apart_as_their_nearest_points(first, second, distan
         for other in (second, second[::-1]):
             nodes = nodes_at(np.array([*turned, *other], dtype=float))
             for i, j in ((0, 1), (1, 0)):
-                square = strut_distance(PAIR, nodes, i, j)
-                assert square == pytest.approx(distance**2, abs=1e-12)
+                apart = strut_distance(PAIR, nodes, i, j)
+                assert apart == pytest.approx(distance, abs=1e-12)
 
 
 def drake_distance(structure: Structure, poses: list[RigidTransform], radius: float) -> float:
@@ -83,10 +84,15 @@ def drake_distance(structure: Structure, poses: list[RigidTransform], radius: fl
     )
 
 
+def distance_of(model: Model, nodes: np.ndarray, state: np.ndarray, least: float) -> float:
+    radius, first_node = model.bodies.radius, model.first_node
+    return least_strut_distance(model.struts, radius, first_node, state, nodes, least)
+
+
 def least_distance(scenario: Scenario, structure: Structure, state: np.ndarray) -> float:
-    model = make_model(scenario, structure)
-    nodes = moved_nodes(structure, state)
-    return np.sqrt(least_strut_distance(model.struts, model.bodies.radius, state, nodes, np.inf))
+    return distance_of(
+        make_model(scenario, structure), moved_nodes(structure, state), state, np.inf
+    )
 
 
 @pytest.mark.parametrize("name", ["thesis", "six_bar", "mast"])
@@ -111,9 +117,6 @@ def test_what_is_farther_than_the_least_so_far_changes_nothing(robot):
     state, model = robot.structure.initial_state, robot.model
     nodes = moved_nodes(robot.structure, state)
 
-    def square(least: float) -> float:
-        return least_strut_distance(model.struts, model.bodies.radius, state, nodes, least)
-
-    least = square(np.inf)
-    assert square(0.99 * least) == 0.99 * least
-    assert square(1.01 * least) == least
+    least = distance_of(model, nodes, state, np.inf)
+    assert distance_of(model, nodes, state, 0.99 * least) == 0.99 * least
+    assert distance_of(model, nodes, state, 1.01 * least) == least

@@ -160,7 +160,7 @@ def test_metrics_of_the_best_gait_stand_beside_the_initial_ones(page):
         ["fitness", "1.500", "4.000"],
         ["distance (in)", "0.750", "2.000"],
         ["cost of transport", "0.100", "0.900"],
-        ["lifted, T1 to T3 (%)", "- - -", "25 0 50"],
+        ["lifted, body by body (%)", "- - -", "25 0 50"],
     ):
         assert row in page.table
     assert page.row("heading change (deg)") is None  # which no gait has

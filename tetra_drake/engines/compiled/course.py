@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK
-from tetra_drake.engines.compiled.dynamics import CABLES_AT_ONCE, LINE_COLUMNS, Solver, make_solver
+from tetra_drake.engines.compiled.dynamics import CABLES_AT_ONCE, LINE_COLUMNS, Solver
 from tetra_drake.engines.compiled.loop import (
     ASKED_ROWS,
     CLOCK_ROWS,
@@ -66,7 +66,7 @@ class PreparedGait:
         """Prepares a gait; raises InputError if it or the steering does not fit the scenario."""
         simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
         marks = np.unique([0.0, simulation.steady_from, simulation.duration, start_up])
-        turns, solver = robot.turns(gait, steering), make_solver(robot.model)
+        turns, solver = robot.turns(gait, steering), Solver.of(robot.model)
         return cls(
             robot=robot,
             record=record,

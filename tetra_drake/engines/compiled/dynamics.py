@@ -46,8 +46,14 @@ class Solver(NamedTuple):
     """(blocks,): their columns."""
 
     @classmethod
+    def of(cls, robot: Model) -> Self:
+        """The solver of a robot."""
+        first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
+        return cls._of(len(robot.bodies.mass), tuple(zip(first, second, strict=True)))
+
+    @classmethod
     @functools.lru_cache(maxsize=8)  # as most robots of a run are coupled alike
-    def of(cls, bodies: int, pairs: tuple[tuple[int, int], ...]) -> Self:
+    def _of(cls, bodies: int, pairs: tuple[tuple[int, int], ...]) -> Self:
         """The solver for so many bodies, of which pairs are coupled."""
         schedule = Schedule.of(bodies, pairs)
         fill = sorted(schedule.blocks - set(pairs))
@@ -57,12 +63,6 @@ class Solver(NamedTuple):
             fill_bodies=_indices(body for body, _ in fill),
             fill_columns=_indices(schedule.column_of(*pair) for pair in fill),
         )
-
-
-def make_solver(robot: Model) -> Solver:
-    """The solver of a robot."""
-    first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
-    return Solver.of(len(robot.bodies.mass), tuple(zip(first, second, strict=True)))
 
 
 def _indices(numbers: Iterable[int]) -> np.ndarray:
