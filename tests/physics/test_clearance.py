@@ -90,9 +90,8 @@ def distance_of(model: Model, nodes: np.ndarray, state: np.ndarray, least: float
 
 
 def least_distance(scenario: Scenario, structure: Structure, state: np.ndarray) -> float:
-    return distance_of(
-        make_model(scenario, structure), moved_nodes(structure, state), state, np.inf
-    )
+    nodes = moved_nodes(structure, state)
+    return distance_of(make_model(scenario, structure), nodes, state, np.inf)
 
 
 @pytest.mark.parametrize("name", ["thesis", "six_bar", "mast"])
