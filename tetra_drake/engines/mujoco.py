@@ -43,9 +43,13 @@ Array = np.ndarray
 
 INSTALL = 'pip install "mujoco>=3.13"'
 
-_IMPEDANCE = 0.5
-"""Damping of contacts. Nothing at rest depends on it, nor do converged distances by over 0.01 in;
-with a smaller one friction chatters in steps beyond 0.06 ms, with a larger one errors grow."""
+_IMPRATIO = 1000.0
+"""How much harder friction is than the normal force. A node that slips gets 1 / _IMPRATIO of the
+force that would hold it as normal force: with 1, MuJoCo's default, it is thrown up and chatters."""
+
+_IMPEDANCE = 1.0 / (1.0 + _IMPRATIO)
+"""Impedance of contacts. It adds inertia: along the ground the body's mass, which keeps friction
+stable in long steps, and 1 / _IMPRATIO of that along the normal."""
 
 _POINT = 1e-8  # radius (m) of the spheres that touch the floor; a larger one spins thin bars
 
@@ -142,7 +146,8 @@ def make_mjcf(robot: Robot) -> str:
     model = Element("mujoco", model=scenario.name)
     steps = {"integrator": INTEGRATOR, "timestep": scenario.settings_of(Mujoco).step}
     _add(model, "compiler", inertiafromgeom="false")
-    _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], cone="elliptic", **steps)
+    contact = {"cone": "elliptic", "impratio": _IMPRATIO}
+    _add(model, "option", gravity=[0.0, 0.0, -scenario.robot.gravity], **contact, **steps)
     world = _add(model, "worldbody")
     _add_floor(world, robot)
     _add_bodies(model, world, robot)
@@ -270,8 +275,10 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
         body = _add(world, "body", name=body_name, pos=pos, quat=quat)
         _add(body, "freejoint")
         mass, inertia = bodies.mass[i], bodies.inertia[i]
-        if structure.isotropic:
-            _add(body, "inertial", pos="0 0 0", mass=mass, diaginertia=3 * [inertia[XX]])
+        is_bar = structure.first_node[i + 1] - structure.first_node[i] == 2
+        if structure.isotropic or is_bar:
+            moment = _moment_across(inertia) if is_bar else inertia[XX]
+            _add(body, "inertial", pos="0 0 0", mass=mass, diaginertia=3 * [moment])
         else:
             _add(body, "inertial", pos="0 0 0", mass=mass, fullinertia=inertia)
         contact = _contact(robot, mass)
@@ -283,20 +290,30 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
 
 
+def _moment_across(inertia: Array) -> float:
+    """The moment of inertia of a bar across its axis, which it gets about its axis, too.
+
+    A spin about the axis moves no node, and cables give none. But MuJoCo's contact points are half
+    the depth above the nodes, and there friction would soon spin a thin bar as fast as it slides.
+    """
+    xx, yy, zz, xy, xz, yz = inertia
+    return float(np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[-1])
+
+
 def _contact(robot: Robot, mass: float) -> dict:
     """Contact settings of the floor and a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
     borne = robot.weight / robot.structure.feet
     rest_damping = ground.damping * borne / ground.stiffness
-    # MuJoCo takes accelerations for forces, and divides them by 1 - impedance. The minus says
-    # that the numbers are stiffness and damping.
+    # MuJoCo takes accelerations for forces, and divides them by 1 - impedance; it multiplies those
+    # of friction by impratio. The minus says that the numbers are stiffness and damping.
     per_mass = -(1.0 - _IMPEDANCE) / mass
     return {
         "condim": "3",
         "friction": [cone.coefficient, cone.coefficient, 0, 0, 0],
         "solref": [ground.stiffness * per_mass, rest_damping * per_mass],
-        "solreffriction": [ground.stiffness * per_mass, cone.damping * per_mass],
+        "solreffriction": [ground.stiffness * per_mass, cone.damping * per_mass / _IMPRATIO],
         "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
     }
 
