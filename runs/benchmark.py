@@ -41,7 +41,7 @@ GROUND_BATCH = 30  # gaits at a time on each ground
 ROUNDS = 3  # measurements, of which the medians count
 
 ENGINES = {
-    "engines": ["!Drake {}", "!Compiled {}", "!Mujoco {}", "!Mujoco {step: 2 ms}"],
+    "engines": ["!Drake {}", "!Compiled {}", "!Mujoco {}", "!Mujoco {step: 1 ms}"],
     "integrators": [
         "!Drake {}",
         "!Drake {look_ahead: 0 s}",
@@ -58,7 +58,7 @@ CONVERGED_MUJOCO = "!Mujoco {step: 0.0625 ms}"
 
 
 def with_engine(scenario: Scenario, engine: str) -> Scenario:
-    """The scenario with an engine written as in a file, as "!Mujoco {step: 2 ms}"."""
+    """The scenario with an engine written as in a file, as "!Mujoco {step: 1 ms}"."""
     tag, _, settings = engine.partition(" ")
     values = {f"engine.{key}": value for key, value in yaml.safe_load(settings).items()}
     return scenario.with_changes({"engine": tag} | values)
