@@ -8,10 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.physics.inertia import XX, XY, XZ, YY, YZ, ZZ
-from tetra_drake.robot.equilibrium import Resting, find_rest, force_at_rest, stiffness_at_rest
+from tetra_drake.robot.equilibrium import (
+    NoRest,
+    Resting,
+    find_rest,
+    force_at_rest,
+    stiffness_at_rest,
+)
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import node_positions
@@ -74,7 +81,12 @@ def _weightless_nodes(robot: Robot) -> np.ndarray:
     bodies = len(model.bodies.mass)
     state[6 : 7 * bodies : 7] += 10.0 * model.bodies.radius.max()
     weightless = model.bodies._replace(weight=np.zeros(bodies))
-    rest = find_rest(model._replace(bodies=weightless), state)
+    try:
+        rest = find_rest(model._replace(bodies=weightless), state)
+    except NoRest as error:
+        body = robot.structure.bodies[error.body]
+        problem = f"finds no balance without weight; {error.force:.3g} N are left on '{body}'"
+        raise InputError(robot.scenario.name, "robot", problem) from error
     return node_positions(robot.structure, rest.state)
 
 

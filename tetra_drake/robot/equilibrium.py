@@ -18,6 +18,9 @@ from tetra_drake.simd.lanes import Table
 TOLERANCE = 1e-11
 """Greatest force left over, as a share of the greatest tension or of the robot's weight."""
 
+LEAST_FORCE = 1e-9
+"""N: forces beside which no tension and no weight count."""
+
 ITERATIONS = 1000
 FIRST_REACH, LONGEST_REACH = 0.05, 0.2
 """Largest step of Newton's method for a body, as a share of its radius."""
@@ -81,7 +84,7 @@ def find_rest(model: Model, start: np.ndarray) -> Rest:
     reach = FIRST_REACH * radius
     for _ in range(ITERATIONS):
         force = force_at_rest(robot, state)
-        greatest = max(np.abs(robot.forces.pulls[:, TENSION]).max(), weight)
+        greatest = max(np.abs(robot.forces.pulls[:, TENSION]).max(), weight, LEAST_FORCE)
         if np.abs(force).max() <= TOLERANCE * greatest:
             lengths = np.round(robot.forces.pulls[:, LENGTH], LENGTH_DIGITS)
             feet = int(np.count_nonzero(robot.forces.pushes[:, NORMAL]))

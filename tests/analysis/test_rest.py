@@ -1,0 +1,86 @@
+"""Robots at rest: statics, balance, frequencies, and what is printed and written of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tetra_drake.analysis.rest import RestStudy, study_rest
+from tetra_drake.report.structure_page import (
+    robot_of_file,
+    save_mjcf,
+    save_structure_page,
+    structure_text,
+)
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.robot_kinds import Structure
+
+SHIPPED = {"prism": (1, 1), "six_bar": (1, 1), "mast": (6, 0), "pair": (2, 0)}
+"""Self-stress states and mechanisms. 24 cables on four bodies are 18 equations, 8 on two are 6."""
+
+
+@pytest.fixture(scope="module")
+def studies() -> dict[str, RestStudy]:
+    return {name: study_rest(robot_of_file(name)) for name in SHIPPED}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_statics_are_those_of_the_structure_without_weight(studies, name):
+    statics = studies[name].statics
+    assert (statics.self_stress_states, statics.mechanisms) == SHIPPED[name]
+
+
+def test_each_junction_of_the_row_has_a_self_stress_and_a_mechanism(robot):
+    statics = study_rest(robot).statics
+    assert (statics.self_stress_states, statics.mechanisms) == (4, 4)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_ground_bears_the_weight_and_no_cable_is_slack(studies, name):
+    study = studies[name]
+    assert study.nodes["load"].sum() == pytest.approx(study.robot.weight, rel=1e-9)
+    assert study.cables["tension"].min() > 0.0
+    elongation = study.cables["length"] - study.cables["free_length"]
+    stiffness = study.robot.structure.cables["stiffness"]
+    np.testing.assert_allclose(study.cables["tension"], stiffness * elongation, rtol=1e-6)
+
+
+def test_two_bars_side_by_side_bounce_as_masses_on_springs():
+    # Each lies on its two ends, which are springs of the ground; cables of almost no stiffness hold
+    # them. Up and down: sqrt(2 k / m); about the middle: 2 k (l/2)^2 = w^2 m l^2 / 12, so sqrt(3)
+    # times as fast for thin bars. The mass of spheres is left out.
+    bars = {"a": ["a1", "a2"], "b": ["b1", "b2"]}
+    nodes = {
+        f"{bar}{i}": [[0.0, 0.2][i - 1], y, 0.0]
+        for bar, y in (("a", 0.0), ("b", 0.1))
+        for i in (1, 2)
+    }
+    group = {"diameter": 0.004, "density": 1e4, "node_diameter": 0.0}
+    cable = {"stiffness": 1e-6, "damping": 0.0, "free_length": 0.05}
+    structure = Structure.model_validate(
+        {
+            "nodes": nodes,
+            "struts": {"bar": group | {"pairs": list(bars.values())}},
+            "cables": {"tie": cable | {"pairs": [["a1", "b1"], ["a2", "b2"]]}},
+        }
+    )
+    robot = robot_of_file("prism")
+    robot = Robot.of(robot.scenario.with_sections(robot=structure))
+    mass, ground = math.pi * 0.002**2 * 0.2 * 1e4, robot.scenario.ground.stiffness
+    slow = math.sqrt(2.0 * ground / mass) / (2.0 * math.pi)
+    expected = [slow, slow, math.sqrt(3.0) * slow, math.sqrt(3.0) * slow]
+    assert study_rest(robot).frequencies == pytest.approx(expected, rel=2e-3)
+
+
+def test_text_page_and_model_are_of_the_structure(studies, tmp_path):
+    study = studies["prism"]
+    text = structure_text(study)
+    assert "60.83 g" in text  # 3 bars of 20.277 g
+    for name in ("n0 n4", "bottom", "side", "0.951"):  # 4.2308 N
+        assert name in text
+    save_structure_page(study, tmp_path / "prism.html")
+    assert "prism at rest" in (tmp_path / "prism.html").read_text()
+    save_mjcf(study.robot, tmp_path / "prism.xml")
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "prism.xml"))
+    assert (model.nbody, model.ntendon, model.nu) == (1 + 3, 9, 3)
