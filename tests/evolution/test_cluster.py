@@ -132,3 +132,4 @@ def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monke
             assert cli.main([*command, "--out", str(tmp_path / "no"), "--dask", wrong]) == 2
             assert "executor: " in capsys.readouterr().err
     assert not (tmp_path / "no").exists()
+    assert dask.config.get("scheduler", None) is None, "others in this process are left alone"

@@ -60,7 +60,9 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
         try:
             if cluster is None:
                 cluster = stack.enter_context(local_cluster(workers or available_cores()))
-            client = stack.enter_context(distributed.Client(cluster))
+            # Not the default client: where none answers, Dask would still be the default scheduler.
+            client = distributed.Client(cluster, set_as_default=False)
+            stack.enter_context(client)
         except RuntimeError as error:
             raise InputError("executor", "", f"Dask's workers do not start: {error}") from error
         except (OSError, ValueError) as error:
