@@ -1,14 +1,17 @@
-"""The laws of a structure and their constants, as the kernels of every engine take them."""
+"""The laws of a structure as the kernels of every engine take them, and its rest."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from tetra_drake.errors import InputError
 from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.model import Bodies, Couplings, Model
+from tetra_drake.robot.equilibrium import NoRest, Rest, find_rest
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.terrain_kinds import Flat
 
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:
@@ -30,6 +33,18 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
         isotropic=structure.isotropic,
         slack=structure.slack,
     )
+
+
+def rest_of(scenario: Scenario, structure: Structure) -> Rest:
+    """Rest of a structure on flat ground without actuation, let go where it starts; raises
+    InputError if there is none."""
+    model = make_model(scenario.with_sections(terrain=Flat()), structure)
+    try:
+        return find_rest(model, structure.initial_state)
+    except NoRest as error:
+        body = structure.bodies[error.body]
+        problem = f"finds no rest; the greatest force left, {error.force:.3g} N, is on '{body}'"
+        raise InputError(scenario.name, "robot", problem) from error
 
 
 def _struts(structure: Structure) -> Struts:

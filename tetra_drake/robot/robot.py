@@ -19,9 +19,9 @@ from tetra_drake.physics.model import Model
 from tetra_drake.physics.oscillator import Network, steered_input
 from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.actuation import Actuation
-from tetra_drake.robot.equilibrium import NoRest, Rest, find_rest
+from tetra_drake.robot.equilibrium import Rest
 from tetra_drake.robot.gait import Gait, check_gait
-from tetra_drake.robot.laws import make_model
+from tetra_drake.robot.laws import make_model, rest_of
 from tetra_drake.robot.structure import Structure
 from tetra_drake.robot.tensegrity import MakeTensegrity
 from tetra_drake.robot.tetrahedra import MakeTetrahedra
@@ -72,13 +72,8 @@ class Robot:
         """Rest of the robot on flat ground without actuation, whatever the scenario's terrain and
         offsets; raises InputError if it finds no rest."""
         undisturbed = self.scenario.robot.model_copy(update={"offsets": []})
-        robot = Robot.of(self.scenario.with_sections(terrain=Flat(), robot=undisturbed))
-        try:
-            return find_rest(robot.model, robot.structure.initial_state)
-        except NoRest as error:
-            body = robot.structure.bodies[error.body]
-            problem = f"finds no rest; the greatest force left, {error.force:.3g} N, is on '{body}'"
-            raise InputError(self.scenario.name, "robot", problem) from error
+        level = self.scenario.with_sections(terrain=Flat(), robot=undisturbed)
+        return rest_of(level, MakeStructure(level))
 
     @functools.cached_property
     def senses(self) -> Senses:

@@ -11,12 +11,10 @@ from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import CABLE
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.bodies import node_inertia, strut_inertia
-from tetra_drake.robot.equilibrium import NoRest, find_rest
-from tetra_drake.robot.laws import make_model
+from tetra_drake.robot.laws import rest_of
 from tetra_drake.robot.structure import Structure, turn_with_slope
 from tetra_drake.scenario import robot_kinds as kinds
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat
 
 START_DEPTH = 1e-3
 """Depth in the ground, as a share of the structure's height, from which on a node counts as placed
@@ -31,13 +29,7 @@ def MakeTensegrity(scenario: Scenario, kind: kinds.Structure) -> Structure:
     mass. Raises InputError if a contact node is placed in the ground, or if there is no rest.
     """
     placed = _placed(scenario, kind)
-    level = scenario.with_sections(terrain=Flat())
-    try:
-        rest = find_rest(make_model(level, placed), placed.initial_state)
-    except NoRest as error:
-        body = placed.bodies[error.body]
-        problem = f"finds no rest; the greatest force left, {error.force:.3g} N, is on '{body}'"
-        raise InputError(scenario.name, "robot", problem) from error
+    rest = rest_of(scenario, placed)
     poses = rest.state[: 7 * len(placed.bodies)].reshape(-1, 7)
     p_WB = poses[:, 4:] + np.array(kind.offsets or [[0.0, 0.0, 0.0]])
     slope = scenario.terrain.plane_slope or 0.0
