@@ -79,34 +79,83 @@ class Schedule(NamedTuple):
 
 @inlined
 def factorise(rows: Table, schedule: Schedule) -> None:
-    """Turns `rows` into its factors in place: L D Lᵀ with 1 / D on the diagonal."""
+    """Turns `rows` into its factors in place: L D Lᵀ with 1 / D on the diagonal.
+
+    A number is in a variable until all products of a body are subtracted from it: in a loop over
+    the pivots it would be read and written once for each.
+    """
     for i in range(rows.shape[0]):
-        coupled = schedule.count[i]
-        width = BLOCK * (1 + coupled)
-        for r in range(BLOCK):
-            inverse = 1.0 / rows[i, r, r]
-            rows[i, r, r] = inverse
-            for t in range(r + 1, BLOCK):
-                factor = rows[i, r, t] * inverse
-                for c in range(t, width):
-                    rows[i, t, c] -= factor * rows[i, r, c]
-            for a in range(coupled):
-                eliminate_row(rows, schedule, i, r, a, inverse)
+        factorise_block(rows, i)
+        for a in range(schedule.count[i]):
+            reduce_block(rows, i, BLOCK * (1 + a))
+        for a in range(schedule.count[i]):
+            eliminate(rows, schedule, i, a)
 
 
 @inlined
-def eliminate_row(rows: Table, schedule: Schedule, i: int, r: int, a: int, inverse: Real) -> None:
-    """Takes row r of body i, whose pivot has the inverse given, out of the rows of the a-th body
-    that it is coupled to."""
+def factorise_block(rows: Table, i: int) -> None:
+    """Factorises the own block of body i."""
+    for r in range(BLOCK):
+        inverse = 1.0 / rows[i, r, r]
+        rows[i, r, r] = inverse
+        for t in range(r + 1, BLOCK):
+            factor = rows[i, r, t] * inverse
+            for c in range(t, BLOCK):
+                rows[i, t, c] -= factor * rows[i, r, c]
+
+
+@inlined
+def reduce_block(rows: Table, i: int, first: int) -> None:
+    """Takes the factors of body i's own block out of its block that begins at column `first`."""
+    f_01, _, _, _, _, _ = factors(rows, i, 1)
+    f_02, f_12, _, _, _, _ = factors(rows, i, 2)
+    f_03, f_13, f_23, _, _, _ = factors(rows, i, 3)
+    f_04, f_14, f_24, f_34, _, _ = factors(rows, i, 4)
+    f_05, f_15, f_25, f_35, f_45, _ = factors(rows, i, 5)
+    for c in range(first, first + BLOCK):
+        x_0 = rows[i, 0, c]
+        x_1 = rows[i, 1, c] - f_01 * x_0
+        x_2 = rows[i, 2, c] - f_02 * x_0 - f_12 * x_1
+        x_3 = rows[i, 3, c] - f_03 * x_0 - f_13 * x_1 - f_23 * x_2
+        x_4 = rows[i, 4, c] - f_04 * x_0 - f_14 * x_1 - f_24 * x_2 - f_34 * x_3
+        x_5 = rows[i, 5, c] - f_05 * x_0 - f_15 * x_1 - f_25 * x_2 - f_35 * x_3 - f_45 * x_4
+        rows[i, 1, c], rows[i, 2, c], rows[i, 3, c] = x_1, x_2, x_3
+        rows[i, 4, c], rows[i, 5, c] = x_4, x_5
+
+
+@inlined
+def eliminate(rows: Table, schedule: Schedule, i: int, a: int) -> None:
+    """Takes body i out of the rows of the a-th body that it is coupled to."""
     j, first = schedule.later[i, a], BLOCK * (1 + a)
     for t in range(BLOCK):
-        factor = rows[i, r, first + t] * inverse
+        column = factors(rows, i, first + t)
         for c in range(t, BLOCK):
-            rows[j, t, c] -= factor * rows[i, r, first + c]
+            rows[j, t, c] = reduced(rows[j, t, c], column, rows, i, first + c)
         for b in range(a + 1, schedule.count[i]):
             target, source = schedule.column[i, a, b], BLOCK * (1 + b)
             for c in range(BLOCK):
-                rows[j, t, target + c] -= factor * rows[i, r, source + c]
+                x = rows[j, t, target + c]
+                rows[j, t, target + c] = reduced(x, column, rows, i, source + c)
+
+
+@inlined
+def factors(rows: Table, i: int, c: int) -> tuple[Real, ...]:
+    """Column c of the rows of body i over the pivots."""
+    return (
+        rows[i, 0, c] * rows[i, 0, 0],
+        rows[i, 1, c] * rows[i, 1, 1],
+        rows[i, 2, c] * rows[i, 2, 2],
+        rows[i, 3, c] * rows[i, 3, 3],
+        rows[i, 4, c] * rows[i, 4, 4],
+        rows[i, 5, c] * rows[i, 5, 5],
+    )
+
+
+@inlined
+def reduced(x: Real, column: tuple[Real, ...], rows: Table, i: int, c: int) -> Real:
+    """A number less the product of a column of factors and column c of the rows of body i."""
+    x = x - column[0] * rows[i, 0, c] - column[1] * rows[i, 1, c] - column[2] * rows[i, 2, c]
+    return x - column[3] * rows[i, 3, c] - column[4] * rows[i, 4, c] - column[5] * rows[i, 5, c]
 
 
 @inlined
