@@ -67,5 +67,4 @@ def observe_states(
         compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
         cables, carriers = robot.cables, robot.ground.carriers
         observe(tally, cables, carriers, times[k], signals[k], forces.pulls, forces.pushes)
-        radius, first_node = robot.bodies.radius, robot.first_node
-        look(tally, robot.struts, radius, first_node, states[k], forces.nodes)
+        look(tally, robot, states[k], forces.nodes)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION, Cables
-from tetra_drake.physics.clearance import Struts, least_strut_distance
+from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.physics.contact import NORMAL
+from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
 
@@ -80,14 +81,8 @@ def add_lifted(tally: Tally, carriers: Table, passed: Real, pushes: Table) -> No
 
 
 @inlined
-def look(
-    tally: Tally,
-    struts: Struts,
-    radius: Table,
-    first_node: Table,
-    state: Table,
-    nodes: Table,
-) -> None:
-    """Notes the clearance of struts; see least_strut_distance()."""
-    least = least_strut_distance(struts, radius, first_node, state, nodes, tally.clearance[0])
+def look(tally: Tally, robot: Model, state: Table, nodes: Table) -> None:
+    """Notes the clearance of struts at a state (13 bodies,); `nodes` are those of kinematics."""
+    radius, first_node, least = robot.bodies.radius, robot.first_node, tally.clearance[0]
+    least = least_strut_distance(robot.struts, radius, first_node, state, nodes, least)
     tally.clearance[0] = least

@@ -166,10 +166,9 @@ def advance(constants: Constants, walk: Walk, log: Log, live: bool, rounds: int)
         ended = False
         for _ in range(ROUND):
             ended |= iterate(constants, walk, log, live)
-        robot, state, nodes = constants.robot, walk.step.state, walk.forces.nodes
+        robot, state = constants.robot, walk.step.state
         move_robot(robot, state, walk.forces)
-        radius, first_node = robot.bodies.radius, robot.first_node
-        look(walk.tally, robot.struts, radius, first_node, state, nodes)
+        look(walk.tally, robot, state, walk.forces.nodes)
         if ended:
             return
 
