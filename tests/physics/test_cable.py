@@ -6,6 +6,7 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
+from tetra_drake.physics.actuator import DIRECT, DRIVE_COLUMNS, CableLaw
 from tetra_drake.physics.cable import PULL_COLUMNS, TENSION, cable_forces, cable_tension
 from tetra_drake.physics.kinematics import NODE_COLUMNS
 from tetra_drake.robot.bodies import AddBodies
@@ -23,15 +24,16 @@ def forces_of_cables(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The generalized force and the tensions."""
     nodes, pulls, force = np.empty((20, NODE_COLUMNS)), np.empty((24, PULL_COLUMNS)), np.empty(30)
+    drives = np.empty((0, DRIVE_COLUMNS))
     points = structure.p_BN, structure.first_node
-    law = structure.cables, False
-    cable_forces(state, np.array(signals), *points, *law, nodes, pulls, force)
+    law = structure.cables, DIRECT, np.zeros(4), False
+    cable_forces(state, np.array(signals), *points, *law, drives, nodes, pulls, force)
     return force, pulls[:, TENSION]
 
 
 def test_tension_is_equation_6():
     # 35 N/m (0.3 m - 0.1 m) + 8 N s/m * -0.25 m/s + 1.5 N = 7 - 2 + 1.5
-    assert cable_tension(0.3, -0.25, 1.5, 35.0, 8.0, 0.1) == pytest.approx(6.5, rel=1e-15)
+    assert cable_tension(0.3, -0.25, 1.5, CableLaw(35.0, 8.0, 0.1)) == pytest.approx(6.5, rel=1e-15)
 
 
 def test_cables_keep_momentum_and_angular_momentum(structure, state):

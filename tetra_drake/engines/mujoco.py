@@ -36,6 +36,7 @@ from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario.actuator_kinds import Force
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.schema import Scenario
 
@@ -83,6 +84,10 @@ class MujocoEngine(Engine):
             kind = type(scenario.terrain).__name__
             problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline"
             raise InputError(scenario.name, "terrain", problem)
+        if not isinstance(scenario.actuation, Force):
+            kind = type(scenario.actuation).__name__
+            problem = f"found !{kind}, but mujoco knows forces on cables only: !Force"
+            raise InputError(scenario.name, "actuation", problem)
         scenario.friction.cone(scenario.name)
 
     def simulate(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tetra_drake.physics.actuator import DRIVE
 from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.model import Model
@@ -12,6 +13,8 @@ from tetra_drake.results.metrics import empty_tally
 from tetra_drake.robot.robot import Robot
 from tetra_drake.simd.compiling import compiled
 from tetra_drake.simd.lanes import Table
+
+_NONE = np.zeros(0)
 
 _TOGETHER = 1000  # observations, as calls of kernels with many tables are slow
 
@@ -26,11 +29,13 @@ class Observer:
         self._model, self._tally = robot.model, empty_tally(robot)
         self._modes = np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
         self._forces = Forces.of(robot.model)
-        self._waiting: list[tuple[float, np.ndarray, np.ndarray]] = []
+        self._waiting: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []
 
-    def add(self, time: float, state: np.ndarray, signals: np.ndarray) -> None:
-        """Adds a state (13 bodies,) and the signals (m,) in N at a time (s)."""
-        self._waiting.append((time, state, signals))
+    def add(
+        self, time: float, state: np.ndarray, signals: np.ndarray, drives: np.ndarray = _NONE
+    ) -> None:
+        """Adds a state (13 bodies,), the signals (m,) in N and the drives at a time (s)."""
+        self._waiting.append((time, state, signals, drives))
         if len(self._waiting) == _TOGETHER:
             self._flush()
 
@@ -42,8 +47,8 @@ class Observer:
     def _flush(self) -> None:
         if not self._waiting:
             return
-        times, states, signals = (np.array(column) for column in zip(*self._waiting, strict=True))
-        observe_states(self._model, self._tally, self._forces, self._modes, times, states, signals)
+        columns = tuple(np.array(column) for column in zip(*self._waiting, strict=True))
+        observe_states(self._model, self._tally, self._forces, self._modes, *columns)
         self._waiting = []
 
 
@@ -56,14 +61,16 @@ def observe_states(
     times: Table,
     states: Table,
     signals: Table,
+    drives: Table,
 ) -> None:
-    """Observes states (k, 13 bodies) and signals (k, m) at times (k,); `modes`, (contacts,
+    """Observes states (k, 13 bodies), signals (k, m) and drives at times (k,); `modes`, (contacts,
     MODE_COLUMNS), is room. What is tallied does not depend on whether contacts stick."""
     generalized = np.empty(6 * tally.lifted.size)
     for k in range(times.size):
         modes[:] = 0.0
         move_robot(robot, states[k], forces)
         update_modes(states[k], forces.nodes, robot.ground, forces.frames, modes)
+        forces.drives[:, DRIVE] = drives[k]
         compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
         cables, carriers = robot.cables, robot.ground.carriers
         observe(tally, cables, carriers, times[k], signals[k], forces.pulls, forces.pushes)

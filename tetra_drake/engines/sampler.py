@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -81,7 +81,8 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
     state, signals = diagram.GetOutputPort("state"), diagram.GetOutputPort("signals")
     context = diagram.CreateDefaultContext()
     ground = diagram.GetSubsystemByName("ground").GetMyContextFromRoot(context)
-    states_then, signals_then, modes_then = [], [], []
+    drives_at = drives_of(diagram)
+    states_then, signals_then, modes_then, drives_then = [], [], [], []
     for sample in samples:
         context.SetTime(sample.time)
         context.SetContinuousState(sample.continuous)
@@ -89,6 +90,7 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
             context.SetDiscreteState(group, values)
         states_then.append(state.Eval(context))
         signals_then.append(signals.Eval(context))
+        drives_then.append(drives_at(context))
         modes = ground.get_discrete_state_vector().CopyToVector()
         modes_then.append(modes.reshape(-1, MODE_COLUMNS))
     return Motion(
@@ -96,4 +98,13 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
         states=np.array(states_then),
         signals=np.array(signals_then),
         modes=np.array(modes_then),
+        drives=np.array(drives_then),
     )
+
+
+def drives_of(diagram: Diagram) -> Callable[[Context], np.ndarray]:
+    """The drives (drives,) by a context of a robot's diagram; empty without actuators."""
+    if not diagram.HasOutputPort("drives"):
+        return lambda context: np.zeros(0)
+    evaluate: Callable[[Context], np.ndarray] = diagram.GetOutputPort("drives").Eval
+    return evaluate

@@ -6,6 +6,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tetra_drake.physics.actuator import (
+    DIRECT,
+    DRIVE,
+    LIMITED,
+    RATE,
+    WINCH,
+    Actuator,
+    CableLaw,
+    Limits,
+    motor_pull,
+    winch_pull,
+)
 from tetra_drake.physics.kinematics import FORCE, P_WN, V_WN, gather_forces, move_nodes
 from tetra_drake.physics.vectors import (
     add_vector,
@@ -17,7 +29,7 @@ from tetra_drake.physics.vectors import (
     vector_at,
 )
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Real, Table, inverse_sqrt, maximum
+from tetra_drake.simd.lanes import Real, Table, inverse_sqrt, maximum, named
 
 PASSIVE = -1
 """The `signal` of a cable that no signal drives."""
@@ -46,31 +58,37 @@ CABLE = np.dtype(
 )
 """One cable. Kernels take an array of these or Cables, alike."""
 
-DIRECTION, LENGTH, TENSION, PULL_COLUMNS = 0, 3, 4, 5
-"""Columns of `pulls`, (cables, 5): direction from node a to node b in World, length (m), tension
-(N); and their number."""
+DIRECTION, LENGTH, TENSION, SLOPE, PULL_COLUMNS = 0, 3, 4, 5, 6
+"""Columns of `pulls`, (cables, 6): direction from node a to node b in World, length (m), tension
+(N), how much that rises with the rate of the length (N s/m); and their number."""
 
 
 @inlined
-def cable_tension(
-    length: Real, rate: Real, signal: Real, stiffness: Real, damping: Real, free_length: Real
-) -> Real:
+def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real:
     """Tension (N) of a cable of `length` (m) that lengthens at `rate` (m/s).
 
     Eq. 6, with the actuation `signal` (N) superimposed.
     """
-    return stiffness * (length - free_length) + damping * rate + signal
+    return law.stiffness * (length - law.free_length) + law.damping * rate + signal
 
 
 @inlined
 def add_cable_forces(
-    nodes: Table, signals: Table, cables: Table, slack: bool, keep: bool, pulls: Table
+    nodes: Table,
+    signals: Table,
+    cables: Table,
+    actuator: Actuator,
+    slack: bool,
+    keep: bool,
+    drives: Table,
+    pulls: Table,
 ) -> None:
     """Adds the forces of all cables to those on the `nodes` of `kinematics`.
 
-    `signals`, (signals,), are in N. With `slack`, tensions are never negative. With `keep`, writes
-    `pulls`.
+    `signals`, (signals,), are in N. With `slack`, tensions are never negative. Writes the rates of
+    `drives`, (drives, DRIVE_COLUMNS), and with `keep` the `pulls`.
     """
+    drive = 0
     for i in range(pulls.shape[0]):
         a, b, driver = cables.node_a[i], cables.node_b[i], cables.signal[i]
         p_AB = difference(vector_at(nodes, b, P_WN), vector_at(nodes, a, P_WN))
@@ -81,22 +99,48 @@ def add_cable_forces(
         signal = 0.0
         if driver != PASSIVE:
             signal = signals[driver]
-        tension = cable_tension(
-            length,
-            dot(v_AB, direction),
-            signal,
-            cables.stiffness[i],
-            cables.damping[i],
-            cables.free_length[i],
-        )
-        if slack:
-            tension = maximum(tension, 0.0)
+        rate, law = dot(v_AB, direction), law_of(cables, i)
+        if driver == PASSIVE or actuator.kind == DIRECT:
+            slope = law.damping
+            tension = cable_tension(length, rate, signal, law)
+            if slack:
+                tension = maximum(tension, 0.0)
+        else:
+            tension, slope = drive_cable(drives, drive, length, rate, signal, law, actuator)
+            drive += 1
         force = scaled(tension, direction)
         add_vector(force, a, FORCE, nodes)
         subtract_vector(force, b, FORCE, nodes)
         if keep:
             put_vector(direction, i, DIRECTION, pulls)
-            pulls[i, LENGTH], pulls[i, TENSION] = length, tension
+            pulls[i, LENGTH], pulls[i, TENSION], pulls[i, SLOPE] = length, tension, slope
+
+
+@inlined
+def law_of(cables: Table, i: int) -> CableLaw:
+    """The constants of a cable."""
+    return CableLaw(cables.stiffness[i], cables.damping[i], cables.free_length[i])
+
+
+@inlined
+def drive_cable(
+    drives: Table,
+    i: int,
+    length: Real,
+    rate: Real,
+    signal: Real,
+    law: CableLaw,
+    actuator: Actuator,
+) -> tuple[Real, Real]:
+    """Tension and slope of a cable that a winch or a tension motor drives; writes the rate of its
+    drive, the i-th."""
+    limits = named(Limits, actuator.limits)
+    if actuator.kind == WINCH:
+        pull = winch_pull(drives[i, DRIVE], length, rate, signal, law, limits)
+    else:
+        pull = motor_pull(drives[i, DRIVE], length, rate, signal, law, limits)
+    drives[i, RATE], drives[i, LIMITED] = pull.rate, pull.limited
+    return pull.tension, pull.slope
 
 
 @compiled
@@ -106,13 +150,17 @@ def cable_forces(
     p_BN: Table,
     first_node: Table,
     cables: Table,
+    kind: int,
+    limits: Table,
     slack: bool,
+    drives: Table,
     nodes: Table,
     pulls: Table,
     generalized_force: Table,
 ) -> None:
     """Writes [t_W; f_W] of all cables at each Bo, (6 bodies,), for a state of the bodies; also
-    `nodes` and `pulls`."""
+    `nodes`, `pulls` and the rates of `drives`. `kind` and `limits` are an Actuator's."""
     move_nodes(state, p_BN, first_node, nodes)
-    add_cable_forces(nodes, signals, cables, slack, True, pulls)
+    actuator = Actuator(kind, limits)
+    add_cable_forces(nodes, signals, cables, actuator, slack, True, drives, pulls)
     gather_forces(nodes, first_node, generalized_force)

@@ -6,7 +6,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.physics.cable import PULL_COLUMNS, add_cable_forces
+from tetra_drake.physics.actuator import DIRECT, DRIVE, DRIVE_COLUMNS
+from tetra_drake.physics.cable import PASSIVE, PULL_COLUMNS, add_cable_forces
 from tetra_drake.physics.contact import PUSH_COLUMNS, add_ground_forces, meet_ground
 from tetra_drake.physics.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia
 from tetra_drake.physics.kinematics import NODE_COLUMNS, gather_forces
@@ -29,17 +30,23 @@ class Forces(NamedTuple):
     """(contacts, PUSH_COLUMNS): of the ground."""
     inertia: Table
     """(bodies, INERTIA_COLUMNS): of the bodies along World's axes, unless they are isotropic."""
+    drives: Table
+    """(drives, DRIVE_COLUMNS): of winches or tension motors, in the order of their cables. What
+    forces are computed from is given; the rest is written."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
         """Room for the forces on a robot."""
         cables, contacts = robot.cables.size, robot.ground.contacts.size
+        driven = np.count_nonzero(robot.cables["signal"] != PASSIVE)
+        drives = 0 if robot.actuator.kind == DIRECT else driven
         return cls(
             nodes=np.zeros((len(robot.p_BN), NODE_COLUMNS)),
             frames=np.zeros((contacts, FRAME_COLUMNS)),
             pulls=np.zeros((cables, PULL_COLUMNS)),
             pushes=np.zeros((contacts, PUSH_COLUMNS)),
             inertia=np.zeros((len(robot.bodies.mass), INERTIA_COLUMNS)),
+            drives=np.zeros((drives, DRIVE_COLUMNS)),
         )
 
 
@@ -67,7 +74,16 @@ def compute_forces(
 
     With `keep`, those of the cables and the ground by themselves, too.
     """
-    add_cable_forces(forces.nodes, signals, robot.cables, robot.slack, keep, forces.pulls)
+    add_cable_forces(
+        forces.nodes,
+        signals,
+        robot.cables,
+        robot.actuator,
+        robot.slack,
+        keep,
+        forces.drives,
+        forces.pulls,
+    )
     add_ground_forces(forces.nodes, modes, robot.ground, forces.frames, keep, forces.pushes)
     gather_forces(forces.nodes, robot.first_node, generalized)
     bodies = generalized.size // 6
@@ -90,15 +106,18 @@ def forces_along(
     states: Table,
     modes: Table,
     signals: Table,
+    drives: Table,
     forces: Forces,
     pulls: Table,
     pushes: Table,
 ) -> None:
     """Writes the `pulls` (k, cables, PULL_COLUMNS) and `pushes` (k, contacts, PUSH_COLUMNS) at
-    states (k, 13 bodies) with modes (k, contacts, MODE_COLUMNS) and signals (k, m) in N."""
+    states (k, 13 bodies) with modes (k, contacts, MODE_COLUMNS), signals (k, m) in N and drives
+    (k, drives)."""
     generalized = np.empty(6 * (states.shape[1] // 13))
     for k in range(states.shape[0]):
         move_robot(robot, states[k], forces)
+        forces.drives[:, DRIVE] = drives[k]
         compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized)
         pulls[k] = forces.pulls
         pushes[k] = forces.pushes

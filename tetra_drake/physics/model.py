@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from tetra_drake.physics.actuator import Actuator
 from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.contact import Ground
 from tetra_drake.simd.lanes import Table
@@ -43,6 +44,7 @@ class Model(NamedTuple):
     """(bodies + 1,): the index of each body's first node, and the number of nodes."""
     cables: Table
     """(cables,) of dtype CABLE or Cables."""
+    actuator: Actuator
     couplings: Couplings
     ground: Ground
     bodies: Bodies

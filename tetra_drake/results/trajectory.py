@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetra_drake.files import write_whole
+from tetra_drake.physics.actuator import WINCH
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION
 from tetra_drake.physics.contact import PUSH_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces, forces_along
@@ -28,13 +29,14 @@ DIMENSIONS = {
     "q_WB": ("time", "body", "quaternion"),
     "tension": ("time", "cable"),
     "length": ("time", "cable"),
+    "free_length": ("time", "cable"),
     "signal": ("time", "oscillator"),
     "normal_force": ("time", "contact"),
     "friction_force": ("time", "contact", "horizontal"),
     "in_contact": ("time", "contact"),
     "friction_mode": ("time", "contact", "horizontal"),
 }
-"""Dimensions of each variable of a trajectory."""
+"""Dimensions of each variable of a trajectory; `free_length` is there with winches only."""
 
 
 def sample_times(duration: float, period: float) -> np.ndarray:
@@ -58,6 +60,8 @@ class Motion:
     pushes: np.ndarray | None = None
     """(k, contacts, 3): forces of the ground along t1, t2 and n, of an engine that has a law of its
     own; otherwise they follow from states and modes."""
+    drives: np.ndarray | None = None
+    """(k, drives): free lengths (m) of winches, or tensions (N) of tension motors."""
 
     def at(self, times: np.ndarray) -> Motion:
         """The motion at some of its times."""
@@ -68,6 +72,7 @@ class Motion:
             signals=self.signals[rows],
             modes=self.modes[rows],
             pushes=None if self.pushes is None else self.pushes[rows],
+            drives=None if self.drives is None else self.drives[rows],
         )
 
 
@@ -101,6 +106,8 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
         "in_contact": (modes[..., 0], "1", "1 on the ground"),
         "friction_mode": (modes[..., 1:], "1", slip),
     }
+    if robot.model.actuator.kind == WINCH:
+        variables["free_length"] = (_free_lengths(robot, motion), "m", "free length of the cable")
     return xarray.Dataset(
         {
             name: (DIMENSIONS[name], values, {"units": unit, "long_name": meaning})
@@ -110,13 +117,23 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     )
 
 
+def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:
+    """(k, cables): free lengths in m, of driven cables those that winches have wound."""
+    cables = robot.structure.cables
+    lengths = np.tile(cables["free_length"], (len(motion.times), 1))
+    lengths[:, cables["signal"] != PASSIVE] = motion.drives
+    return lengths
+
+
 def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """The cables' `pulls` (k, cables, PULL_COLUMNS) and the ground's `pushes` (k, contacts, 3)."""
     model, samples = robot.model, len(motion.times)
     pulls = np.empty((samples, len(model.cables), PULL_COLUMNS))
     pushes = np.empty((samples, len(model.ground.contacts), PUSH_COLUMNS))
     forces = Forces.of(model)
-    forces_along(model, motion.states, motion.modes, motion.signals, forces, pulls, pushes)
+    drives = np.zeros((samples, 0)) if motion.drives is None else motion.drives
+    given = motion.states, motion.modes, motion.signals, drives
+    forces_along(model, *given, forces, pulls, pushes)
     return pulls, pushes if motion.pushes is None else motion.pushes
 
 

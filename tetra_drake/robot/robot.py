@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from tetra_drake.errors import InputError
+from tetra_drake.physics.actuator import DIRECT, WINCH
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, modes_after_step
 from tetra_drake.physics.feedback import Senses
@@ -22,7 +23,7 @@ from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.equilibrium import Rest
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.laws import make_model, rest_of
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.robot.tensegrity import MakeTensegrity
 from tetra_drake.robot.tetrahedra import MakeTetrahedra
 from tetra_drake.scenario import robot_kinds
@@ -130,6 +131,18 @@ class Robot:
         u0 = self.scenario.cpg.external_input
         steered: np.ndarray = steered_input(u0, turns[..., np.newaxis], sides)
         return steered
+
+    def starting_drives(self) -> np.ndarray:
+        """(drives,): free lengths (m) of winches, or tensions (N) of tension motors, at t = 0."""
+        cables, kind = self.structure.cables, self.model.actuator.kind
+        driven = cables[cables["signal"] != PASSIVE]
+        if kind == DIRECT:
+            return np.zeros(0)
+        if kind == WINCH:
+            return driven["free_length"].copy()
+        p_WN = node_positions(self.structure, self.structure.initial_state)
+        lengths = np.linalg.norm(p_WN[driven["node_b"]] - p_WN[driven["node_a"]], axis=1)
+        return np.maximum(driven["stiffness"] * (lengths - driven["free_length"]), 0.0)
 
     def starting_modes(self) -> np.ndarray:
         """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self, TypeVar
 from pydantic import PrivateAttr
 
 from tetra_drake.errors import InputError
+from tetra_drake.scenario.actuator_kinds import Actuation, Force
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
@@ -56,6 +57,7 @@ class Scenario(Section):
     ground: GroundSection
     friction: Friction
     terrain: Terrain = Flat()
+    actuation: Actuation = Force()
     cpg: CpgSection
     gait_bounds: GaitBounds
     simulation: SimulationSection
@@ -205,7 +207,7 @@ def _replacing(tree: Tree, keys: Iterable[str]) -> Tree:
 def _with_tags(tree: Tree, scenario: Scenario) -> Tree:
     """The tree with the tags of all kinds, so that another kind does not merge with them."""
     tagged = {}
-    for name in ("robot", "friction", "terrain", "engine", "optimizer"):
+    for name in ("robot", "friction", "terrain", "actuation", "engine", "optimizer"):
         if name in tree:
             tagged[name] = {TAG: type(getattr(scenario, name)).__name__} | tree[name]
     return tree | tagged
@@ -233,7 +235,7 @@ def check_relations(scenario: Scenario, source: object) -> None:
 
 
 def _check_metrics(scenario: Scenario, source: object) -> None:
-    """Raises InputError for a metric that the robot does not have."""
+    """Raises InputError for a metric that the robot, or its actuators, do not have."""
     metrics: dict[str, Iterable[str]] = {
         "objective": scenario.objective,
         "require": scenario.require,
@@ -242,10 +244,11 @@ def _check_metrics(scenario: Scenario, source: object) -> None:
         metrics["optimizer.measures"] = scenario.optimizer.measures
     for key, names in metrics.items():
         for name in names:
-            if name in scenario.robot.lacking:
-                kind = f"!{type(scenario.robot).__name__}"
-                problem = f"{kind} does not have this metric; give `{key}` without it"
-                raise InputError(source, f"{key}.{name}", problem)
+            for section in (scenario.robot, scenario.actuation):
+                if name in section.lacking:
+                    kind = f"!{type(section).__name__}"
+                    problem = f"{kind} does not have this metric; give `{key}` without it"
+                    raise InputError(source, f"{key}.{name}", problem)
 
 
 def _check_memory(scenario: Scenario, source: object) -> None:

@@ -22,6 +22,7 @@ from tetra_drake.engines.compiled.loop import (
 )
 from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.physics.actuator import DIRECT, DRIVE, Limits
 from tetra_drake.physics.cable import Cables
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.inertia import INERTIA_COLUMNS
@@ -92,6 +93,7 @@ class PreparedGait:
             self.live,
             ground.flat,
             ground.friction.kind,
+            self.robot.model.actuator.kind,
         )
 
     @property
@@ -126,17 +128,28 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
         samples=np.array([sample_count(scenario)], dtype=float),
         start_up=np.array([cpg.start_up]),
         tolerance=np.array([engine.tolerance]),
-        max_step=np.array([engine.max_step]),
+        max_step=np.array([_max_step(robot)]),
         look_ahead=np.array([engine.look_ahead]),
         max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
     )
+
+
+def _max_step(robot: Robot) -> float:
+    """Longest step (s): that of the engine, and no longer than the actuators' time constant, up to
+    which Heun's method is stable."""
+    longest, actuator = robot.scenario.settings_of(Compiled).max_step, robot.model.actuator
+    if actuator.kind == DIRECT:
+        return longest
+    return min(longest, Limits(*actuator.limits).time_constant)
 
 
 def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
     scenario, structure = robot.scenario, robot.structure
     bodies, signals = len(structure.bodies), structure.signals
     contacts, cables = len(structure.contacts), len(structure.cables)
-    velocities = np.zeros(BLOCK * bodies)
+    velocities, forces = np.zeros(BLOCK * bodies), Forces.of(robot.model)
+    drives = np.zeros_like(forces.drives)
+    drives[:, DRIVE] = robot.starting_drives()
     return Walk(
         clock=np.zeros(CLOCK_ROWS),
         asked=np.zeros(ASKED_ROWS),
@@ -153,11 +166,13 @@ def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
             lines=np.zeros((CABLES_AT_ONCE, LINE_COLUMNS)),
             inertia=np.zeros((bodies, INERTIA_COLUMNS)),
         ),
-        forces=Forces.of(robot.model),
+        forces=forces,
         modes=robot.starting_modes(),
         acceleration=velocities,
         signals=np.zeros(signals),
         end_signals=np.zeros(signals),
+        drives=drives,
+        end_drives=drives,
         neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
         output=np.zeros(signals),
         tonic=robot.tonic_input(turns)[0],

@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK, Schedule
-from tetra_drake.physics.cable import DIRECTION
+from tetra_drake.physics.cable import DIRECTION, SLOPE
 from tetra_drake.physics.contact import (
     CONTACT,
     NORMAL,
@@ -210,14 +210,14 @@ def add_cables(
         lines[j, 4] = p_z * d_x - p_x * d_z
         lines[j, 5] = p_x * d_y - p_y * d_x
         lines[j, 6], lines[j, 7], lines[j, 8] = d_x, d_y, d_z
-    damping = robot.cables.damping
+    pulls = forces.pulls
     weights = (
-        time * damping[first],
-        time * damping[min(first + 1, last - 1)],
-        time * damping[min(first + 2, last - 1)],
-        time * damping[min(first + 3, last - 1)],
-        time * damping[min(first + 4, last - 1)],
-        time * damping[min(first + 5, last - 1)],
+        time * pulls[first, SLOPE],
+        time * pulls[min(first + 1, last - 1), SLOPE],
+        time * pulls[min(first + 2, last - 1), SLOPE],
+        time * pulls[min(first + 3, last - 1), SLOPE],
+        time * pulls[min(first + 4, last - 1), SLOPE],
+        time * pulls[min(first + 5, last - 1), SLOPE],
     )
     rear, front = robot.couplings.first[pair], robot.couplings.second[pair]
     turn, shift = column, column + 3  # the columns of the front body's rotation and translation

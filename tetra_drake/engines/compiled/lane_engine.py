@@ -26,6 +26,7 @@ from tetra_drake.engines.compiled.loop import (
     Log,
     advance,
 )
+from tetra_drake.physics.actuator import DRIVE
 from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.tally import Tally
 from tetra_drake.physics.terrain import SurfaceGrid
@@ -64,6 +65,7 @@ class LaneEngine:
             states=np.zeros((*shape, structure.initial_state.size)),
             modes=np.zeros((*shape, len(structure.contacts), MODE_COLUMNS)),
             signals=np.zeros((*shape, signals)),
+            drives=np.zeros((*shape, len(first.start.drives))),
             recent=np.zeros((width, first.recent_signals, signals)),
             turns=np.zeros((width, len(first.turns))),
         )
@@ -116,6 +118,7 @@ class LaneEngine:
         log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
         log.states[lane, 0], log.modes[lane, 0] = walk.step.state, walk.modes
         log.signals[lane, 0] = 0.0
+        log.drives[lane, 0] = walk.drives[:, DRIVE]
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)
         clock[STATUS, lane] = WALKING
@@ -158,6 +161,7 @@ class LaneEngine:
                 states=log.states[lane, kept].copy(),
                 signals=log.signals[lane, kept].copy(),
                 modes=log.modes[lane, kept].copy(),
+                drives=log.drives[lane, kept].copy(),
             ),
             totals=Tally(*(table.array[..., lane].copy() for table in self._walk.tally)),
             wall_time=self._wall_times[lane],

@@ -22,6 +22,7 @@ from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.errors import MAX_SPEED
+from tetra_drake.physics.actuator import DRIVE, RATE, put_drives
 from tetra_drake.physics.cable import LENGTH
 from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.feedback import Senses, sense
@@ -118,6 +119,9 @@ class Walk(NamedTuple):
     signals: Table
     """(n,), at the lane's time; `end_signals` at the end of its step."""
     end_signals: Table
+    drives: Table
+    """(drives, DRIVE_COLUMNS), at the lane's time; `end_drives` at the end of its step."""
+    end_drives: Table
     neurons: Table
     """(2n, NEURON_COLUMNS)."""
     output: Table
@@ -148,6 +152,8 @@ class Log(NamedTuple):
     """(W, samples, contacts, MODE_COLUMNS): those of the step."""
     signals: Table
     """(W, samples, n), in N."""
+    drives: Table
+    """(W, samples, drives)."""
     recent: Table
     """(W, RECENT, n): the latest samples of the listing's signals; see row_of."""
     turns: Table
@@ -188,6 +194,8 @@ def iterate(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
     foresee_signals(constants, walk, log, live)
+    foresee_drives(constants, walk)
+    driven = walk.drives.shape[0] > 0
     error = take_step(
         constants.robot,
         constants.solver,
@@ -196,8 +204,9 @@ def iterate(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
         walk.forces,
         walk.end_signals,
         step,
-        live,
+        live or driven,
     )
+    correct_drives(constants, walk)
 
     accepted = walks & (error <= constants.tolerance[0])
     if live:
@@ -221,6 +230,8 @@ def arrive(constants: Constants, walk: Walk) -> None:
     """Brings the modes up to date with the state, computes its forces and tallies them."""
     robot, forces, state = constants.robot, walk.forces, walk.step.state
     move_robot(robot, state, forces)
+    for i in range(walk.drives.shape[0]):
+        forces.drives[i, DRIVE] = walk.drives[i, DRIVE]
     update_modes(state, forces.nodes, robot.ground, forces.frames, walk.modes)
     compute_forces(robot, state, walk.modes, walk.signals, True, forces, walk.step.force)
     observe(
@@ -251,6 +262,25 @@ def foresee_signals(constants: Constants, walk: Walk, log: Log, live: bool) -> N
 
 
 @inlined
+def foresee_drives(constants: Constants, walk: Walk) -> None:
+    """Notes the drives and their rates at the state, and moves them to the end of the step."""
+    drives = walk.forces.drives
+    for i in range(drives.shape[0]):
+        walk.drives[i, RATE] = drives[i, RATE]
+    put_drives(walk.drives, constants.robot.actuator.limits, walk.clock[STEP], drives)
+
+
+@inlined
+def correct_drives(constants: Constants, walk: Walk) -> None:
+    """Writes the drives at the end of the step, by the mean of the rates at both ends."""
+    drives, end = walk.forces.drives, walk.end_drives
+    for i in range(drives.shape[0]):
+        end[i, DRIVE] = walk.drives[i, DRIVE]
+        end[i, RATE] = 0.5 * (walk.drives[i, RATE] + drives[i, RATE])
+    put_drives(end, constants.robot.actuator.limits, walk.clock[STEP], end)
+
+
+@inlined
 def move_on(walk: Walk, walks: Truth, accepted: Truth) -> None:
     """Makes the end of the step the state where it is accepted."""
     clock, state = walk.clock, walk.step.state
@@ -258,6 +288,9 @@ def move_on(walk: Walk, walks: Truth, accepted: Truth) -> None:
         state[i] = select(accepted, walk.step.end[i], state[i])
     for k in range(walk.signals.size):
         walk.signals[k] = select(accepted, walk.end_signals[k], walk.signals[k])
+    for i in range(walk.drives.shape[0]):
+        end_drive = walk.end_drives[i, DRIVE]
+        walk.drives[i, DRIVE] = select(accepted, end_drive, walk.drives[i, DRIVE])
     clock[TIME] = select(accepted, clock[END], clock[TIME])
     clock[TRIED] += select(walks, 1.0, 0.0)
     clock[TAKEN] += select(accepted, 1.0, 0.0)
@@ -445,6 +478,10 @@ def keep_samples(constants: Constants, walk: Walk, log: Log, live: bool) -> None
                 first, last = by_lane(walk.signals)[k, lane], by_lane(walk.end_signals)[k, lane]
                 between = first + part * (last - first)
                 log.signals[lane, i, k] = between if live else signals[k, lane]
+            drives, end_drives = by_lane(walk.drives), by_lane(walk.end_drives)
+            for k in range(walk.drives.shape[0]):
+                first, last = drives[k, DRIVE, lane], end_drives[k, DRIVE, lane]
+                log.drives[lane, i, k] = first + part * (last - first)
             log.kept[lane] = i + 1
             clock[DUE, lane] = log.times[lane, i + 1]
 

@@ -1,0 +1,122 @@
+"""Actuators: what a signal does to the cable that it drives.
+
+    direct         superimposes a force, without limits (Eq. 6)
+    winch          winds the cable: its free length is a state, commanded as l0 - S / k
+    tension motor  pulls the cable by force control: its tension is a state, commanded as the
+                   whole law of the cable, of which spring and damper are played by software
+
+A *drive* is the state of an actuator, one for each driven cable of a winch or a tension motor.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from tetra_drake.simd.compiling import inlined
+from tetra_drake.simd.lanes import Real, Table, maximum, minimum, named, select
+
+DIRECT, WINCH, TENSION_MOTOR = range(3)
+"""Kinds of actuators."""
+
+DRIVE, RATE, LIMITED, DRIVE_COLUMNS = range(4)
+"""Columns of `drives`, a row per drive: free length (m) of a winch or tension (N) of a tension
+motor, its rate per s, 1 where a limit binds or else 0; and their number."""
+
+
+class Actuator(NamedTuple):
+    """The actuators of all driven cables."""
+
+    kind: int
+    limits: Table
+    """The numbers of Limits."""
+
+
+class Limits(NamedTuple):
+    """What an actuator can do; SI units."""
+
+    max_force: Real
+    max_speed: Real
+    time_constant: Real
+    least_length: Real
+
+
+class CableLaw(NamedTuple):
+    """Constants of a cable in SI units."""
+
+    stiffness: Real
+    damping: Real
+    free_length: Real
+
+
+class Pull(NamedTuple):
+    """What an actuator does to its cable."""
+
+    tension: Real
+    """N."""
+    slope: Real
+    """How much the tension rises with the rate of the length, N s/m."""
+    rate: Real
+    """Rate of the drive, per s."""
+    limited: Real
+    """1 where a limit binds, or else 0."""
+
+
+@inlined
+def winch_pull(
+    drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
+) -> Pull:
+    """Pull of a winch whose cable has a free length `drive`, for a cable that lengthens at `rate`.
+
+    It follows its command with a lag, pays out at max_speed at most, and winds at most at
+    max_speed (1 - tension / max_force). Above max_force it is driven backward. The tension depends
+    on the winding by the cable's damping, and the winding on the tension by the force-speed line:
+    both are linear, so they are solved together.
+    """
+    elastic = law.stiffness * (length - drive)
+    wanted = (law.free_length - signal / law.stiffness - drive) / limits.time_constant
+    allowed = minimum(wanted, limits.max_speed)
+    allowed = select(drive <= limits.least_length, maximum(allowed, 0.0), allowed)
+    per_force = limits.max_speed / limits.max_force
+    stiffening = 1.0 + per_force * law.damping
+    on_line = (per_force * (elastic + law.damping * rate) - limits.max_speed) / stiffening
+    slowed = on_line > maximum(allowed, -limits.max_speed)
+    winds = maximum(allowed, maximum(on_line, -limits.max_speed))
+    tension = elastic + law.damping * (rate - winds)
+    slope = select(slowed, law.damping / stiffening, law.damping)
+    return Pull(
+        tension=maximum(tension, 0.0),
+        slope=select(tension > 0.0, slope, 0.0),
+        rate=winds,
+        limited=select(winds != wanted, 1.0, 0.0),
+    )
+
+
+@inlined
+def motor_pull(
+    drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
+) -> Pull:
+    """Pull of a tension motor of tension `drive`, for a cable that lengthens at `rate`.
+
+    It follows its command with a lag, pulls with max_force at most, and less the faster it winds:
+    max_force (1 - winding speed / max_speed).
+    """
+    left = minimum(maximum(1.0 + rate / limits.max_speed, 0.0), 1.0)
+    most = limits.max_force * left
+    on_line = (drive > most) & (left > 0.0) & (left < 1.0)
+    command = law.stiffness * (length - law.free_length) + law.damping * rate + signal
+    target = minimum(maximum(command, 0.0), limits.max_force)
+    limited = (drive > most) | (command > limits.max_force)
+    return Pull(
+        tension=minimum(drive, most),
+        slope=select(on_line, limits.max_force / limits.max_speed, 0.0),
+        rate=(target - drive) / limits.time_constant,
+        limited=select(limited, 1.0, 0.0),
+    )
+
+
+@inlined
+def put_drives(drives: Table, limits: Table, step: Real, moved: Table) -> None:
+    """Writes the drives after a step (s) at their rates, which begins at `drives`, as `moved`."""
+    least = named(Limits, limits).least_length
+    for i in range(drives.shape[0]):
+        moved[i, DRIVE] = maximum(drives[i, DRIVE] + step * drives[i, RATE], least)
