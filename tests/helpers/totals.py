@@ -13,6 +13,7 @@ def make_totals(bodies: int = 5) -> Tally:
         begins=np.array([3.0]),
         time=np.array([15.0]),
         work=np.array([0.3]),
+        effort=np.array([4.0, 96.0, 0.2, 4.8, 0.5, 24.0, 9.6]),
         roughness=np.array([48.0]),
         lifted=np.arange(float(bodies)),
         tension=np.array([1.0]),

@@ -5,11 +5,14 @@ import math
 import numpy as np
 import pytest
 
+from tetra_drake.physics.actuator import DIRECT, DRIVE_COLUMNS
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, Cables
-from tetra_drake.physics.tally import Tally, observe
+from tetra_drake.physics.tally import EFFORT_COLUMNS, Tally, observe
 
 CABLES = Cables([3, 3], [4, 5], [0, PASSIVE], [1.0, 1.0], [0.0, 0.0], [0.0, 0.0])
 """The first is driven."""
+
+NO_DRIVES = np.zeros((0, DRIVE_COLUMNS))
 
 CARRIERS = np.array([0, 0, 1])
 """Two contacts of the first body and one of the second."""
@@ -22,6 +25,7 @@ def tallied(times, *, lengths, signals, tensions=None, loads=None, begins=0.0) -
     tally = Tally(*columns)._replace(
         begins=np.array([begins]), lengths=np.zeros(2), lifted=np.zeros(2), tension=np.full(1, 99.0)
     )
+    tally = tally._replace(effort=np.zeros(EFFORT_COLUMNS))
     pulls, pushes = np.zeros((2, PULL_COLUMNS)), np.zeros((3, 3))
     for k, time in enumerate(times):
         pulls[:, LENGTH] = lengths[k]
@@ -29,7 +33,8 @@ def tallied(times, *, lengths, signals, tensions=None, loads=None, begins=0.0) -
         pushes[:, 2] = 0.0 if loads is None else loads[k]
         # The rate of signals is 0 / 0 where no time has passed, which counts for nothing.
         with np.errstate(divide="ignore", invalid="ignore"):
-            observe(tally, CABLES, CARRIERS, time, np.array([signals[k]]), pulls, pushes)
+            signal = np.array([signals[k]])
+            observe(tally, CABLES, CARRIERS, DIRECT, time, signal, NO_DRIVES, pulls, pushes)
     return tally
 
 

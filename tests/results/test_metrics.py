@@ -103,6 +103,14 @@ def test_totals_become_metrics(robot: Robot) -> None:
     assert metrics.lifted == pytest.approx(2.0 / 12.0)
     assert (metrics.clearance, metrics.tension) == (0.01, 1.0)
     assert metrics.travelling_index == 0.0
+    # Eight driven cables in 12 s: the integrals are over 96 s of actuators.
+    assert metrics.peak_actuator_force == 4.0
+    assert metrics.mean_actuator_force == pytest.approx(1.0)
+    assert metrics.peak_actuator_speed == 0.2
+    assert metrics.mean_actuator_speed == pytest.approx(0.05)
+    assert metrics.peak_actuator_power == 0.5
+    assert metrics.mean_actuator_power == pytest.approx(0.25)
+    assert math.isnan(metrics.actuator_limited), "forces have no limits"
     phases = 0.5 * np.pi * (np.arange(48)[:, None] / 4.0 - np.arange(4.0))
     travelling = walked(robot, 0.24, signals=np.sin(phases))
     assert travelling.travelling_index == pytest.approx(1.0)

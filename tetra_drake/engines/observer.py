@@ -72,6 +72,15 @@ def observe_states(
         update_modes(states[k], forces.nodes, robot.ground, forces.frames, modes)
         forces.drives[:, DRIVE] = drives[k]
         compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
-        cables, carriers = robot.cables, robot.ground.carriers
-        observe(tally, cables, carriers, times[k], signals[k], forces.pulls, forces.pushes)
+        observe(
+            tally,
+            robot.cables,
+            robot.ground.carriers,
+            robot.actuator.kind,
+            times[k],
+            signals[k],
+            forces.drives,
+            forces.pulls,
+            forces.pushes,
+        )
         look(tally, robot, states[k], forces.nodes)

@@ -11,7 +11,7 @@ import numpy as np
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario.disturbances import IterationSeed
-from tetra_drake.scenario.metric_units import LEAST
+from tetra_drake.scenario.metric_units import LEAST, MOST
 
 
 class SeededVector(NamedTuple):
@@ -37,7 +37,7 @@ def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
 
 
 def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Means, or the least of LEAST, of each metric; none if a draw has none."""
+    """Means, least or greatest values of each metric; none if a draw has none."""
     if not all(draws):
         return {}
     return {name: _combined(name, [draw[name] for draw in draws]) for name in draws[0]}
@@ -48,6 +48,8 @@ def _combined(name: str, values: Sequence[Any]) -> Any:
         return None
     if name in LEAST:
         return min(values)
+    if name in MOST:
+        return max(values)
     return np.mean(values, axis=0).tolist()
 
 

@@ -8,11 +8,23 @@ from collections.abc import Mapping
 import numpy as np
 
 from tetra_drake.formatting import fixed
-from tetra_drake.physics.tally import Tally
+from tetra_drake.physics.actuator import DIRECT
+from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.tally import (
+    EFFORT_COLUMNS,
+    FORCE,
+    LIMITED_TIME,
+    PEAK_FORCE,
+    PEAK_POWER,
+    PEAK_SPEED,
+    POWER,
+    SPEED,
+    Tally,
+)
 from tetra_drake.results.measures import travelling_index
 from tetra_drake.results.path import CentrePath, curvature
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
+from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, MOST, Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
 
@@ -26,6 +38,7 @@ def empty_tally(robot: Robot) -> Tally:
         signals=np.zeros(structure.signals),
         lengths=np.zeros(len(structure.cables)),
         work=np.zeros(1),
+        effort=np.zeros(EFFORT_COLUMNS),
         roughness=np.zeros(1),
         lifted=np.zeros(len(structure.bodies)),
         tension=np.array([math.inf]),
@@ -67,6 +80,10 @@ def compute_metrics(
     steady_time = max(0.0, totals.time[0] - totals.begins[0])
     per_time = 1.0 / (steady_time or 1)
     lifted = (per_time * totals.lifted).tolist()
+    driven = int(np.count_nonzero(structure.cables["signal"] != PASSIVE))
+    effort = totals.effort.tolist()
+    mean_effort = [per_time / (driven or 1) * item for item in effort]
+    limited = math.nan if robot.model.actuator.kind == DIRECT else mean_effort[LIMITED_TIME]
     return Metrics(
         distance=float(marker[0] - marker_start[0]),
         steady_distance=float(marker[0] - marker_steady[0]),
@@ -83,6 +100,13 @@ def compute_metrics(
         clearance=float(totals.clearance[0]),
         tension=float(totals.tension[0]),
         travelling_index=travelling_index(signals),
+        peak_actuator_force=effort[PEAK_FORCE],
+        mean_actuator_force=mean_effort[FORCE],
+        peak_actuator_speed=effort[PEAK_SPEED],
+        mean_actuator_speed=mean_effort[SPEED],
+        peak_actuator_power=effort[PEAK_POWER],
+        mean_actuator_power=mean_effort[POWER],
+        actuator_limited=limited,
         lifted_shares=tuple(lifted),
     )
 
@@ -119,11 +143,13 @@ def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
 
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:
-    """Metrics below their required SI values, or NaN: name, value and limit, as
+    """Metrics beyond their required SI values, or NaN: name, value and limit, as
     "clearance is 0.05 in, less than 0.125 in"."""
     texts = []
-    for name, least in require.items():
+    for name, limit in require.items():
         value, unit = getattr(metrics, name), METRICS[name]
-        if not value >= least:
-            texts.append(f"{name} is {shown(value, unit)}, less than {shown(least, unit)}")
+        is_met = value <= limit if name in MOST else value >= limit
+        if not is_met:
+            beyond = "more" if name in MOST else "less"
+            texts.append(f"{name} is {shown(value, unit)}, {beyond} than {shown(limit, unit)}")
     return texts

@@ -8,7 +8,7 @@ from tetra_drake.scenario.sections import Kinds, Section, quantity
 class Force(Section):
     """Signals are forces, superimposed on cables without limits (thesis section 2.1.3)."""
 
-    lacking: ClassVar[tuple[str, ...]] = ("limited",)
+    lacking: ClassVar[tuple[str, ...]] = ("actuator_limited",)
     """Metrics that walks with such actuators do not have."""
 
 

@@ -18,13 +18,14 @@ LEAST_WAY = 1e-3
 """m: a robot that goes less far counts as gone so far in its cost of transport."""
 
 
-def _metric(unit: str, *, least: bool = False, of_a_row: bool = False) -> Any:
+def _metric(unit: str, *, least: bool = False, most: bool = False, of_a_row: bool = False) -> Any:
     """A field of Metrics in the SI unit `unit`, "" for none.
 
     least: True if of several simulations the least value is recorded, in place of the mean.
+    most: True if it is the greatest value, and a requirement is an upper limit.
     of_a_row: True if only the row of tetrahedra has the metric.
     """
-    return field(metadata={"unit": unit, "least": least, "of_a_row": of_a_row})
+    return field(metadata={"unit": unit, "least": least, "most": most, "of_a_row": of_a_row})
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,20 @@ class Metrics:
     travelling_index: float = _metric("")
     """0 if the signals stand along the robot, 1 if they travel, in the steady stretch. See
     results.measures."""
+    peak_actuator_force: float = _metric("N", most=True)
+    """Greatest tension of a driven cable in the steady stretch, as are the next ones."""
+    mean_actuator_force: float = _metric("N")
+    """Mean tension of the driven cables."""
+    peak_actuator_speed: float = _metric("m/s", most=True)
+    """Greatest speed at which an actuator winds: a winch its free length, another one its cable."""
+    mean_actuator_speed: float = _metric("m/s")
+    """Mean speed, winding or paying out."""
+    peak_actuator_power: float = _metric("W", most=True)
+    """Greatest product of an actuator's tension and winding speed."""
+    mean_actuator_power: float = _metric("W")
+    """Mean positive power of an actuator."""
+    actuator_limited: float = _metric("", most=True)
+    """Share of time in which a limit binds, mean of all winches or tension motors."""
     lifted_shares: tuple[float, ...] = ()
     """The share of `lifted` of each tetrahedron, from T1 on."""
 
@@ -109,6 +124,9 @@ METRICS_OF_A_ROW = tuple(field.name for field in _FIELDS if field.metadata["of_a
 
 LEAST = tuple(field.name for field in _FIELDS if field.metadata["least"])
 """Metrics of which the least of several simulations is recorded, in place of their mean."""
+
+MOST = tuple(field.name for field in _FIELDS if field.metadata["most"])
+"""Metrics of which the greatest is recorded; their requirements are upper limits."""
 
 
 def inverse(unit: str) -> str:

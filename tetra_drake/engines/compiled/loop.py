@@ -238,8 +238,10 @@ def arrive(constants: Constants, walk: Walk) -> None:
         walk.tally,
         robot.cables,
         robot.ground.carriers,
+        robot.actuator.kind,
         walk.clock[TIME],
         walk.signals,
+        forces.drives,
         forces.pulls,
         forces.pushes,
     )
