@@ -49,27 +49,11 @@ def cable_nodes(junction: int, cable: str) -> tuple[int, int]:
     return 4 * junction + rear, 4 * (junction + 1) + place
 
 
-def row_layout(
-    *, tetrahedra: int, strut_length: float, spacing: float, groups: Sequence[Sequence[str]]
-) -> Layout:
-    """The layout of a row on flat ground; each junction has the same groups of driven cables."""
-    forward = spacing * np.arange(tetrahedra)[:, np.newaxis, np.newaxis] * [1.0, 0.0, 0.0]
-    p_WN = (forward + tetrahedron_nodes(strut_length)).reshape(-1, 3)
-    cables = [(junction, cable) for junction in range(tetrahedra - 1) for cable in CABLES]
-    nodes = np.array([cable_nodes(*cable) for cable in cables])
-    oscillators, driven = [], []
-    for junction in range(tetrahedra - 1):
-        name = f"T{junction + 1}-T{junction + 2}"
-        for group in groups:
-            oscillators.append(f"{name} {' + '.join(group)}" if len(groups) > 1 else name)
-            driven.append(tuple(cables.index((junction, cable)) for cable in group))
-    return Layout(
-        cable_names=tuple(f"T{i + 1}-T{i + 2} {cable}" for i, cable in cables),
-        ends=p_WN[nodes],
-        bodies=nodes // len(NODES),
-        oscillators=tuple(oscillators),
-        groups=tuple(driven),
-    )
+def check_offsets(offsets: Sequence[Sequence[float]], bodies: int) -> None:
+    """Refuses displacements of bodies that are not one for each."""
+    if len(offsets) not in (0, bodies):
+        expected = f"expected none or {bodies}, one for each body"
+        refuse("offsets", f"found {len(offsets)} items, {expected}")
 
 
 class RowCables(Section):
@@ -115,11 +99,6 @@ class Tetrahedra(Section):
         return self.tetrahedra
 
     @property
-    def oscillator_count(self) -> int:
-        """One neural oscillator for each group of cables of each junction between tetrahedra."""
-        return len(self.actuation) * (self.tetrahedra - 1)
-
-    @property
     def slack(self) -> bool:
         """True if the cables never push."""
         return self.cables.slack
@@ -130,12 +109,27 @@ class Tetrahedra(Section):
         return self.spacing
 
     def layout(self) -> Layout:
-        """Cables and oscillators of the robot."""
-        return row_layout(
-            tetrahedra=self.tetrahedra,
-            strut_length=self.strut_length,
-            spacing=self.spacing,
-            groups=self.actuation,
+        """Cables and oscillators of the robot on flat ground."""
+        forward = self.spacing * np.arange(self.tetrahedra)[:, np.newaxis, np.newaxis]
+        p_BN = tetrahedron_nodes(self.strut_length)
+        p_WN = (forward * [1.0, 0.0, 0.0] + p_BN).reshape(-1, 3)
+        names: list[str] = []
+        nodes: list[tuple[int, int]] = []
+        oscillators, groups = [], []
+        for junction in range(self.tetrahedra - 1):
+            name = f"T{junction + 1}-T{junction + 2}"
+            for group in self.actuation:
+                several = len(self.actuation) > 1
+                oscillators.append(f"{name} {' + '.join(group)}" if several else name)
+                groups.append(tuple(len(names) + CABLES.index(cable) for cable in group))
+            names += [f"{name} {cable}" for cable in CABLES]
+            nodes += [cable_nodes(junction, cable) for cable in CABLES]
+        return Layout(
+            cable_names=tuple(names),
+            ends=p_WN[np.array(nodes)],
+            bodies=np.array(nodes) // len(NODES),
+            oscillators=tuple(oscillators),
+            groups=tuple(groups),
         )
 
     def following(self, base: Section, changes: Tree) -> Tree:
@@ -161,9 +155,7 @@ class Tetrahedra(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
-        if len(self.offsets) not in (0, self.tetrahedra):
-            problem = f"found {len(self.offsets)} items, expected none or {self.tetrahedra}"
-            refuse("offsets", f"{problem}, one for each tetrahedron")
+        check_offsets(self.offsets, self.tetrahedra)
         if not self.actuation or not all(self.actuation):
             refuse("actuation", f"found {self.actuation}, expected groups of at least one cable")
         cables = [cable for group in self.actuation for cable in group]
@@ -191,21 +183,17 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
     near, far = 0.0, height + cables.free_length
     if pull(near) >= 0.0:
         refuse("", "the cables balance at no spacing; give one")
-    middle = 0.5 * (near + far)
-    while near < middle < far:
+    for _ in range(100):  # more than double precision has halvings
+        middle = 0.5 * (near + far)
         if pull(middle) > 0.0:
             far = middle
         else:
             near = middle
-        middle = 0.5 * (near + far)
     return far
 
 
 def _deciding_numbers(robot: Tetrahedra) -> tuple[float, ...]:
     """The numbers on which the balanced spacing depends."""
-    return (
-        robot.strut_length,
-        robot.cables.outer_stiffness,
-        robot.cables.inner_stiffness,
-        robot.cables.free_length,
-    )
+    cables = robot.cables
+    stiffness = cables.outer_stiffness, cables.inner_stiffness
+    return (*stiffness, cables.free_length, robot.strut_length)

@@ -18,6 +18,7 @@ from tetra_drake.scenario.sections import (
     Section,
     Tree,
     Whole,
+    flattened,
     hint,
     merge,
     quantity,
@@ -87,7 +88,7 @@ class Scenario(Section):
     @property
     def oscillators(self) -> int:
         """The number of neural oscillators."""
-        return self.robot.oscillator_count
+        return len(self.robot.layout().oscillators)
 
     @property
     def engine_name(self) -> str:
@@ -108,7 +109,7 @@ class Scenario(Section):
     @classmethod
     def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
         """The scenario of a complete tree; raises InputError that names `source` and key."""
-        tree = merge({}, with_structure(tree, source))
+        tree = merge({}, with_structure(_replacing(tree, tree), source))
         scenario = super().from_tree(tree, source, key=key)
         scenario._tree = _with_tags(tree, scenario)
         check_relations(scenario, source)
@@ -146,60 +147,39 @@ class Scenario(Section):
 
     def with_numbers(self, numbers: Mapping[str, float]) -> Self:
         """A copy with other SI numbers by dotted keys, which are not checked."""
-        changed = self
+        changed = self.with_sections()
         for key, number in numbers.items():
-            section, *names = key.split(".")
-            copy = _with_number(getattr(changed, section), names, number)
-            changed = changed.with_sections(**{section: copy})
+            changed = _with_number(changed, key.split("."), number)
         return changed
 
     def numbers(self) -> dict[str, float]:
         """The SI numbers of the sections but `disturbances`, by their dotted keys."""
-        numbers: dict[str, float] = {}
-        for name in type(self).model_fields:
-            section = getattr(self, name)
-            if isinstance(section, Section) and name != "disturbances":
-                _collect_numbers(section, name, numbers)
-        return numbers
+        tree = self.model_dump(exclude={"disturbances", "objective", "require"})
+        return {key: value for key, value in flattened(tree).items() if type(value) is float}
 
 
-def _with_number(
-    value: Section | Mapping[str, Any], names: Sequence[str], number: float
-) -> Section | Mapping[str, Any]:
+def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
     """A copy of a section, or of a mapping by names, with another number where names lead."""
+    if not names:
+        return number
     name, *rest = names
     if isinstance(value, Section):
-        item = _with_number(getattr(value, name), rest, number) if rest else number
-        return value.model_copy(update={name: item})
-    item = _with_number(value[name], rest, number) if rest else number
-    return {**value, name: item}
-
-
-def _collect_numbers(
-    value: Section | Mapping[str, Any], key: str, numbers: dict[str, float]
-) -> None:
-    """Adds the numbers of a section, or of a mapping by names, by their dotted keys."""
-    if isinstance(value, Section):
-        value = {name: getattr(value, name) for name in type(value).model_fields}
-    for name, item in value.items():
-        if type(item) is float:
-            numbers[f"{key}.{name}"] = item
-        elif isinstance(item, (Section, dict)):
-            _collect_numbers(item, f"{key}.{name}", numbers)
+        return value.model_copy(update={name: _with_number(getattr(value, name), rest, number)})
+    return {**value, name: _with_number(value[name], rest, number)}
 
 
 def _replacing(tree: Tree, keys: Iterable[str]) -> Tree:
     """A tree whose objective, requirements and actuated cables replace those of a base, if they, or
     the robot, are in `keys`."""
-    whole: Tree = {}
+    tree = dict(tree)
     for name in ("objective", "require"):
         if name in keys and isinstance(tree[name], dict):
-            whole[name] = Whole(tree[name])
+            tree[name] = Whole(tree[name])
     robot = tree.get("robot")
     is_given = "robot" in keys or "robot.actuated" in keys
     if is_given and type(robot) is dict and isinstance(robot.get("actuated"), dict):
-        whole["robot"] = robot | {"actuated": Whole(robot["actuated"])}
-    return tree | whole
+        tree["robot"] = robot | {"actuated": Whole(robot["actuated"])}
+    return tree
 
 
 def _with_tags(tree: Tree, scenario: Scenario) -> Tree:
@@ -234,14 +214,14 @@ def check_relations(scenario: Scenario, source: object) -> None:
 
 def _check_metrics(scenario: Scenario, source: object) -> None:
     """Raises InputError for a metric that the robot does not have."""
-    metrics: dict[str, Iterable[str]] = {
-        "objective": scenario.objective,
-        "require": scenario.require,
-    }
-    if isinstance(scenario.optimizer, QualityDiversity):
-        metrics["optimizer.measures"] = scenario.optimizer.measures
-    for key, names in metrics.items():
-        for name in names:
+    optimizer = scenario.optimizer
+    measures = optimizer.measures if isinstance(optimizer, QualityDiversity) else {}
+    for key, metrics in (
+        ("objective", scenario.objective),
+        ("require", scenario.require),
+        ("optimizer.measures", measures),
+    ):
+        for name in metrics:
             if name in scenario.robot.lacking:
                 kind = f"!{type(scenario.robot).__name__}"
                 problem = f"{kind} does not have this metric; give `{key}` without it"
