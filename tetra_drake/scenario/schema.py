@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Self, TypeVar
 
-from pydantic import PrivateAttr
+from pydantic import PrivateAttr, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
-from tetra_drake.scenario.optimizer_kinds import OptimizerKind, QualityDiversity, SteadyState
+from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.robot_kinds import Robot
 from tetra_drake.scenario.sections import (
     TAG,
@@ -22,6 +22,7 @@ from tetra_drake.scenario.sections import (
     hint,
     merge,
     quantity,
+    refuse,
     tree_of,
     tree_of_changes,
 )
@@ -80,6 +81,88 @@ class Scenario(Section):
         # Units in which a number was written do not matter.
         return type(other) is type(self) and vars(other) == vars(self)
 
+    @model_validator(mode="after")
+    def _check(self) -> Scenario:
+        """Refuses settings of different sections that cannot go together."""
+        if not self.objective:
+            refuse("objective", "found no metric, expected one at least")
+        step, duration = self.cpg.listing_step, self.simulation.duration
+        if step > duration:
+            expected = f"expected at most the duration, {duration} s"
+            refuse("cpg.listing_step", f"found {step} s, {expected}")
+        evaluations, optimizer = self.evolution.evaluations, self.optimizer
+        if isinstance(optimizer, SteadyState) and evaluations < optimizer.population:
+            expected = f"expected at least the population, {optimizer.population}"
+            refuse("evolution.evaluations", f"found {evaluations}, {expected}")
+        if "load" in self.cpg.feedback and self.robot.gravity == 0.0:
+            refuse("robot.gravity", "found 0 m/s^2, expected a weight, for feedback of the load")
+        self._check_metrics()
+        self._check_memory()
+        self._check_sides()
+        self._check_disturbances()
+        return self
+
+    def _check_metrics(self) -> None:
+        """Refuses a metric that the robot does not have."""
+        measures = getattr(self.optimizer, "measures", {})
+        for key, metrics in (
+            ("objective", self.objective),
+            ("require", self.require),
+            ("optimizer.measures", measures),
+        ):
+            for name in metrics:
+                if name in self.robot.lacking:
+                    kind = f"!{type(self.robot).__name__}"
+                    problem = f"{kind} does not have this metric; give `{key}` without it"
+                    refuse(f"{key}.{name}", problem)
+
+    def _check_memory(self) -> None:
+        """Refuses what does not fit in memory."""
+        duration, sample_period = self.simulation.duration, self.simulation.sample_period
+        is_drake = isinstance(self.engine, Drake)
+        most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
+        least_step = duration * self.oscillators / most_signals
+        least_sample = duration * self.robot.body_count / MOST_SAMPLES
+        periods = [
+            ("cpg.listing_step", self.cpg.listing_step, least_step),
+            ("simulation.sample_period", sample_period, least_sample),
+        ]
+        if isinstance(self.engine, Mujoco):
+            periods.append(("engine.step", self.engine.step, least_step))
+        for key, period, least in periods:
+            if period < least:
+                problem = f"found {period} s, expected at least {least:.3g} s, to fit in memory"
+                refuse(key, f"{problem}, for this duration and robot")
+
+    def _check_sides(self) -> None:
+        """Refuses gaits that turn, or are mirrored, where groups of cables have no sides."""
+        layout, bounds = self.robot.layout(), self.gait_bounds
+        if bounds.turn != 0.0 and not layout.sides.any():
+            expected = "expected 0, as no group is on one side"
+            refuse("gait_bounds.turn", f"found {bounds.turn}, {expected}")
+        if bounds.mirrored and None in layout.images:
+            oscillator = layout.oscillators[layout.images.index(None)]
+            expected = f"expected false, as '{oscillator}' has no mirror image"
+            refuse("gait_bounds.mirrored", f"found true, {expected}")
+
+    def _check_disturbances(self) -> None:
+        """Refuses draws that change a number further than it can be changed."""
+        if self.disturbances is None:
+            return
+        undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()
+        for joined, spread in self.disturbances.spreads.items():
+            place, keys = f"disturbances.spreads.{joined}", separate(joined)
+            for key in keys:
+                if key not in numbers:
+                    refuse(place, f"'{key}' is no number of the scenario; {hint(key, numbers)}")
+            for factor in (1.0 - spread, 1.0 + spread):
+                changed = undisturbed.with_numbers({key: factor * numbers[key] for key in keys})
+                try:
+                    self.from_tree(changed.tree, place)
+                except InputError as error:
+                    problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
+                    refuse(place, problem)
+
     @property
     def tree(self) -> Tree:
         """Content of a complete file of this scenario, in the units in which it was written."""
@@ -112,7 +195,6 @@ class Scenario(Section):
         tree = merge({}, with_structure(_replacing(tree, tree), source))
         scenario = super().from_tree(tree, source, key=key)
         scenario._tree = _with_tags(tree, scenario)
-        check_relations(scenario, source)
         return scenario
 
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
@@ -189,92 +271,3 @@ def _with_tags(tree: Tree, scenario: Scenario) -> Tree:
         if name in tree:
             tagged[name] = {TAG: type(getattr(scenario, name)).__name__} | tree[name]
     return tree | tagged
-
-
-def check_relations(scenario: Scenario, source: object) -> None:
-    """Raises InputError where settings of different sections cannot go together."""
-    if not scenario.objective:
-        raise InputError(source, "objective", "found no metric, expected one at least")
-    step, duration = scenario.cpg.listing_step, scenario.simulation.duration
-    if step > duration:
-        problem = f"found {step} s, expected at most the duration, {duration} s"
-        raise InputError(source, "cpg.listing_step", problem)
-    evaluations, optimizer = scenario.evolution.evaluations, scenario.optimizer
-    if isinstance(optimizer, SteadyState) and evaluations < optimizer.population:
-        problem = f"found {evaluations}, expected at least the population, {optimizer.population}"
-        raise InputError(source, "evolution.evaluations", problem)
-    if "load" in scenario.cpg.feedback and scenario.robot.gravity == 0.0:
-        problem = "found 0 m/s^2, expected a weight, for feedback of the load"
-        raise InputError(source, "robot.gravity", problem)
-    _check_metrics(scenario, source)
-    _check_memory(scenario, source)
-    _check_sides(scenario, source)
-    _check_disturbances(scenario, source)
-
-
-def _check_metrics(scenario: Scenario, source: object) -> None:
-    """Raises InputError for a metric that the robot does not have."""
-    optimizer = scenario.optimizer
-    measures = optimizer.measures if isinstance(optimizer, QualityDiversity) else {}
-    for key, metrics in (
-        ("objective", scenario.objective),
-        ("require", scenario.require),
-        ("optimizer.measures", measures),
-    ):
-        for name in metrics:
-            if name in scenario.robot.lacking:
-                kind = f"!{type(scenario.robot).__name__}"
-                problem = f"{kind} does not have this metric; give `{key}` without it"
-                raise InputError(source, f"{key}.{name}", problem)
-
-
-def _check_memory(scenario: Scenario, source: object) -> None:
-    """Raises InputError for what does not fit in memory."""
-    simulation = scenario.simulation
-    is_drake = isinstance(scenario.engine, Drake)
-    most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
-    least_step = simulation.duration * scenario.oscillators / most_signals
-    least_sample = simulation.duration * scenario.robot.body_count / MOST_SAMPLES
-    periods = [
-        ("cpg.listing_step", scenario.cpg.listing_step, least_step),
-        ("simulation.sample_period", simulation.sample_period, least_sample),
-    ]
-    if isinstance(scenario.engine, Mujoco):
-        periods.append(("engine.step", scenario.engine.step, least_step))
-    for key, period, least in periods:
-        if period < least:
-            problem = f"found {period} s, expected at least {least:.3g} s, to fit in memory"
-            raise InputError(source, key, f"{problem}, for this duration and robot")
-
-
-def _check_sides(scenario: Scenario, source: object) -> None:
-    """Raises InputError if gaits turn, or are mirrored, where groups of cables have no sides."""
-    layout, bounds = scenario.robot.layout(), scenario.gait_bounds
-    if bounds.turn != 0.0 and not layout.sides.any():
-        problem = f"found {bounds.turn}, expected 0, as no group is on one side"
-        raise InputError(source, "gait_bounds.turn", problem)
-    if bounds.mirrored and None in layout.images:
-        oscillator = layout.oscillators[layout.images.index(None)]
-        problem = f"found true, expected false, as '{oscillator}' has no mirror image"
-        raise InputError(source, "gait_bounds.mirrored", problem)
-
-
-def _check_disturbances(scenario: Scenario, source: object) -> None:
-    """Raises InputError if a number that draws change cannot be changed that far."""
-    if scenario.disturbances is None:
-        return
-    undisturbed = scenario.with_sections(disturbances=None)
-    numbers = scenario.numbers()
-    for joined, spread in scenario.disturbances.spreads.items():
-        place, keys = f"disturbances.spreads.{joined}", separate(joined)
-        for key in keys:
-            if key not in numbers:
-                problem = f"'{key}' is no number of the scenario; {hint(key, numbers)}"
-                raise InputError(source, place, problem)
-        for factor in (1.0 - spread, 1.0 + spread):
-            changed = undisturbed.with_numbers({key: factor * numbers[key] for key in keys})
-            try:
-                type(scenario).from_tree(changed.tree, source)
-            except InputError as error:
-                problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
-                raise InputError(source, place, problem) from error
