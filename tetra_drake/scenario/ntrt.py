@@ -85,23 +85,6 @@ class Builder(Section):
     ] = Field(alias="class")
     parameters: Parameters = Parameters()
 
-    def group(self, pairs: list[Pair], unit: float) -> StrutGroup | CableGroup:
-        """The pairs as a group; unit: length of NTRT's unit in m."""
-        given = self.parameters
-        if self.made_as == "tgRodInfo":
-            return StrutGroup.model_construct(
-                pairs=pairs,
-                diameter=2.0 * given.radius * unit,
-                density=given.density / unit**3,
-                node_diameter=0.0,
-            )
-        return CableGroup.model_construct(
-            pairs=pairs,
-            stiffness=given.stiffness,
-            damping=given.damping,
-            tension=given.pretension * unit,
-        )
-
 
 DEFAULTS = {
     "rod": Builder.model_validate({"class": "tgRodInfo"}),
@@ -220,12 +203,24 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     for name, p_W in whole.nodes.items():
         structure.nodes[_without_dots(name)] = (unit * p_W[[2, 0, 1]]).tolist()
     for tags, pairs in whole.pairs.items():
-        named = [[_without_dots(node) for node in pair] for pair in pairs]
-        group = _builder_of(tags, whole.builders, file).group(named, unit)
-        groups: dict[str, Any] = structure.cables
-        if isinstance(group, StrutGroup):
-            groups = structure.struts
-        groups[_without_dots(tags).replace(" ", "/")] = group
+        name = _without_dots(tags).replace(" ", "/")
+        named_pairs = [[_without_dots(node) for node in pair] for pair in pairs]
+        builder = _builder_of(tags, whole.builders, file)
+        given = builder.parameters
+        if builder.made_as == "tgRodInfo":
+            structure.struts[name] = StrutGroup.model_construct(
+                pairs=named_pairs,
+                diameter=2.0 * given.radius * unit,
+                density=given.density / unit**3,
+                node_diameter=0.0,
+            )
+        else:
+            structure.cables[name] = CableGroup.model_construct(
+                pairs=named_pairs,
+                stiffness=given.stiffness,
+                damping=given.damping,
+                tension=given.pretension * unit,
+            )
     return tree_of(structure)
 
 

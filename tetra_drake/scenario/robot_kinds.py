@@ -197,7 +197,15 @@ class Structure(Section):
     @cached_property
     def cables_of_oscillator(self) -> dict[str, tuple[int, ...]]:
         """The numbers of the cables that each oscillator drives."""
-        numbers = self._cable_numbers()
+        numbers = {}
+        for number, cable in enumerate(self.all_cables):
+            backward = cable._replace(nodes=cable.nodes[::-1])
+            numbers[cable.name] = numbers[backward.name] = number
+        for oscillator, names in self.actuated.items():
+            for place, name in enumerate(names):
+                if name not in numbers:
+                    problem = f"found unknown cable '{name}'; {hint(name, numbers)}"
+                    refuse(f"actuated.{oscillator}[{place}]", problem)
         return {
             oscillator: tuple(numbers[name] for name in names)
             for oscillator, names in self.actuated.items()
@@ -208,14 +216,6 @@ class Structure(Section):
         """The nodes that the ground can touch, in the order of `nodes`."""
         touching = self.nodes if self.contacts == "all" else self.contacts
         return tuple(node for node in self.nodes if node in touching)
-
-    def _cable_numbers(self) -> dict[str, int]:
-        """The numbers of the cables by their names, for both orders of the nodes."""
-        numbers = {}
-        for number, cable in enumerate(self.all_cables):
-            backward = cable._replace(nodes=cable.nodes[::-1])
-            numbers[cable.name] = numbers[backward.name] = number
-        return numbers
 
     def _bodies_joined(self, cable: Member) -> tuple[int, int]:
         """The numbers of the bodies that a cable joins, the lower one first."""
@@ -247,17 +247,14 @@ class Structure(Section):
     @pydantic.model_validator(mode="after")
     def _check(self) -> Structure:
         self._check_pairs()
+        self._check_bodies()
+        self._check_tensions()
+        self._check_actuated()
         for node in self.masses:
             self._check_node(f"masses.{node}", node)
         if self.contacts != "all":
             for place, node in enumerate(self.contacts):
                 self._check_node(f"contacts[{place}]", node)
-        for node in self.nodes:
-            if node not in self.body_of_node:
-                refuse(f"nodes.{node}", "is on no strut, expected a node of a strut")
-        self._check_lengths()
-        self._check_joints()
-        self._check_actuated()
         check_offsets(self.offsets, self.body_count)
         return self
 
@@ -270,25 +267,16 @@ class Structure(Section):
         for member in (*self.all_struts, *_members("cables", self.cables)):
             for node in member.nodes:
                 self._check_node(member.key, node)
-            pair = frozenset(member.nodes)
-            if len(pair) == 1:
-                refuse(member.key, f"found '{member.nodes[0]}' twice, expected two nodes")
-            if pair in keys:
-                refuse(member.key, f"found the nodes of {keys[pair]}, expected each pair once")
-            keys[pair] = member.key
-
-    def _check_lengths(self) -> None:
-        for member in (*self.all_struts, *self.all_cables):
             if self._length(member) == 0.0:
                 refuse(member.key, "has length 0, expected nodes at two places")
-        for cable, free_length in zip(self.all_cables, self.free_lengths, strict=True):
-            if free_length < 0.0:
-                group = self.cables[cable.group]
-                most = f"at most {self._length(cable) * group.stiffness:.4g} N"
-                problem = f"found {group.tension} N, expected {most} for '{cable.name}'"
-                refuse(f"cables.{cable.group}.tension", f"{problem}: its stiffness times length")
+            earlier = keys.setdefault(frozenset(member.nodes), member.key)
+            if earlier != member.key:
+                refuse(member.key, f"found the nodes of {earlier}, expected each pair once")
 
-    def _check_joints(self) -> None:
+    def _check_bodies(self) -> None:
+        for node in self.nodes:
+            if node not in self.body_of_node:
+                refuse(f"nodes.{node}", "is on no strut, expected a node of a strut")
         for cable in self.all_cables:
             first, second = self._bodies_joined(cable)
             if first == second:
@@ -300,18 +288,23 @@ class Structure(Section):
             problem = f"no cables lead from the body '{other}' to '{one}'"
             refuse("cables", f"{problem}, expected all bodies to be joined")
 
+    def _check_tensions(self) -> None:
+        for cable, free_length in zip(self.all_cables, self.free_lengths, strict=True):
+            if free_length < 0.0:
+                group = self.cables[cable.group]
+                most = f"at most {self._length(cable) * group.stiffness:.4g} N"
+                problem = f"found {group.tension} N, expected {most} for '{cable.name}'"
+                refuse(f"cables.{cable.group}.tension", f"{problem}: its stiffness times length")
+
     def _check_actuated(self) -> None:
-        numbers = self._cable_numbers()
         oscillators: dict[int, str] = {}
-        for oscillator, names in self.actuated.items():
-            for place, name in enumerate(names):
-                key = f"actuated.{oscillator}[{place}]"
-                if name not in numbers:
-                    refuse(key, f"found unknown cable '{name}'; {hint(name, numbers)}")
-                if numbers[name] in oscillators:
-                    problem = f"found '{name}', which '{oscillators[numbers[name]]}' drives"
-                    refuse(key, f"{problem}, expected each cable once")
-                oscillators[numbers[name]] = oscillator
+        for oscillator, cables in self.cables_of_oscillator.items():
+            for place, cable in enumerate(cables):
+                if cable in oscillators:
+                    name = self.all_cables[cable].name
+                    problem = f"found '{name}', which '{oscillators[cable]}' drives"
+                    refuse(f"actuated.{oscillator}[{place}]", f"{problem}, expected it once")
+                oscillators[cable] = oscillator
 
 
 Robot = Annotated[Tetrahedra | Structure, Kinds()]
