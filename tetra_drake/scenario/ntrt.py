@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -117,7 +118,7 @@ class Assembly:
     builders: dict[str, Builder] = field(default_factory=dict)
 
     def add_file(self, file: Path, *, prefix: str = "", above: tuple[Path, ...] = ()) -> None:
-        """Adds the content of a file, whose nodes get a prefix, and that the files `above` name."""
+        """Adds a file that the files `above` contain, with a prefix to the names of its nodes."""
         if file.resolve() in above:
             raise InputError(file, "substructures", "the structure contains itself")
         content = read_text(file, "structure file of NTRT", most=MOST_BYTES)
@@ -142,11 +143,7 @@ class Assembly:
             for inner, pairs in groups.items():
                 bond, tags = (outer, inner) if "/" in outer else (inner, outer)
                 key = f"bond_groups.{outer}.{inner}"
-                *names, kind = bond.split("/")
-                if kind != "node_node" or len(names) < 2 or not parts.keys() >= set(names):
-                    expected = f"expected 'A/B/node_node' with A and B of {', '.join(parts)}"
-                    raise InputError(file, key, f"found the bond '{bond}', {expected}")
-                for first, second in itertools.pairwise(names):
+                for first, second in _bonded_parts(bond, list(parts), file, key):
                     starts = f"{prefix}{first}.", f"{prefix}{second}."
                     self._add_pairs(tags, pairs, starts, file, key)
 
@@ -178,6 +175,15 @@ class Assembly:
                     raise InputError(file, f"{key}[{place}]", problem)
                 nodes.append(min(fitting, key=lambda name: name.count(".")))
             self.pairs.setdefault(" ".join(tags.split()), []).append(nodes)
+
+
+def _bonded_parts(bond: str, parts: list[str], file: Path, key: str) -> Iterable[tuple[str, str]]:
+    """Neighbours in a row of substructures, as in the bond "a/b/c/node_node"."""
+    *names, kind = bond.split("/")
+    if kind != "node_node" or len(names) < 2 or not set(names) <= set(parts):
+        expected = f"expected 'A/B/node_node' with A and B of {', '.join(parts)}"
+        raise InputError(file, key, f"found the bond '{bond}', {expected}")
+    return itertools.pairwise(names)
 
 
 def _turned(p: np.ndarray, rotation: Rotation) -> np.ndarray:

@@ -323,13 +323,12 @@ def _members(key: str, groups: Mapping[str, StrutGroup | CableGroup]) -> Iterato
 
 def _components(members: Iterable[Member]) -> tuple[tuple[str, ...], ...]:
     """The nodes that members connect, in the order of the members."""
-    component: dict[str, list[str]] = {}
+    first_node: dict[str, str] = {}
     for member in members:
-        first, second = (component.setdefault(node, [node]) for node in member.nodes)
-        if first is not second:
-            first.extend(second)
-            component.update(dict.fromkeys(second, first))
-    components: dict[int, list[str]] = {}
-    for node, connected in component.items():
-        components.setdefault(id(connected), []).append(node)
+        start, joined = (first_node.setdefault(node, node) for node in member.nodes)
+        if start != joined:
+            first_node |= {node: start for node, old in first_node.items() if old == joined}
+    components: dict[str, list[str]] = {}
+    for node, start in first_node.items():
+        components.setdefault(start, []).append(node)
     return tuple(tuple(nodes) for nodes in components.values())

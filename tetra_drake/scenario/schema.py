@@ -81,6 +81,82 @@ class Scenario(Section):
         # Units in which a number was written do not matter.
         return type(other) is type(self) and vars(other) == vars(self)
 
+    @property
+    def tree(self) -> Tree:
+        """Content of a complete file of this scenario, in the units in which it was written."""
+        return self._tree or tree_of(self)
+
+    @property
+    def oscillators(self) -> int:
+        """The number of neural oscillators."""
+        return len(self.robot.layout().oscillators)
+
+    @property
+    def engine_name(self) -> str:
+        """Name of the engine: that of its kind, in lower case."""
+        return type(self.engine).__name__.lower()
+
+    def settings_of(self, engine: type[EngineKind]) -> EngineKind:
+        """The settings of the scenario's engine, which must be of this kind."""
+        if not isinstance(self.engine, engine):
+            raise TypeError(f"the engine is !{type(self.engine).__name__}")
+        return self.engine
+
+    @property
+    def draws(self) -> int:
+        """Simulations of a gait in evolution: one, or one for each draw of disturbances."""
+        return self.disturbances.draws if self.disturbances else 1
+
+    @classmethod
+    def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
+        """The scenario of a complete tree; raises InputError that names `source` and key."""
+        tree = merge({}, with_structure(_replacing(tree, tree), source))
+        scenario = super().from_tree(tree, source, key=key)
+        scenario._tree = _with_tags(tree, scenario)
+        return scenario
+
+    def with_changes(self, changes: Mapping[str, Any]) -> Self:
+        """A checked copy with other values: {"robot.tetrahedra": 7, "friction": "!Coulomb"}.
+
+        The same rules hold as in a file that is based on this scenario: quantities have units,
+        mappings are merged, and the spacing follows what is changed. A kind may be given by its tag
+        ("engine": "!Compiled"). Sections, whose numbers are SI, replace what they change as a
+        whole: {"friction": Coulomb()}. Raises InputError, naming the key.
+        """
+        source = f"scenario {self.name}"
+        return self._merged(_replacing(tree_of_changes(changes, source), changes), source)
+
+    def with_file(self, tree: Tree, source: object) -> Self:
+        """The scenario of a file's tree, of which this one is the base."""
+        return self._merged(_replacing(tree, tree), source)
+
+    def _merged(self, changes: Tree, source: object) -> Self:
+        changes = with_structure(changes, source)
+        tree = merge(self.tree, changes)
+        changed = self.from_tree(tree, source)
+        following = changed.robot.following(self.robot, changes.get("robot", {}))
+        if not following:
+            return changed
+        return self.from_tree(merge(tree, {"robot": following}), source)
+
+    def with_sections(self, **sections: Any) -> Self:
+        """A copy with other sections, which are not checked."""
+        changed = self.model_copy(update=sections)
+        changed._tree = None
+        return changed
+
+    def with_numbers(self, numbers: Mapping[str, float]) -> Self:
+        """A copy with other SI numbers by dotted keys, which are not checked."""
+        changed = self.with_sections()
+        for key, number in numbers.items():
+            changed = _with_number(changed, key.split("."), number)
+        return changed
+
+    def numbers(self) -> dict[str, float]:
+        """The SI numbers of the sections but `disturbances`, by their dotted keys."""
+        tree = self.model_dump(exclude={"disturbances", "objective", "require"})
+        return {key: value for key, value in flattened(tree).items() if type(value) is float}
+
     @model_validator(mode="after")
     def _check(self) -> Scenario:
         """Refuses settings of different sections that cannot go together."""
@@ -162,82 +238,6 @@ class Scenario(Section):
                 except InputError as error:
                     problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
                     refuse(place, problem)
-
-    @property
-    def tree(self) -> Tree:
-        """Content of a complete file of this scenario, in the units in which it was written."""
-        return self._tree or tree_of(self)
-
-    @property
-    def oscillators(self) -> int:
-        """The number of neural oscillators."""
-        return len(self.robot.layout().oscillators)
-
-    @property
-    def engine_name(self) -> str:
-        """Name of the engine: that of its kind, in lower case."""
-        return type(self.engine).__name__.lower()
-
-    def settings_of(self, engine: type[EngineKind]) -> EngineKind:
-        """The settings of the scenario's engine, which must be of this kind."""
-        if not isinstance(self.engine, engine):
-            raise TypeError(f"the engine is !{type(self.engine).__name__}")
-        return self.engine
-
-    @property
-    def draws(self) -> int:
-        """Simulations of a gait in evolution: one, or one for each draw of disturbances."""
-        return self.disturbances.draws if self.disturbances else 1
-
-    @classmethod
-    def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
-        """The scenario of a complete tree; raises InputError that names `source` and key."""
-        tree = merge({}, with_structure(_replacing(tree, tree), source))
-        scenario = super().from_tree(tree, source, key=key)
-        scenario._tree = _with_tags(tree, scenario)
-        return scenario
-
-    def with_changes(self, changes: Mapping[str, Any]) -> Self:
-        """A checked copy with other values: {"robot.tetrahedra": 7, "friction": "!Coulomb"}.
-
-        The same rules hold as in a file that is based on this scenario: quantities have units,
-        mappings are merged, and the spacing follows what is changed. A kind may be given by its tag
-        ("engine": "!Compiled"). Sections, whose numbers are SI, replace what they change as a
-        whole: {"friction": Coulomb()}. Raises InputError, naming the key.
-        """
-        source = f"scenario {self.name}"
-        return self._merged(_replacing(tree_of_changes(changes, source), changes), source)
-
-    def with_file(self, tree: Tree, source: object) -> Self:
-        """The scenario of a file's tree, of which this one is the base."""
-        return self._merged(_replacing(tree, tree), source)
-
-    def _merged(self, changes: Tree, source: object) -> Self:
-        changes = with_structure(changes, source)
-        tree = merge(self.tree, changes)
-        changed = self.from_tree(tree, source)
-        following = changed.robot.following(self.robot, changes.get("robot", {}))
-        if not following:
-            return changed
-        return self.from_tree(merge(tree, {"robot": following}), source)
-
-    def with_sections(self, **sections: Any) -> Self:
-        """A copy with other sections, which are not checked."""
-        changed = self.model_copy(update=sections)
-        changed._tree = None
-        return changed
-
-    def with_numbers(self, numbers: Mapping[str, float]) -> Self:
-        """A copy with other SI numbers by dotted keys, which are not checked."""
-        changed = self.with_sections()
-        for key, number in numbers.items():
-            changed = _with_number(changed, key.split("."), number)
-        return changed
-
-    def numbers(self) -> dict[str, float]:
-        """The SI numbers of the sections but `disturbances`, by their dotted keys."""
-        tree = self.model_dump(exclude={"disturbances", "objective", "require"})
-        return {key: value for key, value in flattened(tree).items() if type(value) is float}
 
 
 def _with_number(value: Any, names: Sequence[str], number: float) -> Any:

@@ -330,11 +330,15 @@ def flattened(tree: Tree, key: str = "") -> dict[str, Any]:
 def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
     """Changes by dotted keys, and mappings of keys, as the tree that a file would hold."""
     tree: Tree = {}
-    for key, value in changes.items():
-        branch = _given(value)
-        for name in reversed(key.split(".")):
-            branch = {name: branch}
-        tree = _joined_trees(tree, branch, key, source)
+    for key in sorted(changes, key=lambda key: key.count(".")):  # "robot" before "robot.gravity"
+        *sections, name = key.split(".")
+        place: Any = tree
+        for section in sections:
+            if type(place) is dict:
+                place = place.setdefault(section, {})
+        if type(place) is not dict or name in place:
+            raise InputError(source, key, "is given twice")
+        place[name] = _given(changes[key])
     return tree
 
 
@@ -350,15 +354,3 @@ def _given(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: _given(item) for name, item in value.items()}
     return value
-
-
-def _joined_trees(first: Tree, second: Tree, key: str, source: object) -> Tree:
-    """Both trees in one; InputError, naming `key`, where both give a value."""
-    tree = dict(first)
-    for name, value in second.items():
-        if name in tree:
-            if type(tree[name]) is not dict or type(value) is not dict:
-                raise InputError(source, key, "is given twice")
-            value = _joined_trees(tree[name], value, key, source)
-        tree[name] = value
-    return tree
