@@ -30,6 +30,8 @@ name, inner ones join the tip to base nodes."""
 
 CABLES: tuple[str, ...] = get_args(Cable)
 
+Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+
 
 def tetrahedron_nodes(strut_length: float) -> np.ndarray:
     """p_BN (4, 3) in m: the base triangle is vertical, the tip points forward, and the origin is
@@ -83,14 +85,14 @@ class Tetrahedra(Section):
     cables balance. So is the spacing of a file that changes strut length or the cables' stiffness
     or free length of its base and gives no spacing."""
     gravity: float = quantity("m/s^2", ge=0)
-    offsets: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = quantity(
-        "m", default=[]
-    )
+    offsets: list[Point] = quantity("m", default=[])
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
     tip of the foremost, as no others reach flat ground. `all`: all four of every tetrahedron."""
-    actuation: list[list[Cable]] = Field(default=[["outer bottom_left", "outer bottom_right"]])
+    actuation: list[Annotated[list[Cable], Field(min_length=1)]] = Field(
+        default=[["outer bottom_left", "outer bottom_right"]], min_length=1
+    )
     """Groups of a junction's cables that share an oscillator, the same for every junction."""
 
     @property
@@ -111,8 +113,7 @@ class Tetrahedra(Section):
     def layout(self) -> Layout:
         """Cables and oscillators of the robot on flat ground."""
         forward = self.spacing * np.arange(self.tetrahedra)[:, np.newaxis, np.newaxis]
-        p_BN = tetrahedron_nodes(self.strut_length)
-        p_WN = (forward * [1.0, 0.0, 0.0] + p_BN).reshape(-1, 3)
+        p_WN = forward * [1.0, 0.0, 0.0] + tetrahedron_nodes(self.strut_length)
         names: list[str] = []
         nodes: list[tuple[int, int]] = []
         oscillators, groups = [], []
@@ -126,7 +127,7 @@ class Tetrahedra(Section):
             nodes += [cable_nodes(junction, cable) for cable in CABLES]
         return Layout(
             cable_names=tuple(names),
-            ends=p_WN[np.array(nodes)],
+            ends=p_WN.reshape(-1, 3)[np.array(nodes)],
             bodies=np.array(nodes) // len(NODES),
             oscillators=tuple(oscillators),
             groups=tuple(groups),
@@ -156,8 +157,6 @@ class Tetrahedra(Section):
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
         check_offsets(self.offsets, self.tetrahedra)
-        if not self.actuation or not all(self.actuation):
-            refuse("actuation", f"found {self.actuation}, expected groups of at least one cable")
         cables = [cable for group in self.actuation for cable in group]
         for cable in cables:
             if cables.count(cable) > 1:

@@ -20,7 +20,8 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.scenario.robot_kinds import CableGroup, Pair, Point, Structure, StrutGroup
+from tetra_drake.scenario.nesting import Point
+from tetra_drake.scenario.robot_kinds import CableGroup, Pair, Structure, StrutGroup
 from tetra_drake.scenario.sections import Section, Tree, hint, tree_of
 from tetra_drake.scenario.yaml_text import parse_yaml
 

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from tetra_drake.scenario.layout import Layout
 from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
-from tetra_drake.scenario.nesting import Tetrahedra, check_offsets
+from tetra_drake.scenario.nesting import Point, Tetrahedra, check_offsets
 from tetra_drake.scenario.sections import (
     Kinds,
     Section,
@@ -44,7 +44,6 @@ def _check_name(name: object) -> object:
 
 
 Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
-Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
 Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 

@@ -62,7 +62,9 @@ class Scenario(Section):
     gait_bounds: GaitBounds
     simulation: SimulationSection
     engine: Engine = Drake()
-    objective: dict[str, float] = quantity({k: inverse(u) for k, u in METRICS.items()})
+    objective: dict[str, float] = quantity(
+        {name: inverse(unit) for name, unit in METRICS.items()}, min_length=1
+    )
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
     require: dict[str, float] = quantity(METRICS, default={})
@@ -160,8 +162,6 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _check(self) -> Scenario:
         """Refuses settings of different sections that cannot go together."""
-        if not self.objective:
-            refuse("objective", "found no metric, expected one at least")
         step, duration = self.cpg.listing_step, self.simulation.duration
         if step > duration:
             expected = f"expected at most the duration, {duration} s"
