@@ -68,7 +68,7 @@ def _placed(scenario: Scenario, kind: kinds.Structure) -> Structure:
         q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (len(inertias), 1)),
         cables=_cables(kind, number, actuation),
         cable_names=actuation.layout.cable_names,
-        cable_groups=tuple(kind.all_cables[number].group for number in kind.ordered_cables),
+        cable_groups=tuple(cable.group for cable in kind.all_cables),
         slack=True,
         actuation=actuation,
         contacts=contacts,
@@ -106,10 +106,9 @@ def _unit_inertia(M_BWo_W: SpatialInertia) -> np.ndarray:
 def _cables(kind: kinds.Structure, number: dict[str, int], actuation: Actuation) -> np.ndarray:
     """(cables,) of dtype CABLE, pair by pair of bodies."""
     rows = []
-    for place, cable_number in enumerate(kind.ordered_cables):
-        cable = kind.all_cables[cable_number]
+    for place, cable in enumerate(kind.all_cables):
         group = kind.cables[cable.group]
         first, second = sorted(cable.nodes, key=kind.body_of_node.__getitem__)
-        law = group.stiffness, group.damping, kind.free_lengths[cable_number]
+        law = group.stiffness, group.damping, kind.free_lengths[place]
         rows.append((number[first], number[second], actuation.drivers[place], *law))
     return np.array(rows, dtype=CABLE)

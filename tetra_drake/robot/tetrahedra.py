@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from pydrake.multibody.tree import SpatialInertia
 
@@ -38,12 +36,10 @@ def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
     the slope, about World's y axis.
     """
     n, cables = robot.tetrahedra, robot.cables
-    edge = robot.strut_length
-    circumradius = edge / math.sqrt(3.0)
-    height = edge * math.sqrt(2.0 / 3.0)
-    p_BN = tetrahedron_nodes(edge)
+    p_BN = tetrahedron_nodes(robot.strut_length)
     bodies = tuple(f"T{i + 1}" for i in range(n))
-    p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
+    x, _, z = -p_BN[BOTTOM_LEFT]
+    p_WB = np.array([[x + i * robot.spacing, 0.0, z] for i in range(n)])
     if robot.offsets:
         p_WB += np.array(robot.offsets)
     upright = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
