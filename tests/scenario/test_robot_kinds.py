@@ -149,6 +149,7 @@ def test_struts_of_the_shipped_true_tensegrities(name: str) -> None:
         ("cables: {a b: {}}", "cables.a b", ["blanks"]),
         ("nodes: {h: [1, 1, 1]}", "nodes.h", ["no strut"]),
         ("nodes: {f: [2, 2, 15]}", "cables.long.pairs[0]", ["length 0"]),
+        ("nodes: {d: [9, 2, 5]}", "nodes.f", ["'d'", "0.0001 m"]),
         ("nodes: {e: [2, 2, 5]}", "struts.arm.pairs[1]", ["length 0"]),
         ("nodes: {e: [2, 2]}", "nodes.e", ["3 items"]),
         ("nodes: {e: [2, 2, up]}", "nodes.e[2]", ["'up'"]),

@@ -22,7 +22,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario.nesting import Point
 from tetra_drake.scenario.robot_kinds import CableGroup, Pair, Structure, StrutGroup
-from tetra_drake.scenario.sections import Section, Tree, hint, tree_of
+from tetra_drake.scenario.sections import Section, Tree, hint, refuse, tree_of
 from tetra_drake.scenario.yaml_text import parse_yaml
 
 MOST_BYTES = 2**20
@@ -44,6 +44,12 @@ class Rotation(Section):
     angle: float
     """In degrees."""
     reference: Point | None = None
+
+    @pydantic.model_validator(mode="after")
+    def _check(self) -> Rotation:
+        if not any(self.axis):
+            refuse("axis", "found a vector of length 0, expected a direction")
+        return self
 
 
 class Substructure(Section):

@@ -32,6 +32,9 @@ from tetra_drake.scenario.units import quantity_to_si
 
 MOST_NODES, MOST_PAIRS = 1000, 2000
 
+LEAST_DISTANCE = 1e-3
+"""Least distance between two nodes, as a share of the shortest strut."""
+
 
 def _check_name(name: object) -> object:
     """A name of a node, group or oscillator: blanks separate the names of a cable, dots those of a
@@ -246,6 +249,7 @@ class Structure(Section):
     @pydantic.model_validator(mode="after")
     def _check(self) -> Structure:
         self._check_pairs()
+        self._check_places()
         self._check_bodies()
         self._check_tensions()
         self._check_actuated()
@@ -271,6 +275,15 @@ class Structure(Section):
             earlier = keys.setdefault(frozenset(member.nodes), member.key)
             if earlier != member.key:
                 refuse(member.key, f"found the nodes of {earlier}, expected each pair once")
+
+    def _check_places(self) -> None:
+        least = LEAST_DISTANCE * self.size
+        names, p_WN = list(self.nodes), np.array(list(self.nodes.values()))
+        for i in range(1, len(names)):
+            distances = np.linalg.norm(p_WN[:i] - p_WN[i], axis=1)
+            if distances.min() < least:
+                problem = f"found the place of '{names[distances.argmin()]}'"
+                refuse(f"nodes.{names[i]}", f"{problem}, expected nodes {least:.3g} m apart")
 
     def _check_bodies(self) -> None:
         for node in self.nodes:
