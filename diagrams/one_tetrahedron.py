@@ -74,11 +74,8 @@ def make_standing_tetrahedron(scenario: Scenario) -> Robot:
         p_WB=-p_BN[TRAILING, 2] * start_axes(row)[None, 2],
         q_WB=row.q_WB[:1],
         cables=row.cables[:0],
-        cable_names=(),
         cable_groups=(),
         contacts=np.array(BASE),
-        thesis_nodes=None,
-        feet=len(BASE),
         markers=row.markers[:2],
     )
     return Robot.of(scenario, tetrahedron)

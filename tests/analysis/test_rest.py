@@ -27,12 +27,12 @@ def studies() -> dict[str, RestStudy]:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_statics_are_those_of_the_structure_without_weight(studies, name):
     statics = studies[name].statics
-    assert (statics.self_stress_states, statics.mechanisms) == SHIPPED[name]
+    assert (len(statics.self_stresses), statics.mechanisms) == SHIPPED[name]
 
 
 def test_each_junction_of_the_row_has_a_self_stress_and_a_mechanism(robot):
     statics = study_rest(robot).statics
-    assert (statics.self_stress_states, statics.mechanisms) == (4, 4)
+    assert (len(statics.self_stresses), statics.mechanisms) == (4, 4)
 
 
 @pytest.mark.parametrize("name", SHIPPED)

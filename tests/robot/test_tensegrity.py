@@ -30,7 +30,7 @@ def test_rests_where_the_independent_simulation_does(name, data):
     expected = np.array(recorded["tensions_at_rest"])[places]
     np.testing.assert_allclose(resting.forces.pulls[:, TENSION], expected, rtol=1e-6)
     assert resting.forces.pushes[:, NORMAL].sum() == pytest.approx(robot.weight, rel=1e-9)
-    assert structure.feet == np.count_nonzero(theirs[:, 2] < 0.0) == 3
+    assert robot.rest.feet == np.count_nonzero(theirs[:, 2] < 0.0) == 3
 
 
 def distances(p_WN: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ from tetra_drake.physics.contact import Ground
 from tetra_drake.results import measures
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, followed_nodes
 from tetra_drake.scenario.units import INCH
 
 X, Y, Z = range(3)
@@ -65,7 +65,7 @@ _FOOTPRINTS: Any = {"color": "0.45", "marker": "o", "linestyle": "", "markersize
 
 
 @common_style()
-def relative_distances(trajectory: xarray.Dataset, structure: Structure) -> Figure:
+def relative_distances(trajectory: xarray.Dataset) -> Figure:
     """Distances along x from the first body to each, between centres of mass, over time.
 
     Grey lines: the distances at the start."""
@@ -79,7 +79,7 @@ def relative_distances(trajectory: xarray.Dataset, structure: Structure) -> Figu
         place = {"xy": (1.01, float(line[-1])), "xycoords": ("axes fraction", "data")}
         panel.annotate(name, color=style["color"], va="center", **place)
     panel.set(xlabel="time (s)", ylabel=f"distance from {names[0]} (in)")
-    figure.suptitle(f"Distances between {'tetrahedra' if structure.is_row else 'bodies'}")
+    figure.suptitle("Distances between bodies")
     return figure
 
 
@@ -91,12 +91,12 @@ def before_and_after(walks: Sequence[tuple[str, xarray.Dataset]], structure: Str
     kinds = ("best initial gait of the trial", "best evolved gait")
     for panel, kind, (label, trajectory) in zip(panels, kinds, walks, strict=True):
         walked = measures.distance_walked(trajectory, structure) / INCH
-        panel.plot(walked.time, walked, color=OKABE_ITO["blue"])
+        panel.plot(trajectory.time, walked, color=OKABE_ITO["blue"])
         title = f"{kind}: {fixed(float(walked[-1]))} in\n{textwrap.shorten(label, 60)}"
         panel.set_title(title, parse_math=False)  # a name may hold a dollar sign
         panel.set_xlabel("time (s)")
     panels[0].margins(y=0.08)
-    panels[0].set_ylabel(f"distance {_distance_symbol(structure)}(in)")
+    panels[0].set_ylabel("distance (in)")
     figure.suptitle("Distance walked before and after evolution")
     return figure
 
@@ -105,13 +105,12 @@ def before_and_after(walks: Sequence[tuple[str, xarray.Dataset]], structure: Str
 def time_lapse(trajectory: xarray.Dataset, structure: Structure, *, instants: int = 6) -> Figure:
     """The robot from above at some instants, to scale, with the distance walked.
 
-    Dots: T1's bottom nodes, or the centre of a robot that is no row, at each full second."""
+    Dots: the first body's bottom nodes, or the robot's centre, at each full second."""
     times = np.linspace(trajectory.time.values[0], trajectory.time.values[-1], instants)
     samples = _nearest(trajectory, times)
     inches = trajectory.p_WN.values / INCH
-    marked = measures.marked_positions(trajectory, structure) / INCH
-    footprints = marked[:, (marked.node_body == marked.node_body[0]).values].values
-    walked = measures.distance_walked(trajectory, structure).values / INCH
+    footprints = followed_nodes(inches, structure)[:, :2]  # of one body
+    walked = measures.distance_walked(trajectory, structure) / INCH
     styles = [{**line_style(i), "linestyle": "-"} for i in range(len(structure.bodies))]
     rows = []
     for time, sample in zip(times, samples, strict=True):
@@ -129,12 +128,9 @@ def time_lapse(trajectory: xarray.Dataset, structure: Structure, *, instants: in
     figure, [[panel]] = make_figure(width_in=max(width + 1.0, 4.8), height_in=height + 1.0)
     _draw_rows(panel, rows, OVERHEAD, structure, width_in=width)
     panel.axvline(footprints[0, 0, X], color="0.45", linewidth=0.8)
-    walker = dots = "the centre"
-    if structure.is_row:
-        walker = structure.bodies[0]
-        dots = f"{walker}'s bottom nodes"
-    panel.set_ylabel(f"time, and distance {_distance_symbol(structure)}walked by {walker}")
-    figure.suptitle(f"Time lapse from above\ndots: {dots} at each full second")
+    of_body = f" of {structure.bodies[0]}" if structure.is_row else ""
+    panel.set_ylabel("time, and distance walked")
+    figure.suptitle(f"Time lapse from above\ndots: {structure.followed}{of_body} each full second")
     return figure
 
 
@@ -183,22 +179,22 @@ def one_step(trajectory: xarray.Dataset, robot: Robot, *, instants: int = 5) -> 
         title = f"Time lapse of the end, {start:.2f} to {end:.2f} s\n"
         title += "no step, as no signal has two periods in the second half"
     step = trajectory.sel(time=slice(start, end))
-    inches, off, since = step.p_WN.values / INCH, measures.lifted(step), step.time - step.time[0]
-    marked = measures.marked_positions(step, structure) / INCH
+    inches, lifted, since = step.p_WN.values / INCH, measures.lifted(step), step.time - step.time[0]
+    followed = followed_nodes(inches, structure)
     rows = []
     for sample in _nearest(step, np.linspace(start, end, instants)):
         row = _Row(
             label=f"{since.values[sample]:.2f} s",
             nodes=inches[sample],
-            styles=[_LIFTED if up else _ON_GROUND for up in off.values[sample]],
-            paths=marked.values[: sample + 1],
+            styles=[_LIFTED if up else _ON_GROUND for up in lifted.values[sample]],
+            paths=followed[: sample + 1],
             path_style=_PATH,
             profile=None if ground.flat else _profile(inches, sample, ground),
         )
         rows.append(row)
     width, height = _size(rows, width_in=3.6, height_in=6.0)
-    shown = _first_of_each_body(marked)
-    heights = [height + 0.8, 0.7 + 1.2 * math.ceil(shown.sizes["node"] / _PATHS)]
+    names = structure.bodies if structure.is_row else (structure.followed,)
+    heights = [height + 0.8, 0.7 + 1.2 * math.ceil(len(names) / _PATHS)]
     legend = 0.4
     figure = Figure(figsize=(max(2 * width + 1.2, 5.8), sum(heights) + legend))
     above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
@@ -210,10 +206,10 @@ def one_step(trajectory: xarray.Dataset, robot: Robot, *, instants: int = 5) -> 
     if ground.flat:
         for i in range(instants):
             panel.axhline(-_pitch(rows) * i, **_GROUND)
-    _draw_paths(below, shown, off, ground)
+    aloft = lifted.values if structure.is_row else lifted.values.all(axis=1, keepdims=True)
+    _draw_paths(below, names, followed[:, ::2], aloft, ground)  # of the left nodes
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
-    path = "path of the bottom nodes" if structure.is_row else "path of the centre"
-    legend_below(figure, {**lines, path: _PATH})
+    legend_below(figure, {**lines, f"path of the {structure.followed}": _PATH})
     figure.suptitle(title)
     return figure
 
@@ -227,41 +223,25 @@ def _profile(nodes: np.ndarray, sample: int, ground: Ground) -> np.ndarray:
     return np.column_stack([x, y, z])
 
 
-def _distance_symbol(structure: Structure) -> str:
-    """The thesis's symbol of the distance walked, and a blank, where it is that of T1."""
-    return "$x_1$ " if structure.is_row else ""
-
-
-def _first_of_each_body(marked: xarray.DataArray) -> xarray.DataArray:
-    """The first marker of each body; marked positions (time, node, axis)."""
-    _, first = np.unique(marked.node_body, return_index=True)
-    return marked.isel(node=np.sort(first))
-
-
 def _draw_paths(
-    figure: SubFigure, marked: xarray.DataArray, off: xarray.DataArray, ground: Ground
+    figure: SubFigure, names: Sequence[str], paths: np.ndarray, lifted: np.ndarray, ground: Ground
 ) -> None:
-    """The paths in the step of marked positions (time, node, axis) in inches, enlarged.
-
-    `off` (time, body) says which bodies are lifted."""
-    bodies = [str(body) for body in marked.node_body.values]
-    names = [body or "centre" for body in bodies]
+    """Paths (samples, names, 3) in inches, enlarged, and where they are `lifted` (samples, names)
+    off the ground."""
     panels = add_grid(figure, names, columns=min(len(names), _PATHS)).values()
-    for i, (body, panel) in enumerate(zip(bodies, panels, strict=True)):
-        node = marked[:, i]
-        x, z = node.sel(axis="x") - node.sel(axis="x")[0], node.sel(axis="z")
+    for i, panel in enumerate(panels):
+        path = paths[:, i]
+        x, z = path[:, X] - path[0, X], path[:, Z]
         if not ground.flat:
-            below = ground_heights(node.values[:, :2] * INCH, ground) / INCH
+            below = ground_heights(path[:, :2] * INCH, ground) / INCH
             z, below = z - below[0], below - below[0]
             panel.plot(x, below, **_GROUND)
-        up = off.sel(body=body) if body else off.all("body")
         panel.plot(x, z, **_PATH)
-        panel.plot(x.where(up), z.where(up), **_LIFTED)
+        panel.plot(x, np.where(lifted[:, i], z, np.nan), **_LIFTED)
         panel.plot(x[0], z[0], "o", color="black")
         panel.margins(0.08)
         panel.update_datalim([(-0.1, 0.0), (0.1, 0.1)])  # even if nothing moves
-    place = "bottom left node" if all(bodies) else "centre"
-    figure.supxlabel(f"displacement of the {place} since the start of the time shown (in)")
+    figure.supxlabel("displacement since the start of the time shown (in)")
     figure.supylabel("height (in)" if ground.flat else "height above the\nground at 0 (in)")
 
 

@@ -52,7 +52,7 @@ def structure_text(study: RestStudy) -> str:
     lines = [
         f"{robot.scenario.name}: {count}, {len(structure.cables)} cables, "
         f"{structure.signals} oscillators, {1e3 * structure.mass.sum():.4g} g",
-        f"Without weight: self-stress states {statics.self_stress_states}, "
+        f"Without weight: self-stress states {len(statics.self_stresses)}, "
         f"infinitesimal mechanisms {statics.mechanisms}.",
         f"Lowest natural frequencies on the ground, undamped: {lowest or 'none'} Hz.",
         "At rest, without actuation:",

@@ -31,16 +31,16 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
         ),
         struts=_struts(structure),
         isotropic=structure.isotropic,
-        slack=structure.slack,
+        slack=scenario.robot.slack,
     )
 
 
-def rest_of(scenario: Scenario, structure: Structure) -> Rest:
-    """Rest of a structure on flat ground without actuation, let go where it starts; raises
-    InputError if there is none."""
+def rest_of(scenario: Scenario, structure: Structure, start: np.ndarray | None = None) -> Rest:
+    """Rest of a structure on flat ground without actuation, let go at `start` (13 bodies,), or else
+    where it starts; raises InputError if there is none."""
     model = make_model(scenario.with_sections(terrain=Flat()), structure)
     try:
-        return find_rest(model, structure.initial_state)
+        return find_rest(model, structure.initial_state if start is None else start)
     except NoRest as error:
         body = structure.bodies[error.body]
         problem = f"finds no rest; the greatest force left, {error.force:.3g} N, is on '{body}'"
