@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tetra_drake.analysis.rest import RestStudy, study_rest
+from tetra_drake.engines.mujoco import make_mjcf
 from tetra_drake.report.structure_page import (
     robot_of_file,
-    save_mjcf,
     save_structure_page,
     structure_text,
 )
@@ -80,7 +80,6 @@ def test_text_page_and_model_are_of_the_structure(studies, tmp_path):
         assert name in text
     save_structure_page(study, tmp_path / "prism.html")
     assert "prism at rest" in (tmp_path / "prism.html").read_text()
-    save_mjcf(study.robot, tmp_path / "prism.xml")
     mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "prism.xml"))
+    model = mujoco.MjModel.from_xml_string(make_mjcf(study.robot))
     assert (model.nbody, model.ntendon, model.nu) == (1 + 3, 9, 3)

@@ -189,7 +189,7 @@ def one_step(trajectory: xarray.Dataset, robot: Robot, *, instants: int = 5) -> 
             styles=[_LIFTED if up else _ON_GROUND for up in lifted.values[sample]],
             paths=followed[: sample + 1],
             path_style=_PATH,
-            profile=None if ground.flat else _profile(inches, sample, ground),
+            profile=_profile(inches, sample, ground),
         )
         rows.append(row)
     width, height = _size(rows, width_in=3.6, height_in=6.0)
@@ -203,10 +203,9 @@ def one_step(trajectory: xarray.Dataset, robot: Robot, *, instants: int = 5) -> 
         _draw_rows(panel, rows, view, structure, width_in=width)
         panel.set_title(f"from {place}")
     panel.tick_params(left=False, labelleft=False)
-    if ground.flat:
-        for i in range(instants):
-            panel.axhline(-_pitch(rows) * i, **_GROUND)
-    aloft = lifted.values if structure.is_row else lifted.values.all(axis=1, keepdims=True)
+    aloft: Any = lifted.values
+    if not structure.is_row:
+        aloft = aloft.all(axis=1, keepdims=True)
     _draw_paths(below, names, followed[:, ::2], aloft, ground)  # of the left nodes
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
     legend_below(figure, {**lines, f"path of the {structure.followed}": _PATH})
@@ -318,16 +317,15 @@ def _draw_rows(
 def _name_bodies(
     panel: Axes, nodes: np.ndarray, structure: Structure, per_paper_inch: float
 ) -> None:
-    """Names bodies above their nodes (nodes, 2), bars above their upper ends, but those whose names
-    would overlap with others'."""
+    """Names bodies above the uppermost of their nodes (nodes, 2), but those whose names would
+    overlap with others'."""
     longest = max(_SHORTEST_NAME, *(len(name) for name in structure.bodies))
     width, height = longest * _CHARACTER_WIDTH * per_paper_inch, _NAME_HEIGHT * per_paper_inch
     left, right = panel.get_xlim()
     places: list[tuple[float, float]] = []
     for body, name in enumerate(structure.bodies):
         of_body = nodes[structure.carriers == body]
-        upper_x, y = of_body[of_body[:, 1].argmax()].tolist()
-        x = upper_x if len(of_body) == 2 else float(of_body[:, 0].mean())
+        x, y = of_body[of_body[:, 1].argmax()].tolist()
         x = min(max(x, left + width / 2), right - width / 2)
         if all(abs(x - a) >= width or abs(y - b) >= height for a, b in places):
             panel.annotate(name, (x, y), (0, 2), textcoords="offset points", ha="center")

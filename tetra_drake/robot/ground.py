@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.contact import (
-    Ground,
-    NormalForce,
-)
+from tetra_drake.physics.contact import Ground, NormalForce
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.physics.terrain import (
     FRAME_COLUMNS,
@@ -77,12 +74,7 @@ def _surface_grid(grid: Grid) -> SurfaceGrid:
 
 
 def _check_start(
-    structure: Structure,
-    ground: Ground,
-    start: np.ndarray,
-    grid: Grid,
-    allowed: float,
-    source: str,
+    structure: Structure, ground: Ground, start: np.ndarray, grid: Grid, allowed: float, source: str
 ) -> None:
     """Raises InputError if a contact node, at `start` (contacts, 3), is off the grid, or deeper in
     the ground than is allowed (m)."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN, move_nodes
+from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, move_nodes
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.equilibrium import Rest
 
@@ -122,11 +122,6 @@ def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
     """p_WN (nodes, 3) in m from the state (13 n,) of the bodies."""
     return moved_nodes(structure, state)[:, P_WN : P_WN + 3]
-
-
-def node_velocities(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """v_WN (nodes, 3) in m/s from the state (13 n,) of the bodies."""
-    return moved_nodes(structure, state)[:, V_WN : V_WN + 3]
 
 
 def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:

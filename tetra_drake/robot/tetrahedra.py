@@ -15,14 +15,12 @@ from tetra_drake.scenario.nesting import (
     CABLES,
     NODES,
     TIP,
-    TOP,
     Tetrahedra,
     cable_nodes,
     tetrahedron_nodes,
 )
 from tetra_drake.scenario.schema import Scenario
 
-BASE = (BOTTOM_LEFT, BOTTOM_RIGHT, TOP)
 STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
 
 
@@ -66,7 +64,8 @@ def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
 
 def _cables(robot: Tetrahedra, actuation: Actuation) -> np.ndarray:
     """(cables,) of dtype CABLE, junction by junction."""
-    cables, rows = robot.cables, []
+    cables = robot.cables
+    rows: list[tuple[float, ...]] = []
     for junction in range(robot.tetrahedra - 1):
         for cable in CABLES:
             outer = cable.startswith("outer")
