@@ -80,9 +80,10 @@ def _weightless_nodes(robot: Robot) -> np.ndarray:
 def _frequencies(resting: Resting, state: np.ndarray) -> np.ndarray:
     """Natural frequencies (Hz) above LEAST_FREQUENCY."""
     stiffness = stiffness_at_rest(resting, state)
+    stiffness = 0.5 * (stiffness + stiffness.T)
     # Of M x'' = -K x with M = L Lᵀ: the eigenvalues of L^-1 K L^-T.
     factor = np.linalg.cholesky(_mass_matrix(resting))
-    scaled = np.linalg.solve(factor, np.linalg.solve(factor, 0.5 * (stiffness + stiffness.T)).T)
+    scaled = np.linalg.solve(factor, np.linalg.solve(factor, stiffness).T)
     squares = np.linalg.eigvalsh(scaled)
     least = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
     return np.sqrt(squares[squares > least]) / (2.0 * math.pi)

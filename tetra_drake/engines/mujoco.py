@@ -124,11 +124,8 @@ class MujocoEngine(Engine):
     def simulate_many(
         self, walks: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
     ) -> list[Outcome]:
-        def outcome(walk: tuple[Scenario, Gait]) -> Outcome:
-            return self.outcome(*walk, record=record)
-
         with ThreadPoolExecutor(threads) as pool:
-            return list(pool.map(outcome, walks))
+            return list(pool.map(lambda walk: self.outcome(*walk, record=record), walks))
 
 
 def installed() -> bool:

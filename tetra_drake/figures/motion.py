@@ -112,21 +112,19 @@ def time_lapse(trajectory: xarray.Dataset, structure: Structure, *, instants: in
     footprints = followed_nodes(inches, structure)[:, :2]  # of one body
     walked = measures.distance_walked(trajectory, structure) / INCH
     styles = [{**line_style(i), "linestyle": "-"} for i in range(len(structure.bodies))]
-    rows = []
-    for time, sample in zip(times, samples, strict=True):
-        seconds = _nearest(trajectory, np.arange(times[0], time))
-        row = _Row(
-            label=f"{time:.4g} s\n{signed(walked[sample])} in",
-            nodes=inches[sample],
-            styles=styles,
-            paths=footprints[seconds],
-            path_style=_FOOTPRINTS,
-        )
-        rows.append(row)
-    width, height = _size(rows, width_in=5.8, height_in=8.5)
+    lapse = _Lapse(
+        structure,
+        labels=[f"{t:.4g} s\n{signed(w)} in" for t, w in zip(times, walked[samples], strict=True)],
+        nodes=inches[samples],
+        styles=[styles] * instants,
+        paths=[footprints[_nearest(trajectory, np.arange(times[0], time))] for time in times],
+        path_style=_FOOTPRINTS,
+        profiles=np.zeros((instants, 0, 3)),
+    )
+    width, height = lapse.size(width_in=5.8, height_in=8.5)
     # Wide enough for the title.
     figure, [[panel]] = make_figure(width_in=max(width + 1.0, 4.8), height_in=height + 1.0)
-    _draw_rows(panel, rows, OVERHEAD, structure, width_in=width)
+    lapse.draw(panel, OVERHEAD, width_in=width)
     panel.axvline(footprints[0, 0, X], color="0.45", linewidth=0.8)
     of_body = f" of {structure.bodies[0]}" if structure.is_row else ""
     panel.set_ylabel("time, and distance walked")
@@ -179,20 +177,19 @@ def one_step(trajectory: xarray.Dataset, robot: Robot, *, instants: int = 5) -> 
         title = f"Time lapse of the end, {start:.2f} to {end:.2f} s\n"
         title += "no step, as no signal has two periods in the second half"
     step = trajectory.sel(time=slice(start, end))
-    inches, lifted, since = step.p_WN.values / INCH, measures.lifted(step), step.time - step.time[0]
-    followed = followed_nodes(inches, structure)
-    rows = []
-    for sample in _nearest(step, np.linspace(start, end, instants)):
-        row = _Row(
-            label=f"{since.values[sample]:.2f} s",
-            nodes=inches[sample],
-            styles=[_LIFTED if up else _ON_GROUND for up in lifted.values[sample]],
-            paths=followed[: sample + 1],
-            path_style=_PATH,
-            profile=_profile(inches, sample, ground),
-        )
-        rows.append(row)
-    width, height = _size(rows, width_in=3.6, height_in=6.0)
+    inches, lifted = step.p_WN.values / INCH, measures.lifted(step).values
+    times = np.linspace(step.time.values[0], end, instants)
+    followed, samples = followed_nodes(inches, structure), _nearest(step, times)
+    lapse = _Lapse(
+        structure,
+        labels=[f"{time - times[0]:.2f} s" for time in step.time.values[samples]],
+        nodes=inches[samples],
+        styles=[[_LIFTED if up else _ON_GROUND for up in bodies] for bodies in lifted[samples]],
+        paths=[followed[: sample + 1] for sample in samples],
+        path_style=_PATH,
+        profiles=np.array([_profile(inches, sample, ground) for sample in samples]),
+    )
+    width, height = lapse.size(width_in=3.6, height_in=6.0)
     names = structure.bodies if structure.is_row else (structure.followed,)
     heights = [height + 0.8, 0.7 + 1.2 * math.ceil(len(names) / _PATHS)]
     legend = 0.4
@@ -200,13 +197,12 @@ def one_step(trajectory: xarray.Dataset, robot: Robot, *, instants: int = 5) -> 
     above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
     panels: Any = above.subplots(1, 2)
     for panel, view, place in zip(panels, (OVERHEAD, SIDE), ("above", "the side"), strict=True):
-        _draw_rows(panel, rows, view, structure, width_in=width)
+        lapse.draw(panel, view, width_in=width)
         panel.set_title(f"from {place}")
     panel.tick_params(left=False, labelleft=False)
-    aloft: Any = lifted.values
     if not structure.is_row:
-        aloft = aloft.all(axis=1, keepdims=True)
-    _draw_paths(below, names, followed[:, ::2], aloft, ground)  # of the left nodes
+        lifted = np.all(lifted, axis=1, keepdims=True)
+    _draw_paths(below, names, followed[:, ::2], lifted, ground)  # of the left nodes
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
     legend_below(figure, {**lines, f"path of the {structure.followed}": _PATH})
     figure.suptitle(title)
@@ -250,68 +246,64 @@ def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class _Row:
-    """The robot at one instant of a time lapse; positions in inches."""
+class _Lapse:
+    """A time lapse: the robot at some instants, one below the other; positions in inches."""
 
-    label: str
+    structure: Structure
+    labels: Sequence[str]
     nodes: np.ndarray
-    """Positions (nodes, 3)."""
-    styles: Sequence[Any]
-    """Line style of each body."""
-    paths: np.ndarray
-    """Earlier positions (samples, nodes, 3) of some nodes."""
+    """(instants, nodes, 3)."""
+    styles: Sequence[Sequence[Any]]
+    """Line style of each body at each instant."""
+    paths: Sequence[np.ndarray]
+    """Earlier positions (samples, nodes, 3) of some nodes at each instant."""
     path_style: Any
-    profile: np.ndarray | None = None
-    """Points (points, 3) of the ground, for views from the side."""
+    profiles: np.ndarray
+    """Points (instants, points, 3) of the ground, for views from the side."""
 
+    @property
+    def heights(self) -> np.ndarray:
+        """All heights of nodes and ground."""
+        return np.concatenate([self.nodes[..., Z].ravel(), self.profiles[..., Z].ravel()])
 
-def _heights(rows: Sequence[_Row]) -> np.ndarray:
-    """All heights of nodes and ground, in inches."""
-    nodes = [row.nodes for row in rows]
-    profiles = [row.profile for row in rows if row.profile is not None]
-    return np.concatenate(nodes + profiles)[:, Z]
+    @property
+    def pitch(self) -> float:
+        """Distance between instants, with room for what climbs or turns."""
+        sideways, upward = np.ptp(self.nodes[..., Y]), np.ptp(self.heights)
+        return max(_PITCH_IN, float(upward) + _MARGIN_IN, float(sideways) + _MARGIN_IN)
 
+    def size(self, *, width_in: float, height_in: float) -> tuple[float, float]:
+        """Width and height on paper, to scale, within bounds."""
+        wide = float(np.ptp(self.nodes[..., X])) + 2 * _MARGIN_IN
+        high = self.pitch * len(self.nodes)
+        scale = min(width_in / wide, height_in / high)
+        return scale * wide, scale * high + _NAME_HEIGHT
 
-def _pitch(rows: Sequence[_Row]) -> float:
-    """Distance in inches between rows, with room for what climbs or turns."""
-    sideways = float(np.ptp([row.nodes[..., Y] for row in rows]))
-    upward = float(np.ptp(_heights(rows)))
-    return max(_PITCH_IN, upward + _MARGIN_IN, sideways + _MARGIN_IN)
-
-
-def _size(rows: Sequence[_Row], *, width_in: float, height_in: float) -> tuple[float, float]:
-    """Width and height on paper of a time lapse, to scale, within bounds."""
-    wide = float(np.ptp([row.nodes[..., X] for row in rows])) + 2 * _MARGIN_IN
-    high = _pitch(rows) * len(rows)
-    scale = min(width_in / wide, height_in / high)
-    return scale * wide, scale * high + _NAME_HEIGHT
-
-
-def _draw_rows(
-    panel: Axes, rows: Sequence[_Row], view: int, structure: Structure, width_in: float
-) -> None:
-    """Draws a time lapse, `width_in` inches wide on paper."""
-    pitch = _pitch(rows)
-    body_of_strut = structure.carriers[structure.struts[:, 0]]
-    for i, row in enumerate(rows):
-        down = pitch * i
-        if row.profile is not None and view == SIDE:
-            panel.plot(row.profile[:, X], row.profile[:, Z] - down, **_GROUND)
-        panel.plot(row.paths[..., X], row.paths[..., view] - down, **row.path_style)
-        for body, style in enumerate(row.styles):
-            ends = row.nodes[structure.struts[body_of_strut == body]]
-            panel.plot(ends[..., X].T, ends[..., view].T - down, **style)
-    nodes = np.array([row.nodes for row in rows])
-    heights = _heights(rows) if view == SIDE else nodes[..., Y]
-    middle = (heights.min() + heights.max()) / 2
-    left, right = nodes[..., X].min() - _MARGIN_IN, nodes[..., X].max() + _MARGIN_IN
-    per_paper_inch = (right - left) / width_in
-    top = middle + pitch / 2 + _NAME_HEIGHT * per_paper_inch
-    bottom = middle - pitch * (len(rows) - 0.5)
-    panel.set(xlabel="x (in)", xlim=(left, right), ylim=(bottom, top), aspect="equal")
-    panel.set_yticks(middle - pitch * np.arange(len(rows)), [row.label for row in rows])
-    panel.grid(visible=False, axis="y")
-    _name_bodies(panel, nodes[0][:, [X, view]], structure, per_paper_inch)
+    def draw(self, panel: Axes, view: int, *, width_in: float) -> None:
+        """Draws the time lapse, `width_in` inches wide on paper."""
+        structure, nodes, downs = (
+            self.structure,
+            self.nodes,
+            self.pitch * np.arange(len(self.nodes)),
+        )
+        body_of_strut = structure.carriers[structure.struts[:, 0]]
+        for i, down in enumerate(downs):
+            if view == SIDE:
+                panel.plot(self.profiles[i, :, X], self.profiles[i, :, Z] - down, **_GROUND)
+            panel.plot(self.paths[i][..., X], self.paths[i][..., view] - down, **self.path_style)
+            for body, style in enumerate(self.styles[i]):
+                ends = nodes[i, structure.struts[body_of_strut == body]]
+                panel.plot(ends[..., X].T, ends[..., view].T - down, **style)
+        heights = self.heights if view == SIDE else nodes[..., Y]
+        middle = (heights.min() + heights.max()) / 2
+        left, right = nodes[..., X].min() - _MARGIN_IN, nodes[..., X].max() + _MARGIN_IN
+        per_paper_inch = (right - left) / width_in
+        top = middle + self.pitch / 2 + _NAME_HEIGHT * per_paper_inch
+        bottom = middle - downs[-1] - self.pitch / 2
+        panel.set(xlabel="x (in)", xlim=(left, right), ylim=(bottom, top), aspect="equal")
+        panel.set_yticks(middle - downs, self.labels)
+        panel.grid(visible=False, axis="y")
+        _name_bodies(panel, nodes[0][:, [X, view]], structure, per_paper_inch)
 
 
 def _name_bodies(

@@ -15,10 +15,9 @@ from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, modes_after_step
 from tetra_drake.physics.feedback import Senses
-from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.oscillator import Network, steered_input
-from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.equilibrium import Rest
 from tetra_drake.robot.gait import Gait, check_gait
@@ -131,11 +130,10 @@ class Robot:
 
     def starting_modes(self) -> np.ndarray:
         """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
-        structure, count = self.structure, len(self.structure.contacts)
-        nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
-        modes, frames = np.zeros((count, MODE_COLUMNS)), np.empty((count, FRAME_COLUMNS))
+        structure, forces = self.structure, Forces.of(self.model)
+        modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
         start, points = structure.initial_state, (structure.p_BN, structure.first_node)
-        modes_after_step(start, *points, self.ground, nodes, frames, modes)
+        modes_after_step(start, *points, self.ground, forces.nodes, forces.frames, modes)
         return modes
 
 
