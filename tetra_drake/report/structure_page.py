@@ -9,7 +9,7 @@ import numpy as np
 
 from tetra_drake.analysis.rest import RestStudy
 from tetra_drake.formatting import Table, fixed
-from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS, NORMAL
+from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Mujoco
@@ -84,14 +84,11 @@ def save_structure_page(study: RestStudy, path: Path) -> None:
     loads = study.nodes["load"].to_numpy()[robot.structure.contacts]
     modes = np.zeros((2, len(loads), MODE_COLUMNS))
     modes[:, :, CONTACT] = loads > 0.0
-    pushes = np.zeros((2, len(loads), 3))
-    pushes[:, :, NORMAL] = loads
     motion = Motion(
         times=np.array([0.0, 1.0]),
         states=np.tile(robot.rest.state, (2, 1)),
         signals=np.zeros((2, robot.structure.signals)),
         modes=modes,
-        pushes=pushes,
     )
     title = f"{robot.scenario.name} at rest"
     save_replay(path, robot=robot, trajectory=make_dataset(robot, motion), title=title)
