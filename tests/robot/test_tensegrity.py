@@ -84,6 +84,12 @@ def test_offsets_move_the_bodies_of_the_robot_at_rest():
     np.testing.assert_allclose(difference, shift, atol=1e-15)
 
 
+def test_a_robot_knows_the_rest_at_which_it_starts():
+    robot = Robot.of(load_scenario("prism"))
+    assert robot.rest is robot.structure.rest
+    np.testing.assert_array_equal(robot.rest.state, robot.structure.initial_state)
+
+
 def test_nodes_placed_in_the_ground_are_refused(refused):
     scenario = load_scenario("prism")
     sunk = scenario.with_changes({"robot.nodes.n1": [-0.05, 0.0866, "-1 mm"]})
