@@ -29,6 +29,7 @@ from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
+from tetra_drake.physics.inertia import XX
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import Gait
@@ -278,8 +279,12 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
             # node, and cables give none. But MuJoCo's contact points are half the depth above the
             # nodes, and there friction would soon spin a thin bar as fast as it slides.
             across = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())[-1]
-            inertia = [across, across, across, 0.0, 0.0, 0.0]
-        _add(body, "inertial", pos="0 0 0", mass=mass, fullinertia=inertia)
+            moments = {"diaginertia": 3 * [across]}
+        elif structure.isotropic:
+            moments = {"diaginertia": 3 * [inertia[XX]]}
+        else:
+            moments = {"fullinertia": inertia}
+        _add(body, "inertial", pos="0 0 0", mass=mass, **moments)
         contact = _contact(robot, mass)
         for node in range(structure.first_node[i], structure.first_node[i + 1]):
             name, p_BN = structure.node_names[node], structure.p_BN[node]
