@@ -46,7 +46,7 @@ ROW = make_row()
 
 def arguments(draw, robot):
     """What a figure needs to know of the robot."""
-    if draw in (relative_distances, time_lapse):
+    if draw is time_lapse:
         return [robot.structure]
     return [robot] if draw in (one_step, ground_forces) else []
 
@@ -103,7 +103,7 @@ def robots(panel):
 
 
 def test_relative_distances_are_in_inches(walk):
-    [panel] = relative_distances(walk, ROW.structure).axes
+    [panel] = relative_distances(walk).axes
     lines = {line.get_label(): line for line in panel.lines}
     for i, name in enumerate(walk.body.values):
         np.testing.assert_allclose(lines[name].get_xdata(), walk.time)

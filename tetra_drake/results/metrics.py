@@ -12,6 +12,7 @@ from tetra_drake.physics.tally import Tally
 from tetra_drake.results.measures import travelling_index
 from tetra_drake.results.path import CentrePath, curvature
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import followed_nodes
 from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
@@ -52,15 +53,11 @@ def compute_metrics(
     """
     structure, steady_from = robot.structure, robot.scenario.simulation.steady_from
     x_way, y_way, _ = (end.mean(axis=0) - steady.mean(axis=0)).tolist()  # of the centre
+    first, middle, last = (followed_nodes(nodes, structure) for nodes in (start, steady, end))
     twist = lead = math.nan
-    if structure.thesis_nodes is None:
-        marker_start, marker_steady = start.mean(axis=0), steady.mean(axis=0)
-        marker = end.mean(axis=0)
-    else:
-        left, right, tip = structure.thesis_nodes
-        marker_start, marker_steady, marker = start[left], steady[left], end[left]
-        twist = float(abs(end[left, 0] - end[right, 0]))
-        lead = float(end[tip, 0] - end[left, 0])
+    if structure.is_row:
+        twist = float(abs(last[0, 0] - last[1, 0]))
+        lead = float(end[-1, 0] - last[0, 0])  # of the foremost tip, the last node
     steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
     work = float(totals.work[0])
     carried = robot.weight * max(math.hypot(x_way, y_way), LEAST_WAY)
@@ -68,12 +65,12 @@ def compute_metrics(
     per_time = 1.0 / (steady_time or 1)
     lifted = (per_time * totals.lifted).tolist()
     return Metrics(
-        distance=float(marker[0] - marker_start[0]),
-        steady_distance=float(marker[0] - marker_steady[0]),
+        distance=float(last[0, 0] - first[0, 0]),
+        steady_distance=float(last[0, 0] - middle[0, 0]),
         speed=float(x_way / (path.times[-1] - steady_from)),
         twist=twist,
         lead=lead,
-        lateral_drift=float(abs(marker[1] - marker_start[1])),
+        lateral_drift=float(abs(last[0, 1] - first[0, 1])),
         heading_change=float(path.heading[-1] - path.heading[0]),
         path_curvature=curvature(steady_path),
         actuator_work=work,
