@@ -33,7 +33,7 @@ CIRCLE = CentrePath(
 """To the left, with a radius of 1 m, but turning to the right."""
 
 
-STEADY = {"totals": make_totals(), "signals": np.zeros((49, 4))}
+STEADY = {"totals": make_totals(), "signals": np.zeros((49, 4)), "centres": np.zeros((3, 3))}
 
 
 def steady_after(robot: Robot, time: float) -> Robot:

@@ -21,15 +21,19 @@ _PADDING = 16
 
 
 def marked_positions(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
-    """(time, node, axis): positions of the structure's markers in m; of the mean of its nodes if it
+    """(time, node, axis): positions of the structure's markers in m; of its centre of mass if it
     has none.
 
     The node of that centre is named "centre", and its node_body is "".
     """
+    import xarray
+
     if len(structure.markers):
         return trajectory.p_WN.isel(node=structure.markers)
-    centre = trajectory.p_WN.mean("node").expand_dims({"node": ["centre"]}, axis=1)
-    return centre.assign_coords(node_body=("node", [""]))
+    mass = xarray.DataArray(structure.mass, dims="body")
+    centre = trajectory.p_WB.weighted(mass).mean("body")
+    named = centre.expand_dims({"node": ["centre"]}, axis=1)
+    return named.assign_coords(node_body=("node", [""]))
 
 
 def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
@@ -45,10 +49,10 @@ def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
     return x - x.isel(body=0)
 
 
-def path_of_centre(trajectory: xarray.Dataset) -> CentrePath:
+def path_of_centre(trajectory: xarray.Dataset, structure: Structure) -> CentrePath:
     """The path of the robot's centre at all samples."""
     poses = np.concatenate([trajectory.q_WB.values, trajectory.p_WB.values], axis=2)
-    return follow(trajectory.time.values, poses)
+    return follow(trajectory.time.values, poses, structure)
 
 
 def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:

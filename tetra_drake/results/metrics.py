@@ -39,6 +39,7 @@ def compute_metrics(
     start: np.ndarray,
     steady: np.ndarray,
     end: np.ndarray,
+    centres: np.ndarray,
     path: CentrePath,
     totals: Tally,
     signals: np.ndarray,
@@ -46,21 +47,23 @@ def compute_metrics(
     """The metrics of a walk.
 
     `start`, `steady` and `end` are node positions p_WN (nodes, 3) in m at 0, at
-    `simulation.steady_from` and at the end. `path` is that of the centre. `totals` is the tally of
+    `simulation.steady_from` and at the end, and `centres` (3, 3) the centres of mass then. `path`
+    is that of the centre. `totals` is the tally of
     the whole walk, as plain arrays. `signals` (k, m) in N are those at evenly spaced times of the
     steady stretch.
     """
     structure, steady_from = robot.structure, robot.scenario.simulation.steady_from
-    x_way, y_way, _ = (end.mean(axis=0) - steady.mean(axis=0)).tolist()  # of the centre
     twist = lead = math.nan
     if structure.thesis_nodes is None:
-        marker_start, marker_steady = start.mean(axis=0), steady.mean(axis=0)
-        marker = end.mean(axis=0)
+        marker_start, marker_steady, marker = centres
+        way = centres[2] - centres[1]
     else:
+        way = end.mean(axis=0) - steady.mean(axis=0)  # of the centre, as recorded
         left, right, tip = structure.thesis_nodes
         marker_start, marker_steady, marker = start[left], steady[left], end[left]
         twist = float(abs(end[left, 0] - end[right, 0]))
         lead = float(end[tip, 0] - end[left, 0])
+    x_way, y_way, _ = way.tolist()
     steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
     work = float(totals.work[0])
     carried = robot.weight * max(math.hypot(x_way, y_way), LEAST_WAY)
