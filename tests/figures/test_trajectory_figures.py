@@ -289,6 +289,8 @@ def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
     way = prism.SPEED * motion.time / INCH
     [panel, _] = before_and_after([("a", motion), ("b", motion)], robot.structure).axes
     np.testing.assert_allclose(panel.lines[0].get_ydata(), way, atol=1e-9)
+    [panel] = path_of_the_centre(motion, robot.structure).axes
+    assert not panel.collections, "no arrows, as it has no heading"
     *_, panel = one_step(motion, robot).axes
     assert panel.get_title("left") == "centre"
     step = 0.5 * prism.PERIOD

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import pytest
-
 from helpers.prism import make_prism
 
 from tetra_drake.results.path import curvature, follow
