@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
 from tetra_drake.physics.feedback import sense
 from tetra_drake.results.result import save_result
 from tetra_drake.robot.gait import seeded_gait
@@ -94,6 +94,14 @@ def test_a_structure_walks_as_far_as_its_centre_of_mass():
     assert result.metrics.distance == pytest.approx(x, abs=1e-9)
     assert result.metrics.lateral_drift == pytest.approx(abs(y), abs=1e-9)
     assert abs(float(way.mean("body")[0]) - x) > 1e-4, "the mean of the bodies goes another way"
+
+
+def test_a_structure_whose_cables_nothing_drives_is_refused(refused):
+    still = briefly("prism").with_changes({"robot.actuated": {}})
+    with refused("prism", "robot.actuated", "oscillator"):
+        check_scenario(still)
+    with refused("prism", "robot.actuated", "oscillator"):
+        simulate(scenario=still, gait=seeded_gait(still))
 
 
 def test_what_a_structure_lacks_is_null_in_its_result(tmp_path):
