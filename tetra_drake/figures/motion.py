@@ -133,32 +133,37 @@ def time_lapse(trajectory: xarray.Dataset, structure: Structure, *, instants: in
 
 
 @common_style()
-def path_of_the_centre(trajectory: xarray.Dataset, *, instants: int = 9) -> Figure:
+def path_of_the_centre(
+    trajectory: xarray.Dataset, structure: Structure, *, instants: int = 9
+) -> Figure:
     """The path of the robot's centre from above, to scale.
 
-    Arrows: where the robot heads, at evenly spaced instants."""
-    path = measures.path_of_centre(trajectory)
+    Arrows: where a row heads, at evenly spaced instants."""
+    path = measures.path_of_centre(trajectory, structure)
     points = path.centre[:, :2] / INCH
     arrow = _ARROW * max(*np.ptp(points, axis=0), _MARGIN_IN)
     samples = _nearest(trajectory, np.linspace(path.times[0], path.times[-1], instants))
     tails, heading = points[samples], path.heading[samples]
     heads = tails + arrow * np.column_stack([np.cos(heading), np.sin(heading)])
-    drawn = np.concatenate([points, heads])
+    drawn = np.concatenate([points, heads]) if structure.is_row else points
     left, bottom = drawn.min(axis=0) - arrow
     right, top = drawn.max(axis=0) + arrow
     scale = min(_PATH_WIDTH / (right - left), _PATH_HEIGHT / (top - bottom))
     width, height = scale * (right - left), scale * (top - bottom)
     figure, [[panel]] = make_figure(width_in=max(width, 3.0) + 0.8, height_in=height + 1.5)
     panel.plot(points[:, X], points[:, Y], **_PATH)
-    ways = heads - tails
-    panel.quiver(tails[:, X], tails[:, Y], ways[:, X], ways[:, Y], **_HEADING)
+    title = "Path of the centre from above"
+    if structure.is_row:
+        title += "\narrows: heading"
+        ways = heads - tails
+        panel.quiver(tails[:, X], tails[:, Y], ways[:, X], ways[:, Y], **_HEADING)
     panel.plot(points[0, X], points[0, Y], **_START)
     panel.plot(points[-1, X], points[-1, Y], **_END)
     panel.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
     panel.set(xlabel="x (in)", ylabel="y (in)")
     end = f"end, after {path.times[-1]:.4g} s"
     legend_below(figure, {"start": _START, end: _END})
-    figure.suptitle("Path of the centre from above\narrows: heading")
+    figure.suptitle(title)
     return figure
 
 

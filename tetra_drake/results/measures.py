@@ -33,10 +33,10 @@ def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
     return x - x.isel(body=0)
 
 
-def path_of_centre(trajectory: xarray.Dataset) -> CentrePath:
+def path_of_centre(trajectory: xarray.Dataset, structure: Structure) -> CentrePath:
     """The path of the robot's centre at all samples."""
     poses = np.concatenate([trajectory.q_WB.values, trajectory.p_WB.values], axis=2)
-    return follow(trajectory.time.values, poses)
+    return follow(trajectory.time.values, poses, structure)
 
 
 def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:

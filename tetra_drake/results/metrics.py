@@ -52,12 +52,13 @@ def compute_metrics(
     steady stretch.
     """
     structure, steady_from = robot.structure, robot.scenario.simulation.steady_from
-    x_way, y_way, _ = (end.mean(axis=0) - steady.mean(axis=0)).tolist()  # of the centre
     first, middle, last = (followed_nodes(nodes, structure) for nodes in (start, steady, end))
-    twist = lead = math.nan
+    way, twist, lead = last[0] - middle[0], math.nan, math.nan
     if structure.is_row:
+        way = end.mean(axis=0) - steady.mean(axis=0)  # of the centre, as recorded
         twist = float(abs(last[0, 0] - last[1, 0]))
         lead = float(end[-1, 0] - last[0, 0])  # of the foremost tip, the last node
+    x_way, y_way, _ = way.tolist()
     steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
     work = float(totals.work[0])
     carried = robot.weight * max(math.hypot(x_way, y_way), LEAST_WAY)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -82,6 +83,18 @@ class Structure:
         """(nodes,): the index of each node's body."""
         return np.repeat(np.arange(len(self.bodies)), np.diff(self.first_node))
 
+    @functools.cached_property
+    def node_shares(self) -> np.ndarray:
+        """(nodes,): the shares with which the nodes make up the centre of mass, wherever the bodies
+        are."""
+        shares = []
+        for p_BN, mass in zip(np.split(self.p_BN, self.first_node[1:-1]), self.mass, strict=True):
+            # Each body's origin is its centre of mass, in the hull of its nodes.
+            conditions = np.vstack([p_BN.T, np.full(len(p_BN), np.abs(p_BN).max())])
+            origin = [0.0, 0.0, 0.0, conditions[3, 0]]
+            shares.append(mass * np.linalg.lstsq(conditions, origin)[0])
+        return np.concatenate(shares) / self.mass.sum()
+
     @property
     def isotropic(self) -> bool:
         """True if each body has the same moment of inertia about all axes, but for rounding."""
@@ -113,10 +126,10 @@ def turn_with_slope(
 
 def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
     """Positions (..., markers, 3) of the markers among nodes p_WN (..., nodes, 3), or (..., 1, 3)
-    of the nodes' centre."""
+    of the centre of mass."""
     if structure.is_row:
         return p_WN[..., structure.markers, :]
-    return p_WN.mean(axis=-2, keepdims=True)
+    return (structure.node_shares @ p_WN)[..., np.newaxis, :]
 
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
