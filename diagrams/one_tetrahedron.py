@@ -23,13 +23,16 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
+from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.robot import MakeStructure, Robot
-from tetra_drake.robot.structure import Structure, node_positions, node_velocities
-from tetra_drake.robot.tetrahedra import BASE, BOTTOM_LEFT, STRUTS, TOP
+from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.robot.tetrahedra import STRUTS
+from tetra_drake.scenario.nesting import BOTTOM_LEFT, BOTTOM_RIGHT, TOP
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import GroundContact
 
+BASE = BOTTOM_LEFT, BOTTOM_RIGHT, TOP
 LEADING, TRAILING = TOP, BOTTOM_LEFT
 R_WB = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 """Turns a tetrahedron as it lies in the robot so that it stands on its base."""
@@ -74,11 +77,8 @@ def make_standing_tetrahedron(scenario: Scenario) -> Robot:
         p_WB=-p_BN[TRAILING, 2] * start_axes(row)[None, 2],
         q_WB=row.q_WB[:1],
         cables=row.cables[:0],
-        cable_names=(),
         cable_groups=(),
         contacts=np.array(BASE),
-        thesis_nodes=None,
-        feet=len(BASE),
         markers=row.markers[:2],
     )
     return Robot.of(scenario, tetrahedron)
@@ -132,10 +132,11 @@ def let_go(
     def logged(port: str) -> np.ndarray:
         return diagram.GetSubsystemByName(f"{port}_log").FindLog(context).data().T
 
+    nodes = np.array([moved_nodes(tetrahedron, state) for state in logged("state")])
     return Samples(
         times=diagram.GetSubsystemByName("state_log").FindLog(context).sample_times(),
-        p_WN=np.array([node_positions(tetrahedron, state) for state in logged("state")]),
-        v_WN=np.array([node_velocities(tetrahedron, state) for state in logged("state")]),
+        p_WN=nodes[..., P_WN : P_WN + 3],
+        v_WN=nodes[..., V_WN : V_WN + 3],
         normal_forces=logged("normal_forces"),
         friction_forces=logged("friction_forces").reshape(-1, len(BASE), 2),
         modes=logged("modes").reshape(-1, len(BASE), 3),

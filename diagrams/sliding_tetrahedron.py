@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from one_tetrahedron import LEADING, TRAILING, Samples, let_go, weight
+from one_tetrahedron import BASE, LEADING, TRAILING, Samples, let_go, weight
 
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
 from tetra_drake.results.measures import intervals
-from tetra_drake.robot.tetrahedra import BASE, NODES
+from tetra_drake.robot.tetrahedra import NODES
 from tetra_drake.scenario.friction_kinds import ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario

@@ -22,10 +22,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from one_tetrahedron import Samples, let_go, make_standing_tetrahedron, start_axes, weight
+from one_tetrahedron import BASE, Samples, let_go, make_standing_tetrahedron, start_axes, weight
 
 from tetra_drake.figures.style import OKABE_ITO, common_style, make_figure, save_figure
-from tetra_drake.robot.tetrahedra import BASE
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from tetra_drake import __version__
 from tetra_drake.engines import ENGINES
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import check_folder
+from tetra_drake.files import check_folder, write_whole
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import hint
@@ -350,20 +350,16 @@ def _structure(options: Options) -> None:
     tensions and heights.
     """
     from tetra_drake.analysis.rest import study_rest
-    from tetra_drake.report.structure_page import robot_of_file, save_mjcf, structure_text
+    from tetra_drake.engines.mujoco import make_mjcf
+    from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
 
-    robot = robot_of_file(options.source, unit=options.unit)
-    for file in filter(None, (options.out, options.mjcf)):
-        check_folder(file.parent)
-    study = study_rest(robot)
+    study = study_rest(robot_of_file(options.source, unit=options.unit))
     print(structure_text(study))
     if options.out:
-        from tetra_drake.report.structure_page import save_structure_page
-
         save_structure_page(study, options.out)
         print(f"to see the structure, open in a browser: {options.out}")
     if options.mjcf:
-        save_mjcf(robot, options.mjcf)
+        write_whole(options.mjcf, make_mjcf(study.robot))
         print(f"wrote {options.mjcf}")
 
 

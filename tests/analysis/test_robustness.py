@@ -57,10 +57,14 @@ def test_the_default_disturbances_are_of_what_the_scenario_has(scenario):
     thesis = default_disturbances(load_scenario("thesis"), 2.0)
     ours = default_disturbances(scenario)
     laws = {"friction.static, friction.kinetic", "friction.damping"}
-    assert set(SPREAD) - set(thesis.spreads) == laws
+    cables = {"robot.cables.outer_stiffness", "robot.cables.inner_stiffness"}
+    assert set(thesis.spreads) - set(SPREAD) == cables
+    assert set(SPREAD) - set(thesis.spreads) == laws | {"robot.cables.*stiffness"}
     assert {key for key in ours.spreads if key.startswith("friction")} == laws
     assert set(thesis.spreads.values()) == {0.02} == {thesis.start}
     assert set(ours.spreads.values()) == {0.05} == {ours.start}
+    groups = default_disturbances(load_scenario("prism")).spreads.keys() - ours.spreads.keys()
+    assert groups == {f"robot.cables.{name}.stiffness" for name in ("bottom", "top", "side")}
 
 
 def test_every_gait_walks_under_the_same_draws_as_evolution_would_simulate_them(judgement, gaits):

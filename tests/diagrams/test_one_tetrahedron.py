@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from one_tetrahedron import LEADING, TRAILING, weight
+from one_tetrahedron import BASE, LEADING, TRAILING, weight
 from settling_node import IMPACT_SPEED, bounce, contact_speeds, settle, velocity_correction
 from sliding_tetrahedron import INITIAL_SPEED, draw, flights, slide, slips, travel
 
-from tetra_drake.robot.tetrahedra import BASE
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.units import INCH
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 import pytest
-from one_tetrahedron import let_go, make_standing_tetrahedron, start_axes, weight
+from one_tetrahedron import BASE, let_go, make_standing_tetrahedron, start_axes, weight
 from tetrahedron_on_incline import (
     GENTLE,
     KINETIC,
@@ -25,7 +25,6 @@ from tetrahedron_on_incline import (
     simulate,
 )
 
-from tetra_drake.robot.tetrahedra import BASE
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.units import INCH

@@ -143,13 +143,14 @@ def row_as_kind(row: Robot) -> Kind:
     }
     cables["outer"]["stiffness"] = law.cables.outer_stiffness
     cables["inner"]["stiffness"] = law.cables.inner_stiffness
-    actuated: dict[str, list[str]] = {name: [] for name in structure.actuation.names}
+    oscillators = [name.replace(" ", "_") for name in structure.actuation.names]
+    actuated: dict[str, list[str]] = {name: [] for name in oscillators}
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
         group = name.split()[1]
         pair = [names[cable["node_a"]], names[cable["node_b"]]]
         cables[group]["pairs"].append(pair)
         if cable["signal"] != PASSIVE:
-            actuated[structure.actuation.names[cable["signal"]]].append(" ".join([group, *pair]))
+            actuated[oscillators[cable["signal"]]].append(" ".join([group, *pair]))
     return Kind(
         nodes=dict(zip(names, p_WN, strict=True)),
         struts={
@@ -164,6 +165,27 @@ def row_as_kind(row: Robot) -> Kind:
         contacts=[names[i] for i in structure.contacts],
         gravity=law.gravity,
     )
+
+
+def test_opposite_turns_of_a_mirrored_gait_lead_to_mirror_images():
+    changes = {
+        "robot.tetrahedra": 2,
+        "robot.actuation": [["outer bottom_left"], ["outer bottom_right"]],
+        "engine": "!Compiled",
+        "cpg.signals": "live",
+        "cpg.start_up": "0.25 s",
+        "simulation.duration": "2 s",
+        "simulation.steady_from": "1 s",
+        "gait_bounds.mirrored": True,
+    }
+    row = Robot.of(load_scenario("coulomb").with_changes(changes))
+    walks = {"robot": row_as_kind(row), "objective": {"speed": "1 s/in"}}
+    scenario = row.scenario.with_changes(walks)
+    gait = seeded_gait(scenario, 3)
+    paths = [simulate(scenario=scenario, gait=gait, steering=turn).path for turn in (0.6, -0.6)]
+    left, right = (path.centre for path in paths)
+    np.testing.assert_allclose(left * [1.0, -1.0, 1.0], right, atol=1e-5)
+    assert np.ptp(left[:, 1]) > 1e-3, "it turns"
 
 
 FINE = {

@@ -46,7 +46,7 @@ ROW = make_row()
 
 def arguments(draw, robot):
     """What a figure needs to know of the robot."""
-    if draw in (relative_distances, time_lapse):
+    if draw in (time_lapse, path_of_the_centre):
         return [robot.structure]
     return [robot] if draw in (one_step, ground_forces) else []
 
@@ -103,7 +103,7 @@ def robots(panel):
 
 
 def test_relative_distances_are_in_inches(walk):
-    [panel] = relative_distances(walk, ROW.structure).axes
+    [panel] = relative_distances(walk).axes
     lines = {line.get_label(): line for line in panel.lines}
     for i, name in enumerate(walk.body.values):
         np.testing.assert_allclose(lines[name].get_xdata(), walk.time)
@@ -133,7 +133,7 @@ def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):
     x, y = radius * np.sin(angle), radius * (1.0 - np.cos(angle))
     p_WB[..., 0], p_WB[..., 1] = x[:, None], y[:, None]
     turned = walk.assign(q_WB=(walk.q_WB.dims, q_WB), p_WB=(walk.p_WB.dims, p_WB))
-    figure = path_of_the_centre(turned, instants=4)
+    figure = path_of_the_centre(turned, ROW.structure, instants=4)
     [panel] = figure.axes
     assert panel.get_aspect() == 1.0
     path, start, end = panel.lines
@@ -289,6 +289,8 @@ def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
     way = prism.SPEED * motion.time / INCH
     [panel, _] = before_and_after([("a", motion), ("b", motion)], robot.structure).axes
     np.testing.assert_allclose(panel.lines[0].get_ydata(), way, atol=1e-9)
+    [panel] = path_of_the_centre(motion, robot.structure).axes
+    assert not panel.collections, "no arrows, as it has no heading"
     *_, panel = one_step(motion, robot).axes
     assert panel.get_title("left") == "centre"
     step = 0.5 * prism.PERIOD

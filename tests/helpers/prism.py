@@ -69,13 +69,9 @@ def make_prism() -> Robot:
         p_WB=p_WB,
         q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)),
         cables=np.array(rows, dtype=CABLE),
-        cable_names=tuple(CABLES),
         cable_groups=tuple(groups),
-        slack=True,
         actuation=Actuation(layout, reach=None),
         contacts=np.arange(6),
-        thesis_nodes=None,
-        feet=3,
         markers=np.zeros(0, dtype=int),
     )
     return Robot.of(load_scenario("coulomb"), structure)

@@ -14,14 +14,16 @@ from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.loop import DONE
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import Structure
+from tetra_drake.scenario import robot_kinds
 
 
 @dataclasses.dataclass(frozen=True)
 class Thrown(Structure):
     """A structure whose bodies move at t = 0."""
 
-    v_WB: np.ndarray
+    v_WB: np.ndarray = dataclasses.field(kw_only=True)
     """(bodies, 6): their angular velocities (rad/s) and velocities (m/s)."""
 
     @property
@@ -59,6 +61,21 @@ def unit_inertias(structure: Structure) -> np.ndarray:
     """(bodies, 3, 3): the inertias over the masses, in the frames of the bodies (m²)."""
     xx, yy, zz, xy, xz, yz = structure.unit_inertia.T
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+
+
+def joined_nodes(given: robot_kinds.Structure) -> dict[str, np.ndarray]:
+    """The nodes of a structure file and what joins them, as statics takes them."""
+    number = {node: place for place, node in enumerate(given.nodes)}
+    return {
+        "p_WN": np.array(list(given.nodes.values())),
+        "body_of_node": np.array([given.body_of_node[node] for node in given.nodes]),
+        "cable_ends": np.array([[number[n] for n in cable.nodes] for cable in given.all_cables]),
+    }
+
+
+def statics_of(given: robot_kinds.Structure) -> Statics:
+    """Statics of a structure with its nodes as given."""
+    return find_statics(**joined_nodes(given))
 
 
 def recorded_structure(data: Path, name: str) -> dict[str, Any]:

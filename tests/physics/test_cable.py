@@ -8,9 +8,9 @@ from pydrake.multibody.tree import LinearSpringDamper
 
 from tetra_drake.physics.actuator import DIRECT, DRIVE_COLUMNS, CableLaw
 from tetra_drake.physics.cable import PULL_COLUMNS, TENSION, cable_forces, cable_tension
-from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN
 from tetra_drake.robot.bodies import AddBodies
-from tetra_drake.robot.structure import Structure, node_positions, node_velocities
+from tetra_drake.robot.structure import Structure, moved_nodes
 
 
 @pytest.fixture
@@ -48,7 +48,8 @@ def test_power_of_the_cables_is_tension_times_shortening(structure, state):
     # Virtual power: generalized force . v = - sum of T dl/dt.
     force, tensions = forces_of_cables(structure, state, 1.0, 0.0, -1.0, 2.0)
     a, b = structure.cables["node_a"], structure.cables["node_b"]
-    p_WN, v_WN = node_positions(structure, state), node_velocities(structure, state)
+    nodes = moved_nodes(structure, state)
+    p_WN, v_WN = nodes[:, P_WN : P_WN + 3], nodes[:, V_WN : V_WN + 3]
     d = p_WN[b] - p_WN[a]
     rates = np.einsum("ij,ij->i", v_WN[b] - v_WN[a], d) / np.linalg.norm(d, axis=1)
     assert force @ state[35:] == pytest.approx(-tensions @ rates, rel=1e-12)

@@ -1,11 +1,15 @@
 """The path of the centre: its curvature and the heading along it."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
+from helpers.prism import make_prism
 
 from tetra_drake.results.path import curvature, follow
+from tetra_drake.robot.robot import MakeStructure
+from tetra_drake.scenario.load import load_scenario
 
 RADIUS = 0.2  # m
 TURN = 2.0 * math.pi
@@ -67,10 +71,19 @@ def poses(headings, pitch=0.3, bodies=3):
 
 
 @pytest.mark.parametrize("turns", [1.7, -1.7])
-def test_the_heading_counts_whole_turns_and_the_centre_is_the_mean_of_the_origins(turns):
+def test_the_heading_of_a_row_counts_whole_turns_and_its_centre_is_that_of_mass(turns):
+    row = MakeStructure(load_scenario("thesis").with_changes({"robot.tetrahedra": 3}))
     headings = np.linspace(0.4, 0.4 + turns * TURN, 30)
-    path = follow(np.arange(30.0), poses(headings))
+    path = follow(np.arange(30.0), poses(headings), row)
     np.testing.assert_allclose(path.heading, headings, atol=1e-12)
     expected = [np.cos(headings) / 3.0, np.sin(headings) / 3.0, 0.1 + 0.0 * headings]
     np.testing.assert_allclose(path.centre, np.transpose(expected), atol=1e-12)
     np.testing.assert_array_equal(path.times, np.arange(30.0))
+
+
+def test_heavy_bodies_draw_the_centre_of_a_structure_which_has_no_heading():
+    structure = dataclasses.replace(make_prism().structure, mass=np.array([0.01, 0.01, 0.02]))
+    # Bodies at 0, 1/3 and 2/3 m, of which the last weighs as much as the others together.
+    path = follow(np.arange(2.0), poses(np.zeros(2)), structure)
+    np.testing.assert_allclose(path.centre[:, 0], (1 / 3 + 2 * 2 / 3) / 4)
+    assert np.isnan(path.heading).all()

@@ -30,7 +30,7 @@ def test_rests_where_the_independent_simulation_does(name, data):
     expected = np.array(recorded["tensions_at_rest"])[places]
     np.testing.assert_allclose(resting.forces.pulls[:, TENSION], expected, rtol=1e-6)
     assert resting.forces.pushes[:, NORMAL].sum() == pytest.approx(robot.weight, rel=1e-9)
-    assert structure.feet == np.count_nonzero(theirs[:, 2] < 0.0) == 3
+    assert robot.rest.feet == np.count_nonzero(theirs[:, 2] < 0.0) == 3
 
 
 def distances(p_WN: np.ndarray) -> np.ndarray:
@@ -82,6 +82,12 @@ def test_offsets_move_the_bodies_of_the_robot_at_rest():
     moved = scenario.with_sections(robot=scenario.robot.model_copy(update={"offsets": shift}))
     difference = MakeStructure(moved).p_WB - MakeStructure(scenario).p_WB
     np.testing.assert_allclose(difference, shift, atol=1e-15)
+
+
+def test_a_robot_knows_the_rest_at_which_it_starts():
+    robot = Robot.of(load_scenario("prism"))
+    assert robot.rest is robot.structure.rest
+    np.testing.assert_array_equal(robot.rest.state, robot.structure.initial_state)
 
 
 def test_nodes_placed_in_the_ground_are_refused(refused):

@@ -84,7 +84,7 @@ BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
     ({"robot": {"tetrahedra": 7}, "robot.tetrahedra": 7}, "robot.tetrahedra", "twice"),
     ({"simulation.duration": "2.0 s"}, "simulation.steady_from", "3.0 s"),
     # Networks that cannot be
-    ({"robot.actuation": []}, "robot.actuation", "[]"),
+    ({"robot.actuation": []}, "robot.actuation", "at least 1"),
     ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
     ({"robot.actuation": [["outer left"]]}, "robot.actuation[0][0]", "'outer left'"),
     ({"robot.actuation": [LEFT], "gait_bounds.mirrored": True}, "gait_bounds.mirrored", "true"),
@@ -196,7 +196,7 @@ BAD = [
     ("robot: {cables: {free_length: 1 km}}", "robot.spacing", "balance"),
     ("terrain: !HeightField {file: none.csv, cell: 1 in}", "terrain.file", "none.csv"),
     ("terrain: !Rough {amplitude: 1 in, wavelength: 1 um}", "terrain.wavelength", "5e-07 m"),
-    ("objective: {}", "objective", "no metric"),
+    ("objective: {}", "objective", "at least 1"),
     ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
     ("optimizer: !CmaEs {population: 3}", "optimizer.population", "3"),
     ("optimizer: !QualityDiversity {cells: [9, 1]}", "optimizer.cells[1]", "1"),

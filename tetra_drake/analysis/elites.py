@@ -63,10 +63,7 @@ def _cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> npt.NDArray[np.in
 
 
 def judge_elites(
-    directory: Path,
-    *,
-    workers: int | None = None,
-    say: Callable[[str], None] = lambda text: None,
+    directory: Path, *, workers: int | None = None, say: Callable[[str], None] = lambda text: None
 ) -> None:
     """Simulates the elites of a run on robots disturbed as judge() does, as often as the scenario
     says, and adds to the record how far they walk. Those that have been are skipped."""

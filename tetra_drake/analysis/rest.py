@@ -7,18 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from pydrake.multibody.tree import RotationalInertia
 
-from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
-from tetra_drake.physics.inertia import XX, XY, XZ, YY, YZ, ZZ
-from tetra_drake.robot.equilibrium import (
-    NoRest,
-    Resting,
-    find_rest,
-    force_at_rest,
-    stiffness_at_rest,
-)
+from tetra_drake.robot.equilibrium import Resting, force_at_rest, stiffness_at_rest
+from tetra_drake.robot.laws import rest_of
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import node_positions
@@ -50,14 +44,14 @@ def study_rest(robot: Robot) -> RestStudy:
     import pandas
 
     structure, rest = robot.structure, robot.rest
-    p_WN = node_positions(structure, rest.state)
     resting = Resting.of(robot.model)
     force_at_rest(resting, rest.state)
     loads = np.zeros(len(structure.node_names))
     loads[structure.contacts] = resting.forces.pushes[:, NORMAL]
     ends = np.column_stack([structure.cables["node_a"], structure.cables["node_b"]])
     bodies = np.array(structure.bodies)[structure.carriers]
-    nodes = {"body": bodies, "x": p_WN[:, 0], "y": p_WN[:, 1], "z": p_WN[:, 2], "load": loads}
+    x, y, z = node_positions(structure, rest.state).T
+    nodes = {"body": bodies, "x": x, "y": y, "z": z, "load": loads}
     cables = {
         "group": structure.cable_groups,
         "length": rest.lengths,
@@ -77,25 +71,19 @@ def study_rest(robot: Robot) -> RestStudy:
 
 def _weightless_nodes(robot: Robot) -> np.ndarray:
     """p_WN (nodes, 3) where the robot is in balance without weight, away from the ground."""
-    model, state = robot.model, robot.rest.state.copy()
-    bodies = len(model.bodies.mass)
-    state[6 : 7 * bodies : 7] += 10.0 * model.bodies.radius.max()
-    weightless = model.bodies._replace(weight=np.zeros(bodies))
-    try:
-        rest = find_rest(model._replace(bodies=weightless), state)
-    except NoRest as error:
-        body = robot.structure.bodies[error.body]
-        problem = f"finds no balance without weight; {error.force:.3g} N are left on '{body}'"
-        raise InputError(robot.scenario.name, "robot", problem) from error
-    return node_positions(robot.structure, rest.state)
+    bodies, start = robot.model.bodies, robot.rest.state.copy()
+    start[6 : 7 * len(bodies.mass) : 7] += 10.0 * bodies.radius.max()
+    weightless = robot.scenario.with_numbers({"robot.gravity": 0.0})
+    return node_positions(robot.structure, rest_of(weightless, robot.structure, start).state)
 
 
 def _frequencies(resting: Resting, state: np.ndarray) -> np.ndarray:
     """Natural frequencies (Hz) above LEAST_FREQUENCY."""
     stiffness = stiffness_at_rest(resting, state)
+    stiffness = 0.5 * (stiffness + stiffness.T)
     # Of M x'' = -K x with M = L Lᵀ: the eigenvalues of L^-1 K L^-T.
     factor = np.linalg.cholesky(_mass_matrix(resting))
-    scaled = np.linalg.solve(factor, np.linalg.solve(factor, 0.5 * (stiffness + stiffness.T)).T)
+    scaled = np.linalg.solve(factor, np.linalg.solve(factor, stiffness).T)
     squares = np.linalg.eigvalsh(scaled)
     least = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
     return np.sqrt(squares[squares > least]) / (2.0 * math.pi)
@@ -103,14 +91,11 @@ def _frequencies(resting: Resting, state: np.ndarray) -> np.ndarray:
 
 def _mass_matrix(resting: Resting) -> np.ndarray:
     """(6 n, 6 n) at the state that was last computed, for rotations times the greatest radius."""
-    bodies, forces = resting.model.bodies, resting.forces
-    matrix = np.zeros((6 * len(bodies.mass), 6 * len(bodies.mass)))
-    for body, mass in enumerate(bodies.mass):
-        inertia = bodies.inertia[body] if resting.model.isotropic else forces.inertia[body]
-        xx, yy, zz = inertia[XX], inertia[YY], inertia[ZZ]
-        xy, xz, yz = inertia[XY], inertia[XZ], inertia[YZ]
-        turning, moving = slice(6 * body, 6 * body + 3), slice(6 * body + 3, 6 * body + 6)
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    model, bodies = resting.model, resting.model.bodies
+    inertia_W = bodies.inertia if model.isotropic else resting.forces.inertia
+    matrix = np.diag(np.repeat(bodies.mass, 6))
+    for body, inertia in enumerate(inertia_W):
+        turning = slice(6 * body, 6 * body + 3)
+        tensor = RotationalInertia(*inertia).CopyToFullMatrix3()
         matrix[turning, turning] = tensor / bodies.radius.max() ** 2
-        matrix[moving, moving] = mass * np.eye(3)
     return matrix

@@ -3,6 +3,7 @@ from the model."""
 
 from __future__ import annotations
 
+import fnmatch
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,10 +33,9 @@ SPREAD = (
     *("robot.spacing", "friction.stiction_range", "friction.stiction_damping"),
     *("friction.stiction_switch", "friction.proportional_stiction"),
     *("friction.static, friction.kinetic", "friction.damping"),
-    *("robot.cables.outer_stiffness", "robot.cables.inner_stiffness"),
-    *("ground.stiffness", "ground.damping"),
+    *("robot.cables.*stiffness", "ground.stiffness", "ground.damping"),
 )
-"""The keys that the default disturbances spread, where the scenario has them."""
+"""The keys that the default disturbances spread, where the scenario has them; * is any text."""
 
 PERCENT, DRAWS = 5.0, 200
 ALONE = 8
@@ -82,11 +82,13 @@ class Judgement:
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
     """Default disturbances: so many percent for keys of SPREAD in the scenario, and for starts."""
     share, numbers = percent / 100.0, scenario.numbers()
-    return Disturbances(
-        draws=1,
-        spreads={joined: share for joined in SPREAD if separate(joined)[0] in numbers},
-        start=share,
-    )
+    keys: list[str] = []
+    for joined in SPREAD:
+        if separate(joined)[0] in numbers:
+            keys.append(joined)
+        else:
+            keys += fnmatch.filter(numbers, joined)
+    return Disturbances(draws=1, spreads=dict.fromkeys(keys, share), start=share)
 
 
 def judge(

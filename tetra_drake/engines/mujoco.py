@@ -21,6 +21,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
+from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.engines.interface import Engine, Outcome, Viewer
 from tetra_drake.engines.observer import Observer
@@ -129,11 +130,8 @@ class MujocoEngine(Engine):
     def simulate_many(
         self, walks: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
     ) -> list[Outcome]:
-        def outcome(walk: tuple[Scenario, Gait]) -> Outcome:
-            return self.outcome(*walk, record=record)
-
         with ThreadPoolExecutor(threads) as pool:
-            return list(pool.map(outcome, walks))
+            return list(pool.map(lambda walk: self.outcome(*walk, record=record), walks))
 
 
 def installed() -> bool:
@@ -281,11 +279,17 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
         _add(body, "freejoint")
         mass, inertia = bodies.mass[i], bodies.inertia[i]
         is_bar = structure.first_node[i + 1] - structure.first_node[i] == 2
-        if structure.isotropic or is_bar:
-            moment = _moment_across(inertia) if is_bar else inertia[XX]
-            _add(body, "inertial", pos="0 0 0", mass=mass, diaginertia=3 * [moment])
+        if is_bar:
+            # A bar gets its moment across its axis about its axis, too: a spin about that moves no
+            # node, and cables give none. But MuJoCo's contact points are half the depth above the
+            # nodes, and there friction would soon spin a thin bar as fast as it slides.
+            across = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())[-1]
+            moments = {"diaginertia": 3 * [across]}
+        elif structure.isotropic:
+            moments = {"diaginertia": 3 * [inertia[XX]]}
         else:
-            _add(body, "inertial", pos="0 0 0", mass=mass, fullinertia=inertia)
+            moments = {"fullinertia": inertia}
+        _add(body, "inertial", pos="0 0 0", mass=mass, **moments)
         contact = _contact(robot, mass)
         for node in range(structure.first_node[i], structure.first_node[i + 1]):
             name, p_BN = structure.node_names[node], structure.p_BN[node]
@@ -295,21 +299,11 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
                 _add(pairs, "pair", geom1="floor", geom2=name, **contact)
 
 
-def _moment_across(inertia: Array) -> float:
-    """The moment of inertia of a bar across its axis, which it gets about its axis, too.
-
-    A spin about the axis moves no node, and cables give none. But MuJoCo's contact points are half
-    the depth above the nodes, and there friction would soon spin a thin bar as fast as it slides.
-    """
-    xx, yy, zz, xy, xz, yz = inertia
-    return float(np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[-1])
-
-
 def _contact(robot: Robot, mass: float) -> dict:
     """Contact settings of the floor and a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
-    borne = robot.weight / robot.structure.feet
+    borne = robot.weight / _feet(robot)
     rest_damping = ground.damping * borne / ground.stiffness
     # MuJoCo takes accelerations for forces, and divides them by 1 - impedance; it multiplies those
     # of friction by impratio. The minus says that the numbers are stiffness and damping.
@@ -321,6 +315,13 @@ def _contact(robot: Robot, mass: float) -> dict:
         "solreffriction": [ground.stiffness * per_mass, cone.damping * per_mass / _IMPRATIO],
         "solimp": [_IMPEDANCE, _IMPEDANCE, 1, 0.5, 1],
     }
+
+
+def _feet(robot: Robot) -> int:
+    """The nodes that bear the weight: at rest, or the bottom nodes and the foremost tip of a row,
+    where the thesis has them."""
+    structure = robot.structure
+    return len(structure.markers) + 1 if structure.is_row else max(1, robot.rest.feet)
 
 
 def _add_cables(model: Element, structure: Structure) -> None:

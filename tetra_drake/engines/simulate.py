@@ -9,7 +9,7 @@ from tetra_drake.engines.interface import Outcome, Viewer, check_can_be_watched,
 from tetra_drake.errors import InputError
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, constant_steering
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -84,8 +84,8 @@ def simulate_many(
 
 def check_scenario(scenario: Scenario) -> None:
     """Raises InputError if the scenario's engine cannot simulate it, say, as the robot would start
-    in the ground."""
-    Robot.of(scenario)
+    in the ground or nothing drives it."""
+    Robot.of(scenario).network(seeded_gait(scenario))
     engine_of(scenario).check(scenario)
 
 

@@ -83,10 +83,9 @@ def ground_forces(trajectory: xarray.Dataset, robot: Robot, *, seconds: float = 
         panel.set_ylim(_limits_between_impacts(forces))
     lines = {"normal force": _FIRST, f"friction force {along}": _SECOND, "landing": _LANDING}
     legend_below(figure, lines, Patch(color=SHADE, label="no normal force"))
-    body = "tetrahedron" if robot.structure.is_row else "body"
     period = 1e3 * float(end.time[1] - end.time[0])
     figure.suptitle(
-        f"Forces of the ground on each {body}\n"
+        "Forces of the ground on each body\n"
         f"every {period:.3g} ms: peaks of impacts, which are shorter, are missed or cut off"
     )
     return figure

@@ -26,7 +26,7 @@ from tetra_drake.physics.contact import Ground
 from tetra_drake.results import measures
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, followed_nodes
 from tetra_drake.scenario.units import INCH
 
 X, Y, Z = range(3)
@@ -65,7 +65,7 @@ _FOOTPRINTS: Any = {"color": "0.45", "marker": "o", "linestyle": "", "markersize
 
 
 @common_style()
-def relative_distances(trajectory: xarray.Dataset, structure: Structure) -> Figure:
+def relative_distances(trajectory: xarray.Dataset) -> Figure:
     """Distances along x from the first body to each, between centres of mass, over time.
 
     Grey lines: the distances at the start."""
@@ -79,7 +79,7 @@ def relative_distances(trajectory: xarray.Dataset, structure: Structure) -> Figu
         place = {"xy": (1.01, float(line[-1])), "xycoords": ("axes fraction", "data")}
         panel.annotate(name, color=style["color"], va="center", **place)
     panel.set(xlabel="time (s)", ylabel=f"distance from {names[0]} (in)")
-    figure.suptitle(f"Distances between {'tetrahedra' if structure.is_row else 'bodies'}")
+    figure.suptitle("Distances between bodies")
     return figure
 
 
@@ -91,12 +91,12 @@ def before_and_after(walks: Sequence[tuple[str, xarray.Dataset]], structure: Str
     kinds = ("best initial gait of the trial", "best evolved gait")
     for panel, kind, (label, trajectory) in zip(panels, kinds, walks, strict=True):
         walked = measures.distance_walked(trajectory, structure) / INCH
-        panel.plot(walked.time, walked, color=OKABE_ITO["blue"])
+        panel.plot(trajectory.time, walked, color=OKABE_ITO["blue"])
         title = f"{kind}: {fixed(float(walked[-1]))} in\n{textwrap.shorten(label, 60)}"
         panel.set_title(title, parse_math=False)  # a name may hold a dollar sign
         panel.set_xlabel("time (s)")
     panels[0].margins(y=0.08)
-    panels[0].set_ylabel(f"distance {_distance_symbol(structure)}(in)")
+    panels[0].set_ylabel("distance (in)")
     figure.suptitle("Distance walked before and after evolution")
     return figure
 
@@ -105,66 +105,65 @@ def before_and_after(walks: Sequence[tuple[str, xarray.Dataset]], structure: Str
 def time_lapse(trajectory: xarray.Dataset, structure: Structure, *, instants: int = 6) -> Figure:
     """The robot from above at some instants, to scale, with the distance walked.
 
-    Dots: T1's bottom nodes, or the centre of a robot that is no row, at each full second."""
+    Dots: the first body's bottom nodes, or the robot's centre, at each full second."""
     times = np.linspace(trajectory.time.values[0], trajectory.time.values[-1], instants)
     samples = _nearest(trajectory, times)
     inches = trajectory.p_WN.values / INCH
-    marked = measures.marked_positions(trajectory, structure) / INCH
-    footprints = marked[:, (marked.node_body == marked.node_body[0]).values].values
-    walked = measures.distance_walked(trajectory, structure).values / INCH
+    footprints = followed_nodes(inches, structure)[:, :2]  # of one body
+    walked = measures.distance_walked(trajectory, structure) / INCH
     styles = [{**line_style(i), "linestyle": "-"} for i in range(len(structure.bodies))]
-    rows = []
-    for time, sample in zip(times, samples, strict=True):
-        seconds = _nearest(trajectory, np.arange(times[0], time))
-        row = _Row(
-            label=f"{time:.4g} s\n{signed(walked[sample])} in",
-            nodes=inches[sample],
-            styles=styles,
-            paths=footprints[seconds],
-            path_style=_FOOTPRINTS,
-        )
-        rows.append(row)
-    width, height = _size(rows, width_in=5.8, height_in=8.5)
+    lapse = _Lapse(
+        structure,
+        labels=[f"{t:.4g} s\n{signed(w)} in" for t, w in zip(times, walked[samples], strict=True)],
+        nodes=inches[samples],
+        styles=[styles] * instants,
+        paths=[footprints[_nearest(trajectory, np.arange(times[0], time))] for time in times],
+        path_style=_FOOTPRINTS,
+        profiles=np.zeros((instants, 0, 3)),
+    )
+    width, height = lapse.size(width_in=5.8, height_in=8.5)
     # Wide enough for the title.
     figure, [[panel]] = make_figure(width_in=max(width + 1.0, 4.8), height_in=height + 1.0)
-    _draw_rows(panel, rows, OVERHEAD, structure, width_in=width)
+    lapse.draw(panel, OVERHEAD, width_in=width)
     panel.axvline(footprints[0, 0, X], color="0.45", linewidth=0.8)
-    walker = dots = "the centre"
-    if structure.is_row:
-        walker = structure.bodies[0]
-        dots = f"{walker}'s bottom nodes"
-    panel.set_ylabel(f"time, and distance {_distance_symbol(structure)}walked by {walker}")
-    figure.suptitle(f"Time lapse from above\ndots: {dots} at each full second")
+    of_body = f" of {structure.bodies[0]}" if structure.is_row else ""
+    panel.set_ylabel("time, and distance walked")
+    figure.suptitle(f"Time lapse from above\ndots: {structure.followed}{of_body} each full second")
     return figure
 
 
 @common_style()
-def path_of_the_centre(trajectory: xarray.Dataset, *, instants: int = 9) -> Figure:
+def path_of_the_centre(
+    trajectory: xarray.Dataset, structure: Structure, *, instants: int = 9
+) -> Figure:
     """The path of the robot's centre from above, to scale.
 
-    Arrows: where the robot heads, at evenly spaced instants."""
-    path = measures.path_of_centre(trajectory)
+    Arrows: where a row heads, at evenly spaced instants."""
+    path = measures.path_of_centre(trajectory, structure)
     points = path.centre[:, :2] / INCH
     arrow = _ARROW * max(*np.ptp(points, axis=0), _MARGIN_IN)
     samples = _nearest(trajectory, np.linspace(path.times[0], path.times[-1], instants))
     tails, heading = points[samples], path.heading[samples]
     heads = tails + arrow * np.column_stack([np.cos(heading), np.sin(heading)])
-    drawn = np.concatenate([points, heads])
+    drawn = np.concatenate([points, heads]) if structure.is_row else points
     left, bottom = drawn.min(axis=0) - arrow
     right, top = drawn.max(axis=0) + arrow
     scale = min(_PATH_WIDTH / (right - left), _PATH_HEIGHT / (top - bottom))
     width, height = scale * (right - left), scale * (top - bottom)
     figure, [[panel]] = make_figure(width_in=max(width, 3.0) + 0.8, height_in=height + 1.5)
     panel.plot(points[:, X], points[:, Y], **_PATH)
-    ways = heads - tails
-    panel.quiver(tails[:, X], tails[:, Y], ways[:, X], ways[:, Y], **_HEADING)
+    title = "Path of the centre from above"
+    if structure.is_row:
+        title += "\narrows: heading"
+        ways = heads - tails
+        panel.quiver(tails[:, X], tails[:, Y], ways[:, X], ways[:, Y], **_HEADING)
     panel.plot(points[0, X], points[0, Y], **_START)
     panel.plot(points[-1, X], points[-1, Y], **_END)
     panel.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
     panel.set(xlabel="x (in)", ylabel="y (in)")
     end = f"end, after {path.times[-1]:.4g} s"
     legend_below(figure, {"start": _START, end: _END})
-    figure.suptitle("Path of the centre from above\narrows: heading")
+    figure.suptitle(title)
     return figure
 
 
@@ -183,37 +182,34 @@ def one_step(trajectory: xarray.Dataset, robot: Robot, *, instants: int = 5) -> 
         title = f"Time lapse of the end, {start:.2f} to {end:.2f} s\n"
         title += "no step, as no signal has two periods in the second half"
     step = trajectory.sel(time=slice(start, end))
-    inches, off, since = step.p_WN.values / INCH, measures.lifted(step), step.time - step.time[0]
-    marked = measures.marked_positions(step, structure) / INCH
-    rows = []
-    for sample in _nearest(step, np.linspace(start, end, instants)):
-        row = _Row(
-            label=f"{since.values[sample]:.2f} s",
-            nodes=inches[sample],
-            styles=[_LIFTED if up else _ON_GROUND for up in off.values[sample]],
-            paths=marked.values[: sample + 1],
-            path_style=_PATH,
-            profile=None if ground.flat else _profile(inches, sample, ground),
-        )
-        rows.append(row)
-    width, height = _size(rows, width_in=3.6, height_in=6.0)
-    shown = _first_of_each_body(marked)
-    heights = [height + 0.8, 0.7 + 1.2 * math.ceil(shown.sizes["node"] / _PATHS)]
+    inches, lifted = step.p_WN.values / INCH, measures.lifted(step).values
+    times = np.linspace(step.time.values[0], end, instants)
+    followed, samples = followed_nodes(inches, structure), _nearest(step, times)
+    lapse = _Lapse(
+        structure,
+        labels=[f"{time - times[0]:.2f} s" for time in step.time.values[samples]],
+        nodes=inches[samples],
+        styles=[[_LIFTED if up else _ON_GROUND for up in bodies] for bodies in lifted[samples]],
+        paths=[followed[: sample + 1] for sample in samples],
+        path_style=_PATH,
+        profiles=np.array([_profile(inches, sample, ground) for sample in samples]),
+    )
+    width, height = lapse.size(width_in=3.6, height_in=6.0)
+    names = structure.bodies if structure.is_row else (structure.followed,)
+    heights = [height + 0.8, 0.7 + 1.2 * math.ceil(len(names) / _PATHS)]
     legend = 0.4
     figure = Figure(figsize=(max(2 * width + 1.2, 5.8), sum(heights) + legend))
     above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=heights)[:, 0]
     panels: Any = above.subplots(1, 2)
     for panel, view, place in zip(panels, (OVERHEAD, SIDE), ("above", "the side"), strict=True):
-        _draw_rows(panel, rows, view, structure, width_in=width)
+        lapse.draw(panel, view, width_in=width)
         panel.set_title(f"from {place}")
     panel.tick_params(left=False, labelleft=False)
-    if ground.flat:
-        for i in range(instants):
-            panel.axhline(-_pitch(rows) * i, **_GROUND)
-    _draw_paths(below, shown, off, ground)
+    if not structure.is_row:
+        lifted = np.all(lifted, axis=1, keepdims=True)
+    _draw_paths(below, names, followed[:, ::2], lifted, ground)  # of the left nodes
     lines = {"off the ground": _LIFTED, "on the ground": _ON_GROUND}
-    path = "path of the bottom nodes" if structure.is_row else "path of the centre"
-    legend_below(figure, {**lines, path: _PATH})
+    legend_below(figure, {**lines, f"path of the {structure.followed}": _PATH})
     figure.suptitle(title)
     return figure
 
@@ -227,41 +223,25 @@ def _profile(nodes: np.ndarray, sample: int, ground: Ground) -> np.ndarray:
     return np.column_stack([x, y, z])
 
 
-def _distance_symbol(structure: Structure) -> str:
-    """The thesis's symbol of the distance walked, and a blank, where it is that of T1."""
-    return "$x_1$ " if structure.is_row else ""
-
-
-def _first_of_each_body(marked: xarray.DataArray) -> xarray.DataArray:
-    """The first marker of each body; marked positions (time, node, axis)."""
-    _, first = np.unique(marked.node_body, return_index=True)
-    return marked.isel(node=np.sort(first))
-
-
 def _draw_paths(
-    figure: SubFigure, marked: xarray.DataArray, off: xarray.DataArray, ground: Ground
+    figure: SubFigure, names: Sequence[str], paths: np.ndarray, lifted: np.ndarray, ground: Ground
 ) -> None:
-    """The paths in the step of marked positions (time, node, axis) in inches, enlarged.
-
-    `off` (time, body) says which bodies are lifted."""
-    bodies = [str(body) for body in marked.node_body.values]
-    names = [body or "centre" for body in bodies]
+    """Paths (samples, names, 3) in inches, enlarged, and where they are `lifted` (samples, names)
+    off the ground."""
     panels = add_grid(figure, names, columns=min(len(names), _PATHS)).values()
-    for i, (body, panel) in enumerate(zip(bodies, panels, strict=True)):
-        node = marked[:, i]
-        x, z = node.sel(axis="x") - node.sel(axis="x")[0], node.sel(axis="z")
+    for i, panel in enumerate(panels):
+        path = paths[:, i]
+        x, z = path[:, X] - path[0, X], path[:, Z]
         if not ground.flat:
-            below = ground_heights(node.values[:, :2] * INCH, ground) / INCH
+            below = ground_heights(path[:, :2] * INCH, ground) / INCH
             z, below = z - below[0], below - below[0]
             panel.plot(x, below, **_GROUND)
-        up = off.sel(body=body) if body else off.all("body")
         panel.plot(x, z, **_PATH)
-        panel.plot(x.where(up), z.where(up), **_LIFTED)
+        panel.plot(x, np.where(lifted[:, i], z, np.nan), **_LIFTED)
         panel.plot(x[0], z[0], "o", color="black")
         panel.margins(0.08)
         panel.update_datalim([(-0.1, 0.0), (0.1, 0.1)])  # even if nothing moves
-    place = "bottom left node" if all(bodies) else "centre"
-    figure.supxlabel(f"displacement of the {place} since the start of the time shown (in)")
+    figure.supxlabel("displacement since the start of the time shown (in)")
     figure.supylabel("height (in)" if ground.flat else "height above the\nground at 0 (in)")
 
 
@@ -271,83 +251,78 @@ def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class _Row:
-    """The robot at one instant of a time lapse; positions in inches."""
+class _Lapse:
+    """A time lapse: the robot at some instants, one below the other; positions in inches."""
 
-    label: str
+    structure: Structure
+    labels: Sequence[str]
     nodes: np.ndarray
-    """Positions (nodes, 3)."""
-    styles: Sequence[Any]
-    """Line style of each body."""
-    paths: np.ndarray
-    """Earlier positions (samples, nodes, 3) of some nodes."""
+    """(instants, nodes, 3)."""
+    styles: Sequence[Sequence[Any]]
+    """Line style of each body at each instant."""
+    paths: Sequence[np.ndarray]
+    """Earlier positions (samples, nodes, 3) of some nodes at each instant."""
     path_style: Any
-    profile: np.ndarray | None = None
-    """Points (points, 3) of the ground, for views from the side."""
+    profiles: np.ndarray
+    """Points (instants, points, 3) of the ground, for views from the side."""
 
+    @property
+    def heights(self) -> np.ndarray:
+        """All heights of nodes and ground."""
+        return np.concatenate([self.nodes[..., Z].ravel(), self.profiles[..., Z].ravel()])
 
-def _heights(rows: Sequence[_Row]) -> np.ndarray:
-    """All heights of nodes and ground, in inches."""
-    nodes = [row.nodes for row in rows]
-    profiles = [row.profile for row in rows if row.profile is not None]
-    return np.concatenate(nodes + profiles)[:, Z]
+    @property
+    def pitch(self) -> float:
+        """Distance between instants, with room for what climbs or turns."""
+        sideways, upward = np.ptp(self.nodes[..., Y]), np.ptp(self.heights)
+        return max(_PITCH_IN, float(upward) + _MARGIN_IN, float(sideways) + _MARGIN_IN)
 
+    def size(self, *, width_in: float, height_in: float) -> tuple[float, float]:
+        """Width and height on paper, to scale, within bounds."""
+        wide = float(np.ptp(self.nodes[..., X])) + 2 * _MARGIN_IN
+        high = self.pitch * len(self.nodes)
+        scale = min(width_in / wide, height_in / high)
+        return scale * wide, scale * high + _NAME_HEIGHT
 
-def _pitch(rows: Sequence[_Row]) -> float:
-    """Distance in inches between rows, with room for what climbs or turns."""
-    sideways = float(np.ptp([row.nodes[..., Y] for row in rows]))
-    upward = float(np.ptp(_heights(rows)))
-    return max(_PITCH_IN, upward + _MARGIN_IN, sideways + _MARGIN_IN)
-
-
-def _size(rows: Sequence[_Row], *, width_in: float, height_in: float) -> tuple[float, float]:
-    """Width and height on paper of a time lapse, to scale, within bounds."""
-    wide = float(np.ptp([row.nodes[..., X] for row in rows])) + 2 * _MARGIN_IN
-    high = _pitch(rows) * len(rows)
-    scale = min(width_in / wide, height_in / high)
-    return scale * wide, scale * high + _NAME_HEIGHT
-
-
-def _draw_rows(
-    panel: Axes, rows: Sequence[_Row], view: int, structure: Structure, width_in: float
-) -> None:
-    """Draws a time lapse, `width_in` inches wide on paper."""
-    pitch = _pitch(rows)
-    body_of_strut = structure.carriers[structure.struts[:, 0]]
-    for i, row in enumerate(rows):
-        down = pitch * i
-        if row.profile is not None and view == SIDE:
-            panel.plot(row.profile[:, X], row.profile[:, Z] - down, **_GROUND)
-        panel.plot(row.paths[..., X], row.paths[..., view] - down, **row.path_style)
-        for body, style in enumerate(row.styles):
-            ends = row.nodes[structure.struts[body_of_strut == body]]
-            panel.plot(ends[..., X].T, ends[..., view].T - down, **style)
-    nodes = np.array([row.nodes for row in rows])
-    heights = _heights(rows) if view == SIDE else nodes[..., Y]
-    middle = (heights.min() + heights.max()) / 2
-    left, right = nodes[..., X].min() - _MARGIN_IN, nodes[..., X].max() + _MARGIN_IN
-    per_paper_inch = (right - left) / width_in
-    top = middle + pitch / 2 + _NAME_HEIGHT * per_paper_inch
-    bottom = middle - pitch * (len(rows) - 0.5)
-    panel.set(xlabel="x (in)", xlim=(left, right), ylim=(bottom, top), aspect="equal")
-    panel.set_yticks(middle - pitch * np.arange(len(rows)), [row.label for row in rows])
-    panel.grid(visible=False, axis="y")
-    _name_bodies(panel, nodes[0][:, [X, view]], structure, per_paper_inch)
+    def draw(self, panel: Axes, view: int, *, width_in: float) -> None:
+        """Draws the time lapse, `width_in` inches wide on paper."""
+        structure, nodes, downs = (
+            self.structure,
+            self.nodes,
+            self.pitch * np.arange(len(self.nodes)),
+        )
+        body_of_strut = structure.carriers[structure.struts[:, 0]]
+        for i, down in enumerate(downs):
+            if view == SIDE:
+                panel.plot(self.profiles[i, :, X], self.profiles[i, :, Z] - down, **_GROUND)
+            panel.plot(self.paths[i][..., X], self.paths[i][..., view] - down, **self.path_style)
+            for body, style in enumerate(self.styles[i]):
+                ends = nodes[i, structure.struts[body_of_strut == body]]
+                panel.plot(ends[..., X].T, ends[..., view].T - down, **style)
+        heights = self.heights if view == SIDE else nodes[..., Y]
+        middle = (heights.min() + heights.max()) / 2
+        left, right = nodes[..., X].min() - _MARGIN_IN, nodes[..., X].max() + _MARGIN_IN
+        per_paper_inch = (right - left) / width_in
+        top = middle + self.pitch / 2 + _NAME_HEIGHT * per_paper_inch
+        bottom = middle - downs[-1] - self.pitch / 2
+        panel.set(xlabel="x (in)", xlim=(left, right), ylim=(bottom, top), aspect="equal")
+        panel.set_yticks(middle - downs, self.labels)
+        panel.grid(visible=False, axis="y")
+        _name_bodies(panel, nodes[0][:, [X, view]], structure, per_paper_inch)
 
 
 def _name_bodies(
     panel: Axes, nodes: np.ndarray, structure: Structure, per_paper_inch: float
 ) -> None:
-    """Names bodies above their nodes (nodes, 2), bars above their upper ends, but those whose names
-    would overlap with others'."""
+    """Names bodies above the uppermost of their nodes (nodes, 2), but those whose names would
+    overlap with others'."""
     longest = max(_SHORTEST_NAME, *(len(name) for name in structure.bodies))
     width, height = longest * _CHARACTER_WIDTH * per_paper_inch, _NAME_HEIGHT * per_paper_inch
     left, right = panel.get_xlim()
     places: list[tuple[float, float]] = []
     for body, name in enumerate(structure.bodies):
         of_body = nodes[structure.carriers == body]
-        upper_x, y = of_body[of_body[:, 1].argmax()].tolist()
-        x = upper_x if len(of_body) == 2 else float(of_body[:, 0].mean())
+        x, y = of_body[of_body[:, 1].argmax()].tolist()
         x = min(max(x, left + width / 2), right - width / 2)
         if all(abs(x - a) >= width or abs(y - b) >= height for a, b in places):
             panel.annotate(name, (x, y), (0, 2), textcoords="offset points", ha="center")

@@ -88,8 +88,8 @@ def draw_trajectory(gait: GaitMotion, folder: Path) -> dict[str, str]:
     trajectory, robot = gait.trajectory, Robot.of(gait.scenario)
     pictures: list[tuple[Any, ...]] = [
         (motion.time_lapse, trajectory, robot.structure),
-        (motion.path_of_the_centre, trajectory),
-        (motion.relative_distances, trajectory, robot.structure),
+        (motion.path_of_the_centre, trajectory, robot.structure),
+        (motion.relative_distances, trajectory),
         (motion.one_step, trajectory, robot),
     ]
     if robot.structure.signals:

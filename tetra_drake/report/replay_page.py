@@ -9,12 +9,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.source import load_source
 from tetra_drake.files import check_folder
-from tetra_drake.report.result_folder import (
-    RESULT,
-    GaitMotion,
-    load_result_folder,
-    simulate_gait,
-)
+from tetra_drake.report.result_folder import RESULT, GaitMotion, load_result_folder, simulate_gait
 
 
 def write_replay(
@@ -41,10 +36,7 @@ def write_replay(
 
 
 def load_or_simulate(
-    source: Path,
-    *,
-    scenario: str | None = None,
-    warn: Callable[[str], None] = lambda text: None,
+    source: Path, *, scenario: str | None = None, warn: Callable[[str], None] = lambda text: None
 ) -> GaitMotion:
     """The motion in a result folder, or of a gait file or a run's fittest gait, simulated.
 

@@ -16,13 +16,7 @@ from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, fixed, render
 from tetra_drake.machine import versions
-from tetra_drake.report.book import (
-    Study,
-    draw_run,
-    draw_trajectory,
-    simulate_again,
-    study_run,
-)
+from tetra_drake.report.book import Study, draw_run, draw_trajectory, simulate_again, study_run
 from tetra_drake.report.result_folder import RESULT, load_result_folder
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline

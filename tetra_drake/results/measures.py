@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetra_drake.results.path import CentrePath, follow
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, followed_nodes
 
 if TYPE_CHECKING:
     import xarray
@@ -20,23 +20,11 @@ _PADDING = 16
 """Length of a zero-padded signal over its own: how many times finer its spectrum is sampled."""
 
 
-def marked_positions(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
-    """(time, node, axis): positions of the structure's markers in m; of the mean of its nodes if it
-    has none.
-
-    The node of that centre is named "centre", and its node_body is "".
-    """
-    if len(structure.markers):
-        return trajectory.p_WN.isel(node=structure.markers)
-    centre = trajectory.p_WN.mean("node").expand_dims({"node": ["centre"]}, axis=1)
-    return centre.assign_coords(node_body=("node", [""]))
-
-
-def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
-    """(time,): displacement of the first marker along x since the start, in m: x1 of T1's bottom
-    left node, or that of the centre."""
-    x = marked_positions(trajectory, structure).isel(node=0).sel(axis="x")
-    return x - x.isel(time=0)
+def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> np.ndarray:
+    """(time,): displacement along x since the start, in m, of the first marker, T1's bottom left
+    node, or of the centre."""
+    x = followed_nodes(trajectory.p_WN.values, structure)[:, 0, 0]
+    return x - x[0]
 
 
 def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
@@ -45,10 +33,10 @@ def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
     return x - x.isel(body=0)
 
 
-def path_of_centre(trajectory: xarray.Dataset) -> CentrePath:
+def path_of_centre(trajectory: xarray.Dataset, structure: Structure) -> CentrePath:
     """The path of the robot's centre at all samples."""
     poses = np.concatenate([trajectory.q_WB.values, trajectory.p_WB.values], axis=2)
-    return follow(trajectory.time.values, poses)
+    return follow(trajectory.time.values, poses, structure)
 
 
 def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:
@@ -61,10 +49,7 @@ def lifted(trajectory: xarray.Dataset) -> xarray.DataArray:
     import xarray
 
     off, bodies = off_ground(trajectory), trajectory.body
-    of_bodies = []
-    for body in bodies.values:
-        nodes = (off.contact_body == body).values
-        of_bodies.append(off[:, nodes].all("contact"))
+    of_bodies = [off[:, (off.contact_body == body).values].all("contact") for body in bodies]
     return xarray.concat(of_bodies, dim=bodies).T
 
 

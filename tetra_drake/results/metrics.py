@@ -24,6 +24,7 @@ from tetra_drake.physics.tally import (
 from tetra_drake.results.measures import travelling_index
 from tetra_drake.results.path import CentrePath, curvature
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.structure import followed_nodes
 from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, MOST, Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
@@ -64,16 +65,13 @@ def compute_metrics(
     steady stretch.
     """
     structure, steady_from = robot.structure, robot.scenario.simulation.steady_from
-    x_way, y_way, _ = (end.mean(axis=0) - steady.mean(axis=0)).tolist()  # of the centre
-    twist = lead = math.nan
-    if structure.thesis_nodes is None:
-        marker_start, marker_steady = start.mean(axis=0), steady.mean(axis=0)
-        marker = end.mean(axis=0)
-    else:
-        left, right, tip = structure.thesis_nodes
-        marker_start, marker_steady, marker = start[left], steady[left], end[left]
-        twist = float(abs(end[left, 0] - end[right, 0]))
-        lead = float(end[tip, 0] - end[left, 0])
+    first, middle, last = (followed_nodes(nodes, structure) for nodes in (start, steady, end))
+    way, twist, lead = last[0] - middle[0], math.nan, math.nan
+    if structure.is_row:
+        way = end.mean(axis=0) - steady.mean(axis=0)  # of the centre, as recorded
+        twist = float(abs(last[0, 0] - last[1, 0]))
+        lead = float(end[-1, 0] - last[0, 0])  # of the foremost tip, the last node
+    x_way, y_way, _ = way.tolist()
     steady_path = path.centre[np.searchsorted(path.times, steady_from) :, :2]
     work = float(totals.work[0])
     carried = robot.weight * max(math.hypot(x_way, y_way), LEAST_WAY)
@@ -85,12 +83,12 @@ def compute_metrics(
     mean_effort = [per_time / (driven or 1) * item for item in effort]
     limited = math.nan if robot.model.actuator.kind == DIRECT else mean_effort[LIMITED_TIME]
     return Metrics(
-        distance=float(marker[0] - marker_start[0]),
-        steady_distance=float(marker[0] - marker_steady[0]),
+        distance=float(last[0, 0] - first[0, 0]),
+        steady_distance=float(last[0, 0] - middle[0, 0]),
         speed=float(x_way / (path.times[-1] - steady_from)),
         twist=twist,
         lead=lead,
-        lateral_drift=float(abs(marker[1] - marker_start[1])),
+        lateral_drift=float(abs(last[0, 1] - first[0, 1])),
         heading_change=float(path.heading[-1] - path.heading[0]),
         path_curvature=curvature(steady_path),
         actuator_work=work,

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tetra_drake.robot.structure import Structure
+
 PERIOD = 0.25
 """Time (s) between the instants of a result's path: half of the fastest gait's period or less, and
 the robot turns by far less than half a turn within it, so that its heading can be unwrapped."""
@@ -17,29 +19,41 @@ _SWAY = 2e-3
 
 @dataclass(frozen=True)
 class CentrePath:
-    """Path of the robot's centre, the mean of its bodies' origins, and its heading."""
+    """Path of the robot's centre of mass, and its heading."""
 
     times: np.ndarray
     """(k,): in s, ascending."""
     centre: np.ndarray
     """(k, 3): in World, in m."""
     heading: np.ndarray
-    """(k,): from World's x axis to the left, in rad; whole turns count."""
+    """(k,): from World's x axis to the left, in rad; whole turns count. NaN for robots that are no
+    row."""
 
 
-def follow(times: np.ndarray, poses: np.ndarray) -> CentrePath:
+def follow(times: np.ndarray, poses: np.ndarray, structure: Structure) -> CentrePath:
     """The path of a robot from the poses (k, n, 7) of its bodies at some times (k,) in s.
 
-    A pose is the quaternion, w first, and the origin in m. The heading is the direction in the
-    horizontal plane of the sum of the bodies' x axes, which point from the rear to the tips.
+    A pose is the quaternion, w first, and the origin in m. The heading of a row is the direction in
+    the horizontal plane of the sum of the bodies' x axes, which point from the rear to the tips.
+    Other structures have none: they may roll over, and bars do not turn about their axes with them.
     """
-    columns = np.ascontiguousarray(poses.T)
-    w, x, y, z = columns[:4]
+    centre = centre_of_mass(poses[..., 4:], structure)
+    if not structure.is_row:
+        return CentrePath(times, centre, np.full(len(times), math.nan))
+    w, x, y, z = np.ascontiguousarray(poses.T)[:4]
     ahead, left = (w * w + x * x - y * y - z * z).sum(axis=0), 2.0 * (x * y + w * z).sum(axis=0)
     heading = np.arctan2(left, ahead)
     # As np.unwrap() would, in a fraction of its time.
     heading[1:] -= math.tau * np.round((heading[1:] - heading[:-1]) / math.tau).cumsum()
-    return CentrePath(times, columns[4:].sum(axis=1).T / poses.shape[1], heading)
+    return CentrePath(times, centre, heading)
+
+
+def centre_of_mass(p_WB: np.ndarray, structure: Structure) -> np.ndarray:
+    """(k, 3): the centre of mass in m from the bodies' origins p_WB (k, n, 3)."""
+    # Factors of exactly 1 where all bodies are alike.
+    shares = structure.mass / structure.mass[0]
+    weighted = shares[:, np.newaxis] * np.ascontiguousarray(p_WB.T)
+    return weighted.sum(axis=1).T / shares.sum()
 
 
 def curvature(points: np.ndarray) -> float:

@@ -18,7 +18,7 @@ from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import node_positions
+from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.metric_units import Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import SimulationSection
@@ -93,8 +93,7 @@ def make_result(
     if record:
         samples = sample_times(simulation.duration, simulation.sample_period)
         trajectory = make_dataset(robot, motion.at(samples))
-    poses = way.states[:, : 7 * len(structure.bodies)].reshape(len(instants), -1, 7)
-    path = follow(instants, poses)
+    path = follow(instants, _poses(way.states, structure), structure)
     start, steady, end = (node_positions(structure, state) for state in ends.states)
     metrics = compute_metrics(
         robot,
@@ -115,6 +114,12 @@ def make_result(
         path=path,
         trajectory=trajectory,
     )
+
+
+def _poses(states: np.ndarray, structure: Structure) -> np.ndarray:
+    """(k, bodies, 7): the poses in states (k, 13 bodies)."""
+    bodies = len(structure.bodies)
+    return states[:, : 7 * bodies].reshape(len(states), bodies, 7)
 
 
 def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult) -> None:
@@ -139,7 +144,7 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
             "time_s": way.times.tolist(),
             "x_m": way.centre[:, 0].tolist(),
             "y_m": way.centre[:, 1].tolist(),
-            "heading_rad": way.heading.tolist(),
+            "heading_rad": [json_number(angle) for angle in way.heading.tolist()],
         },
     }
     write_whole(path, json.dumps(content, indent=1, allow_nan=False) + "\n")

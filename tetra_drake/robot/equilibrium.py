@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
 
+from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION
 from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, NormalForce, update_modes
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
@@ -52,15 +54,6 @@ class Rest(NamedTuple):
     """The number of contact nodes that bear a load."""
 
 
-class NoRest(Exception):
-    """No rest is found: forces are left, the greatest of them on a body."""
-
-    def __init__(self, body: int, force: float) -> None:
-        super().__init__(f"body {body}, {force} N")
-        self.body = body
-        self.force = force
-
-
 class Resting(NamedTuple):
     """A robot whose forces are sought, without actuation, and room to compute them in."""
 
@@ -76,9 +69,12 @@ class Resting(NamedTuple):
         return cls(model._replace(cables=cables), Forces.of(model))
 
 
-def find_rest(model: Model, start: np.ndarray) -> Rest:
+def find_rest(model: Model, start: np.ndarray, *, bodies: Sequence[str], source: str) -> Rest:
     """Rest of a robot on flat ground, let go at `start` (13 n,) without actuation: the minimum of
-    potential energy downhill from there; friction carries nothing. Raises NoRest."""
+    potential energy downhill from there; friction carries nothing.
+
+    Raises InputError if it is not found, with the source and the name of a body.
+    """
     robot, state = Resting.of(model), start
     weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
     reach = FIRST_REACH * radius
@@ -96,8 +92,9 @@ def find_rest(model: Model, start: np.ndarray) -> Rest:
             reach = 0.5 * np.abs(step).max()
         else:
             state, reach = moved, min(2.0 * reach, LONGEST_REACH * radius)
-    forces = np.abs(force.reshape(-1, 6)).max(axis=1)
-    raise NoRest(int(forces.argmax()), float(forces.max()))
+    left = np.abs(force.reshape(-1, 6)).max(axis=1)
+    problem = f"finds no rest; the greatest force left, {left.max():.3g} N, is on"
+    raise InputError(source, "robot", f"{problem} '{bodies[left.argmax()]}'")
 
 
 def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.contact import (
-    Ground,
-    NormalForce,
-)
+from tetra_drake.physics.contact import Ground, NormalForce
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.physics.terrain import (
     FRAME_COLUMNS,
@@ -22,7 +19,7 @@ from tetra_drake.physics.terrain import (
     SurfaceGrid,
     find_frames,
 )
-from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Grid
 from tetra_drake.scenario.units import INCH
@@ -41,7 +38,7 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
     Raises InputError if its heights cannot be had, or if the structure starts off their grid or
     with a contact node in the ground.
     """
-    start = moved_nodes(structure, structure.initial_state)[structure.contacts, P_WN : P_WN + 3]
+    start = node_positions(structure, structure.initial_state)[structure.contacts]
     ahead = start[:, 0].max() + STEP_AHEAD
     grid = scenario.terrain.grid(ahead=ahead, source=scenario.name)
     made = Ground(
@@ -54,9 +51,7 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
         heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
     )
     if not made.flat:
-        weight = float(structure.mass.sum()) * scenario.robot.gravity
-        allowed = START_DEPTH + weight / scenario.ground.stiffness
-        _check_start(structure, made, start, grid, allowed, scenario.name)
+        _check_start(scenario, structure, made, grid, start)
     return made
 
 
@@ -77,26 +72,23 @@ def _surface_grid(grid: Grid) -> SurfaceGrid:
 
 
 def _check_start(
-    structure: Structure,
-    ground: Ground,
-    start: np.ndarray,
-    grid: Grid,
-    allowed: float,
-    source: str,
+    scenario: Scenario, structure: Structure, ground: Ground, grid: Grid, start: np.ndarray
 ) -> None:
-    """Raises InputError if a contact node, at `start` (contacts, 3), is off the grid, or deeper in
-    the ground than is allowed (m)."""
+    """Raises InputError if a contact node, at `start` (contacts, 3), is off the grid or in the
+    ground."""
     corner, cells = np.array(grid.corner), np.array(grid.heights.shape) - 1
     low, high = start[:, :2].min(axis=0), start[:, :2].max(axis=0)
     if (low < corner).any() or (high > corner + cells * grid.cell).any():
         reach = [f"{side / INCH:.4g} in" for side in (*corner, *(corner + cells * grid.cell))]
         problem = f"the robot starts off its grid, which goes from x, y = {reach[0]}, {reach[1]} "
-        raise InputError(source, "terrain", problem + f"to {reach[2]}, {reach[3]}")
+        raise InputError(scenario.name, "terrain", problem + f"to {reach[2]}, {reach[3]}")
     gaps = ground_frames(start, ground)[:, GAP]
-    if gaps.min() < -allowed:
+    weight = float(structure.mass.sum()) * scenario.robot.gravity
+    if gaps.min() < -START_DEPTH - weight / scenario.ground.stiffness:
         node = structure.node_names[structure.contacts[gaps.argmin()]]
         problem = f"the robot starts with node {node} {-gaps.min() / INCH:.3g} in below the ground"
-        raise InputError(source, "terrain", f"{problem}; move what is there, or robot.offsets")
+        problem += "; move what is there, or robot.offsets"
+        raise InputError(scenario.name, "terrain", problem)
 
 
 def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:

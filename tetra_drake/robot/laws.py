@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.errors import InputError
 from tetra_drake.physics.actuator import DIRECT, TENSION_MOTOR, WINCH, Actuator, Limits
 from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.model import Bodies, Couplings, Model
-from tetra_drake.robot.equilibrium import NoRest, Rest, find_rest
+from tetra_drake.robot.equilibrium import Rest, find_rest
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.actuator_kinds import ActuatorKind, Force, Winch
@@ -34,20 +33,16 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
         ),
         struts=_struts(structure),
         isotropic=structure.isotropic,
-        slack=structure.slack,
+        slack=scenario.robot.slack,
     )
 
 
-def rest_of(scenario: Scenario, structure: Structure) -> Rest:
-    """Rest of a structure on flat ground without actuation, let go where it starts; raises
-    InputError if there is none."""
+def rest_of(scenario: Scenario, structure: Structure, start: np.ndarray | None = None) -> Rest:
+    """Rest of a structure on flat ground without actuation, let go at `start` (13 bodies,), or else
+    where it starts; raises InputError if there is none."""
     model = make_model(scenario.with_sections(terrain=Flat()), structure)
-    try:
-        return find_rest(model, structure.initial_state)
-    except NoRest as error:
-        body = structure.bodies[error.body]
-        problem = f"finds no rest; the greatest force left, {error.force:.3g} N, is on '{body}'"
-        raise InputError(scenario.name, "robot", problem) from error
+    start = structure.initial_state if start is None else start
+    return find_rest(model, start, bodies=structure.bodies, source=scenario.name)
 
 
 def _actuator(kind: ActuatorKind) -> Actuator:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import numbers
 from collections.abc import Callable
@@ -15,21 +16,19 @@ from tetra_drake.physics.actuator import DIRECT, WINCH
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, modes_after_step
 from tetra_drake.physics.feedback import Senses
-from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.oscillator import Network, steered_input
-from tetra_drake.physics.terrain import FRAME_COLUMNS
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.equilibrium import Rest
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.laws import make_model, rest_of
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import Structure, node_positions, turn_with_slope
 from tetra_drake.robot.tensegrity import MakeTensegrity
 from tetra_drake.robot.tetrahedra import MakeTetrahedra
 from tetra_drake.scenario import robot_kinds
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import CpgSection
-from tetra_drake.scenario.terrain_kinds import Flat
 
 SteeringSignal = Callable[[float], float]
 """The turn, from -1 to 1, at a time in s."""
@@ -72,9 +71,7 @@ class Robot:
     def rest(self) -> Rest:
         """Rest of the robot on flat ground without actuation, whatever the scenario's terrain and
         offsets; raises InputError if it finds no rest."""
-        undisturbed = self.scenario.robot.model_copy(update={"offsets": []})
-        level = self.scenario.with_sections(terrain=Flat(), robot=undisturbed)
-        return rest_of(level, MakeStructure(level))
+        return self.structure.rest or rest_of(self.scenario, _undisturbed(self.scenario))
 
     @functools.cached_property
     def senses(self) -> Senses:
@@ -146,16 +143,26 @@ class Robot:
 
     def starting_modes(self) -> np.ndarray:
         """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
-        structure, count = self.structure, len(self.structure.contacts)
-        nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
-        modes, frames = np.zeros((count, MODE_COLUMNS)), np.empty((count, FRAME_COLUMNS))
+        structure, forces = self.structure, Forces.of(self.model)
+        modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
         start, points = structure.initial_state, (structure.p_BN, structure.first_node)
-        modes_after_step(start, *points, self.ground, nodes, frames, modes)
+        modes_after_step(start, *points, self.ground, forces.nodes, forces.frames, modes)
         return modes
 
 
 def MakeStructure(scenario: Scenario) -> Structure:
-    """The structure of a scenario's robot, of any kind. Raises InputError if it cannot start."""
+    """The structure of a scenario's robot where it starts, displaced by `robot.offsets` and turned
+    with an incline. Raises InputError if it cannot start."""
+    structure = _undisturbed(scenario)
+    p_WB, slope = structure.p_WB, scenario.terrain.plane_slope or 0.0
+    if scenario.robot.offsets:
+        p_WB = p_WB + np.array(scenario.robot.offsets)
+    p_WB, q_WB = turn_with_slope(p_WB, structure.q_WB, slope)
+    return dataclasses.replace(structure, p_WB=p_WB, q_WB=q_WB)
+
+
+def _undisturbed(scenario: Scenario) -> Structure:
+    """The structure of a scenario's robot, of any kind, as it starts on flat ground."""
     if isinstance(scenario.robot, robot_kinds.Structure):
         return MakeTensegrity(scenario, scenario.robot)
     return MakeTetrahedra(scenario, scenario.robot)

@@ -59,11 +59,7 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
 
 
 def signals_at(
-    robot: Robot,
-    gait: Gait,
-    times: np.ndarray,
-    *,
-    steering: SteeringSignal | None = None,
+    robot: Robot, gait: Gait, times: np.ndarray, *, steering: SteeringSignal | None = None
 ) -> np.ndarray:
     """The signals (times, m) in N that cables are fed at `times` (s), zero before the start-up."""
     samples, cpg = signal_samples(robot, gait, steering), robot.scenario.cpg

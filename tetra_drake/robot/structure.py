@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN, move_nodes
+from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, move_nodes
 from tetra_drake.robot.actuation import Actuation
+from tetra_drake.robot.equilibrium import Rest
 
 
 @dataclass(frozen=True)
@@ -43,23 +45,23 @@ class Structure:
     """(bodies, 4): their quaternions then, w first."""
     cables: np.ndarray
     """(cables,) of dtype CABLE: pair by pair of bodies, from the lower index to the higher one."""
-    cable_names: tuple[str, ...]
-    """Such as "T1-T2 outer bottom_left"."""
     cable_groups: tuple[str, ...]
     """The group of each cable, such as "outer"."""
-    slack: bool
-    """True if a cable cannot push."""
     actuation: Actuation
     contacts: np.ndarray
     """(contacts,): the indices of the nodes that the ground can touch, ascending."""
-    thesis_nodes: tuple[int, int, int] | None
-    """T1's bottom left and bottom right nodes and the lead's tip, for the thesis's metrics. None
-    for robots that are no row of tetrahedra."""
-    feet: int
-    """Nodes that bear the weight at rest."""
     markers: np.ndarray
-    """(markers,): the indices of the nodes whose paths pictures show, body by body: the bottom
-    nodes of a row of tetrahedra. None for other structures, whose centre is shown."""
+    """(markers,): the indices of the nodes that are followed, body by body: the bottom left and
+    bottom right ones of a row of tetrahedra. None for other structures, whose centre is followed.
+    """
+    rest: Rest | None = None
+    """The rest at which it starts, but for offsets and slope; None for a row of tetrahedra, which
+    starts as placed."""
+
+    @property
+    def cable_names(self) -> tuple[str, ...]:
+        """Such as "T1-T2 outer bottom_left"."""
+        return self.actuation.layout.cable_names
 
     @property
     def signals(self) -> int:
@@ -69,12 +71,29 @@ class Structure:
     @property
     def is_row(self) -> bool:
         """True for a row of tetrahedra."""
-        return self.thesis_nodes is not None
+        return len(self.markers) > 0
+
+    @property
+    def followed(self) -> str:
+        """The name of what is followed."""
+        return "bottom nodes" if self.is_row else "centre"
 
     @property
     def carriers(self) -> np.ndarray:
         """(nodes,): the index of each node's body."""
         return np.repeat(np.arange(len(self.bodies)), np.diff(self.first_node))
+
+    @functools.cached_property
+    def node_shares(self) -> np.ndarray:
+        """(nodes,): the shares with which the nodes make up the centre of mass, wherever the bodies
+        are."""
+        shares = []
+        for p_BN, mass in zip(np.split(self.p_BN, self.first_node[1:-1]), self.mass, strict=True):
+            # Each body's origin is its centre of mass, in the hull of its nodes.
+            conditions = np.vstack([p_BN.T, np.full(len(p_BN), np.abs(p_BN).max())])
+            origin = [0.0, 0.0, 0.0, conditions[3, 0]]
+            shares.append(mass * np.linalg.lstsq(conditions, origin)[0])
+        return np.concatenate(shares) / self.mass.sum()
 
     @property
     def isotropic(self) -> bool:
@@ -105,14 +124,17 @@ def turn_with_slope(
     return turned_p_WB, turned_q_WB
 
 
+def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
+    """Positions (..., markers, 3) of the markers among nodes p_WN (..., nodes, 3), or (..., 1, 3)
+    of the centre of mass."""
+    if structure.is_row:
+        return p_WN[..., structure.markers, :]
+    return (structure.node_shares @ p_WN)[..., np.newaxis, :]
+
+
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
     """p_WN (nodes, 3) in m from the state (13 n,) of the bodies."""
     return moved_nodes(structure, state)[:, P_WN : P_WN + 3]
-
-
-def node_velocities(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """v_WN (nodes, 3) in m/s from the state (13 n,) of the bodies."""
-    return moved_nodes(structure, state)[:, V_WN : V_WN + 3]
 
 
 def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from pydrake.multibody.tree import SpatialInertia
 
 from tetra_drake.physics.cable import CABLE
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.bodies import node_inertia, strut_inertia
-from tetra_drake.robot.structure import Structure, turn_with_slope
+from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.nesting import (
     BOTTOM_LEFT,
     BOTTOM_RIGHT,
     CABLES,
     NODES,
     TIP,
-    TOP,
     Tetrahedra,
     cable_nodes,
     tetrahedron_nodes,
 )
 from tetra_drake.scenario.schema import Scenario
 
-BASE = (BOTTOM_LEFT, BOTTOM_RIGHT, TOP)
 STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
 
 
@@ -34,28 +30,14 @@ def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
     Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0; the
     tips point forward (+x) into the next tetrahedron. Junction i joins T(i+1) and T(i+2)
     by 3 outer cables (base node to base node) and 3 inner ones (tip to base nodes); see
-    CABLES and Actuation. On an incline without start, the robot is turned with
-    the slope, about World's y axis.
+    CABLES and Actuation.
     """
-    n, cables = robot.tetrahedra, robot.cables
-    edge = robot.strut_length
-    circumradius = edge / math.sqrt(3.0)
-    height = edge * math.sqrt(2.0 / 3.0)
-    p_BN = tetrahedron_nodes(edge)
+    n = robot.tetrahedra
+    p_BN = tetrahedron_nodes(robot.strut_length)
     bodies = tuple(f"T{i + 1}" for i in range(n))
-    p_WB = np.array([[height / 4 + i * robot.spacing, 0.0, circumradius / 2] for i in range(n)])
-    if robot.offsets:
-        p_WB += np.array(robot.offsets)
-    upright = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-    p_WB, q_WB = turn_with_slope(p_WB, upright, scenario.terrain.plane_slope or 0.0)
+    x, _, z = p_BN[BOTTOM_LEFT]
+    p_WB = np.array([[i * robot.spacing - x, 0.0, -z] for i in range(n)])
     actuation = Actuation.of(scenario)
-    rows: list[tuple[float, ...]] = []
-    for i in range(n - 1):
-        for cable in CABLES:
-            outer = cable.startswith("outer")
-            stiffness = cables.outer_stiffness if outer else cables.inner_stiffness
-            law = stiffness, cables.damping, cables.free_length
-            rows.append((*cable_nodes(i, cable), actuation.drivers[len(rows)], *law))
     bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
     contacts = [*bottom, 4 * (n - 1) + TIP] if robot.contacts == "thesis" else range(4 * n)
     struts = [(4 * i + a, 4 * i + b) for i in range(n) for a, b in STRUTS]
@@ -71,17 +53,26 @@ def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
         mass=np.full(n, mass),
         unit_inertia=np.tile(unit_inertia, (n, 1)),
         p_WB=p_WB,
-        q_WB=q_WB,
-        cables=np.array(rows, dtype=CABLE),
-        cable_names=actuation.layout.cable_names,
+        q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
+        cables=_cables(robot, actuation),
         cable_groups=tuple(cable.split()[0] for cable in CABLES) * (n - 1),
-        slack=robot.slack,
         actuation=actuation,
         contacts=np.array(contacts),
-        thesis_nodes=(BOTTOM_LEFT, BOTTOM_RIGHT, 4 * (n - 1) + TIP),
-        feet=2 * n + 1,
         markers=np.array(bottom),
     )
+
+
+def _cables(robot: Tetrahedra, actuation: Actuation) -> np.ndarray:
+    """(cables,) of dtype CABLE, junction by junction."""
+    cables = robot.cables
+    rows: list[tuple[float, ...]] = []
+    for junction in range(robot.tetrahedra - 1):
+        for cable in CABLES:
+            outer = cable.startswith("outer")
+            stiffness = cables.outer_stiffness if outer else cables.inner_stiffness
+            law = stiffness, cables.damping, cables.free_length
+            rows.append((*cable_nodes(junction, cable), actuation.drivers[len(rows)], *law))
+    return np.array(rows, dtype=CABLE)
 
 
 def tetrahedron_inertia(p_BN: np.ndarray, robot: Tetrahedra) -> tuple[float, np.ndarray]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import TAG, Tree, tree_of
+from tetra_drake.scenario.sections import TAG, Tree, flattened, tree_of
 from tetra_drake.scenario.structure_files import structure_file
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
@@ -47,18 +47,11 @@ def differences(scenario: Scenario, base: Scenario) -> list[tuple[str, str]]:
 
 def _texts(scenario: Scenario) -> dict[str, str]:
     """The values of a scenario as texts, by their keys."""
+    tree = tree_of(scenario, show="{:.6g} {}".format, sparse=False)
     texts = {}
-
-    def add(tree: Tree, prefix: str) -> None:
-        for name, value in tree.items():
-            key = f"{prefix}.{name}".strip(".")
-            if isinstance(value, dict):
-                add(value, key)
-            else:
-                text = f"{value:.6g}" if isinstance(value, float) else json.dumps(value)
-                texts[key.removesuffix(f".{TAG}")] = text.replace('"', "")
-
-    add(tree_of(scenario, show="{:.6g} {}".format, sparse=False), "")
+    for key, value in flattened(tree).items():
+        text = f"{value:.6g}" if isinstance(value, float) else json.dumps(value)
+        texts[key.removesuffix(f".{TAG}")] = text.replace('"', "")
     return texts
 
 

@@ -32,14 +32,14 @@ def _metric(unit: str, *, least: bool = False, most: bool = False, of_a_row: boo
 class Metrics:
     """Metrics of a simulation, each number in the SI unit of its field's metadata.
 
-    x₁ and y₁ are those of T1's bottom left node, x₂ is that of its bottom right node, x₃ that of
-    the lead tetrahedron's tip. The steady stretch is from `simulation.steady_from`, or from
-    `cpg.start_up` where that is later, to the end. The centre is the mean of the bodies' origins.
-    Values come from results.metrics.
+    x₁ and y₁ are those of T1's bottom left node, or of the centre of a robot that is no row. x₂ is
+    that of T1's bottom right node, x₃ that of the lead tetrahedron's tip. The steady stretch is
+    from `simulation.steady_from`, or from `cpg.start_up` where that is later, to the end. The
+    centre is that of mass. What a robot lacks is NaN. Values come from results.metrics.
     """
 
     distance: float = _metric("m")
-    """Way along x of T1's bottom left node, x₁."""
+    """Way along x, of x₁."""
     steady_distance: float = _metric("m")
     """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
     speed: float = _metric("m/s")
@@ -49,8 +49,8 @@ class Metrics:
     lead: float = _metric("m", of_a_row=True)
     """x₃ - x₁ at the end."""
     lateral_drift: float = _metric("m")
-    """abs(y₁): sideways way of T1's bottom left node."""
-    heading_change: float = _metric("rad")
+    """Sideways way, abs(y₁)."""
+    heading_change: float = _metric("rad", of_a_row=True)
     """Angle by which the robot has turned to the left at the end. Whole turns count. See
     results.path."""
     path_curvature: float = _metric("1/m")
@@ -66,10 +66,10 @@ class Metrics:
     """Root mean square of dS/dt in the steady stretch, over all oscillators' signals S: the less,
     the smoother the drive."""
     lifted: float = _metric("")
-    """Share of the steady stretch in which a tetrahedron is off the ground, mean of all. Off the
-    ground is one none of whose contact nodes bears a normal force. It says little in MuJoCo."""
+    """Share of the steady stretch in which a body is off the ground, mean of all. Off the ground
+    is one none of whose contact nodes bears a normal force. It says little in MuJoCo."""
     clearance: float = _metric("m", least=True)
-    """Least distance, at any time, between the axes of struts of two tetrahedra. Less than a
+    """Least distance, at any time, between the axes of struts of two bodies. Less than a
     strut's diameter is overlap: nothing in the model keeps struts apart."""
     tension: float = _metric("N", least=True)
     """Least tension of any cable at any time. Below 0 the cable would have to push."""
@@ -91,7 +91,7 @@ class Metrics:
     actuator_limited: float = _metric("", most=True)
     """Share of time in which a limit binds, mean of all winches or tension motors."""
     lifted_shares: tuple[float, ...] = ()
-    """The share of `lifted` of each tetrahedron, from T1 on."""
+    """The share of `lifted` of each body, from T1 on."""
 
     @property
     def distance_in(self) -> float:
@@ -104,12 +104,13 @@ class Metrics:
         bend = abs(self.path_curvature)
         return 1.0 / bend if bend > STRAIGHT else math.inf
 
-    def in_inches(self) -> dict[str, float]:
-        """The metrics that are lengths, in inches: distance_in, steady_distance_in ..."""
-        return {f"{n}_in": getattr(self, n) / INCH for n, unit in METRICS.items() if unit == "m"}
+    def in_inches(self) -> dict[str, Any]:
+        """The lengths in inches, as JSON holds them: distance_in, steady_distance_in ..."""
+        lengths = [name for name, unit in METRICS.items() if unit == "m"]
+        return {f"{name}_in": json_number(getattr(self, name) / INCH) for name in lengths}
 
     def to_json(self) -> dict[str, Any]:
-        """The metrics by name, as JSON holds them: None for an infinite one."""
+        """The metrics by name, as JSON holds them: None for one that is not finite."""
         numbers = {name: json_number(getattr(self, name)) for name in METRICS}
         return numbers | {"lifted_shares": list(self.lifted_shares)}
 

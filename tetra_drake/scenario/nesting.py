@@ -30,6 +30,8 @@ name, inner ones join the tip to base nodes."""
 
 CABLES: tuple[str, ...] = get_args(Cable)
 
+Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+
 
 def tetrahedron_nodes(strut_length: float) -> np.ndarray:
     """p_BN (4, 3) in m: the base triangle is vertical, the tip points forward, and the origin is
@@ -49,27 +51,11 @@ def cable_nodes(junction: int, cable: str) -> tuple[int, int]:
     return 4 * junction + rear, 4 * (junction + 1) + place
 
 
-def row_layout(
-    *, tetrahedra: int, strut_length: float, spacing: float, groups: Sequence[Sequence[str]]
-) -> Layout:
-    """The layout of a row on flat ground; each junction has the same groups of driven cables."""
-    forward = spacing * np.arange(tetrahedra)[:, np.newaxis, np.newaxis] * [1.0, 0.0, 0.0]
-    p_WN = (forward + tetrahedron_nodes(strut_length)).reshape(-1, 3)
-    cables = [(junction, cable) for junction in range(tetrahedra - 1) for cable in CABLES]
-    nodes = np.array([cable_nodes(*cable) for cable in cables])
-    oscillators, driven = [], []
-    for junction in range(tetrahedra - 1):
-        name = f"T{junction + 1}-T{junction + 2}"
-        for group in groups:
-            oscillators.append(f"{name} {' + '.join(group)}" if len(groups) > 1 else name)
-            driven.append(tuple(cables.index((junction, cable)) for cable in group))
-    return Layout(
-        cable_names=tuple(f"T{i + 1}-T{i + 2} {cable}" for i, cable in cables),
-        ends=p_WN[nodes],
-        bodies=nodes // len(NODES),
-        oscillators=tuple(oscillators),
-        groups=tuple(driven),
-    )
+def check_offsets(offsets: Sequence[Sequence[float]], bodies: int) -> None:
+    """Refuses displacements of bodies that are not one for each."""
+    if len(offsets) not in (0, bodies):
+        expected = f"expected none or {bodies}, one for each body"
+        refuse("offsets", f"found {len(offsets)} items, {expected}")
 
 
 class RowCables(Section):
@@ -99,25 +85,20 @@ class Tetrahedra(Section):
     cables balance. So is the spacing of a file that changes strut length or the cables' stiffness
     or free length of its base and gives no spacing."""
     gravity: float = quantity("m/s^2", ge=0)
-    offsets: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = quantity(
-        "m", default=[]
-    )
+    offsets: list[Point] = quantity("m", default=[])
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
     tip of the foremost, as no others reach flat ground. `all`: all four of every tetrahedron."""
-    actuation: list[list[Cable]] = Field(default=[["outer bottom_left", "outer bottom_right"]])
+    actuation: list[Annotated[list[Cable], Field(min_length=1)]] = Field(
+        default=[["outer bottom_left", "outer bottom_right"]], min_length=1
+    )
     """Groups of a junction's cables that share an oscillator, the same for every junction."""
 
     @property
     def body_count(self) -> int:
         """The number of rigid bodies."""
         return self.tetrahedra
-
-    @property
-    def oscillator_count(self) -> int:
-        """One neural oscillator for each group of cables of each junction between tetrahedra."""
-        return len(self.actuation) * (self.tetrahedra - 1)
 
     @property
     def slack(self) -> bool:
@@ -130,12 +111,26 @@ class Tetrahedra(Section):
         return self.spacing
 
     def layout(self) -> Layout:
-        """Cables and oscillators of the robot."""
-        return row_layout(
-            tetrahedra=self.tetrahedra,
-            strut_length=self.strut_length,
-            spacing=self.spacing,
-            groups=self.actuation,
+        """Cables and oscillators of the robot on flat ground."""
+        forward = self.spacing * np.arange(self.tetrahedra)[:, np.newaxis, np.newaxis]
+        p_WN = forward * [1.0, 0.0, 0.0] + tetrahedron_nodes(self.strut_length)
+        names: list[str] = []
+        nodes: list[tuple[int, int]] = []
+        oscillators, groups = [], []
+        for junction in range(self.tetrahedra - 1):
+            name = f"T{junction + 1}-T{junction + 2}"
+            for group in self.actuation:
+                several = len(self.actuation) > 1
+                oscillators.append(f"{name} {' + '.join(group)}" if several else name)
+                groups.append(tuple(len(names) + CABLES.index(cable) for cable in group))
+            names += [f"{name} {cable}" for cable in CABLES]
+            nodes += [cable_nodes(junction, cable) for cable in CABLES]
+        return Layout(
+            cable_names=tuple(names),
+            ends=p_WN.reshape(-1, 3)[np.array(nodes)],
+            bodies=np.array(nodes) // len(NODES),
+            oscillators=tuple(oscillators),
+            groups=tuple(groups),
         )
 
     def following(self, base: Section, changes: Tree) -> Tree:
@@ -161,11 +156,7 @@ class Tetrahedra(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
-        if len(self.offsets) not in (0, self.tetrahedra):
-            problem = f"found {len(self.offsets)} items, expected none or {self.tetrahedra}"
-            refuse("offsets", f"{problem}, one for each tetrahedron")
-        if not self.actuation or not all(self.actuation):
-            refuse("actuation", f"found {self.actuation}, expected groups of at least one cable")
+        check_offsets(self.offsets, self.tetrahedra)
         cables = [cable for group in self.actuation for cable in group]
         for cable in cables:
             if cables.count(cable) > 1:
@@ -191,21 +182,17 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
     near, far = 0.0, height + cables.free_length
     if pull(near) >= 0.0:
         refuse("", "the cables balance at no spacing; give one")
-    middle = 0.5 * (near + far)
-    while near < middle < far:
+    for _ in range(100):  # more than double precision has halvings
+        middle = 0.5 * (near + far)
         if pull(middle) > 0.0:
             far = middle
         else:
             near = middle
-        middle = 0.5 * (near + far)
     return far
 
 
 def _deciding_numbers(robot: Tetrahedra) -> tuple[float, ...]:
     """The numbers on which the balanced spacing depends."""
-    return (
-        robot.strut_length,
-        robot.cables.outer_stiffness,
-        robot.cables.inner_stiffness,
-        robot.cables.free_length,
-    )
+    cables = robot.cables
+    stiffness = cables.outer_stiffness, cables.inner_stiffness
+    return (*stiffness, cables.free_length, robot.strut_length)

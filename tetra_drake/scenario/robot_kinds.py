@@ -6,6 +6,7 @@ World (x forward, y left, z up) and need only be near a static equilibrium.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
@@ -16,27 +17,38 @@ from pydantic import Field
 
 from tetra_drake.scenario.layout import Layout
 from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
-from tetra_drake.scenario.nesting import Tetrahedra
+from tetra_drake.scenario.nesting import Point, Tetrahedra, check_offsets
 from tetra_drake.scenario.sections import (
-    TAG,
     Kinds,
     Section,
     Tree,
     described,
+    each_number,
     hint,
     quantity,
     refuse,
 )
 from tetra_drake.scenario.units import quantity_to_si
 
-MOST_NODES, MOST_BODIES, MOST_CABLES = 1000, 200, 2000
+MOST_NODES, MOST_PAIRS = 1000, 2000
 
 LEAST_DISTANCE = 1e-3
 """Least distance between two nodes, as a share of the shortest strut."""
 
-Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+def _check_name(name: object) -> object:
+    """A name of a node, group or oscillator: blanks separate the names of a cable, dots those of a
+    key, and commas keys."""
+    if not isinstance(name, str):
+        refuse("", f"found the name {name}, expected a text, such as n{name}")
+    if re.search(r"[\s.,]", name):
+        refuse("", f"found the name '{name}', expected one without blanks, dots and commas")
+    return name
+
+
+Name = Annotated[str, pydantic.BeforeValidator(_check_name)]
 Pair = Annotated[list[str], Field(min_length=2, max_length=2)]
-Pairs = Annotated[list[Pair], Field(min_length=1)]
+Pairs = Annotated[list[Pair], Field(min_length=1, max_length=MOST_PAIRS)]
 
 
 class StrutGroup(Section):
@@ -61,12 +73,16 @@ class CableGroup(Section):
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> CableGroup:
-        expected = "expected one of free_length and tension"
-        if self.free_length is None and self.tension is None:
-            refuse("free_length", f"found neither it nor a tension, {expected}")
-        if self.free_length is not None and self.tension is not None:
-            refuse("tension", f"found a free_length, too, {expected}")
+        if (self.free_length is None) == (self.tension is None):
+            found = "neither" if self.tension is None else "both"
+            refuse("free_length", f"found {found}, expected one of free_length and tension")
         return self
+
+    def free_length_at(self, length: float) -> float:
+        """Free length in m of a cable whose nodes are given `length` apart."""
+        if self.free_length is not None:
+            return self.free_length
+        return length - (self.tension or 0.0) / self.stiffness
 
 
 class Member(NamedTuple):
@@ -86,8 +102,7 @@ class Member(NamedTuple):
 class Structure(Section):
     """A tensegrity: nodes, struts and cables between them, and what actuates the cables.
 
-    Nodes, bodies and cables are numbered in the order of `nodes`, `bodies` and `all_cables`. A file
-    may give the `unit` of coordinates that are bare numbers; once read, they are in m.
+    A file may give the `unit` of coordinates that are bare numbers; once read, they are in m.
     """
 
     lacking: ClassVar[tuple[str, ...]] = METRICS_OF_A_ROW
@@ -95,10 +110,10 @@ class Structure(Section):
     slack: ClassVar[bool] = True
     """Cables never push."""
 
-    nodes: dict[str, Point] = quantity("m")
-    struts: dict[str, StrutGroup] = Field(min_length=1)
-    cables: dict[str, CableGroup] = Field(default={})
-    actuated: dict[str, Annotated[list[str], Field(min_length=1)]] = Field(default={})
+    nodes: dict[Name, Point] = quantity("m", max_length=MOST_NODES)
+    struts: dict[Name, StrutGroup] = Field(min_length=1)
+    cables: dict[Name, CableGroup] = Field(default={})
+    actuated: dict[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Names of the cables that each oscillator drives, their nodes in either order."""
     masses: dict[str, Annotated[float, Field(gt=0)]] = quantity("kg", default={})
     """Point masses at nodes, such as motors."""
@@ -119,11 +134,6 @@ class Structure(Section):
         return len(self.bodies)
 
     @property
-    def oscillator_count(self) -> int:
-        """The number of neural oscillators."""
-        return len(self.actuated)
-
-    @property
     def size(self) -> float:
         """Length in m of the shortest strut, of which `disturbances.start` is a share."""
         return min(map(self._length, self.all_struts))
@@ -132,6 +142,18 @@ class Structure(Section):
         """What changes, too, where `changes` made this robot of a base: nothing."""
         return {}
 
+    def layout(self) -> Layout:
+        """Cables and oscillators of the robot."""
+        ends = [[self.nodes[node] for node in cable.nodes] for cable in self.all_cables]
+        bodies = [self._bodies_joined(cable) for cable in self.all_cables]
+        return Layout(
+            cable_names=tuple(cable.name for cable in self.all_cables),
+            ends=np.array(ends).reshape(-1, 2, 3),
+            bodies=np.array(bodies).reshape(-1, 2),
+            oscillators=tuple(self.actuated),
+            groups=tuple(self.cables_of_oscillator.values()),
+        )
+
     @cached_property
     def all_struts(self) -> tuple[Member, ...]:
         """The struts, in the order of the file."""
@@ -139,45 +161,21 @@ class Structure(Section):
 
     @cached_property
     def all_cables(self) -> tuple[Member, ...]:
-        """The cables, in the order of the file."""
-        return tuple(_members("cables", self.cables))
-
-    @cached_property
-    def ordered_cables(self) -> tuple[int, ...]:
-        """The numbers of the cables, pair by pair of bodies: the order in which they are simulated
-        and recorded."""
-        bodies = [self._bodies_joined(cable) for cable in self.all_cables]
-        return tuple(sorted(range(len(bodies)), key=bodies.__getitem__))
-
-    def layout(self) -> Layout:
-        """Cables and oscillators of the robot, cables in the order of `ordered_cables`."""
-        cables = [self.all_cables[number] for number in self.ordered_cables]
-        place = {number: place for place, number in enumerate(self.ordered_cables)}
-        ends = [[self.nodes[node] for node in cable.nodes] for cable in cables]
-        return Layout(
-            cable_names=tuple(cable.name for cable in cables),
-            ends=np.array(ends).reshape(-1, 2, 3),
-            bodies=np.array([self._bodies_joined(cable) for cable in cables]).reshape(-1, 2),
-            oscillators=tuple(self.actuated),
-            groups=tuple(
-                tuple(place[number] for number in numbers)
-                for numbers in self.cables_of_oscillator.values()
-            ),
-        )
+        """The cables, pair by pair of bodies: as they are numbered, simulated and recorded."""
+        return tuple(sorted(_members("cables", self.cables), key=self._bodies_joined))
 
     @cached_property
     def bodies(self) -> tuple[tuple[str, ...], ...]:
         """The nodes of each rigid body, bodies and nodes in the order of the struts."""
-        return _components(strut.nodes for strut in self.all_struts)
+        return _components(self.all_struts)
 
     @cached_property
     def body_names(self) -> tuple[str, ...]:
         """The group of struts whose nodes are those of the body, or else its nodes."""
-        group_of_nodes = {
-            frozenset(node for pair in group.pairs for node in pair): name
-            for name, group in self.struts.items()
-        }
-        return tuple(group_of_nodes.get(frozenset(body), " ".join(body)) for body in self.bodies)
+        groups: dict[frozenset[str], str] = {}
+        for name, group in self.struts.items():
+            groups[frozenset(node for pair in group.pairs for node in pair)] = name
+        return tuple(groups.get(frozenset(body), " ".join(body)) for body in self.bodies)
 
     @cached_property
     def body_of_node(self) -> dict[str, int]:
@@ -187,28 +185,29 @@ class Structure(Section):
     @cached_property
     def sphere_of_node(self) -> dict[str, StrutGroup]:
         """The group whose sphere a node has: that of the first strut at the node."""
-        groups: dict[str, StrutGroup] = {}
-        for strut in self.all_struts:
-            for node in strut.nodes:
-                groups.setdefault(node, self.struts[strut.group])
-        return groups
+        last_first = reversed(self.all_struts)
+        return {node: self.struts[strut.group] for strut in last_first for node in strut.nodes}
 
     @cached_property
     def free_lengths(self) -> tuple[float, ...]:
         """Free lengths of the cables in m; from the tension where the file gives that."""
-        lengths = []
-        for cable in self.all_cables:
-            group = self.cables[cable.group]
-            if group.free_length is not None:
-                lengths.append(group.free_length)
-            elif group.tension is not None:
-                lengths.append(self._length(cable) - group.tension / group.stiffness)
-        return tuple(lengths)
+        return tuple(
+            self.cables[cable.group].free_length_at(self._length(cable))
+            for cable in self.all_cables
+        )
 
     @cached_property
     def cables_of_oscillator(self) -> dict[str, tuple[int, ...]]:
         """The numbers of the cables that each oscillator drives."""
-        numbers = self._cable_numbers
+        numbers = {}
+        for number, cable in enumerate(self.all_cables):
+            backward = cable._replace(nodes=cable.nodes[::-1])
+            numbers[cable.name] = numbers[backward.name] = number
+        for oscillator, names in self.actuated.items():
+            for place, name in enumerate(names):
+                if name not in numbers:
+                    problem = f"found unknown cable '{name}'; {hint(name, numbers)}"
+                    refuse(f"actuated.{oscillator}[{place}]", problem)
         return {
             oscillator: tuple(numbers[name] for name in names)
             for oscillator, names in self.actuated.items()
@@ -219,15 +218,6 @@ class Structure(Section):
         """The nodes that the ground can touch, in the order of `nodes`."""
         touching = self.nodes if self.contacts == "all" else self.contacts
         return tuple(node for node in self.nodes if node in touching)
-
-    @property
-    def _cable_numbers(self) -> dict[str, int]:
-        """The numbers of the cables by their names, for both orders of the nodes."""
-        numbers = {}
-        for number, cable in enumerate(self.all_cables):
-            backward = cable._replace(nodes=(cable.nodes[1], cable.nodes[0]))
-            numbers[cable.name] = numbers[backward.name] = number
-        return numbers
 
     def _bodies_joined(self, cable: Member) -> tuple[int, int]:
         """The numbers of the bodies that a cable joins, the lower one first."""
@@ -240,31 +230,26 @@ class Structure(Section):
 
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _read_nodes(cls, tree: Any) -> Any:
-        """The tree with a unit at every coordinate, if it has the key `unit`, and without that."""
-        if not isinstance(tree, dict):
+    def _apply_unit(cls, tree: Any) -> Any:
+        """The tree without its key `unit`, with that unit at all coordinates that have none."""
+        if not isinstance(tree, dict) or "unit" not in tree:
             return tree
-        tree = dict(tree)
-        unit = tree.pop("unit", None)
-        if not isinstance(tree.get("nodes"), dict):
-            return tree
-        for node in tree["nodes"]:
-            if not isinstance(node, str):
-                refuse(f"nodes.{node}", f"found the name {node}, expected a text, such as n{node}")
-        if unit is None:
-            return tree
+        unit = tree["unit"]
         try:
             quantity_to_si(f"1 {unit}", "m")
         except ValueError:
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
-        tree["nodes"] = {node: _with_unit(point, unit) for node, point in tree["nodes"].items()}
-        return tree
+
+        def with_unit(number: Any, _unit: str, _key: str) -> Any:
+            return f"{number!r} {unit}" if type(number) in (int, float) else number
+
+        tree = {key: value for key, value in tree.items() if key != "unit"}
+        return tree | {"nodes": each_number(tree.get("nodes"), "m", with_unit)}
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Structure:
-        self._check_names()
         self._check_pairs()
-        self._check_nodes()
+        self._check_places()
         self._check_bodies()
         self._check_tensions()
         self._check_actuated()
@@ -273,18 +258,8 @@ class Structure(Section):
         if self.contacts != "all":
             for place, node in enumerate(self.contacts):
                 self._check_node(f"contacts[{place}]", node)
-        if len(self.offsets) not in (0, self.body_count):
-            problem = f"found {len(self.offsets)} items, expected none or {self.body_count}"
-            refuse("offsets", f"{problem}, one for each body")
+        check_offsets(self.offsets, self.body_count)
         return self
-
-    def _check_names(self) -> None:
-        for key in ("nodes", "struts", "cables", "actuated"):
-            for name in getattr(self, key):
-                # Blanks separate the names of a cable, dots those of a key, commas keys.
-                if name in ("", TAG) or any(c.isspace() or c in ".," for c in name):
-                    expected = "expected one without blanks, dots and commas"
-                    refuse(f"{key}.{name}", f"found the name '{name}', {expected}")
 
     def _check_node(self, key: str, node: str) -> None:
         if node not in self.nodes:
@@ -292,52 +267,37 @@ class Structure(Section):
 
     def _check_pairs(self) -> None:
         keys: dict[frozenset[str], str] = {}
-        for member in (*self.all_struts, *self.all_cables):
-            first, second = member.nodes
-            self._check_node(member.key, first)
-            self._check_node(member.key, second)
-            if first == second:
-                refuse(member.key, f"found '{first}' twice, expected two nodes")
+        for member in (*self.all_struts, *_members("cables", self.cables)):
+            for node in member.nodes:
+                self._check_node(member.key, node)
+            if self._length(member) == 0.0:
+                refuse(member.key, "has length 0, expected nodes at two places")
             earlier = keys.setdefault(frozenset(member.nodes), member.key)
             if earlier != member.key:
-                problem = f"found '{first}' and '{second}' as in {earlier}"
-                refuse(member.key, f"{problem}, expected each pair of nodes once")
-        if len(self.all_cables) > MOST_CABLES:
-            refuse("cables", f"found {len(self.all_cables)} cables, expected at most {MOST_CABLES}")
+                refuse(member.key, f"found the nodes of {earlier}, expected each pair once")
 
-    def _check_nodes(self) -> None:
-        if len(self.nodes) > MOST_NODES:
-            refuse("nodes", f"found {len(self.nodes)} nodes, expected at most {MOST_NODES}")
+    def _check_places(self) -> None:
+        least = LEAST_DISTANCE * self.size
+        names, p_WN = list(self.nodes), np.array(list(self.nodes.values()))
+        for i in range(1, len(names)):
+            distances = np.linalg.norm(p_WN[:i] - p_WN[i], axis=1)
+            if distances.min() < least:
+                problem = f"found the place of '{names[distances.argmin()]}'"
+                refuse(f"nodes.{names[i]}", f"{problem}, expected nodes {least:.3g} m apart")
+
+    def _check_bodies(self) -> None:
         for node in self.nodes:
             if node not in self.body_of_node:
                 refuse(f"nodes.{node}", "is on no strut, expected a node of a strut")
-        for strut in self.all_struts:
-            if self._length(strut) == 0.0:
-                refuse(strut.key, "is a strut of length 0, expected nodes at two places")
-        least = LEAST_DISTANCE * self.size
-        p_WN = np.array(list(self.nodes.values()))
-        distances = np.linalg.norm(p_WN[:, None] - p_WN, axis=2)
-        np.fill_diagonal(distances, np.inf)
-        if distances.min() < least:
-            names = list(self.nodes)
-            first, second = divmod(int(distances.argmin()), len(names))
-            problem = f"found the place of '{names[first]}', too"
-            expected = f"expected nodes at least {least:.3g} m apart"
-            refuse(f"nodes.{names[second]}", f"{problem}, {expected}")
-
-    def _check_bodies(self) -> None:
-        if len(self.bodies) > MOST_BODIES:
-            refuse("struts", f"found {len(self.bodies)} bodies, expected at most {MOST_BODIES}")
         for cable in self.all_cables:
-            first, second = (self.body_of_node[node] for node in cable.nodes)
+            first, second = self._bodies_joined(cable)
             if first == second:
                 problem = f"joins the body '{self.body_names[first]}' to itself"
                 refuse(cable.key, f"{problem}, expected nodes of two bodies")
-        joined = _components(member.nodes for member in (*self.all_struts, *self.all_cables))
+        joined = _components((*self.all_struts, *self.all_cables))
         if len(joined) > 1:
-            apart = self.body_names[self.body_of_node[joined[1][0]]]
-            first_body = self.body_names[0]
-            problem = f"no cables lead from the body '{apart}' to '{first_body}'"
+            one, other = (self.body_names[self.body_of_node[nodes[0]]] for nodes in joined[:2])
+            problem = f"no cables lead from the body '{other}' to '{one}'"
             refuse("cables", f"{problem}, expected all bodies to be joined")
 
     def _check_tensions(self) -> None:
@@ -349,32 +309,22 @@ class Structure(Section):
                 refuse(f"cables.{cable.group}.tension", f"{problem}: its stiffness times length")
 
     def _check_actuated(self) -> None:
-        numbers = self._cable_numbers
         oscillators: dict[int, str] = {}
-        for oscillator, names in self.actuated.items():
-            for place, name in enumerate(names):
-                key = f"actuated.{oscillator}[{place}]"
-                if name not in numbers:
-                    refuse(key, f"found unknown cable '{name}'; {hint(name, numbers)}")
-                if numbers[name] in oscillators:
-                    problem = f"found '{name}', which '{oscillators[numbers[name]]}' drives"
-                    refuse(key, f"{problem}, expected each cable once")
-                oscillators[numbers[name]] = oscillator
+        for oscillator, cables in self.cables_of_oscillator.items():
+            for place, cable in enumerate(cables):
+                if cable in oscillators:
+                    name = self.all_cables[cable].name
+                    problem = f"found '{name}', which '{oscillators[cable]}' drives"
+                    refuse(f"actuated.{oscillator}[{place}]", f"{problem}, expected it once")
+                oscillators[cable] = oscillator
 
 
 Robot = Annotated[Tetrahedra | Structure, Kinds()]
 """The tagged kinds of robots; without a tag it is the first.
 
-All have `gravity`, `offsets` (one for each body), `body_count`, `oscillator_count`, `slack`,
-`size`, `lacking` (metrics), `layout()` and `following()`.
+All have `gravity`, `offsets` (one for each body), `body_count`, `slack`, `size`, `lacking`
+(metrics), `layout()` and `following()`.
 """
-
-
-def _with_unit(point: Any, unit: str) -> Any:
-    """The coordinates of a point as texts with a unit, where they are bare numbers."""
-    if not isinstance(point, list):
-        return point
-    return [f"{x!r} {unit}" if type(x) in (int, float) else x for x in point]
 
 
 def _members(key: str, groups: Mapping[str, StrutGroup | CableGroup]) -> Iterator[Member]:
@@ -383,17 +333,14 @@ def _members(key: str, groups: Mapping[str, StrutGroup | CableGroup]) -> Iterato
             yield Member(f"{key}.{name}.pairs[{place}]", name, (first, second))
 
 
-def _components(pairs: Iterable[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
-    """The connected components of a graph, they and their nodes in the order of its edges."""
-    component: dict[str, list[str]] = {}
-    nodes: dict[str, None] = {}
-    for pair in pairs:
-        first, second = (component.setdefault(node, [node]) for node in pair)
-        nodes.update(dict.fromkeys(pair))
-        if first is not second:
-            first.extend(second)
-            component.update(dict.fromkeys(second, first))
-    ordered: dict[int, list[str]] = {}
-    for node in nodes:
-        ordered.setdefault(id(component[node]), []).append(node)
-    return tuple(tuple(members) for members in ordered.values())
+def _components(members: Iterable[Member]) -> tuple[tuple[str, ...], ...]:
+    """The nodes that members connect, in the order of the members."""
+    first_node: dict[str, str] = {}
+    for member in members:
+        start, joined = (first_node.setdefault(node, node) for node in member.nodes)
+        if start != joined:
+            first_node |= {node: start for node, old in first_node.items() if old == joined}
+    components: dict[str, list[str]] = {}
+    for node, start in first_node.items():
+        components.setdefault(start, []).append(node)
+    return tuple(tuple(nodes) for nodes in components.values())

@@ -5,23 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Self, TypeVar
 
-from pydantic import PrivateAttr
+from pydantic import PrivateAttr, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.actuator_kinds import Actuation, Force
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
-from tetra_drake.scenario.optimizer_kinds import OptimizerKind, QualityDiversity, SteadyState
+from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.robot_kinds import Robot
 from tetra_drake.scenario.sections import (
     TAG,
     Section,
     Tree,
     Whole,
+    flattened,
     hint,
     merge,
     quantity,
+    refuse,
     tree_of,
     tree_of_changes,
 )
@@ -62,7 +64,9 @@ class Scenario(Section):
     gait_bounds: GaitBounds
     simulation: SimulationSection
     engine: Engine = Drake()
-    objective: dict[str, float] = quantity({k: inverse(u) for k, u in METRICS.items()})
+    objective: dict[str, float] = quantity(
+        {name: inverse(unit) for name, unit in METRICS.items()}, min_length=1
+    )
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
     require: dict[str, float] = quantity(METRICS, default={})
@@ -89,7 +93,7 @@ class Scenario(Section):
     @property
     def oscillators(self) -> int:
         """The number of neural oscillators."""
-        return self.robot.oscillator_count
+        return len(self.robot.layout().oscillators)
 
     @property
     def engine_name(self) -> str:
@@ -110,10 +114,9 @@ class Scenario(Section):
     @classmethod
     def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
         """The scenario of a complete tree; raises InputError that names `source` and key."""
-        tree = merge({}, with_structure(tree, source))
+        tree = merge({}, with_structure(_replacing(tree, tree), source))
         scenario = super().from_tree(tree, source, key=key)
         scenario._tree = _with_tags(tree, scenario)
-        check_relations(scenario, source)
         return scenario
 
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
@@ -148,60 +151,120 @@ class Scenario(Section):
 
     def with_numbers(self, numbers: Mapping[str, float]) -> Self:
         """A copy with other SI numbers by dotted keys, which are not checked."""
-        changed = self
+        changed = self.with_sections()
         for key, number in numbers.items():
-            section, *names = key.split(".")
-            copy = _with_number(getattr(changed, section), names, number)
-            changed = changed.with_sections(**{section: copy})
+            changed = _with_number(changed, key.split("."), number)
         return changed
 
     def numbers(self) -> dict[str, float]:
         """The SI numbers of the sections but `disturbances`, by their dotted keys."""
-        numbers: dict[str, float] = {}
-        for name in type(self).model_fields:
-            section = getattr(self, name)
-            if isinstance(section, Section) and name != "disturbances":
-                _collect_numbers(section, name, numbers)
-        return numbers
+        tree = self.model_dump(exclude={"disturbances", "objective", "require"})
+        return {key: value for key, value in flattened(tree).items() if type(value) is float}
+
+    @model_validator(mode="after")
+    def _check(self) -> Scenario:
+        """Refuses settings of different sections that cannot go together."""
+        step, duration = self.cpg.listing_step, self.simulation.duration
+        if step > duration:
+            expected = f"expected at most the duration, {duration} s"
+            refuse("cpg.listing_step", f"found {step} s, {expected}")
+        evaluations, optimizer = self.evolution.evaluations, self.optimizer
+        if isinstance(optimizer, SteadyState) and evaluations < optimizer.population:
+            expected = f"expected at least the population, {optimizer.population}"
+            refuse("evolution.evaluations", f"found {evaluations}, {expected}")
+        if "load" in self.cpg.feedback and self.robot.gravity == 0.0:
+            refuse("robot.gravity", "found 0 m/s^2, expected a weight, for feedback of the load")
+        self._check_metrics()
+        self._check_memory()
+        self._check_sides()
+        self._check_disturbances()
+        return self
+
+    def _check_metrics(self) -> None:
+        """Refuses a metric that the robot does not have."""
+        measures = getattr(self.optimizer, "measures", {})
+        for key, metrics in (
+            ("objective", self.objective),
+            ("require", self.require),
+            ("optimizer.measures", measures),
+        ):
+            for name in metrics:
+                for section in (self.robot, self.actuation):
+                    if name in section.lacking:
+                        kind = f"!{type(section).__name__}"
+                        problem = f"{kind} does not have this metric; give `{key}` without it"
+                        refuse(f"{key}.{name}", problem)
+
+    def _check_memory(self) -> None:
+        """Refuses what does not fit in memory."""
+        duration, sample_period = self.simulation.duration, self.simulation.sample_period
+        is_drake = isinstance(self.engine, Drake)
+        most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
+        least_step = duration * self.oscillators / most_signals
+        least_sample = duration * self.robot.body_count / MOST_SAMPLES
+        periods = [
+            ("cpg.listing_step", self.cpg.listing_step, least_step),
+            ("simulation.sample_period", sample_period, least_sample),
+        ]
+        if isinstance(self.engine, Mujoco):
+            periods.append(("engine.step", self.engine.step, least_step))
+        for key, period, least in periods:
+            if period < least:
+                problem = f"found {period} s, expected at least {least:.3g} s, to fit in memory"
+                refuse(key, f"{problem}, for this duration and robot")
+
+    def _check_sides(self) -> None:
+        """Refuses gaits that turn, or are mirrored, where groups of cables have no sides."""
+        layout, bounds = self.robot.layout(), self.gait_bounds
+        if bounds.turn != 0.0 and not layout.sides.any():
+            expected = "expected 0, as no group is on one side"
+            refuse("gait_bounds.turn", f"found {bounds.turn}, {expected}")
+        if bounds.mirrored and None in layout.images:
+            oscillator = layout.oscillators[layout.images.index(None)]
+            expected = f"expected false, as '{oscillator}' has no mirror image"
+            refuse("gait_bounds.mirrored", f"found true, {expected}")
+
+    def _check_disturbances(self) -> None:
+        """Refuses draws that change a number further than it can be changed."""
+        if self.disturbances is None:
+            return
+        undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()
+        for joined, spread in self.disturbances.spreads.items():
+            place, keys = f"disturbances.spreads.{joined}", separate(joined)
+            for key in keys:
+                if key not in numbers:
+                    refuse(place, f"'{key}' is no number of the scenario; {hint(key, numbers)}")
+            for factor in (1.0 - spread, 1.0 + spread):
+                changed = undisturbed.with_numbers({key: factor * numbers[key] for key in keys})
+                try:
+                    self.from_tree(changed.tree, place)
+                except InputError as error:
+                    problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
+                    refuse(place, problem)
 
 
-def _with_number(
-    value: Section | Mapping[str, Any], names: Sequence[str], number: float
-) -> Section | Mapping[str, Any]:
+def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
     """A copy of a section, or of a mapping by names, with another number where names lead."""
+    if not names:
+        return number
     name, *rest = names
     if isinstance(value, Section):
-        item = _with_number(getattr(value, name), rest, number) if rest else number
-        return value.model_copy(update={name: item})
-    item = _with_number(value[name], rest, number) if rest else number
-    return {**value, name: item}
-
-
-def _collect_numbers(
-    value: Section | Mapping[str, Any], key: str, numbers: dict[str, float]
-) -> None:
-    """Adds the numbers of a section, or of a mapping by names, by their dotted keys."""
-    if isinstance(value, Section):
-        value = {name: getattr(value, name) for name in type(value).model_fields}
-    for name, item in value.items():
-        if type(item) is float:
-            numbers[f"{key}.{name}"] = item
-        elif isinstance(item, (Section, dict)):
-            _collect_numbers(item, f"{key}.{name}", numbers)
+        return value.model_copy(update={name: _with_number(getattr(value, name), rest, number)})
+    return {**value, name: _with_number(value[name], rest, number)}
 
 
 def _replacing(tree: Tree, keys: Iterable[str]) -> Tree:
     """A tree whose objective, requirements and actuated cables replace those of a base, if they, or
     the robot, are in `keys`."""
-    whole: Tree = {}
+    tree = dict(tree)
     for name in ("objective", "require"):
         if name in keys and isinstance(tree[name], dict):
-            whole[name] = Whole(tree[name])
+            tree[name] = Whole(tree[name])
     robot = tree.get("robot")
     is_given = "robot" in keys or "robot.actuated" in keys
     if is_given and type(robot) is dict and isinstance(robot.get("actuated"), dict):
-        whole["robot"] = robot | {"actuated": Whole(robot["actuated"])}
-    return tree | whole
+        tree["robot"] = robot | {"actuated": Whole(robot["actuated"])}
+    return tree
 
 
 def _with_tags(tree: Tree, scenario: Scenario) -> Tree:
@@ -211,93 +274,3 @@ def _with_tags(tree: Tree, scenario: Scenario) -> Tree:
         if name in tree:
             tagged[name] = {TAG: type(getattr(scenario, name)).__name__} | tree[name]
     return tree | tagged
-
-
-def check_relations(scenario: Scenario, source: object) -> None:
-    """Raises InputError where settings of different sections cannot go together."""
-    if not scenario.objective:
-        raise InputError(source, "objective", "found no metric, expected one at least")
-    step, duration = scenario.cpg.listing_step, scenario.simulation.duration
-    if step > duration:
-        problem = f"found {step} s, expected at most the duration, {duration} s"
-        raise InputError(source, "cpg.listing_step", problem)
-    evaluations, optimizer = scenario.evolution.evaluations, scenario.optimizer
-    if isinstance(optimizer, SteadyState) and evaluations < optimizer.population:
-        problem = f"found {evaluations}, expected at least the population, {optimizer.population}"
-        raise InputError(source, "evolution.evaluations", problem)
-    if "load" in scenario.cpg.feedback and scenario.robot.gravity == 0.0:
-        problem = "found 0 m/s^2, expected a weight, for feedback of the load"
-        raise InputError(source, "robot.gravity", problem)
-    _check_metrics(scenario, source)
-    _check_memory(scenario, source)
-    _check_sides(scenario, source)
-    _check_disturbances(scenario, source)
-
-
-def _check_metrics(scenario: Scenario, source: object) -> None:
-    """Raises InputError for a metric that the robot, or its actuators, do not have."""
-    metrics: dict[str, Iterable[str]] = {
-        "objective": scenario.objective,
-        "require": scenario.require,
-    }
-    if isinstance(scenario.optimizer, QualityDiversity):
-        metrics["optimizer.measures"] = scenario.optimizer.measures
-    for key, names in metrics.items():
-        for name in names:
-            for section in (scenario.robot, scenario.actuation):
-                if name in section.lacking:
-                    kind = f"!{type(section).__name__}"
-                    problem = f"{kind} does not have this metric; give `{key}` without it"
-                    raise InputError(source, f"{key}.{name}", problem)
-
-
-def _check_memory(scenario: Scenario, source: object) -> None:
-    """Raises InputError for what does not fit in memory."""
-    simulation = scenario.simulation
-    is_drake = isinstance(scenario.engine, Drake)
-    most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
-    least_step = simulation.duration * scenario.oscillators / most_signals
-    least_sample = simulation.duration * scenario.robot.body_count / MOST_SAMPLES
-    periods = [
-        ("cpg.listing_step", scenario.cpg.listing_step, least_step),
-        ("simulation.sample_period", simulation.sample_period, least_sample),
-    ]
-    if isinstance(scenario.engine, Mujoco):
-        periods.append(("engine.step", scenario.engine.step, least_step))
-    for key, period, least in periods:
-        if period < least:
-            problem = f"found {period} s, expected at least {least:.3g} s, to fit in memory"
-            raise InputError(source, key, f"{problem}, for this duration and robot")
-
-
-def _check_sides(scenario: Scenario, source: object) -> None:
-    """Raises InputError if gaits turn, or are mirrored, where groups of cables have no sides."""
-    layout, bounds = scenario.robot.layout(), scenario.gait_bounds
-    if bounds.turn != 0.0 and not layout.sides.any():
-        problem = f"found {bounds.turn}, expected 0, as no group is on one side"
-        raise InputError(source, "gait_bounds.turn", problem)
-    if bounds.mirrored and None in layout.images:
-        oscillator = layout.oscillators[layout.images.index(None)]
-        problem = f"found true, expected false, as '{oscillator}' has no mirror image"
-        raise InputError(source, "gait_bounds.mirrored", problem)
-
-
-def _check_disturbances(scenario: Scenario, source: object) -> None:
-    """Raises InputError if a number that draws change cannot be changed that far."""
-    if scenario.disturbances is None:
-        return
-    undisturbed = scenario.with_sections(disturbances=None)
-    numbers = scenario.numbers()
-    for joined, spread in scenario.disturbances.spreads.items():
-        place, keys = f"disturbances.spreads.{joined}", separate(joined)
-        for key in keys:
-            if key not in numbers:
-                problem = f"'{key}' is no number of the scenario; {hint(key, numbers)}"
-                raise InputError(source, place, problem)
-        for factor in (1.0 - spread, 1.0 + spread):
-            changed = undisturbed.with_numbers({key: factor * numbers[key] for key in keys})
-            try:
-                type(scenario).from_tree(changed.tree, source)
-            except InputError as error:
-                problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
-                raise InputError(source, place, problem) from error

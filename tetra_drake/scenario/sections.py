@@ -62,7 +62,7 @@ class Section(BaseModel):
             errors = error.errors(include_url=False)
             # A value that fits no member of a union has an error for each: the innermost says most.
             of_field = [one for one in errors if one["loc"][:1] == errors[0]["loc"][:1]]
-            first = max(of_field, key=lambda one: len(_place(one, tree)))
+            first = max(of_field, key=lambda one: _place(one, tree)[1])
         key, problem = _in_words(first, cls, tree)
         if first["type"] == "missing" and info.context and info.context["has_base"]:
             problem += ", or name a `base` that has it"
@@ -90,7 +90,7 @@ class Section(BaseModel):
         def read(number: Any, unit: str, key: str) -> Any:
             return _read_number(number, unit, key, needs_unit=bool(info.context))
 
-        return _each_number(python_value(value), unit, read)
+        return each_number(python_value(value), unit, read)
 
     @pydantic.model_serializer(mode="wrap")
     def _write_units(
@@ -105,7 +105,7 @@ class Section(BaseModel):
             return show(number, unit) if isinstance(number, float) else number
 
         for name in tree:
-            tree[name] = _each_number(tree[name], _unit(type(self).model_fields[name]), write)
+            tree[name] = each_number(tree[name], _unit(type(self).model_fields[name]), write)
         return tree
 
     @classmethod
@@ -192,17 +192,17 @@ def python_value(value: Any) -> Any:
     return value
 
 
-def _each_number(
+def each_number(
     value: Any, unit: str | Mapping[str, str], change: Callable[[Any, str, str], Any], key: str = ""
 ) -> Any:
     """A value with change(number, unit, key) in place of each number that has a unit."""
     if isinstance(value, list):
         items = enumerate(value)
-        return [_each_number(item, unit, change, f"{key}[{i}]") for i, item in items]
+        return [each_number(item, unit, change, f"{key}[{i}]") for i, item in items]
     if isinstance(value, dict) and unit:
         units = dict.fromkeys(value, unit) if isinstance(unit, str) else unit
         return {
-            name: _each_number(item, units[name], change, f"{key}.{name}".strip("."))
+            name: each_number(item, units[name], change, f"{key}.{name}".strip("."))
             for name, item in value.items()
         }
     return change(value, unit, key) if unit and isinstance(unit, str) else value
@@ -221,41 +221,37 @@ def _read_number(value: Any, unit: str, key: str, *, needs_unit: bool) -> Any:
     return value
 
 
-def _place(error: ErrorDetails, tree: Any) -> list[int | str]:
-    """The keys and indices that lead to an error: pydantic also names the members of unions."""
-    place: list[int | str] = []
-    for part in error["loc"]:
-        if isinstance(tree, list):
-            holds = isinstance(part, int)
+def _place(error: ErrorDetails, tree: Any) -> tuple[str, int, Any]:
+    """The key that an error is at, its number of parts, and what the tree holds there."""
+    key, depth = "", 0
+    for part in error["loc"]:  # where pydantic also names the members of unions
+        if isinstance(tree, list) and isinstance(part, int):
+            key = _joined(key, f"[{part}]")
+        elif isinstance(tree, dict) and part in tree:
+            key = _joined(key, str(part))
         else:
-            holds = isinstance(tree, dict) and part in tree
-        if holds:
-            tree = tree[part]
-            place.append(part)
+            continue
+        tree, depth = tree[part], depth + 1
     if error["type"] == "missing":
-        place.append(error["loc"][-1])
-    return place
+        return _joined(key, str(error["loc"][-1])), depth + 1, None
+    return key, depth, tree
 
 
 def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[str, str]:
     """Key and problem of an error in the validation of a tree as a section."""
-    place = _place(error, tree)
-    key = _joined(*place)
+    key, _, value = _place(error, tree)
+    context = error.get("ctx", {})
     if error["type"] == "refused":
-        return _joined(key, error["ctx"]["key"]), error["ctx"]["problem"]
+        return _joined(key, context["key"]), context["problem"]
     if error["type"] == "missing":
         return key, "is missing; give it"
-    expected, context = error["msg"].removeprefix("Input should be "), error.get("ctx", {})
+    expected = error["msg"].removeprefix("Input should be ")
     if error["type"] in _LIMITS:
         words, name = _LIMITS[error["type"]]
-        unit = _unit(keys_of(section)[str(place[0])])
+        unit = _unit(keys_of(section)[str(error["loc"][0])])
+        if "length" in name:
+            unit = f"items, not {context['actual_length']}"
         expected = f"{words} {context[name]:.4g} {unit}".rstrip()
-    elif "actual_length" in context:
-        length = context.get("min_length", context.get("max_length"))
-        expected = f"{length} items, not {context['actual_length']}"
-    value = tree  # as it was written, with its unit
-    for part in place:
-        value = value[part]
     return key, f"found {described(value)}, expected {expected}"
 
 
@@ -263,21 +259,15 @@ _LIMITS = {
     "greater_than": ("more than", "gt"),
     "greater_than_equal": ("at least", "ge"),
     "less_than_equal": ("at most", "le"),
+    "too_short": ("at least", "min_length"),
+    "too_long": ("at most", "max_length"),
 }
 """Words for the kinds of limits, and the names by which pydantic gives their numbers."""
 
 
-def _joined(*parts: int | str) -> str:
-    """A dotted key of names, indices and other keys."""
-    key = ""
-    for part in parts:
-        if isinstance(part, int):
-            key += f"[{part}]"
-        elif part.startswith("["):
-            key += part
-        else:
-            key = f"{key}.{part}".strip(".")
-    return key
+def _joined(key: str, inner: str) -> str:
+    """The key of what has the key `inner` within what is at `key`."""
+    return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
 
 
 def described(value: Any) -> str:
@@ -328,14 +318,27 @@ def tree_of(section: Section, *, show: Show = "{!r} {}".format, sparse: bool = T
     return section.model_dump(context={"show": show}, exclude_defaults=sparse)
 
 
+def flattened(tree: Tree, key: str = "") -> dict[str, Any]:
+    """The values of a tree by their dotted keys."""
+    values: dict[str, Any] = {}
+    for name, value in tree.items():
+        inner = _joined(key, name)
+        values |= flattened(value, inner) if isinstance(value, dict) else {inner: value}
+    return values
+
+
 def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
     """Changes by dotted keys, and mappings of keys, as the tree that a file would hold."""
     tree: Tree = {}
-    for key, value in changes.items():
-        branch = _given(value)
-        for name in reversed(key.split(".")):
-            branch = {name: branch}
-        tree = _joined_trees(tree, branch, key, source)
+    for key in sorted(changes, key=lambda key: key.count(".")):  # "robot" before "robot.gravity"
+        *sections, name = key.split(".")
+        place: Any = tree
+        for section in sections:
+            if type(place) is dict:
+                place = place.setdefault(section, {})
+        if type(place) is not dict or name in place:
+            raise InputError(source, key, "is given twice")
+        place[name] = _given(changes[key])
     return tree
 
 
@@ -351,15 +354,3 @@ def _given(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: _given(item) for name, item in value.items()}
     return value
-
-
-def _joined_trees(first: Tree, second: Tree, key: str, source: object) -> Tree:
-    """Both trees in one; InputError, naming `key`, where both give a value."""
-    tree = dict(first)
-    for name, value in second.items():
-        if name in tree:
-            if type(tree[name]) is not dict or type(value) is not dict:
-                raise InputError(source, key, "is given twice")
-            value = _joined_trees(tree[name], value, key, source)
-        tree[name] = value
-    return tree

@@ -58,8 +58,6 @@ def with_structure(tree: Tree, source: object) -> Tree:
     file = structure_file(name, Path())
     content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
     Structure.from_tree(content, file)
-    if isinstance(changes.get("actuated"), dict):
-        changes["actuated"] = Whole(changes["actuated"])
     return tree | {"robot": Whole({TAG: Structure.__name__} | merge(content, changes))}
 
 

@@ -19,9 +19,8 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import render
-from tetra_drake.results.measures import marked_positions
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import Structure
+from tetra_drake.robot.structure import Structure, followed_nodes
 from tetra_drake.visualization.scene import (
     ASPECT,
     COLOURS,
@@ -78,12 +77,11 @@ def save_replay(
 def legend_of(structure: Structure) -> list[tuple[str, str]]:
     """Names in COLOURS, and what has these colours."""
     cables = [(colour, f"{kind} cable") for kind, colour in cable_colours(structure).items()]
-    path = "path of the bottom nodes" if structure.is_row else "path of the centre"
     return [
         *cables,
         ("normal", "normal force"),
         ("friction", "friction force"),
-        ("trace", path),
+        ("trace", f"path of the {structure.followed}"),
         ("forward", "arrow on the floor: forward (+x)"),
     ]
 
@@ -102,14 +100,14 @@ def _add_film(meshcat: Meshcat, robot: Robot, trajectory: xarray.Dataset) -> dic
     moving = list(tracks(robot, frames))
     for track in moving:
         meshcat.SetTransform(track.path, track.matrix(0))
-    marked = _rounded(marked_positions(frames, robot.structure).values) * RESOLUTION
+    followed = _rounded(followed_nodes(frames["p_WN"].values, robot.structure)) * RESOLUTION
     return {
         "per_second": _TICKS_PER_SECOND,
         "resolution": RESOLUTION,
         "repetitions": _REPETITIONS,
         "ticks": ticks,
         "motions": {track.path: _steps(track) for track in moving},
-        "traces": _add_traces(meshcat, marked, ticks),
+        "traces": _add_traces(meshcat, followed, ticks),
     }
 
 

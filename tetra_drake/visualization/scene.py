@@ -225,41 +225,30 @@ def _rgb(name: str) -> np.ndarray:
 
 def _add_bodies(meshcat: Meshcat, structure: Structure) -> None:
     """Adds struts and nodes below the paths of their bodies, in the frames of these."""
-    carriers, names = structure.carriers, structure.node_names
+    names, p_BN = structure.node_names, structure.p_BN
+    paths = [f"/robot/{structure.bodies[body]}" for body in structure.carriers]
+    colours = [rgba("even" if body % 2 else "odd") for body in structure.carriers]
     for (a, b), radius in zip(structure.struts, structure.strut_radius, strict=True):
-        path = f"{_body_path(structure, carriers[a])}/strut {names[a]} to {names[b]}"
-        p_BA, p_BC = structure.p_BN[a], structure.p_BN[b]
-        strut = Cylinder(radius, float(np.linalg.norm(p_BC - p_BA)))
-        meshcat.SetObject(path, strut, _body_colour(carriers[a]))
-        meshcat.SetTransform(path, strut_pose(p_BA, p_BC))
-    for node, (name, radius) in enumerate(zip(names, structure.node_radius, strict=True)):
-        path = f"{_body_path(structure, carriers[node])}/node {name}"
-        meshcat.SetObject(path, Sphere(radius), _body_colour(carriers[node]))
-        meshcat.SetTransform(path, RigidTransform(structure.p_BN[node]))
-
-
-def _body_path(structure: Structure, body: int) -> str:
-    return f"/robot/{structure.bodies[body]}"
-
-
-def _body_colour(body: int) -> Rgba:
-    return rgba("even" if body % 2 else "odd")
+        path = f"{paths[a]}/strut {names[a]} to {names[b]}"
+        strut = Cylinder(radius, float(np.linalg.norm(p_BN[b] - p_BN[a])))
+        meshcat.SetObject(path, strut, colours[a])
+        meshcat.SetTransform(path, strut_pose(p_BN[a], p_BN[b]))
+    for node, radius in enumerate(structure.node_radius):
+        path = f"{paths[node]}/node {names[node]}"
+        meshcat.SetObject(path, Sphere(radius), colours[node])
+        meshcat.SetTransform(path, RigidTransform(p_BN[node]))
 
 
 def cable_kinds(structure: Structure) -> list[str]:
     """Kind of each cable: "actuated", or such as "passive outer", with its group."""
-    kinds = []
-    for cable, group in zip(structure.cables, structure.cable_groups, strict=True):
-        kinds.append(f"passive {group}" if cable["signal"] == PASSIVE else "actuated")
-    return kinds
+    cables = zip(structure.cables["signal"], structure.cable_groups, strict=True)
+    return ["actuated" if signal != PASSIVE else f"passive {group}" for signal, group in cables]
 
 
 def cable_colours(structure: Structure) -> dict[str, str]:
     """Name in COLOURS of each kind of cable that the structure has."""
-    colours = {"actuated": "actuated"}
-    groups = dict.fromkeys(structure.cable_groups)
-    for group, colour in zip(groups, itertools.cycle(PASSIVE_COLOURS)):
-        colours[f"passive {group}"] = colour
+    passive = [f"passive {group}" for group in dict.fromkeys(structure.cable_groups)]
+    colours = {"actuated": "actuated", **dict(zip(passive, itertools.cycle(PASSIVE_COLOURS)))}
     kinds = cable_kinds(structure)
     return {kind: colour for kind, colour in colours.items() if kind in kinds}
 
@@ -284,9 +273,8 @@ def _add_unit_arrow(meshcat: Meshcat, path: str, colour: Rgba) -> None:
 def _body_tracks(structure: Structure, frames: xarray.Dataset) -> Iterator[Track]:
     q_WB = frames["q_WB"].values
     q_WB = q_WB / np.linalg.norm(q_WB, axis=-1, keepdims=True)
-    for body in range(len(structure.bodies)):
-        path = _body_path(structure, body)
-        yield Track(path, frames["p_WB"].values[:, body], q_WB[:, body])
+    for body, name in enumerate(structure.bodies):
+        yield Track(f"/robot/{name}", frames["p_WB"].values[:, body], q_WB[:, body])
 
 
 def _cable_tracks(structure: Structure, frames: xarray.Dataset) -> Iterator[Track]:
