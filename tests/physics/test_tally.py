@@ -5,9 +5,27 @@ import math
 import numpy as np
 import pytest
 
-from tetra_drake.physics.actuator import DIRECT, DRIVE_COLUMNS
+from tetra_drake.physics.actuator import (
+    DIRECT,
+    DRIVE,
+    DRIVE_COLUMNS,
+    LIMITED,
+    TENSION_MOTOR,
+    WINCH,
+)
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, Cables
-from tetra_drake.physics.tally import EFFORT_COLUMNS, Tally, observe
+from tetra_drake.physics.tally import (
+    EFFORT_COLUMNS,
+    FORCE,
+    LIMITED_TIME,
+    PEAK_FORCE,
+    PEAK_POWER,
+    PEAK_SPEED,
+    POWER,
+    SPEED,
+    Tally,
+    observe,
+)
 
 CABLES = Cables([3, 3], [4, 5], [0, PASSIVE], [1.0, 1.0], [0.0, 0.0], [0.0, 0.0])
 """The first is driven."""
@@ -18,9 +36,11 @@ CARRIERS = np.array([0, 0, 1])
 """Two contacts of the first body and one of the second."""
 
 
-def tallied(times, *, lengths, signals, tensions=None, loads=None, begins=0.0) -> Tally:
+def tallied(
+    times, *, lengths, signals, tensions=None, loads=None, begins=0.0, kind=DIRECT, drives=None
+) -> Tally:
     """The tally of the motion of both cables' length (k,), their tension and the contacts' loads
-    (k, 3) at times (k,)."""
+    (k, 3) at times (k,); `drives` (k, drives, DRIVE_COLUMNS) are those of actuators of a kind."""
     columns = [np.zeros(1) for _ in Tally._fields]
     tally = Tally(*columns)._replace(
         begins=np.array([begins]), lengths=np.zeros(2), lifted=np.zeros(2), tension=np.full(1, 99.0)
@@ -34,7 +54,8 @@ def tallied(times, *, lengths, signals, tensions=None, loads=None, begins=0.0) -
         # The rate of signals is 0 / 0 where no time has passed, which counts for nothing.
         with np.errstate(divide="ignore", invalid="ignore"):
             signal = np.array([signals[k]])
-            observe(tally, CABLES, CARRIERS, DIRECT, time, signal, NO_DRIVES, pulls, pushes)
+            driven = NO_DRIVES if drives is None else drives[k]
+            observe(tally, CABLES, CARRIERS, kind, time, signal, driven, pulls, pushes)
     return tally
 
 
@@ -81,3 +102,53 @@ def test_a_body_is_lifted_while_none_of_its_contacts_bears():
     times = np.array([0.0, 1.0, 3.0, 6.0, 10.0, 15.0])  # a step is as its end
     tally = tallied(times, lengths=np.ones(6), signals=np.ones(6), loads=loads)
     assert tally.lifted.tolist() == [3.0 - 1.0 + 10.0 - 6.0 + 5.0, 1.0 + 2.0 + 5.0]
+
+
+EFFORT = {
+    "times": np.array([0.0, 1.0, 3.0, 4.0]),
+    "signals": np.zeros(4),
+    "tensions": np.array([[9.0, 50.0], [2.0, 50.0], [3.0, 50.0], [4.0, 50.0]]),
+}
+"""Three steps; the tension of the cable that is not driven is 50 N."""
+
+WOUND = np.array([1.0, 0.9, 0.5, 0.7])
+"""0.1 m in 1 s, 0.4 m in 2 s, then 0.2 m paid out."""
+
+# Peaks: 4 N, 0.2 m/s, 3 N * 0.2 m/s. Sums: 1 * 2 + 2 * 3 + 1 * 4 N s, 0.1 + 0.4 + 0.2 m,
+# 2 N * 0.1 m + 3 N * 0.4 m, without what is paid out.
+PEAKS_AND_SUMS = {"peaks": [4.0, 0.2, 0.6], "sums": [12.0, 0.7, 1.4]}
+
+
+def effort_of(tally: Tally) -> dict[str, list[float]]:
+    effort = tally.effort
+    return {
+        "peaks": effort[[PEAK_FORCE, PEAK_SPEED, PEAK_POWER]].tolist(),
+        "sums": effort[[FORCE, SPEED, POWER]].tolist(),
+    }
+
+
+@pytest.mark.parametrize("kind", [DIRECT, TENSION_MOTOR])
+def test_actuators_without_a_winch_wind_what_their_cables_shorten(kind):
+    drives = np.zeros((4, int(kind != DIRECT), DRIVE_COLUMNS))
+    tally = tallied(lengths=WOUND, kind=kind, drives=drives, **EFFORT)
+    found = effort_of(tally)
+    assert found["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
+    assert found["sums"] == pytest.approx(PEAKS_AND_SUMS["sums"])
+    assert tally.effort[LIMITED_TIME] == 0.0
+
+
+def test_winches_wind_their_free_length_and_are_limited_for_a_time():
+    drives = np.zeros((4, 1, DRIVE_COLUMNS))
+    drives[:, 0, DRIVE], drives[:, 0, LIMITED] = WOUND, [1.0, 0.0, 1.0, 1.0]
+    tally = tallied(lengths=np.linspace(1.0, 9.0, 4), kind=WINCH, drives=drives, **EFFORT)
+    found = effort_of(tally)
+    assert found["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
+    assert found["sums"] == pytest.approx(PEAKS_AND_SUMS["sums"])
+    assert tally.effort[LIMITED_TIME] == pytest.approx(2.0 + 1.0)
+    assert tally.work[0] == pytest.approx(1.4), "of the tension"
+
+
+def test_the_effort_before_the_steady_stretch_does_not_count():
+    tally = tallied(lengths=WOUND, begins=3.0, **EFFORT)
+    # The last step, in which 0.2 m are paid out at 4 N.
+    assert effort_of(tally) == {"peaks": [4.0, 0.0, 0.0], "sums": [4.0, pytest.approx(0.2), 0.0]}

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.simd.compiling import inlined
-from tetra_drake.simd.lanes import Real, Table, maximum, minimum, named, select
+from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
 
 DIRECT, WINCH, TENSION_MOTOR = range(3)
 """Kinds of actuators."""
@@ -70,12 +70,14 @@ def winch_pull(
     It follows its command with a lag, pays out at max_speed at most, and winds at most at
     max_speed (1 - tension / max_force). Above max_force it is driven backward. The tension depends
     on the winding by the cable's damping, and the winding on the tension by the force-speed line:
-    both are linear, so they are solved together.
+    both are linear, so they are solved together. A command below least_length counts as
+    least_length. So the winch slows down before that; a sudden stop there would be a jump of the
+    tension, which no step of an integrator is short enough for.
     """
     elastic = law.stiffness * (length - drive)
     wanted = (law.free_length - signal / law.stiffness - drive) / limits.time_constant
-    allowed = minimum(wanted, limits.max_speed)
-    allowed = select(drive <= limits.least_length, maximum(allowed, 0.0), allowed)
+    allowed = maximum(wanted, (limits.least_length - drive) / limits.time_constant)
+    allowed = minimum(allowed, limits.max_speed)
     per_force = limits.max_speed / limits.max_force
     stiffening = 1.0 + per_force * law.damping
     on_line = (per_force * (elastic + law.damping * rate) - limits.max_speed) / stiffening
@@ -115,8 +117,7 @@ def motor_pull(
 
 
 @inlined
-def put_drives(drives: Table, limits: Table, step: Real, moved: Table) -> None:
+def put_drives(drives: Table, step: Real, moved: Table) -> None:
     """Writes the drives after a step (s) at their rates, which begins at `drives`, as `moved`."""
-    least = named(Limits, limits).least_length
     for i in range(drives.shape[0]):
-        moved[i, DRIVE] = maximum(drives[i, DRIVE] + step * drives[i, RATE], least)
+        moved[i, DRIVE] = drives[i, DRIVE] + step * drives[i, RATE]

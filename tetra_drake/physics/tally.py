@@ -45,6 +45,24 @@ class Tally(NamedTuple):
     """(1,): the least distance between struts, in m; see physics.clearance."""
 
 
+class Effort(NamedTuple):
+    """What actuators do in a step: the most of one, and sums over all."""
+
+    most_force: Real
+    """N."""
+    most_wound: Real
+    """Length wound, m."""
+    most_work: Real
+    """J."""
+    force: Real
+    way: Real
+    """Length wound or paid out, m."""
+    work: Real
+    """Positive work, J."""
+    limited: Real
+    """How many are at a limit."""
+
+
 @inlined
 def observe(
     tally: Tally,
@@ -62,13 +80,15 @@ def observe(
     nothing."""
     passed = time - tally.time[0]
     counts = (passed > 0.0) & (tally.time[0] >= tally.begins[0])
-    work, roughness, tension = 0.0 * passed, 0.0 * passed, tally.tension[0]
+    zero = 0.0 * passed
+    work, roughness, tension = zero, zero, tally.tension[0]
+    effort = Effort(zero, zero, zero, zero, zero, zero, zero)
     drive = 0
     for i in range(tally.lengths.size):
         driver = cables.signal[i]
         if driver != PASSIVE:
             force, left = 0.5 * (tally.signals[driver] + signals[driver]), pulls[i, LENGTH]
-            limited = 0.0 * passed
+            limited = zero
             if kind != DIRECT:
                 force, limited = pulls[i, TENSION], drives[drive, LIMITED]
                 left = drives[drive, DRIVE] if kind == WINCH else left
@@ -76,7 +96,7 @@ def observe(
             wound = tally.lengths[i] - left
             work += maximum(force * wound, 0.0)
             tally.lengths[i] = left
-            add_effort(tally.effort, counts, passed, pulls[i, TENSION], wound, limited)
+            effort = with_actuator(effort, pulls[i, TENSION], wound, limited)
         tension = minimum(tension, pulls[i, TENSION])
     tally.tension[0] = tension
     for k in range(tally.signals.size):
@@ -85,25 +105,39 @@ def observe(
         tally.signals[k] = signals[k]
     tally.work[0] += select(counts, work, 0.0)
     tally.roughness[0] += select(counts, roughness / passed, 0.0)
+    add_effort(tally.effort, effort, counts, passed)
     add_lifted(tally, carriers, select(counts, passed, 0.0), pushes)
     tally.time[0] = time
 
 
 @inlined
-def add_effort(
-    effort: Table, counts: Truth, passed: Real, tension: Real, wound: Real, limited: Real
-) -> None:
-    """Adds a step in which an actuator has `wound` some of its cable (m) under a tension (N)."""
-    speed = select(counts, wound / passed, 0.0)
-    power = tension * speed
-    effort[PEAK_FORCE] = maximum(effort[PEAK_FORCE], select(counts, tension, 0.0))
-    effort[PEAK_SPEED] = maximum(effort[PEAK_SPEED], speed)
-    effort[PEAK_POWER] = maximum(effort[PEAK_POWER], power)
-    duration = select(counts, passed, 0.0)
-    effort[FORCE] += duration * tension
-    effort[SPEED] += duration * abs(speed)
-    effort[POWER] += duration * maximum(power, 0.0)
-    effort[LIMITED_TIME] += duration * limited
+def with_actuator(effort: Effort, tension: Real, wound: Real, limited: Real) -> Effort:
+    """The effort of a step with another actuator, which has `wound` some of its cable (m) under a
+    tension (N)."""
+    work = tension * wound
+    return Effort(
+        most_force=maximum(effort.most_force, tension),
+        most_wound=maximum(effort.most_wound, wound),
+        most_work=maximum(effort.most_work, work),
+        force=effort.force + tension,
+        way=effort.way + abs(wound),
+        work=effort.work + maximum(work, 0.0),
+        limited=effort.limited + limited,
+    )
+
+
+@inlined
+def add_effort(sums: Table, effort: Effort, counts: Truth, passed: Real) -> None:
+    """Adds the effort of a step that has taken some time (s) if it counts."""
+    per_time = 1.0 / passed
+    speed, power = effort.most_wound * per_time, effort.most_work * per_time
+    sums[PEAK_FORCE] = maximum(sums[PEAK_FORCE], select(counts, effort.most_force, 0.0))
+    sums[PEAK_SPEED] = maximum(sums[PEAK_SPEED], select(counts, speed, 0.0))
+    sums[PEAK_POWER] = maximum(sums[PEAK_POWER], select(counts, power, 0.0))
+    sums[FORCE] += select(counts, passed * effort.force, 0.0)
+    sums[SPEED] += select(counts, effort.way, 0.0)
+    sums[POWER] += select(counts, effort.work, 0.0)
+    sums[LIMITED_TIME] += select(counts, passed * effort.limited, 0.0)
 
 
 @inlined

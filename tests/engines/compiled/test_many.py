@@ -26,6 +26,7 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
+from tetra_drake.scenario.actuator_kinds import TensionMotor, Winch
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Rough
@@ -73,7 +74,7 @@ def prepared(scenario: Scenario, seed: int = 0) -> PreparedGait:
 def same(a: Course, b: Course) -> bool:
     """Whether two courses agree to the last bit, cost aside."""
     pairs = [(a.status, b.status), (a.time, b.time), (a.evaluations, b.evaluations)]
-    for name in ("times", "states", "signals", "modes"):
+    for name in ("times", "states", "signals", "modes", "drives"):
         pairs.append((getattr(a.motion, name), getattr(b.motion, name)))
     pairs += zip(a.totals, b.totals, strict=True)
     return all(np.array_equal(x, y, equal_nan=True) for x, y in pairs)
@@ -113,6 +114,24 @@ def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short, wid
     alone = [courses([walk], 1)[0] for walk in walks]
     assert [course.status for course in alone[:3]] == [DONE, DONE, STEP_TOO_SMALL]
     assert not same(alone[1], alone[4])
+    assert all(map(same, courses(walks, width), alone))
+
+
+@pytest.mark.parametrize("kind", [Winch, TensionMotor])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_actuators_of_different_limits_pull_alike_beside_each_other(short, width, kind):
+    limits = [(70.0, 0.5, 0.02), (5.0, 0.1, 0.1), (4.0, 0.3, 0.5e-3)]
+    scenarios = [
+        short.with_sections(actuation=kind(max_force=f, max_speed=v, time_constant=tau))
+        for f, v, tau in limits
+    ]
+    robots = [Robot.of(scenarios[i % 3]) for i in range(9)]
+    walks = [
+        PreparedGait.of(robot, seeded_gait(short, i), record=True) for i, robot in enumerate(robots)
+    ]
+    alone = [courses([walk], 1)[0] for walk in walks]
+    assert [course.status for course in alone] == [DONE] * 9
+    assert all(np.ptp(course.motion.drives) > 0.0 for course in alone)
     assert all(map(same, courses(walks, width), alone))
 
 

@@ -194,8 +194,7 @@ def iterate(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
     foresee_signals(constants, walk, log, live)
-    foresee_drives(constants, walk)
-    driven = walk.drives.shape[0] > 0
+    foresee_drives(walk)
     error = take_step(
         constants.robot,
         constants.solver,
@@ -204,9 +203,9 @@ def iterate(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
         walk.forces,
         walk.end_signals,
         step,
-        live or driven,
+        live,
     )
-    correct_drives(constants, walk)
+    correct_drives(walk)
 
     accepted = walks & (error <= constants.tolerance[0])
     if live:
@@ -264,22 +263,22 @@ def foresee_signals(constants: Constants, walk: Walk, log: Log, live: bool) -> N
 
 
 @inlined
-def foresee_drives(constants: Constants, walk: Walk) -> None:
+def foresee_drives(walk: Walk) -> None:
     """Notes the drives and their rates at the state, and moves them to the end of the step."""
     drives = walk.forces.drives
     for i in range(drives.shape[0]):
         walk.drives[i, RATE] = drives[i, RATE]
-    put_drives(walk.drives, constants.robot.actuator.limits, walk.clock[STEP], drives)
+    put_drives(walk.drives, walk.clock[STEP], drives)
 
 
 @inlined
-def correct_drives(constants: Constants, walk: Walk) -> None:
+def correct_drives(walk: Walk) -> None:
     """Writes the drives at the end of the step, by the mean of the rates at both ends."""
     drives, end = walk.forces.drives, walk.end_drives
     for i in range(drives.shape[0]):
         end[i, DRIVE] = walk.drives[i, DRIVE]
         end[i, RATE] = 0.5 * (walk.drives[i, RATE] + drives[i, RATE])
-    put_drives(end, constants.robot.actuator.limits, walk.clock[STEP], end)
+    put_drives(end, walk.clock[STEP], end)
 
 
 @inlined

@@ -1,0 +1,158 @@
+"""The laws of winches and tension motors: their limits, and what a cable is to integrators."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tetra_drake.physics.actuator import CableLaw, Limits, Pull, motor_pull, winch_pull
+
+CABLE = CableLaw(stiffness=100.0, damping=5.0, free_length=0.2)
+"""In N/m, N s/m and m."""
+
+WINCH = Limits(max_force=20.0, max_speed=0.4, time_constant=0.05, least_length=0.05)
+
+MOTOR = Limits(max_force=20.0, max_speed=0.4, time_constant=0.05, least_length=0.0)
+
+
+def wind(
+    drive: float, length: float, *, rate: float = 0.0, signal: float = 0.0, limits: Limits = WINCH
+) -> Pull:
+    return winch_pull(drive, length, rate, signal, CABLE, limits)
+
+
+def pull(drive: float, length: float, *, rate: float = 0.0, signal: float = 0.0) -> Pull:
+    return motor_pull(drive, length, rate, signal, CABLE, MOTOR)
+
+
+def test_a_free_winch_follows_its_command_with_a_lag():
+    # Commanded: 0.2 m - 1.5 N / (100 N/m) = 0.185 m, 5 mm below the drive: 5 mm / 50 ms.
+    # Tension: 100 N/m (0.23 m - 0.19 m) + 5 N s/m (0.01 m/s + 0.1 m/s).
+    found = wind(0.19, 0.23, rate=0.01, signal=1.5)
+    assert found == pytest.approx((4.0 + 0.55, 5.0, -0.1, 0.0))
+
+
+def test_a_winch_pays_out_at_its_speed_at_most():
+    # Commanded: 0.2 m + 10 N / (100 N/m) = 0.3 m; 0.11 m / 50 ms would be 2.2 m/s.
+    found = wind(0.19, 0.26, signal=-10.0)
+    assert found == pytest.approx((7.0 - 5.0 * 0.4, 5.0, 0.4, 1.0))
+
+
+def test_a_winch_winds_a_slack_cable_at_its_speed():
+    # 5 N s/m * 0.4 m/s cannot make up for the 10 cm that the cable is too long.
+    assert wind(0.3, 0.2, signal=20.0) == pytest.approx((0.0, 0.0, -0.4, 1.0))
+    # One that the winch pulls taut by winding at its speed would be: 5 * 0.4 > 100 * 0.01.
+    assert wind(0.21, 0.2, signal=20.0).tension > 0.0
+
+
+def test_under_tension_winding_is_on_the_force_speed_line():
+    # By hand: x' = -0.4 (1 - T / 20) and T = 100 * 0.06 + 5 (0.02 - x'):
+    # T = 6.1 + 2 - T / 10, so T = 8.1 / 1.1 and the slope is 5 / 1.1.
+    found = wind(0.14, 0.2, rate=0.02, signal=20.0)
+    tension = 8.1 / 1.1
+    assert found == pytest.approx((tension, 5.0 / 1.1, -0.4 * (1.0 - tension / 20.0), 1.0))
+
+
+def test_above_its_force_a_winch_is_driven_backward():
+    # T = 100 * 0.3 + 2 - T / 10 = 32 / 1.1 > 20, whether it shall wind or hold.
+    tension = 32.0 / 1.1
+    for signal in (20.0, 0.0):
+        found = wind(0.2, 0.5, signal=signal)
+        assert found.tension == pytest.approx(tension)
+        assert found.rate == pytest.approx(-0.4 * (1.0 - tension / 20.0))
+        assert found.rate > 0.0 and found.limited == 1.0
+
+
+def test_a_winch_slows_down_before_the_least_length():
+    # 5 mm before it, at 5 mm / 50 ms; at it, it stops; below it, it pays out.
+    rates = [wind(drive, drive, signal=1e3).rate for drive in (0.055, 0.05, 0.04)]
+    assert rates == pytest.approx([-0.1, 0.0, 0.2])
+    assert wind(0.05, 0.05, signal=1e3).limited == 1.0
+    assert wind(0.05, 0.05, signal=15.0).limited == 0.0, "commanded just there"
+
+
+def random_pulls(count: int = 2000) -> list[tuple[float, float, float, float]]:
+    """Drive (m), length (m), rate (m/s) and signal (N)."""
+    generator = np.random.default_rng(0)
+    low, high = [0.04, 0.1, -1.0, -30.0], [0.3, 0.6, 1.0, 30.0]
+    return [tuple(each) for each in generator.uniform(low, high, (count, 4)).tolist()]
+
+
+def test_tension_and_winding_satisfy_both_of_their_equations():
+    limits, seen = WINCH, set()
+    for drive, length, rate, signal in random_pulls():
+        found = wind(drive, length, rate=rate, signal=signal)
+        stretched = 100.0 * (length - drive) + 5.0 * (rate - found.rate)
+        assert found.tension == pytest.approx(max(0.0, stretched), abs=1e-12)
+        fastest = -limits.max_speed * (1.0 - found.tension / limits.max_force)
+        command = max(0.2 - signal / 100.0, limits.least_length)
+        wanted = min((command - drive) / limits.time_constant, limits.max_speed)
+        assert found.rate == pytest.approx(max(wanted, fastest), abs=1e-12)
+        seen.add((found.tension > 0.0, wanted > fastest, wanted == limits.max_speed, fastest > 0))
+    assert len(seen) >= 6, "regimes"
+
+
+def test_tension_and_winding_have_no_jumps():
+    # From each random place a small way into a random direction.
+    generator, way = np.random.default_rng(1), 1e-7
+    for place in random_pulls():
+        near = (np.array(place) + way * generator.uniform(-1.0, 1.0, 4)).tolist()
+        for law in (wind, pull):
+            before = law(place[0], place[1], rate=place[2], signal=place[3])
+            after = law(near[0], near[1], rate=near[2], signal=near[3])
+            # 5 N s/m / 50 ms + 100 N/m is the most that a tension changes per m.
+            assert after.tension == pytest.approx(before.tension, abs=300.0 * way)
+            # A command that changes by 100 N/m, per 50 ms, is the most of a tension motor.
+            assert after.rate == pytest.approx(before.rate, abs=3000.0 * way)
+    # The place where a winch arrives.
+    just_before, there = (wind(drive, 0.1, signal=30.0) for drive in (0.05 + way, 0.05))
+    assert just_before.tension == pytest.approx(there.tension, abs=300.0 * way)
+
+
+def test_the_slope_is_the_derivative_of_the_tension_by_the_rate():
+    step, slopes = 1e-6, set()
+    for drive, length, rate, signal in random_pulls():
+        for law, state in ((wind, drive), (pull, 60.0 * drive)):
+            below, at, above = (
+                law(state, length, rate=rate + shift, signal=signal) for shift in (-step, 0.0, step)
+            )
+            if below.slope == above.slope:  # else a regime ends here
+                derivative = (above.tension - below.tension) / (2.0 * step)
+                assert at.slope == pytest.approx(derivative, abs=1e-6)
+                slopes.add(at.slope)
+    # Slack or limited; a free winch; one on the line; a motor on its line: 20 N / (0.4 m/s).
+    assert sorted(slopes) == pytest.approx([0.0, 5.0 / 1.1, 5.0, 50.0])
+
+
+def test_a_tension_motor_follows_the_whole_law_with_a_lag():
+    # Commanded: 100 (0.23 - 0.2) + 5 * 0.1 + 1.5 = 5 N; it has 4.5 N: 0.5 N / 50 ms.
+    assert pull(4.5, 0.23, rate=0.1, signal=1.5) == pytest.approx((4.5, 0.0, 10.0, 0.0))
+
+
+def test_a_tension_motor_never_pushes():
+    # Commanded: 100 (0.1 - 0.2) = -10 N, so that it goes to 0.
+    assert pull(2.0, 0.1) == pytest.approx((2.0, 0.0, -2.0 / 0.05, 0.0))
+    assert pull(0.0, 0.1) == pytest.approx((0.0, 0.0, 0.0, 0.0))
+
+
+def test_a_tension_motor_pulls_with_its_force_at_most():
+    # Commanded: 40 N.
+    assert pull(19.0, 0.6) == pytest.approx((19.0, 0.0, 1.0 / 0.05, 1.0))
+    assert pull(20.0, 0.6, rate=0.3) == pytest.approx((20.0, 0.0, 0.0, 1.0))
+
+
+@pytest.mark.parametrize(("rate", "most"), [(-0.1, 15.0), (-0.3, 5.0), (-0.4, 0.0), (-0.7, 0.0)])
+def test_a_tension_motor_pulls_less_the_faster_it_winds(rate, most):
+    assert pull(16.0, 0.4, rate=rate).tension == pytest.approx(most)
+    assert pull(16.0, 0.4, rate=rate).limited == 1.0
+    assert pull(0.5 * most, 0.3, rate=rate).tension == pytest.approx(0.5 * most)
+
+
+def test_a_winch_without_limits_is_the_force_law_when_it_has_arrived():
+    # At rest at its command, l0 - S / k: k (l - l0 + S / k) = k (l - l0) + S.
+    limitless = Limits(max_force=1e9, max_speed=1e9, time_constant=1e-3, least_length=-math.inf)
+    for _, length, rate, signal in random_pulls(50):
+        found = wind(0.2 - signal / 100.0, length, rate=rate, signal=signal, limits=limitless)
+        expected = 100.0 * (length - 0.2) + 5.0 * rate + signal
+        assert found.tension == pytest.approx(max(0.0, expected), abs=1e-6)
+        assert (found.rate, found.limited) == (pytest.approx(0.0, abs=1e-12), 0.0)
