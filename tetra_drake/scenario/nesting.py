@@ -103,6 +103,8 @@ class Tetrahedra(Section):
         "m", default=[]
     )
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
+    payload: list[Annotated[float, Field(ge=0)]] = quantity("kg", default=[])
+    """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
     tip of the foremost, as no others reach flat ground. `all`: all four of every tetrahedron."""
@@ -161,9 +163,10 @@ class Tetrahedra(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
-        if len(self.offsets) not in (0, self.tetrahedra):
-            problem = f"found {len(self.offsets)} items, expected none or {self.tetrahedra}"
-            refuse("offsets", f"{problem}, one for each tetrahedron")
+        for key, items in {"offsets": self.offsets, "payload": self.payload}.items():
+            if len(items) not in (0, self.tetrahedra):
+                problem = f"found {len(items)} items, expected none or {self.tetrahedra}"
+                refuse(key, f"{problem}, one for each tetrahedron")
         if not self.actuation or not all(self.actuation):
             refuse("actuation", f"found {self.actuation}, expected groups of at least one cable")
         cables = [cable for group in self.actuation for cable in group]
