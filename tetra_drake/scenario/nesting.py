@@ -163,9 +163,9 @@ class Tetrahedra(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
-        for key, items in {"offsets": self.offsets, "payload": self.payload}.items():
-            if len(items) not in (0, self.tetrahedra):
-                problem = f"found {len(items)} items, expected none or {self.tetrahedra}"
+        for key, count in {"offsets": len(self.offsets), "payload": len(self.payload)}.items():
+            if count not in (0, self.tetrahedra):
+                problem = f"found {count} items, expected none or {self.tetrahedra}"
                 refuse(key, f"{problem}, one for each tetrahedron")
         if not self.actuation or not all(self.actuation):
             refuse("actuation", f"found {self.actuation}, expected groups of at least one cable")
