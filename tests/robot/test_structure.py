@@ -12,7 +12,7 @@ from pydrake.multibody.tree import FixedOffsetFrame
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.kinematics import V_WN
 from tetra_drake.robot.bodies import AddBodies
-from tetra_drake.robot.robot import MakeStructure
+from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
 from tetra_drake.robot.tetrahedra import NODES, STRUTS
 from tetra_drake.scenario.load import load_scenario
@@ -72,6 +72,24 @@ def test_mass_and_inertia_are_those_of_six_cylinders_and_four_spheres(structure)
     assert inertia == pytest.approx(np.array([[*[moment] * 3, 0.0, 0.0, 0.0]] * 5), rel=1e-14)
     assert structure.isotropic
     assert moment == pytest.approx(6.74e-5, abs=0.005e-5)
+
+
+def test_a_payload_adds_mass_and_weight_but_no_inertia_about_the_centre(scenario, structure):
+    payload = np.array([0.036, 0.036, 0.0, 0.07, 0.0])
+    loaded = Robot.of(scenario.with_changes({"robot.payload": [f"{kg} kg" for kg in payload]}))
+    mass = structure.mass + payload
+    assert loaded.structure.mass == pytest.approx(mass, rel=1e-15)
+    assert loaded.weight == pytest.approx(9.80665 * mass.sum(), rel=1e-14)
+    moments = structure.mass[:, np.newaxis] * structure.unit_inertia
+    assert loaded.model.bodies.inertia == pytest.approx(moments, rel=1e-14)
+    assert loaded.structure.p_BN == pytest.approx(structure.p_BN, abs=0.0)
+    assert loaded.structure.isotropic
+
+
+def test_a_payload_of_nothing_changes_no_digit(scenario, structure):
+    loaded = MakeStructure(scenario.with_changes({"robot.payload": [0.0] * 5}))
+    assert np.array_equal(loaded.mass, structure.mass)
+    assert np.array_equal(loaded.unit_inertia, structure.unit_inertia)
 
 
 # Any number of tetrahedra

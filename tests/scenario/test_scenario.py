@@ -79,6 +79,8 @@ LOAD = {"cpg.feedback": ["load"]}
 BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
     ({"robot.spacing.x": "1 m"}, "robot.spacing", "a mapping"),
     ({"robot.offsets": np.ones((5, 3))}, "robot.offsets[0][0]", "1.0 without a unit"),
+    ({"robot.payload": ["35 g"]}, "robot.payload", "1 items"),
+    ({"robot.payload": ["-1 g"] * 5}, "robot.payload[0]", "-1 g"),
     ({"accuracy": 0.1}, "accuracy", "'engine.accuracy'"),
     ({"engine": "compiled"}, "engine", "!Compiled"),
     ({"robot": {"tetrahedra": 7}, "robot.tetrahedra": 7}, "robot.tetrahedra", "twice"),

@@ -76,7 +76,7 @@ def compute_metrics(
     work = float(totals.work[0])
     carried = robot.weight * max(math.hypot(x_way, y_way), LEAST_WAY)
     steady_time = max(0.0, totals.time[0] - totals.begins[0])
-    per_time = 1.0 / (steady_time or 1)
+    per_time = 1.0 / float(steady_time or 1)
     lifted = (per_time * totals.lifted).tolist()
     driven = int(np.count_nonzero(structure.cables["signal"] != PASSIVE))
     effort = totals.effort.tolist()

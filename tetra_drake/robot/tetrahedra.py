@@ -41,7 +41,7 @@ def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
     bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
     contacts = [*bottom, 4 * (n - 1) + TIP] if robot.contacts == "thesis" else range(4 * n)
     struts = [(4 * i + a, 4 * i + b) for i in range(n) for a, b in STRUTS]
-    mass, unit_inertia = tetrahedron_inertia(p_BN, robot)
+    mass, unit_inertia = bodies_inertia(p_BN, robot)
     return Structure(
         bodies=bodies,
         node_names=tuple(f"{body} {node}" for body in bodies for node in NODES),
@@ -50,8 +50,8 @@ def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
         struts=np.array(struts),
         strut_radius=np.full(len(struts), robot.strut_diameter / 2),
         node_radius=np.full(4 * n, robot.node_diameter / 2),
-        mass=np.full(n, mass),
-        unit_inertia=np.tile(unit_inertia, (n, 1)),
+        mass=mass,
+        unit_inertia=unit_inertia,
         p_WB=p_WB,
         q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
         cables=_cables(robot, actuation),
@@ -75,9 +75,21 @@ def _cables(robot: Tetrahedra, actuation: Actuation) -> np.ndarray:
     return np.array(rows, dtype=CABLE)
 
 
+def bodies_inertia(p_BN: np.ndarray, robot: Tetrahedra) -> tuple[np.ndarray, np.ndarray]:
+    """Masses (bodies,), and unit inertias (bodies, 6) as in Structure, of tetrahedra with payload.
+
+    A payload is a point mass at the centre of mass: it adds no inertia about it.
+    """
+    empty, unit_inertia = tetrahedron_inertia(p_BN, robot)
+    mass = np.full(robot.tetrahedra, empty)
+    if robot.payload:
+        mass += robot.payload
+    return mass, (empty / mass)[:, np.newaxis] * unit_inertia
+
+
 def tetrahedron_inertia(p_BN: np.ndarray, robot: Tetrahedra) -> tuple[float, np.ndarray]:
-    """Mass, and unit inertia (6,) as in Structure, of six struts and four spheres with nodes p_BN
-    (4, 3)."""
+    """Mass, and unit inertia (6,) as in Structure, of the six struts and four spheres of a
+    tetrahedron with nodes p_BN (4, 3)."""
     total = SpatialInertia.Zero()
     for a, b in STRUTS:
         total += strut_inertia(

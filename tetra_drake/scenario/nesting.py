@@ -51,11 +51,10 @@ def cable_nodes(junction: int, cable: str) -> tuple[int, int]:
     return 4 * junction + rear, 4 * (junction + 1) + place
 
 
-def check_offsets(offsets: Sequence[Sequence[float]], bodies: int) -> None:
-    """Refuses displacements of bodies that are not one for each."""
-    if len(offsets) not in (0, bodies):
-        expected = f"expected none or {bodies}, one for each body"
-        refuse("offsets", f"found {len(offsets)} items, {expected}")
+def check_one_per_body(key: str, items: Sequence[object], bodies: int) -> None:
+    """Refuses items that are neither none nor one for each body."""
+    if len(items) not in (0, bodies):
+        refuse(key, f"found {len(items)} items, expected none or {bodies}, one for each body")
 
 
 class RowCables(Section):
@@ -87,6 +86,8 @@ class Tetrahedra(Section):
     gravity: float = quantity("m/s^2", ge=0)
     offsets: list[Point] = quantity("m", default=[])
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
+    payload: list[Annotated[float, Field(ge=0)]] = quantity("kg", default=[])
+    """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
     tip of the foremost, as no others reach flat ground. `all`: all four of every tetrahedron."""
@@ -156,7 +157,8 @@ class Tetrahedra(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
-        check_offsets(self.offsets, self.tetrahedra)
+        check_one_per_body("offsets", self.offsets, self.tetrahedra)
+        check_one_per_body("payload", self.payload, self.tetrahedra)
         cables = [cable for group in self.actuation for cable in group]
         for cable in cables:
             if cables.count(cable) > 1:

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from tetra_drake.scenario.layout import Layout
 from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
-from tetra_drake.scenario.nesting import Point, Tetrahedra, check_offsets
+from tetra_drake.scenario.nesting import Point, Tetrahedra, check_one_per_body
 from tetra_drake.scenario.sections import (
     Kinds,
     Section,
@@ -258,7 +258,7 @@ class Structure(Section):
         if self.contacts != "all":
             for place, node in enumerate(self.contacts):
                 self._check_node(f"contacts[{place}]", node)
-        check_offsets(self.offsets, self.body_count)
+        check_one_per_body("offsets", self.offsets, self.body_count)
         return self
 
     def _check_node(self, key: str, node: str) -> None:
