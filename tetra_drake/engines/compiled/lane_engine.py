@@ -117,7 +117,9 @@ class LaneEngine:
         log.marks[lane, : len(prepared.marks)] = prepared.marks
         log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
         log.states[lane, 0], log.modes[lane, 0] = walk.step.state, walk.modes
-        log.signals[lane, 0] = 0.0
+        log.signals[lane, 0] = walk.signals
+        if prepared.robot.commanded is not None:
+            log.recent[lane, : len(prepared.robot.commanded)] = prepared.robot.commanded
         log.drives[lane, 0] = walk.drives[:, DRIVE]
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)
