@@ -67,7 +67,8 @@ class PreparedGait:
     ) -> PreparedGait:
         """Prepares a gait; raises InputError if it or the steering does not fit the scenario."""
         simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
-        marks = np.unique([0.0, simulation.steady_from, simulation.duration, start_up])
+        instants = [0.0, simulation.steady_from, simulation.duration, start_up]
+        marks = np.unique(np.concatenate([instants, _jumps(robot)]))
         turns, solver = robot.turns(gait, steering), Solver.of(robot.model)
         return cls(
             robot=robot,
@@ -140,6 +141,15 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
 def _sample_count(robot: Robot) -> int:
     """Number of samples of the signals."""
     return sample_count(robot.scenario) if robot.commanded is None else len(robot.commanded)
+
+
+def _jumps(robot: Robot) -> np.ndarray:
+    """Times (s) at which a change of the robot's command begins or ends."""
+    if robot.commanded is None:
+        return np.zeros(0)
+    changes = (np.diff(robot.commanded, axis=0) != 0.0).any(axis=1)
+    ends = np.append(changes, False) | np.append(False, changes)
+    return robot.scenario.cpg.listing_step * np.flatnonzero(ends)
 
 
 def _max_step(robot: Robot) -> float:

@@ -58,7 +58,7 @@ class LaneEngine:
         self._walk = in_lanes(first.start, width)
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
-            marks=np.full((width, 5), math.inf),
+            marks=np.full((width, len(first.marks) + 5), math.inf),
             passed=np.zeros(width, dtype=np.int64),
             times=np.full((width, len(first.times) + 1), math.inf),
             kept=np.zeros(width, dtype=np.int64),
@@ -87,6 +87,7 @@ class LaneEngine:
         return (
             prepared.kind == self._kind
             and len(prepared.times) < log.times.shape[1]
+            and len(prepared.marks) < log.marks.shape[1]
             and prepared.recent_signals <= log.recent.shape[1]
             and len(prepared.turns) <= log.turns.shape[1]
             and prepared.robot.ground.heights.size <= self._heights.shape[1]
