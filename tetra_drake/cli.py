@@ -122,10 +122,8 @@ def _simulate(options: Options) -> None:
     what: dict[str, Any] = {"command": command} if command else {"gait": gait}
     result = simulate(scenario=scenario, record=True, viewer=view, **what)
     print(result_text(scenario, gait, result))
-    commanded = command is not None
-    save_result_folder(
-        options.out, scenario=scenario, gait=gait, result=result, commanded=commanded
-    )
+    commanded, out = command is not None, options.out
+    save_result_folder(out, scenario=scenario, gait=gait, result=result, commanded=commanded)
     print(
         f"wrote result.json, trajectory.nc, scenario.yaml and replay.html to {options.out}/\n"
         f"to watch the robot, open in a browser: {options.out / REPLAY}"

@@ -70,7 +70,7 @@ def test_forces_are_the_signals_of_the_gait(short, tmp_path):
     np.testing.assert_allclose(samples, signals.values[:, of_cable], atol=1e-6)
     assert not samples[:20].any() and samples[21:].any(), "start-up until 0.2 s"
     limits = rows_of(tmp_path / "lab" / LIMITS)
-    assert {row["limit_of_peak_force_N"] for row in limits} == {""}
+    assert {row["limit_of_force_N"] for row in limits} == {""}
     assert {row["time_at_a_limit_percent"] for row in limits} == {""}
 
 
@@ -99,7 +99,7 @@ def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
     assert peak("peak_power_W") == pytest.approx(metrics.peak_actuator_power, rel=0.1)
     if actuation is not FORCE:
         # Half the greatest force at half the greatest speed: 5 N times 0.25 m/s.
-        assert peak("limit_of_peak_power_W") == 1.25
+        assert peak("limit_of_power_W") == 1.25
         shares = [float(row["time_at_a_limit_percent"]) for row in rows]
         limited = 100.0 * metrics.actuator_limited
         assert np.mean(shares) == pytest.approx(limited, abs=0.15 * limited)

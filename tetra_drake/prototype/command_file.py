@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import io
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
@@ -46,10 +45,8 @@ def command_text(robot: Robot, command: Command) -> str:
 
 def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) -> str:
     """CSV with times (s) and values, a row for each time."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow([TIME, *columns])
-    np.savetxt(text, np.column_stack([times, values]), delimiter=",", fmt="%.6f")
-    return text.getvalue()
+    table = pandas.DataFrame(values, columns=columns, index=pandas.Index(times, name=TIME))
+    return table.reset_index().to_csv(index=False, float_format="%.6f")
 
 
 def load_command(path: str | Path, scenario: Scenario) -> Command:
@@ -62,60 +59,43 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
 
 def parse_command(text: str, robot: Robot, *, source: str | Path) -> Command:
     """The command in the content of its file; raises InputError, see load_command()."""
-    names, wanted = _rows(text)[0], [TIME, *command_columns(robot)]
-    for name in names:
+    try:
+        cells = pandas.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+    except ValueError as error:  # also what pandas raises for ragged rows and an empty file
+        raise InputError(source, "", f"is no table: {error}") from error
+    if not isinstance(cells.index, pandas.RangeIndex):
+        raise InputError(source, "", "is no table: rows have more cells than the heading")
+    wanted = [TIME, *command_columns(robot)]
+    for name in cells.columns:
         if name not in wanted:
             raise InputError(source, name, f"is no column of this robot; {hint(name, wanted)}")
-    if sorted(names) != sorted(wanted):
-        wrong = next(name for name in wanted if names.count(name) != 1)
-        problem = f"found {names.count(wrong)} such columns, expected 1 of each driven cable"
-        raise InputError(source, wrong, problem)
-    table = _numbers(text, names, source)[:, [names.index(name) for name in wanted]]
+    for name in wanted:
+        if name not in cells.columns:
+            raise InputError(source, name, "is missing")
+    table = cells[wanted].apply(pandas.to_numeric, errors="coerce").to_numpy(dtype=float)
+    wrong = np.argwhere(~np.isfinite(table))
+    if len(wrong):
+        row, column = wrong[0]
+        place = f"line {row + 2}, {wanted[column]}"
+        raise InputError(
+            source, place, f"found '{cells[wanted].iat[row, column]}', expected a number"
+        )
     _, unit = QUANTITIES[robot.model.actuator.kind]
     period = _period(table[:, 0], robot.scenario.cpg.listing_step, source)
     return Command(Path(source).name, period, unit * table[:, 1:])
 
 
-def _rows(text: str) -> list[list[str]]:
-    return list(csv.reader(io.StringIO(text), skipinitialspace=True)) or [[]]
-
-
-def _numbers(text: str, names: Sequence[str], source: str | Path) -> np.ndarray:
-    """(samples, columns): the numbers below the heading."""
-    rows = _rows(text)[1:]
-    for line, row in enumerate(rows, start=2):
-        if len(row) != len(names):
-            problem = f"found {len(row)} cells, expected {len(names)}"
-            raise InputError(source, f"line {line}", problem)
-        for name, cell in zip(names, row, strict=True):
-            if not _is_number(cell):
-                raise InputError(
-                    source, f"line {line}, {name}", f"found '{cell}', expected a number"
-                )
-    if len(rows) < 2:
-        raise InputError(source, "", f"found {len(rows)} samples, expected at least 2")
-    return np.array(rows, dtype=float)
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False
-
-
 def _period(times: np.ndarray, least: float, source: str | Path) -> float:
     """Time (s) between samples; InputError unless they are evenly spaced from 0 on."""
-    if abs(times[0]) > 1e-6:
-        raise InputError(source, f"line 2, {TIME}", f"found {times[0]:g}, expected 0")
-    steps = np.diff(times)
-    usual = float(np.median(steps))
-    uneven = np.abs(steps - usual) > _UNEVEN * abs(usual)
+    if len(times) < 2 or abs(times[0]) > 1e-6:
+        raise InputError(source, TIME, "expected at least two samples, the first at 0")
+    usual = float(np.median(np.diff(times)))
+    uneven = np.abs(np.diff(times) - usual) > _UNEVEN * abs(usual)
     if uneven.any():
-        first = int(uneven.argmax())
-        problem = f"found {times[first + 1]:g} after {times[first]:g}, expected {usual:g} s more"
-        raise InputError(source, f"line {first + 3}, {TIME}", problem)
+        before = int(uneven.argmax())
+        problem = f"found {times[before + 1]:g} after {times[before]:g}, expected {usual:g} s more"
+        raise InputError(source, f"line {before + 3}, {TIME}", problem)
     if usual < (1.0 - _UNEVEN) * least:
         problem = f"found samples {usual:g} s apart, expected at least {least:g} s"
         raise InputError(source, TIME, problem)
-    return float(times[-1]) / len(steps)
+    return float(times[-1]) / (len(times) - 1)
