@@ -24,7 +24,7 @@ from tetra_drake.scenario.sections import hint
 from tetra_drake.scenario.structure_files import shipped_structures
 
 if TYPE_CHECKING:
-    from tetra_drake.robot import command as actuation
+    from tetra_drake.robot.command import Command as RobotCommand
     from tetra_drake.robot.gait import Gait
 
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
@@ -133,7 +133,7 @@ def _simulate(options: Options) -> None:
             input("press Enter to close the view in the browser ")
 
 
-def _what_to_simulate(options: Options) -> tuple[Scenario, Gait, actuation.Command | None]:
+def _what_to_simulate(options: Options) -> tuple[Scenario, Gait, RobotCommand | None]:
     """The scenario, the gait and, if the robot follows one, the command, whose gait it is then."""
     from tetra_drake.prototype.command_file import load_command
 

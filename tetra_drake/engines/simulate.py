@@ -28,7 +28,8 @@ def simulate(
     """Simulates the scenario's robot walking by a gait, or following a command, for the scenario's
     duration, on the engine that the scenario names.
 
-    `scenario` may be the name of a shipped one or a file. `steering`, the turn from -1 to 1, or a
+    `scenario` may be the name of a shipped one or a file. Either a gait or a command is given; of
+    a command see robot.command and prototype.command_file. `steering`, the turn from -1 to 1, or a
     function of the time in s that gives it, acts in place of the gait's turn.
 
     Pure: the same scenario and gait give the same numbers, bit for bit, wall time aside,
