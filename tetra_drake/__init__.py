@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tetra_drake.engines.simulate import simulate_many as simulate_many
     from tetra_drake.evolution.run import load_run as load_run
     from tetra_drake.experiment import evolve as evolve
+    from tetra_drake.prototype.command_file import load_command as load_command
     from tetra_drake.robot.gait import load_gait as load_gait
     from tetra_drake.scenario.load import load_scenario as load_scenario
 
@@ -26,6 +27,7 @@ __version__ = "0.2.0"
 
 _HOMES = {
     "evolve": "tetra_drake.experiment",
+    "load_command": "tetra_drake.prototype.command_file",
     "load_gait": "tetra_drake.robot.gait",
     "load_run": "tetra_drake.evolution.run",
     "load_scenario": "tetra_drake.scenario.load",

@@ -24,6 +24,7 @@ from tetra_drake.scenario.sections import hint
 from tetra_drake.scenario.structure_files import shipped_structures
 
 if TYPE_CHECKING:
+    from tetra_drake.robot.command import Command as RobotCommand
     from tetra_drake.robot.gait import Gait
 
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
@@ -87,7 +88,9 @@ def make_parser() -> Command:
 
 def _simulate_options(command: Command) -> None:
     _add_scenario(command, default=_OF_GAIT)
-    _add_gait(command)
+    gaits = _add_gait(command, "--gait")
+    what = "instead, a file of commands for the actuators (CSV), as `export` writes"
+    gaits.add_argument("--command", metavar="FILE", dest="command_file", type=Path, help=what)
     _add_engine(command)
     _add_path(command, "--out", "DIR", "the folder to write to (default: out)", default=Path("out"))
     what = "show the robot in a browser while the Drake diagram simulates it, at most in real time"
@@ -97,17 +100,16 @@ def _simulate_options(command: Command) -> None:
 def _simulate(options: Options) -> None:
     """Simulate one gait.
 
-    Simulates one gait, prints how far and how straight the robot walked, and writes result.json
-    (the numbers), trajectory.nc (motion and forces over time, for xarray), replay.html (open it
-    in a browser) and scenario.yaml (the scenario in full).
+    Simulates one gait, or a robot that follows a file of commands, prints how far and how straight
+    it walked, and writes result.json (the numbers), trajectory.nc (motion and forces over time, for
+    xarray), replay.html (open it in a browser) and scenario.yaml (the scenario in full).
     """
     from tetra_drake.engines.interface import check_can_be_watched
     from tetra_drake.engines.simulate import prepare, simulate
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
 
-    scenario, gait = _chosen_gait(options)
-    scenario = scenario.with_changes(_engine_change(options))
+    scenario, gait, command = _what_to_simulate(options)
     if options.meshcat:
         check_can_be_watched(scenario)
     check_result_folder(options.out)
@@ -117,9 +119,11 @@ def _simulate(options: Options) -> None:
         from tetra_drake.visualization.live import open_view
 
         view = open_view(scenario, say=lambda text: print(text, flush=True))
-    result = simulate(scenario=scenario, gait=gait, record=True, viewer=view)
+    what: dict[str, Any] = {"command": command} if command else {"gait": gait}
+    result = simulate(scenario=scenario, record=True, viewer=view, **what)
     print(result_text(scenario, gait, result))
-    save_result_folder(options.out, scenario=scenario, gait=gait, result=result)
+    commanded, out = command is not None, options.out
+    save_result_folder(out, scenario=scenario, gait=gait, result=result, commanded=commanded)
     print(
         f"wrote result.json, trajectory.nc, scenario.yaml and replay.html to {options.out}/\n"
         f"to watch the robot, open in a browser: {options.out / REPLAY}"
@@ -127,6 +131,42 @@ def _simulate(options: Options) -> None:
     if view is not None:
         with contextlib.suppress(EOFError, KeyboardInterrupt):
             input("press Enter to close the view in the browser ")
+
+
+def _what_to_simulate(options: Options) -> tuple[Scenario, Gait, RobotCommand | None]:
+    """The scenario, the gait and, if the robot follows one, the command, whose gait it is then."""
+    from tetra_drake.prototype.command_file import load_command
+
+    if options.command_file is None:
+        scenario, gait = _chosen_gait(options)
+        return scenario.with_changes(_engine_change(options)), gait, None
+    scenario = load_scenario(options.scenario or "thesis").with_changes(_engine_change(options))
+    command = load_command(options.command_file, scenario)
+    return scenario, command.gait, command
+
+
+def _export_options(command: Command) -> None:
+    _add_gait(command, "gait", nargs="?")
+    _add_scenario(command, default=_OF_GAIT)
+    _add_engine(command)
+    rate = "samples per second (default: 100 Hz)"
+    command.add_argument("--rate", metavar="RATE", type=_rate, default="100 Hz", help=rate)
+    _add_path(command, "--out", "DIR", "the new folder to write", required=True)
+
+
+def _export(options: Options) -> None:
+    """Write a gait as commands for the actuators of a prototype.
+
+    Simulates a gait and writes command.csv (what each actuator shall do), expected.csv (positions
+    of the nodes), limits.csv (the load on each actuator), scenario.yaml and README.md. Prints
+    whether the scenario's actuators can play it, and how far the robot goes by these commands.
+    """
+    from tetra_drake.prototype.export import export
+
+    scenario, gait = _chosen_gait(options)
+    scenario = scenario.with_changes(_engine_change(options))
+    print(export(scenario, gait, rate=options.rate, out=options.out))
+    print(f"wrote {options.out}/")
 
 
 def _evolve_options(command: Command) -> None:
@@ -314,7 +354,7 @@ def _compare(options: Options) -> None:
 
 def _cpg_options(command: Command) -> None:
     _add_scenario(command, default=_OF_GAIT)
-    _add_gait(command)
+    _add_gait(command, "--gait")
     _add_path(command, "--out", "FILE", "the CSV file to write", required=True)
 
 
@@ -386,12 +426,14 @@ def _add_workers(command: Command) -> None:
     _add_count(command, "--workers", "worker processes (default: one per core)")
 
 
-def _add_gait(command: Command) -> None:
+def _add_gait(command: Command, name: str, **more: Any) -> argparse._MutuallyExclusiveGroup:
+    """Adds the ways to choose a gait, and returns their group."""
     group = command.add_mutually_exclusive_group()
     what = "a gait file (JSON), or a folder written by `evolve`, whose best gait it is"
-    group.add_argument("--gait", metavar="FILE|RUN", type=Path, help=what)
+    group.add_argument(name, metavar="FILE|RUN", type=Path, help=what, **more)
     seed = "instead, a random gait of this seed (default: one that walks)"
     group.add_argument("--seed", metavar="N", type=_integer(0), help=seed)
+    return group
 
 
 def _engine_change(options: Options) -> dict[str, Any]:
@@ -423,10 +465,18 @@ def _integer(least: int) -> Callable[[str], int]:
 
 
 def _length(text: str) -> float:
+    return _quantity(text, "m")
+
+
+def _rate(text: str) -> float:
+    return _quantity(text, "Hz")
+
+
+def _quantity(text: str, unit: str) -> float:
     from tetra_drake.scenario.units import quantity_to_si
 
     try:
-        return quantity_to_si(text, "m")
+        return quantity_to_si(text, unit)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
 
@@ -438,6 +488,7 @@ def _warn(text: str) -> None:
 _COMMANDS: tuple[tuple[Callable[[Options], None], Callable[[Command], None]], ...] = (
     (_simulate, _simulate_options),
     (_evolve, _evolve_options),
+    (_export, _export_options),
     (_replay, _replay_options),
     (_figures, _figures_options),
     (_robustness, _robustness_options),

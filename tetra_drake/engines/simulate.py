@@ -9,6 +9,7 @@ from tetra_drake.engines.interface import Outcome, Viewer, check_can_be_watched,
 from tetra_drake.errors import InputError
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.command import Command, commanded_robot
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, constant_steering
 from tetra_drake.scenario.load import load_scenario
@@ -18,15 +19,17 @@ from tetra_drake.scenario.schema import Scenario
 def simulate(
     *,
     scenario: Scenario | str | Path,
-    gait: Gait,
+    gait: Gait | None = None,
+    command: Command | None = None,
     record: bool = False,
     viewer: Viewer | None = None,
     steering: SteeringSignal | float | None = None,
 ) -> SimulationResult:
-    """Simulates the scenario's robot walking by a gait for the scenario's duration, on the
-    engine that the scenario names.
+    """Simulates the scenario's robot walking by a gait, or following a command, for the scenario's
+    duration, on the engine that the scenario names.
 
-    `scenario` may be the name of a shipped one or a file. `steering`, the turn from -1 to 1, or a
+    `scenario` may be the name of a shipped one or a file. Either a gait or a command is given; of
+    a command see robot.command and prototype.command_file. `steering`, the turn from -1 to 1, or a
     function of the time in s that gives it, acts in place of the gait's turn.
 
     Pure: the same scenario and gait give the same numbers, bit for bit, wall time aside,
@@ -41,8 +44,15 @@ def simulate(
         steering = constant_steering(steering)
     if viewer is not None:
         check_can_be_watched(scenario)
-    robot = Robot.of(scenario)
     engine = engine_of(scenario)
+    if command is not None:
+        if gait is not None or steering is not None:
+            raise InputError("simulate", "command", "excludes a gait, and steering")
+        robot, gait = commanded_robot(scenario, command), command.gait
+    elif gait is not None:
+        robot = Robot.of(scenario)
+    else:
+        raise InputError("simulate", "gait", "is needed, or a command")
     return engine.simulate(robot, gait, record=record, viewer=viewer, steering=steering)
 
 

@@ -84,10 +84,16 @@ def check_result_folder(folder: Path) -> None:
 
 
 def save_result_folder(
-    folder: Path, *, scenario: Scenario, gait: Gait, result: SimulationResult
+    folder: Path,
+    *,
+    scenario: Scenario,
+    gait: Gait,
+    result: SimulationResult,
+    commanded: bool = False,
 ) -> None:
     """Writes the files of a simulation that recorded its trajectory.
 
+    commanded: True if a command was played; then the gait, which is the command's, is left out.
     Raises InputError if the folder cannot be written to.
     """
     from tetra_drake.results.result import save_result
@@ -101,7 +107,7 @@ def save_result_folder(
     write_whole(folder / SCENARIO, dump_scenario(scenario))
     save_dataset(motion.trajectory, folder / TRAJECTORY)
     motion.save_replay(folder / REPLAY)
-    save_result(folder / RESULT, scenario, gait, result)
+    save_result(folder / RESULT, scenario, None if commanded else gait, result)
 
 
 def load_result_folder(folder: Path) -> GaitMotion:

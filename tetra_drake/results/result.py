@@ -122,9 +122,11 @@ def _poses(states: np.ndarray, structure: Structure) -> np.ndarray:
     return states[:, : 7 * bodies].reshape(len(states), bodies, 7)
 
 
-def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: SimulationResult) -> None:
+def save_result(
+    path: str | Path, scenario: Scenario, gait: Gait | None, result: SimulationResult
+) -> None:
     """Writes result.json: metrics in SI, lengths in inches beside them, times in s, and the path of
-    the centre as columns."""
+    the centre as columns. There is no gait if a command was played."""
     way, radius = result.path, result.metrics.path_radius
     content = {
         "schema": SCHEMA,
@@ -139,7 +141,7 @@ def save_result(path: str | Path, scenario: Scenario, gait: Gait, result: Simula
         "engine": result.engine,
         "integrator": dataclasses.asdict(result.integrator),
         "versions": versions(scenario.engine.packages),
-        "gait": gait.to_json(scenario),
+        "gait": gait and gait.to_json(scenario),
         "path": {
             "time_s": way.times.tolist(),
             "x_m": way.centre[:, 0].tolist(),

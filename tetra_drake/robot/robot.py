@@ -42,6 +42,9 @@ class Robot:
     structure: Structure
     model: Model
     """The numbers of its bodies, cables and ground, as kernels take them."""
+    commanded: np.ndarray | None = None
+    """(samples, m): the signals in N at 0, one `cpg.listing_step`, two ... to beyond the duration,
+    if a command gives them (see robot.command). None if a network does."""
 
     @classmethod
     def of(cls, scenario: Scenario, structure: Structure | None = None) -> Self:
@@ -56,6 +59,11 @@ class Robot:
     def actuation(self) -> Actuation:
         """The oscillators and what they drive."""
         return self.structure.actuation
+
+    @property
+    def driven(self) -> np.ndarray:
+        """(driven cables,): their indices."""
+        return np.flatnonzero(self.structure.cables["signal"] != PASSIVE)
 
     @property
     def ground(self) -> Ground:
@@ -131,12 +139,13 @@ class Robot:
 
     def starting_drives(self) -> np.ndarray:
         """(drives,): free lengths (m) of winches, or tensions (N) of tension motors, at t = 0."""
-        cables, kind = self.structure.cables, self.model.actuator.kind
-        driven = cables[cables["signal"] != PASSIVE]
+        driven, kind = self.structure.cables[self.driven], self.model.actuator.kind
         if kind == DIRECT:
             return np.zeros(0)
         if kind == WINCH:
             return driven["free_length"].copy()
+        if self.commanded is not None:
+            return np.maximum(self.commanded[0], 0.0)
         p_WN = node_positions(self.structure, self.structure.initial_state)
         lengths = np.linalg.norm(p_WN[driven["node_b"]] - p_WN[driven["node_a"]], axis=1)
         return np.maximum(driven["stiffness"] * (lengths - driven["free_length"]), 0.0)

@@ -52,8 +52,11 @@ def sample_count(scenario: Scenario) -> int:
 def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
     """The signals (samples, m) in N at 0, one `cpg.listing_step`, two ... to beyond the duration.
 
-    Between samples the signals are linear. Start-up is not applied.
+    Between samples the signals are linear. Start-up is not applied. If the robot follows a
+    command, the signals are those, and the gait has no part in them.
     """
+    if robot.commanded is not None:
+        return robot.commanded
     raw = raw_output(robot, gait, steering)
     return robot.scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])
 

@@ -14,6 +14,7 @@ from tetra_drake.engines.compiled.loop import (
     ASKED_ROWS,
     CLOCK_ROWS,
     DONE,
+    SAMPLES,
     STEP_TOO_SMALL,
     TOO_FAST,
     TOO_MANY_EVALUATIONS,
@@ -66,7 +67,8 @@ class PreparedGait:
     ) -> PreparedGait:
         """Prepares a gait; raises InputError if it or the steering does not fit the scenario."""
         simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
-        marks = np.unique([0.0, simulation.steady_from, simulation.duration, start_up])
+        instants = [0.0, simulation.steady_from, simulation.duration, start_up]
+        marks = np.unique(np.concatenate([instants, _jumps(robot)]))
         turns, solver = robot.turns(gait, steering), Solver.of(robot.model)
         return cls(
             robot=robot,
@@ -104,8 +106,10 @@ class PreparedGait:
     @property
     def recent_signals(self) -> int:
         """Number of signal samples that an engine holds: those within a step, and as many
-        for lanes that run ahead; a power of two."""
-        scenario = self.robot.scenario
+        for lanes that run ahead, or all those of a command; a power of two."""
+        scenario, commanded = self.robot.scenario, self.robot.commanded
+        if commanded is not None:
+            return 1 << math.ceil(math.log2(len(commanded)))
         within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
         return 1 << math.ceil(math.log2(2.0 * within + 32.0))
 
@@ -125,13 +129,27 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
         gains=np.array([gain for _, gain in gait.gains]),
         gain=np.array([cpg.gain]),
         period=np.array([cpg.listing_step]),
-        samples=np.array([sample_count(scenario)], dtype=float),
+        samples=np.array([_sample_count(robot)], dtype=float),
         start_up=np.array([cpg.start_up]),
         tolerance=np.array([engine.tolerance]),
         max_step=np.array([_max_step(robot)]),
         look_ahead=np.array([engine.look_ahead]),
         max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
     )
+
+
+def _sample_count(robot: Robot) -> int:
+    """Number of samples of the signals."""
+    return sample_count(robot.scenario) if robot.commanded is None else len(robot.commanded)
+
+
+def _jumps(robot: Robot) -> np.ndarray:
+    """Times (s) at which a change of the robot's command begins or ends."""
+    if robot.commanded is None:
+        return np.zeros(0)
+    changes = (np.diff(robot.commanded, axis=0) != 0.0).any(axis=1)
+    ends = np.append(changes, False) | np.append(False, changes)
+    return robot.scenario.cpg.listing_step * np.flatnonzero(ends)
 
 
 def _max_step(robot: Robot) -> float:
@@ -144,14 +162,16 @@ def _max_step(robot: Robot) -> float:
 
 
 def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
-    scenario, structure = robot.scenario, robot.structure
+    structure, commanded = robot.structure, robot.commanded
     bodies, signals = len(structure.bodies), structure.signals
     contacts, cables = len(structure.contacts), len(structure.cables)
     velocities, forces = np.zeros(BLOCK * bodies), Forces.of(robot.model)
     drives = np.zeros_like(forces.drives)
     drives[:, DRIVE] = robot.starting_drives()
+    clock = np.zeros(CLOCK_ROWS)
+    clock[SAMPLES] = 0 if commanded is None else len(commanded)
     return Walk(
-        clock=np.zeros(CLOCK_ROWS),
+        clock=clock,
         asked=np.zeros(ASKED_ROWS),
         step=Step(
             state=structure.initial_state,
@@ -169,11 +189,11 @@ def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
         forces=forces,
         modes=robot.starting_modes(),
         acceleration=velocities,
-        signals=np.zeros(signals),
+        signals=np.zeros(signals) if commanded is None else commanded[0],
         end_signals=np.zeros(signals),
         drives=drives,
         end_drives=drives,
-        neurons=make_neurons(initial_neurons(scenario.cpg, scenario.oscillators)),
+        neurons=make_neurons(initial_neurons(robot.scenario.cpg, signals)),
         output=np.zeros(signals),
         tonic=robot.tonic_input(turns)[0],
         inputs=np.zeros(2 * signals),

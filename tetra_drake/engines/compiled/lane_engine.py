@@ -58,7 +58,7 @@ class LaneEngine:
         self._walk = in_lanes(first.start, width)
         shape, signals = (width, len(first.times)), structure.signals
         self._log = Log(
-            marks=np.full((width, 5), math.inf),
+            marks=np.full((width, len(first.marks) + 5), math.inf),
             passed=np.zeros(width, dtype=np.int64),
             times=np.full((width, len(first.times) + 1), math.inf),
             kept=np.zeros(width, dtype=np.int64),
@@ -87,6 +87,7 @@ class LaneEngine:
         return (
             prepared.kind == self._kind
             and len(prepared.times) < log.times.shape[1]
+            and len(prepared.marks) < log.marks.shape[1]
             and prepared.recent_signals <= log.recent.shape[1]
             and len(prepared.turns) <= log.turns.shape[1]
             and prepared.robot.ground.heights.size <= self._heights.shape[1]
@@ -117,7 +118,9 @@ class LaneEngine:
         log.marks[lane, : len(prepared.marks)] = prepared.marks
         log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
         log.states[lane, 0], log.modes[lane, 0] = walk.step.state, walk.modes
-        log.signals[lane, 0] = 0.0
+        log.signals[lane, 0] = walk.signals
+        if prepared.robot.commanded is not None:
+            log.recent[lane, : len(prepared.robot.commanded)] = prepared.robot.commanded
         log.drives[lane, 0] = walk.drives[:, DRIVE]
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)

@@ -1,0 +1,111 @@
+"""The file of a command: it reads back as written, and bad ones are refused."""
+
+import numpy as np
+import pytest
+from helpers.actuations import FORCE, MOTOR, WINCH
+
+from tetra_drake.cli import main
+from tetra_drake.prototype.command_file import (
+    command_text,
+    load_command,
+    parse_command,
+)
+from tetra_drake.robot.command import Command
+from tetra_drake.robot.robot import Robot
+
+ACTUATIONS = {"force_N": FORCE, "free_length_mm": WINCH, "tension_N": MOTOR}
+
+
+@pytest.mark.parametrize("quantity", ACTUATIONS)
+@pytest.mark.parametrize("rate", [30.0, 100.0, 2000.0])
+def test_a_command_reads_back_as_written(scenario, quantity, rate, tmp_path):
+    driven = scenario.with_changes(ACTUATIONS[quantity])
+    robot = Robot.of(driven)
+    samples = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 8))
+    text = command_text(robot, Command("random", 1.0 / rate, samples))
+    assert text.startswith(f"time_s,T1-T2 outer bottom_left {quantity},")
+    (tmp_path / "command.csv").write_text(text)
+    loaded = load_command(tmp_path / "command.csv", driven)
+    assert loaded.name == "command.csv"
+    assert loaded.period == pytest.approx(1.0 / rate, rel=1e-5)
+    np.testing.assert_allclose(loaded.samples, samples, atol=0.5e-6)  # six decimals
+
+
+def test_a_free_length_is_in_millimetres(scenario):
+    robot = Robot.of(scenario.with_changes(WINCH))
+    text = command_text(robot, Command("metres", 0.5, np.full((2, 8), 0.05)))
+    assert text.splitlines()[2] == ",".join(["0.500000", *["50.000000"] * 8])
+
+
+def test_columns_may_stand_in_any_order(robot):
+    samples = np.arange(24.0).reshape(3, 8)
+    rows = command_text(robot, Command("any", 0.01, samples)).splitlines()
+    turned = "\n".join(",".join(row.split(",")[::-1]) for row in rows)
+    assert np.array_equal(parse_command(turned, robot, source="x").samples, samples)
+
+
+FIRST, LAST = "T1-T2 outer bottom_left force_N", "T4-T5 outer bottom_right force_N"
+BAD = {
+    "another cable": (("T1-T2", "T1-T9"), "T1-T9 outer bottom_left force_N", "is no column"),
+    "another quantity": ((FIRST, "T1-T2 outer bottom_left tension_N"), None, "is no column"),
+    "no time": (("time_s", "time"), "time", "'time_s'"),
+    "twice": (
+        (FIRST, "T1-T2 outer bottom_right force_N"),
+        "T1-T2 outer bottom_right force_N.1",
+        "",
+    ),
+    "a column too few": ((FIRST + ",", ""), "", "is no table"),
+    "no number": (("0.010000,0.500000", "0.010000,"), f"line 3, {FIRST}", "''"),
+    "NaN": (("0.010000,0.500000", "0.010000,nan"), f"line 3, {FIRST}", "'nan'"),
+    "infinite": (("0.010000,0.500000", "0.010000,inf"), f"line 3, {FIRST}", "'inf'"),
+    "a cell too few": (("0.010000,0.500000", "0.010000"), f"line 3, {LAST}", "''"),
+    "a gap": (("0.030000", "0.040000"), "line 5, time_s", "found 0.04 after 0.02"),
+    "back in time": (("0.030000", "0.010000"), "line 5, time_s", "found 0.01 after 0.02"),
+    "a late start": (("0.000000,0", "0.005000,0"), "time_s", "the first at 0"),
+}
+
+
+@pytest.mark.parametrize("wrong", BAD)
+def test_a_bad_file_is_refused(robot, wrong, refused):
+    (old, new), key, problem = BAD[wrong]
+    text = command_text(robot, Command("half", 0.01, np.full((5, 8), 0.5)))
+    assert old in text
+    with refused("c.csv", key or new, problem):
+        parse_command(text.replace(old, new, 1), robot, source="c.csv")
+
+
+@pytest.mark.parametrize(
+    ("period", "problem"), [(1e-4, "samples 0.0001 s apart"), (0.0, "samples 0 s apart")]
+)
+def test_samples_closer_than_the_signals_are_refused(robot, period, problem, refused):
+    text = command_text(robot, Command("dense", period, np.zeros((5, 8))))
+    with refused("c.csv", "time_s", problem):
+        parse_command(text, robot, source="c.csv")
+
+
+def test_a_file_that_only_goes_back_is_refused(robot, refused):
+    text = command_text(robot, Command("back", -0.01, np.zeros((5, 8))))
+    with refused("c.csv", "time_s", "found samples -0.01 s apart"):
+        parse_command(text, robot, source="c.csv")
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_file_without_two_samples_is_refused(robot, rows, refused):
+    lines = command_text(robot, Command("short", 0.01, np.zeros((5, 8)))).splitlines()
+    with refused("c.csv", "time_s", "at least two samples"):
+        parse_command("\n".join(lines[:rows]), robot, source="c.csv")
+
+
+def test_an_empty_file_is_refused(robot, refused):
+    with refused("c.csv", "", "is no table"):
+        parse_command("", robot, source="c.csv")
+
+
+def test_simulate_refuses_a_bad_file_in_a_line_and_writes_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "c.csv").write_text("time_s,speed\n0,1\n")
+    assert main(["simulate", "--command", "c.csv", "--out", "out"]) == 2
+    captured = capsys.readouterr()
+    (line,) = captured.err.splitlines()
+    assert line.startswith("tetra-drake: c.csv: speed: ")
+    assert captured.out == "" and not (tmp_path / "out").exists()

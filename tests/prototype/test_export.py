@@ -1,0 +1,157 @@
+"""A gait as a folder for a prototype: what is in it, and that a robot walks by it."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.actuations import FORCE, MOTOR, WINCH
+
+from tetra_drake.cli import main
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.errors import InputError
+from tetra_drake.prototype.command_file import load_command
+from tetra_drake.prototype.export import COMMAND, EXPECTED, LIMITS, README, SCENARIO, export
+from tetra_drake.robot.gait import load_gait, seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
+
+RECORDED = Path(__file__).parents[2] / "runs/coulomb/trial_00/best_gait.json"
+
+SHORT = {"simulation.duration": "3 s", "simulation.steady_from": "1 s", "cpg.start_up": "0.2 s"}
+
+
+def rows_of(file):
+    with open(file, encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+@pytest.fixture(scope="module")
+def short():
+    return load_scenario("coulomb").with_changes(SHORT)
+
+
+@pytest.mark.skipif(not RECORDED.exists(), reason="the recorded runs are not here")
+@pytest.mark.parametrize("actuation", [FORCE, MOTOR])
+def test_a_robot_walks_by_the_file_as_far_as_by_the_gait(actuation, tmp_path):
+    scenario = load_scenario("coulomb").with_changes(actuation)
+    gait = load_gait(RECORDED, scenario)
+    export(scenario, gait, rate=100.0, out=tmp_path / "lab")
+    own = simulate(scenario=scenario, gait=gait).metrics.distance_in
+    assert own > 30.0
+    command = load_command(tmp_path / "lab" / COMMAND, scenario)
+    assert simulate(scenario=scenario, command=command).metrics.distance_in == pytest.approx(
+        own, rel=0.02
+    )
+
+
+def test_the_folder_loads_and_begins_where_the_robot_does(short, tmp_path):
+    folder = tmp_path / "lab"
+    export(short, seeded_gait(short), rate=50.0, out=folder)
+    names = {path.name for path in folder.iterdir()}
+    assert names == {COMMAND, EXPECTED, LIMITS, SCENARIO, README}
+    assert [path.name for path in tmp_path.iterdir()] == ["lab"], "nothing temporary is left"
+    assert load_command(folder / COMMAND, load_scenario(folder / SCENARIO)).period == 0.02
+    expected = rows_of(folder / EXPECTED)
+    assert len(expected) == 3 * 50 + 1
+    # T1's base edge of 6 in lies along y.
+    first = expected[0]
+    edge = float(first["T1 bottom_left y_mm"]) - float(first["T1 bottom_right y_mm"])
+    assert edge == pytest.approx(6 * 25.4, abs=1e-5)
+    assert float(first["T1 bottom_left x_mm"]) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_forces_are_the_signals_of_the_gait(short, tmp_path):
+    gait = seeded_gait(short)
+    export(short, gait, rate=100.0, out=tmp_path / "lab")
+    samples = load_command(tmp_path / "lab" / COMMAND, short).samples
+    signals = simulate(scenario=short, gait=gait, record=True).trajectory.signal
+    of_cable = Robot.of(short).structure.cables["signal"][Robot.of(short).driven]
+    np.testing.assert_allclose(samples, signals.values[:, of_cable], atol=1e-6)
+    assert not samples[:20].any() and samples[21:].any(), "start-up until 0.2 s"
+    limits = rows_of(tmp_path / "lab" / LIMITS)
+    assert {row["limit_of_force_N"] for row in limits} == {""}
+    assert {row["time_at_a_limit_percent"] for row in limits} == {""}
+
+
+def test_a_tension_motor_is_commanded_the_whole_law_of_the_cable(short, tmp_path):
+    driven = short.with_changes(MOTOR)
+    export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
+    samples = load_command(tmp_path / "lab" / COMMAND, driven).samples
+    # At the start the law is that of the spring, with which the motor begins.
+    np.testing.assert_allclose(samples[0], Robot.of(driven).starting_drives(), atol=1e-6)
+    assert samples.min() >= 0.0 and samples.max() <= 10.0
+
+
+@pytest.mark.parametrize("actuation", [FORCE, MOTOR, WINCH])
+def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
+    # The metrics look at every step of the steady stretch, here all; the file at every millisecond.
+    from_start = {"simulation.steady_from": "0 s", "cpg.start_up": "0 s"}
+    driven = short.with_changes(actuation | from_start)
+    export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
+    metrics = simulate(scenario=driven, gait=seeded_gait(short)).metrics
+    rows = rows_of(tmp_path / "lab" / LIMITS)
+
+    def peak(name):
+        return max(float(row[name]) for row in rows)
+
+    assert peak("peak_force_N") == pytest.approx(metrics.peak_actuator_force, rel=0.05)
+    assert peak("peak_power_W") == pytest.approx(metrics.peak_actuator_power, rel=0.1)
+    if actuation is not FORCE:
+        # Half the greatest force at half the greatest speed: 5 N times 0.25 m/s.
+        assert peak("limit_of_power_W") == 1.25
+        shares = [float(row["time_at_a_limit_percent"]) for row in rows]
+        limited = 100.0 * metrics.actuator_limited
+        assert np.mean(shares) == pytest.approx(limited, abs=0.15 * limited)
+
+
+def test_a_weak_motor_is_told_to_be_too_weak(short, tmp_path):
+    weak = short.with_changes(MOTOR).with_changes({"actuation.max_force": "2 N"})
+    verdict = export(weak, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
+    assert "cannot play it" in verdict and "first at 0.000 s (T1-T2 outer bottom_left)" in verdict
+    strong = export(
+        short.with_changes(MOTOR), seeded_gait(short), rate=100.0, out=tmp_path / "other"
+    )
+    assert "can play it" in strong
+
+
+def test_a_gait_with_feedback_is_exported_as_it_walked_once(tmp_path):
+    scenario = load_scenario("feedback").with_changes(SHORT | {"engine": "!Compiled"})
+    export(scenario, seeded_gait(scenario), rate=100.0, out=tmp_path / "lab")
+    command = load_command(tmp_path / "lab" / COMMAND, scenario)
+    played = simulate(scenario=scenario, command=command, record=True).trajectory
+    walked = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
+    assert np.abs(played.p_WN.values - walked.p_WN.values).max() < 2e-3
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, 2001.0, 0.5, 7.1, float("nan")])
+def test_a_rate_without_meaning_is_refused(short, rate, tmp_path, refused):
+    with refused("--rate", "", "Hz"):
+        export(short, seeded_gait(short), rate=rate, out=tmp_path / "lab")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_existing_folder_is_left_alone(short, tmp_path, refused):
+    (tmp_path / "lab").mkdir()
+    with refused(tmp_path / "lab", "", "exists"):
+        export(short, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
+    assert not list((tmp_path / "lab").iterdir())
+
+
+def test_an_export_that_fails_leaves_nothing(short, tmp_path):
+    wrong = load_gait(RECORDED, short) if RECORDED.exists() else seeded_gait(short)
+    smaller = short.with_changes({"robot.tetrahedra": 3})
+    with pytest.raises(InputError):
+        export(smaller, wrong, rate=100.0, out=tmp_path / "new" / "lab")
+    assert not list((tmp_path / "new").iterdir())
+
+
+def test_the_commands_write_and_play(short, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    export_it = "export --seed 80 --scenario coulomb --rate 100Hz --out lab"
+    assert main(export_it.split()) == 0
+    assert "No motor is given" in capsys.readouterr().out
+    play = "simulate --command lab/command.csv --scenario lab/scenario.yaml --out out"
+    assert main(play.split()) == 0
+    assert capsys.readouterr().out.startswith("command.csv: 15 s on scenario coulomb\n")
+    assert (tmp_path / "out/replay.html").exists()

@@ -1,0 +1,60 @@
+"""Commands: samples that are held, and the robot that follows them."""
+
+import numpy as np
+import pytest
+from helpers.actuations import MOTOR, WINCH
+
+from tetra_drake.robot.command import Command, commanded_robot, held_samples
+from tetra_drake.robot.robot import Robot
+
+
+def counting(cables: int = 8, samples: int = 3) -> Command:
+    """Sample k of cable i is 10 k + i."""
+    values = 10.0 * np.arange(samples)[:, np.newaxis] + np.arange(cables)
+    return Command("counting", 0.01, values)
+
+
+def test_a_sample_is_held_and_changes_within_a_step():
+    # Steps of 4 ms: a new sample begins at 10 ms, within the step from 8 to 12 ms.
+    held = held_samples(counting(1), 0.004, 0.03)[:, 0]
+    at_8, at_12, at_16 = held[2:5]
+    assert (held[0], at_8, at_12) == (0.0, 0.0, 0.0)
+    assert at_16 == 10.0
+    assert len(held) * 0.004 > 0.03 + 0.004
+
+
+def test_a_change_on_the_grid_begins_at_its_time_and_takes_a_step():
+    held = held_samples(counting(1), 0.0005, 1.0)[:, 0]
+    assert held[20] == 0.0 and held[21] == 10.0
+    assert held[40] == 10.0 and held[41] == 20.0
+    assert held[-1] == 20.0, "the last sample is held for ever"
+
+
+def test_each_driven_cable_has_a_signal_of_its_own(scenario):
+    plain, robot = Robot.of(scenario), commanded_robot(scenario, counting())
+    assert robot.structure.cables["signal"][plain.driven].tolist() == list(range(8))
+    names = np.array(plain.structure.cable_names)[plain.driven].tolist()
+    assert list(robot.actuation.names) == names
+    assert robot.structure.signals == 8
+    assert robot.commanded[0].tolist() == list(range(8)), "no start-up gate"
+
+
+def test_a_free_length_is_the_signal_that_shortens_the_cable_to_it(scenario):
+    wound = scenario.with_changes(WINCH)
+    robot = commanded_robot(wound, counting())
+    law = robot.structure.cables[robot.driven]
+    lengths = law["free_length"] - robot.commanded[0] / law["stiffness"]
+    np.testing.assert_allclose(lengths, np.arange(8.0), atol=1e-12)
+
+
+def test_a_tension_motor_plays_no_spring_and_starts_at_its_first_tension(scenario):
+    robot = commanded_robot(scenario.with_changes(MOTOR), counting())
+    law = robot.structure.cables[robot.driven]
+    assert not law["stiffness"].any() and not law["damping"].any()
+    assert robot.starting_drives().tolist() == list(range(8))
+
+
+@pytest.mark.parametrize("cables", [7, 24])
+def test_a_command_for_other_cables_is_refused(scenario, cables, refused):
+    with refused("command counting", "samples", "expected 8 driven cables"):
+        commanded_robot(scenario, counting(cables))

@@ -1,0 +1,1 @@
+"""Commands for a prototype of the robot."""

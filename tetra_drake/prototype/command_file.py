@@ -1,0 +1,101 @@
+"""The file of a command: CSV with a column for the time, and one for each driven cable."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas
+
+from tetra_drake.errors import InputError
+from tetra_drake.files import read_text
+from tetra_drake.physics.actuator import DIRECT, TENSION_MOTOR, WINCH
+from tetra_drake.robot.command import Command
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.sections import hint
+
+TIME = "time_s"
+
+QUANTITIES = {
+    DIRECT: ("force_N", 1.0),
+    WINCH: ("free_length_mm", 1e-3),
+    TENSION_MOTOR: ("tension_N", 1.0),
+}
+"""Quantity that each kind of actuators is commanded, and its unit in SI."""
+
+_UNEVEN = 0.05
+"""Largest error of the time between two samples, as a share of it: times may be rounded."""
+
+
+def command_columns(robot: Robot) -> list[str]:
+    """The columns of a robot's commands but for the time, such as "T1-T2 outer top tension_N"."""
+    quantity, _ = QUANTITIES[robot.model.actuator.kind]
+    return [f"{robot.structure.cable_names[cable]} {quantity}" for cable in robot.driven]
+
+
+def command_text(robot: Robot, command: Command) -> str:
+    """A command as the content of its file."""
+    _, unit = QUANTITIES[robot.model.actuator.kind]
+    times = command.period * np.arange(len(command.samples))
+    return table_text(command_columns(robot), times, command.samples / unit)
+
+
+def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) -> str:
+    """CSV with times (s) and values, a row for each time."""
+    table = pandas.DataFrame(values, columns=columns, index=pandas.Index(times, name=TIME))
+    return table.reset_index().to_csv(index=False, float_format="%.6f")
+
+
+def load_command(path: str | Path, scenario: Scenario) -> Command:
+    """Reads the file of a command for a scenario's robot; columns may stand in any order.
+
+    Raises InputError, naming file and place, for whatever is wrong in the file or does not fit.
+    """
+    return parse_command(read_text(path, "command file"), Robot.of(scenario), source=path)
+
+
+def parse_command(text: str, robot: Robot, *, source: str | Path) -> Command:
+    """The command in the content of its file; raises InputError, see load_command()."""
+    try:
+        cells = pandas.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+    except ValueError as error:  # also what pandas raises for ragged rows and an empty file
+        raise InputError(source, "", f"is no table: {error}") from error
+    if not isinstance(cells.index, pandas.RangeIndex):
+        raise InputError(source, "", "is no table: rows have more cells than the heading")
+    wanted = [TIME, *command_columns(robot)]
+    for name in cells.columns:
+        if name not in wanted:
+            raise InputError(source, name, f"is no column of this robot; {hint(name, wanted)}")
+    for name in wanted:
+        if name not in cells.columns:
+            raise InputError(source, name, "is missing")
+    table = cells[wanted].apply(pandas.to_numeric, errors="coerce").to_numpy(dtype=float)
+    wrong = np.argwhere(~np.isfinite(table))
+    if len(wrong):
+        row, column = wrong[0]
+        place = f"line {row + 2}, {wanted[column]}"
+        raise InputError(
+            source, place, f"found '{cells[wanted].iat[row, column]}', expected a number"
+        )
+    _, unit = QUANTITIES[robot.model.actuator.kind]
+    period = _period(table[:, 0], robot.scenario.cpg.listing_step, source)
+    return Command(Path(source).name, period, unit * table[:, 1:])
+
+
+def _period(times: np.ndarray, least: float, source: str | Path) -> float:
+    """Time (s) between samples; InputError unless they are evenly spaced from 0 on."""
+    if len(times) < 2 or abs(times[0]) > 1e-6:
+        raise InputError(source, TIME, "expected at least two samples, the first at 0")
+    usual = float(np.median(np.diff(times)))
+    uneven = np.abs(np.diff(times) - usual) > _UNEVEN * abs(usual)
+    if uneven.any():
+        before = int(uneven.argmax())
+        problem = f"found {times[before + 1]:g} after {times[before]:g}, expected {usual:g} s more"
+        raise InputError(source, f"line {before + 3}, {TIME}", problem)
+    if usual < (1.0 - _UNEVEN) * least:
+        problem = f"found samples {usual:g} s apart, expected at least {least:g} s"
+        raise InputError(source, TIME, problem)
+    return float(times[-1]) / (len(times) - 1)

@@ -1,0 +1,80 @@
+"""Commands of actuators: samples for each driven cable, in place of the signals of a network."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tetra_drake.errors import InputError
+from tetra_drake.physics.actuator import TENSION_MOTOR, WINCH
+from tetra_drake.robot.actuation import Actuation
+from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.schema import Scenario
+
+_NONE_COUPLED = -1
+"""Reach of oscillators none of which inhibit each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Command:
+    """What actuators shall do at evenly spaced times from 0 on; each sample is held until the next
+    one, the last one for ever."""
+
+    name: str
+    period: float
+    """Time (s) between samples."""
+    samples: np.ndarray
+    """(samples, driven cables): free lengths (m) for winches, tensions (N) for tension motors,
+    superimposed forces (N) for forces."""
+
+    @property
+    def gait(self) -> Gait:
+        """A gait of the command's name for a robot that follows it: a network that is never run."""
+        return Gait(name=self.name, weights=(), tau_a=1.0, tau_b=1.0)
+
+
+def commanded_robot(scenario: Scenario, command: Command) -> Robot:
+    """The robot of a scenario that follows a command: each driven cable has a signal of its own.
+
+    There is no network, so no start-up and no feedback. A tension motor plays no spring and damper,
+    which are in its command, and starts with its first tension. Raises InputError if the command is
+    for another number of cables.
+    """
+    plain = Robot.of(scenario)
+    driven, kind = plain.driven, plain.model.actuator.kind
+    if command.samples.shape[1:] != driven.shape:
+        problem = f"is of shape {command.samples.shape}, expected {driven.size} driven cables"
+        raise InputError(f"command {command.name}", "samples", problem)
+    cables = plain.structure.cables.copy()
+    cables["signal"][driven] = np.arange(driven.size)
+    if kind == TENSION_MOTOR:
+        cables["stiffness"][driven] = cables["damping"][driven] = 0.0
+    layout = dataclasses.replace(
+        plain.actuation.layout,
+        oscillators=tuple(plain.structure.cable_names[cable] for cable in driven),
+        groups=tuple((cable,) for cable in driven.tolist()),
+    )
+    actuation = Actuation(layout, _NONE_COUPLED)
+    structure = dataclasses.replace(plain.structure, cables=cables, actuation=actuation)
+    without_network = {"signals": "listing", "feedback": [], "start_up": 0.0}
+    cpg = scenario.cpg.model_copy(update=without_network)
+    robot = Robot.of(scenario.with_sections(cpg=cpg), structure)
+    signals = held_samples(command, cpg.listing_step, scenario.simulation.duration)
+    if kind == WINCH:
+        laws = cables[driven]
+        signals = laws["stiffness"] * (laws["free_length"] - signals)
+    return dataclasses.replace(robot, commanded=signals)
+
+
+def held_samples(command: Command, step: float, duration: float) -> np.ndarray:
+    """The command at 0, one `step` (s), two ... to beyond the duration (s).
+
+    Signals are linear between these times, so a change begins at its time and takes a step.
+    """
+    times = step * (np.arange(math.ceil(duration / step) + 2) - 1)
+    latest = np.floor(times / command.period + 1e-6).astype(int)
+    return command.samples[np.clip(latest, 0, len(command.samples) - 1)]
