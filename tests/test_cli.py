@@ -69,7 +69,7 @@ def unchanged(work):
         ("cpg --scenario short.yaml --out good.json/a.csv", "good.json/a.csv", ""),
         ("structure six_baer", "six_baer", ""),
         ("structure good.json", "good.json", "schema"),
-        ("structure prism --out good.json/a.html", "good.json", ""),
+        ("structure prism --out good.json/a.html", "good.json/a.html", ""),
         ("replay --out new/a.html missing", "missing", ""),
         ("replay good.json --out folder", "folder", ""),
     ],

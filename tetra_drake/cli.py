@@ -394,13 +394,14 @@ def _structure(options: Options) -> None:
     from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
 
     study = study_rest(robot_of_file(options.source, unit=options.unit))
-    print(structure_text(study))
+    text = structure_text(study)
     if options.out:
         save_structure_page(study, options.out)
-        print(f"to see the structure, open in a browser: {options.out}")
+        text += f"\nto see the structure, open in a browser: {options.out}"
     if options.mjcf:
         write_whole(options.mjcf, make_mjcf(study.robot))
-        print(f"wrote {options.mjcf}")
+        text += f"\nwrote {options.mjcf}"
+    print(text)
 
 
 def _add_scenario(command: Command, *, default: str) -> None:

@@ -42,7 +42,7 @@ ENGINES = pytest.mark.parametrize("engine", FINE.values(), ids=FINE)
 class Wound(Robot):
     """A robot whose actuators do not start as usual."""
 
-    drives: np.ndarray
+    drives: np.ndarray = dataclasses.field(kw_only=True)
 
     def starting_drives(self) -> np.ndarray:
         return self.drives
