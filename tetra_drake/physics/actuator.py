@@ -10,7 +10,10 @@ A *drive* is the state of an actuator, one for each driven cable of a winch or a
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
 
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
@@ -23,6 +26,15 @@ DRIVE, RATE, LIMITED, DRIVE_COLUMNS = range(4)
 motor, its rate per s, 1 where a limit binds or else 0; and their number."""
 
 
+class Limits(NamedTuple):
+    """What an actuator can do, in SI units; NaN where it has no limit."""
+
+    max_force: Real = math.nan
+    max_speed: Real = math.nan
+    time_constant: Real = math.nan
+    least_length: Real = math.nan
+
+
 class Actuator(NamedTuple):
     """The actuators of all driven cables."""
 
@@ -30,14 +42,10 @@ class Actuator(NamedTuple):
     limits: Table
     """The numbers of Limits."""
 
-
-class Limits(NamedTuple):
-    """What an actuator can do; SI units."""
-
-    max_force: Real
-    max_speed: Real
-    time_constant: Real
-    least_length: Real
+    @classmethod
+    def of(cls, kind: int, **limits: float) -> Self:
+        """Actuators of a kind, with values of Limits by name."""
+        return cls(kind, np.array(Limits(**limits)))
 
 
 class CableLaw(NamedTuple):
@@ -114,10 +122,3 @@ def motor_pull(
         rate=(target - drive) / limits.time_constant,
         limited=select(limited, 1.0, 0.0),
     )
-
-
-@inlined
-def put_drives(drives: Table, step: Real, moved: Table) -> None:
-    """Writes the drives after a step (s) at their rates, which begins at `drives`, as `moved`."""
-    for i in range(drives.shape[0]):
-        moved[i, DRIVE] = drives[i, DRIVE] + step * drives[i, RATE]

@@ -149,8 +149,6 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
         if name not in trajectory.coords or trajectory[name].values.tolist() != expected:
             raise InputError(path, name, f"is not that of the robot in {SCENARIO}")
     for name, dimensions in {"time": ("time",), **DIMENSIONS}.items():
-        if name == "free_length" and name not in trajectory:
-            continue  # of winches only
         if name not in trajectory or trajectory[name].dims != dimensions:
             raise InputError(path, name, f"is missing, or not over {', '.join(dimensions)}")
         values = trajectory[name].values
