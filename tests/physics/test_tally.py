@@ -1,6 +1,7 @@
 """The tally of a walk: work, signals, lifted bodies and tension of hand-made motions."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -36,6 +37,8 @@ def tallied(
     )
     tally = tally._replace(peaks=np.zeros(3), sums=np.zeros(4))
     pulls, pushes = np.zeros((2, PULL_COLUMNS)), np.zeros((3, 3))
+    ground, actuator = SimpleNamespace(carriers=CARRIERS), SimpleNamespace(kind=kind)
+    robot = SimpleNamespace(cables=CABLES, ground=ground, actuator=actuator)
     for k, time in enumerate(times):
         pulls[:, LENGTH] = lengths[k]
         pulls[:, TENSION] = 1.0 if tensions is None else tensions[k]
@@ -44,7 +47,8 @@ def tallied(
         with np.errstate(divide="ignore", invalid="ignore"):
             signal = np.array([signals[k]])
             driven = NO_DRIVES if drives is None else drives[k]
-            observe(tally, CABLES, CARRIERS, kind, time, signal, driven, pulls, pushes)
+            forces = SimpleNamespace(drives=driven, pulls=pulls, pushes=pushes)
+            observe(tally, robot, time, signal, forces)
     return tally
 
 

@@ -68,15 +68,5 @@ def observe_states(
         update_modes(states[k], forces.nodes, robot.ground, forces.frames, modes)
         forces.drives[:, DRIVE] = drives[k]
         compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
-        observe(
-            tally,
-            robot.cables,
-            robot.ground.carriers,
-            robot.actuator.kind,
-            times[k],
-            signals[k],
-            forces.drives,
-            forces.pulls,
-            forces.pushes,
-        )
+        observe(tally, robot, times[k], signals[k], forces)
         look(tally, robot, states[k], forces.nodes)

@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.simd.compiling import inlined
-from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
+from tetra_drake.simd.lanes import Real, Table, maximum, minimum, named, select
 
 DIRECT, WINCH, TENSION_MOTOR = range(3)
 """Kinds of actuators."""
@@ -70,10 +70,21 @@ class Pull(NamedTuple):
 
 
 @inlined
+def actuator_pull(
+    actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
+) -> Pull:
+    """Pull of a winch or a tension motor, for a cable of `length` that lengthens at `rate`."""
+    limits = named(Limits, actuator.limits)
+    if actuator.kind == WINCH:
+        return winch_pull(drive, length, rate, signal, law, limits)
+    return motor_pull(drive, length, rate, signal, law, limits)
+
+
+@inlined
 def winch_pull(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> Pull:
-    """Pull of a winch whose cable has a free length `drive`, for a cable that lengthens at `rate`.
+    """Pull of a winch whose cable has a free length `drive`.
 
     It follows its command with a lag, pays out at max_speed at most, and winds at most at
     max_speed (1 - tension / max_force). Above max_force it is driven backward. The tension depends
@@ -105,7 +116,7 @@ def winch_pull(
 def motor_pull(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> Pull:
-    """Pull of a tension motor of tension `drive`, for a cable that lengthens at `rate`.
+    """Pull of a tension motor of tension `drive`.
 
     It follows its command with a lag, pulls with max_force at most, and less the faster it winds:
     max_force (1 - winding speed / max_speed).

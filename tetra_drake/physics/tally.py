@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.physics.actuator import DIRECT, DRIVE, LIMITED, WINCH
-from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION, Cables
+from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION
 from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.physics.contact import NORMAL
+from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
@@ -47,20 +48,10 @@ class Tally(NamedTuple):
 
 
 @inlined
-def observe(
-    tally: Tally,
-    cables: Cables,
-    carriers: Table,
-    kind: int,
-    time: Real,
-    signals: Table,
-    drives: Table,
-    pulls: Table,
-    pushes: Table,
-) -> None:
-    """Adds the step that ends at a time (s), with the `drives` of actuators of a kind, the `pulls`
-    of cables and the `pushes` of the ground there. A second observation of the same time adds
-    nothing."""
+def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
+    """Adds the step that ends at a time (s) with these signals and forces. A second observation of
+    the same time adds nothing."""
+    cables, kind, drives, pulls = robot.cables, robot.actuator.kind, forces.drives, forces.pulls
     passed = time - tally.time[0]
     counts = (passed > 0.0) & (tally.time[0] >= tally.begins[0])
     counted, per_time = select(counts, passed, 0.0), select(counts, 1.0 / passed, 0.0)
@@ -87,7 +78,7 @@ def observe(
         tally.signals[k] = signals[k]
     tally.work[0] += work
     tally.roughness[0] += select(counts, roughness / passed, 0.0)
-    add_lifted(tally, carriers, counted, pushes)
+    add_lifted(tally, robot.ground.carriers, counted, forces.pushes)
     tally.time[0] = time
 
 

@@ -18,8 +18,6 @@ class Force(Section):
 
     lacking: ClassVar[tuple[str, ...]] = ("actuator_limited",)
     """Metrics that walks with such actuators do not have."""
-    in_mujoco: ClassVar[bool] = True
-    """True if MuJoCo can simulate them."""
 
     def law(self) -> Actuator:
         """Law as the kernels take it."""
@@ -32,7 +30,6 @@ class LimitedActuator(Section):
     """An actuator of limited force and speed on each driven cable, which then never pushes."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
-    in_mujoco: ClassVar[bool] = False
 
     max_force: float = quantity("N", gt=0)
     max_speed: float = quantity("m/s", gt=0)

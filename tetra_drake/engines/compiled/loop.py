@@ -234,17 +234,7 @@ def arrive(constants: Constants, walk: Walk) -> None:
         forces.drives[i, DRIVE] = walk.drives[i, DRIVE]
     update_modes(state, forces.nodes, robot.ground, forces.frames, walk.modes)
     compute_forces(robot, state, walk.modes, walk.signals, True, forces, walk.step.force)
-    observe(
-        walk.tally,
-        robot.cables,
-        robot.ground.carriers,
-        robot.actuator.kind,
-        walk.clock[TIME],
-        walk.signals,
-        forces.drives,
-        forces.pulls,
-        forces.pushes,
-    )
+    observe(walk.tally, robot, walk.clock[TIME], walk.signals, forces)
 
 
 @inlined
