@@ -91,11 +91,8 @@ def save_result_folder(
     result: SimulationResult,
     commanded: bool = False,
 ) -> None:
-    """Writes the files of a simulation that recorded its trajectory.
-
-    commanded: True if a command was played; then the gait, which is the command's, is left out.
-    Raises InputError if the folder cannot be written to.
-    """
+    """Writes the files of a simulation that recorded its trajectory; the gait of one that was
+    `commanded` is left out. Raises InputError if the folder cannot be written to."""
     from tetra_drake.results.result import save_result
     from tetra_drake.results.trajectory import save_dataset
 

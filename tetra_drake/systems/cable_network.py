@@ -12,7 +12,7 @@ from tetra_drake.robot.robot import Robot
 
 
 class CableNetwork(LeafSystem):
-    """The cables between the tetrahedra (thesis Eq. 6); no state.
+    """The cables between the tetrahedra (thesis Eq. 6), and what drives them.
 
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|
@@ -23,7 +23,7 @@ class CableNetwork(LeafSystem):
     | lengths           | (6 (n - 1),)   | m      | length of each cable                     |
 
     With `robot.cables.slack`, a cable that would have to push goes slack. Continuous state: the
-    drives of winches (m) or tension motors (N), see physics.actuator.
+    drives of winches (m) or tension motors (N), see physics.actuator; none with `!Force`.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -35,20 +35,16 @@ class CableNetwork(LeafSystem):
         self._force = np.empty(6 * bodies)
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self._signals = self.DeclareVectorInputPort("signals", structure.signals)
-        self._driven = len(self._forces.drives) > 0
-        inputs = {self._state.ticket(), self._signals.ticket()}
-        if self._driven:
-            self.DeclareContinuousState(BasicVector(robot.starting_drives()))
-            inputs.add(self.xc_ticket())
+        self.DeclareContinuousState(BasicVector(robot.starting_drives()))
+        inputs = {self._state.ticket(), self._signals.ticket(), self.xc_ticket()}
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, inputs)
         self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
 
     def _pull(self, context: Context) -> None:
         """Writes the generalized force and the cables' `pulls`."""
-        if self._driven:
-            drives = context.get_continuous_state_vector().CopyToVector()
-            self._forces.drives[:, DRIVE] = drives
+        drives = context.get_continuous_state_vector().CopyToVector()
+        self._forces.drives[:, DRIVE] = drives
         cable_forces(
             self._state.Eval(context),
             self._signals.Eval(context),
@@ -64,7 +60,7 @@ class CableNetwork(LeafSystem):
         )
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
-        if self._driven:
+        if derivatives.size():
             self._pull(context)
             derivatives.SetFromVector(self._forces.drives[:, RATE])
 

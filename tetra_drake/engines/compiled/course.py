@@ -150,8 +150,7 @@ def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
     bodies, signals = len(structure.bodies), structure.signals
     contacts, cables = len(structure.contacts), len(structure.cables)
     velocities, forces = np.zeros(BLOCK * bodies), Forces.of(robot.model)
-    drives = np.zeros_like(forces.drives)
-    drives[:, DRIVE] = robot.starting_drives()
+    forces.drives[:, DRIVE] = robot.starting_drives()
     return Walk(
         clock=np.zeros(CLOCK_ROWS),
         asked=np.zeros(ASKED_ROWS),
@@ -173,8 +172,8 @@ def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
         acceleration=velocities,
         signals=commanded[0] if len(commanded) else np.zeros(signals),
         end_signals=np.zeros(signals),
-        drives=drives,
-        end_drives=drives[:, DRIVE],
+        drives=forces.drives,
+        end_drives=forces.drives[:, DRIVE],
         neurons=make_neurons(initial_neurons(scenario.cpg, signals)),
         output=np.zeros(signals),
         tonic=robot.tonic_input(turns)[0],

@@ -120,7 +120,8 @@ class LaneEngine:
         log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
         log.states[lane, 0], log.modes[lane, 0] = walk.step.state, walk.modes
         log.signals[lane, 0] = walk.signals
-        log.recent[lane, : len(commanded)], clock[SAMPLES, lane] = commanded, len(commanded)
+        log.recent[lane, : len(commanded)] = commanded
+        clock[SAMPLES, lane] = len(commanded)
         log.drives[lane, 0] = walk.drives[:, DRIVE]
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)
