@@ -36,11 +36,9 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
     walk = trajectory.isel(cable=robot.driven)
     tension, length, free_length = walk.tension.values, walk.length.values, walk.free_length.values
     signal = trajectory.signal.values[:, cables["signal"]]
-    p_AB, v_AB = (
-        nodes.values[:, cables["node_b"]] - nodes.values[:, cables["node_a"]]
-        for nodes in (trajectory.p_WN, trajectory.v_WN)
-    )
-    rate = (p_AB * v_AB).sum(axis=2) / length
+    a, b = cables["node_a"], cables["node_b"]
+    p_WN, v_WN = trajectory.p_WN.values, trajectory.v_WN.values
+    rate = ((p_WN[:, b] - p_WN[:, a]) * (v_WN[:, b] - v_WN[:, a])).sum(axis=2) / length
 
     @np.vectorize
     def pull(drive: float, length: float, rate: float, signal: float, *law: float) -> Pull:
