@@ -142,8 +142,10 @@ def _export_options(command: Command) -> None:
     _add_gait(command, "gait", nargs="?")
     _add_scenario(command, default=_OF_GAIT)
     _add_engine(command)
-    rate, what = _quantity("Hz"), "samples per second (default: 100 Hz)"
-    command.add_argument("--rate", metavar="RATE", type=rate, default="100 Hz", help=what)
+    rate = "samples per second (default: 100 Hz)"
+    command.add_argument(
+        "--rate", metavar="RATE", type=_quantity("Hz"), default="100 Hz", help=rate
+    )
     _add_path(command, "--out", "DIR", "the new folder to write", required=True)
 
 

@@ -10,7 +10,7 @@ from pydrake.systems.framework import Context, Diagram
 
 from tetra_drake.engines.interface import Engine, Viewer
 from tetra_drake.engines.observer import Observer
-from tetra_drake.engines.sampler import Sample, Sampler, drives_at, motion_of
+from tetra_drake.engines.sampler import Sample, Sampler, drives_of, motion_of
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
@@ -48,6 +48,7 @@ class DrakeEngine(Engine):
         simulator = MakeSimulator(diagram, engine)
         integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
         signals, observer = diagram.GetOutputPort("signals"), Observer(robot)
+        drives_at = drives_of(diagram)
         work = _Work(integrator)
         aimer = _StepAimer(diagram, simulator, engine, work)
         times = motion_times(settings, record=record)
@@ -61,7 +62,7 @@ class DrakeEngine(Engine):
             _check(settings, now, velocities, work)
             aimer.aim(context, velocities)
             sampler.after_step(context)
-            observer.add(now, bodies, signals.Eval(context), drives_at(diagram, context))
+            observer.add(now, bodies, signals.Eval(context), drives_at(context))
             if viewer is not None and viewer.wants(now):
                 viewer.show(make_dataset(robot, motion_of(diagram, [Sample.of(context)])))
 

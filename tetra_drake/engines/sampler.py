@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -81,6 +81,7 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
     state, signals = diagram.GetOutputPort("state"), diagram.GetOutputPort("signals")
     context = diagram.CreateDefaultContext()
     ground = diagram.GetSubsystemByName("ground").GetMyContextFromRoot(context)
+    drives_at = drives_of(diagram)
     states_then, signals_then, modes_then, drives_then = [], [], [], []
     for sample in samples:
         context.SetTime(sample.time)
@@ -89,7 +90,7 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
             context.SetDiscreteState(group, values)
         states_then.append(state.Eval(context))
         signals_then.append(signals.Eval(context))
-        drives_then.append(drives_at(diagram, context))
+        drives_then.append(drives_at(context))
         modes = ground.get_discrete_state_vector().CopyToVector()
         modes_then.append(modes.reshape(-1, MODE_COLUMNS))
     return Motion(
@@ -101,7 +102,9 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
     )
 
 
-def drives_at(diagram: Diagram, context: Context) -> np.ndarray:
-    """The drives (drives,) in a context of a robot's diagram."""
-    cables = diagram.GetSubsystemByName("cables").GetMyContextFromRoot(context)
-    return cables.get_continuous_state_vector().CopyToVector()
+def drives_of(diagram: Diagram) -> Callable[[Context], np.ndarray]:
+    """The drives (drives,) by a context of a robot's diagram; empty without actuators."""
+    if not diagram.HasOutputPort("drives"):
+        return lambda context: np.zeros(0)
+    evaluate: Callable[[Context], np.ndarray] = diagram.GetOutputPort("drives").Eval
+    return evaluate

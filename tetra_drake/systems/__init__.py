@@ -1,5 +1,6 @@
 """The LeafSystems of the diagram: ports, state and events around the laws in `physics`."""
 
+from tetra_drake.systems.actuators import Actuators
 from tetra_drake.systems.cable_feedback import Feedback
 from tetra_drake.systems.cable_network import CableNetwork
 from tetra_drake.systems.ground_contact import GroundContact
@@ -8,6 +9,7 @@ from tetra_drake.systems.start_up_gate import StartUpGate
 from tetra_drake.systems.steering import Steering
 
 __all__ = [
+    "Actuators",
     "CableNetwork",
     "Feedback",
     "GroundContact",

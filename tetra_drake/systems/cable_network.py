@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from tetra_drake.physics.actuator import DRIVE, RATE
 from tetra_drake.physics.cable import LENGTH, TENSION, cable_forces
@@ -18,12 +18,14 @@ class CableNetwork(LeafSystem):
     |-------------------|----------------|--------|------------------------------------------|
     | state             | (13 n,)        | SI     | [q; v] of n free bodies, from the plant  |
     | signals           | (m,)           | N      | actuation, one per oscillator            |
+    | drives            | (drives,)      | m or N | of winches or motors, from `actuators`   |
     | generalized_force | (6 n,)         | N m, N | [t_W; f_W] at each body's origin         |
     | tensions          | (6 (n - 1),)   | N      | tension of each cable                    |
     | lengths           | (6 (n - 1),)   | m      | length of each cable                     |
+    | rates             | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 
-    With `robot.cables.slack`, a cable that would have to push goes slack. Continuous state: the
-    drives of winches (m) or tension motors (N), see physics.actuator; none with `!Force`.
+    With `robot.cables.slack`, a cable that would have to push goes slack. Ports of drives are there
+    with `actuation` of winches or tension motors only.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -35,16 +37,20 @@ class CableNetwork(LeafSystem):
         self._force = np.empty(6 * bodies)
         self._state = self.DeclareVectorInputPort("state", 13 * bodies)
         self._signals = self.DeclareVectorInputPort("signals", structure.signals)
-        self.DeclareContinuousState(BasicVector(robot.starting_drives()))
-        inputs = {self._state.ticket(), self._signals.ticket(), self.xc_ticket()}
+        inputs = {self._state.ticket(), self._signals.ticket()}
+        self._drives, drives = None, len(self._forces.drives)
+        if drives:
+            self._drives = self.DeclareVectorInputPort("drives", drives)
+            inputs.add(self._drives.ticket())
+            self.DeclareVectorOutputPort("rates", drives, self._calc_rates, inputs)
         self.DeclareVectorOutputPort("generalized_force", 6 * bodies, self._calc_force, inputs)
         self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
 
     def _pull(self, context: Context) -> None:
         """Writes the generalized force and the cables' `pulls`."""
-        drives = context.get_continuous_state_vector().CopyToVector()
-        self._forces.drives[:, DRIVE] = drives
+        if self._drives is not None:
+            self._forces.drives[:, DRIVE] = self._drives.Eval(context)
         cable_forces(
             self._state.Eval(context),
             self._signals.Eval(context),
@@ -59,11 +65,6 @@ class CableNetwork(LeafSystem):
             self._force,
         )
 
-    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
-        if derivatives.size():
-            self._pull(context)
-            derivatives.SetFromVector(self._forces.drives[:, RATE])
-
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         self._pull(context)
         output.SetFromVector(self._force)
@@ -75,3 +76,7 @@ class CableNetwork(LeafSystem):
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
         self._pull(context)
         output.SetFromVector(self._forces.pulls[:, LENGTH])
+
+    def _calc_rates(self, context: Context, output: BasicVector) -> None:
+        self._pull(context)
+        output.SetFromVector(self._forces.drives[:, RATE])

@@ -14,6 +14,7 @@ from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import signal_samples
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import (
+    Actuators,
     CableNetwork,
     Feedback,
     GroundContact,
@@ -36,13 +37,16 @@ def MakeTensegrityDiagram(
                                 ↑           │        │                     │
                                 └───────────┴────────┴─────────────────────┘
 
+        actuators ←──→ cables
+
     With `cpg.signals: live`, cpg is the network, else its signals, computed beforehand; feedback is
-    there if `cpg.feedback` is not empty. `steering` acts in place of the gait's turn.
+    there if `cpg.feedback` is not empty, actuators with winches or tension motors. `steering` acts
+    in place of the gait's turn.
 
     Input port: turn (steering, of a live network). Output ports: state (plant), signals
-    (start_up), tensions and lengths (cables), normal_forces, friction_forces and modes (ground);
-    the systems' docstrings give shapes and units. There is no SceneGraph: pictures are made from
-    trajectories.
+    (start_up), drives (actuators), tensions and lengths (cables), normal_forces, friction_forces
+    and modes (ground); the systems' docstrings give shapes and units. There is no SceneGraph:
+    pictures are made from trajectories.
     """
     scenario, structure = robot.scenario, robot.structure
     builder = DiagramBuilder()
@@ -69,6 +73,11 @@ def MakeTensegrityDiagram(
     builder.Connect(cables.GetOutputPort("generalized_force"), forces.get_input_port(0))
     builder.Connect(ground.GetOutputPort("generalized_force"), forces.get_input_port(1))
     builder.Connect(forces.get_output_port(), plant.get_applied_generalized_force_input_port())
+    if len(robot.starting_drives()):
+        actuators = builder.AddNamedSystem("actuators", Actuators(robot))
+        builder.Connect(cables.GetOutputPort("rates"), actuators.GetInputPort("rates"))
+        builder.Connect(actuators.get_output_port(), cables.GetInputPort("drives"))
+        builder.ExportOutput(actuators.get_output_port(), "drives")
     if scenario.cpg.feedback:
         gains = [gain for _, gain in gait.gains]
         feedback = builder.AddNamedSystem("feedback", Feedback(robot, gains=gains))

@@ -1,0 +1,33 @@
+"""The actuators of all driven cables as a system."""
+
+from __future__ import annotations
+
+from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
+
+from tetra_drake.robot.robot import Robot
+
+
+class Actuators(LeafSystem):
+    """The drives of winches or tension motors (see physics.actuator).
+
+    | port   | shape     | unit       | meaning                                                   |
+    |--------|-----------|------------|-----------------------------------------------------------|
+    | rates  | (drives,) | m/s or N/s | rate of each drive, from the cables                       |
+    | drives | (drives,) | m or N     | free length of each winch, or tension of each motor       |
+
+    Continuous state: the drives. The output depends on it alone, so the cables, which know lengths
+    and tensions, compute the rates without an algebraic loop.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__()
+        start = robot.starting_drives()
+        self._rates = self.DeclareVectorInputPort("rates", len(start))
+        self.DeclareContinuousState(BasicVector(start))
+        self.DeclareVectorOutputPort("drives", len(start), self._calc_drives, {self.xc_ticket()})
+
+    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
+        derivatives.SetFromVector(self._rates.Eval(context))
+
+    def _calc_drives(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_continuous_state_vector().CopyToVector())
