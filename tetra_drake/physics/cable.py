@@ -123,7 +123,8 @@ def cable_forces(
     p_BN: Table,
     first_node: Table,
     cables: Table,
-    actuator: Actuator,
+    kind: int,
+    limits: Table,
     slack: bool,
     drives: Table,
     nodes: Table,
@@ -131,7 +132,9 @@ def cable_forces(
     generalized_force: Table,
 ) -> None:
     """Writes [t_W; f_W] of all cables at each Bo, (6 bodies,), for a state of the bodies; also
-    `nodes`, `pulls` and the rates of `drives`."""
+    `nodes`, `pulls` and the rates of `drives`. `kind` and `limits` are an Actuator's: a call from
+    Python takes longer if it has to unpack them."""
     move_nodes(state, p_BN, first_node, nodes)
+    actuator = Actuator(kind, limits)
     add_cable_forces(nodes, signals, cables, actuator, slack, True, drives, pulls)
     gather_forces(nodes, first_node, generalized_force)

@@ -57,9 +57,11 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
     robot, text = Robot.of(scenario), read_text(path, "command file")
     try:
         # Cells are read as texts, and cells beyond the heading are left out.
-        cells = pandas.read_csv(io.StringIO(text), dtype=str, na_filter=False, index_col=False)
+        cells = pandas.read_csv(io.StringIO(text), dtype=str, na_filter=False)
     except ValueError as error:  # also what pandas raises for ragged rows and an empty file
         raise InputError(path, "", f"is no table: {error}") from error
+    if not isinstance(cells.index, pandas.RangeIndex):
+        raise InputError(path, "", "is no table: rows have more cells than the heading")
     wanted = [TIME, *command_columns(robot)]
     for name in cells.columns:
         if name not in wanted:

@@ -57,7 +57,7 @@ class CableNetwork(LeafSystem):
             self._model.p_BN,
             self._model.first_node,
             self._model.cables,
-            self._model.actuator,
+            *self._model.actuator,
             self._model.slack,
             self._forces.drives,
             self._forces.nodes,
