@@ -24,7 +24,6 @@ from tetra_drake.scenario.sections import hint
 from tetra_drake.scenario.structure_files import shipped_structures
 
 if TYPE_CHECKING:
-    from tetra_drake.robot.command import Command as RobotCommand
     from tetra_drake.robot.gait import Gait
 
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
@@ -106,10 +105,15 @@ def _simulate(options: Options) -> None:
     """
     from tetra_drake.engines.interface import check_can_be_watched
     from tetra_drake.engines.simulate import prepare, simulate
+    from tetra_drake.prototype.command_file import load_command
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
 
-    scenario, gait, command = _what_to_simulate(options)
+    scenario, gait = _chosen_gait(options)
+    scenario, command = scenario.with_changes(_engine_change(options)), None
+    if options.command_file is not None:
+        command = load_command(options.command_file, scenario)
+        gait = command.gait
     if options.meshcat:
         check_can_be_watched(scenario)
     check_result_folder(options.out)
@@ -122,8 +126,9 @@ def _simulate(options: Options) -> None:
     what: dict[str, Any] = {"command": command} if command else {"gait": gait}
     result = simulate(scenario=scenario, record=True, viewer=view, **what)
     print(result_text(scenario, gait, result))
-    commanded, out = command is not None, options.out
-    save_result_folder(out, scenario=scenario, gait=gait, result=result, commanded=commanded)
+    save_result_folder(
+        options.out, scenario=scenario, gait=gait, result=result, commanded=bool(command)
+    )
     print(
         f"wrote result.json, trajectory.nc, scenario.yaml and replay.html to {options.out}/\n"
         f"to watch the robot, open in a browser: {options.out / REPLAY}"
@@ -133,24 +138,14 @@ def _simulate(options: Options) -> None:
             input("press Enter to close the view in the browser ")
 
 
-def _what_to_simulate(options: Options) -> tuple[Scenario, Gait, RobotCommand | None]:
-    """The scenario, the gait and, if the robot follows one, the command, whose gait it is then."""
-    from tetra_drake.prototype.command_file import load_command
-
-    if options.command_file is None:
-        scenario, gait = _chosen_gait(options)
-        return scenario.with_changes(_engine_change(options)), gait, None
-    scenario = load_scenario(options.scenario or "thesis").with_changes(_engine_change(options))
-    command = load_command(options.command_file, scenario)
-    return scenario, command.gait, command
-
-
 def _export_options(command: Command) -> None:
     _add_gait(command, "gait", nargs="?")
     _add_scenario(command, default=_OF_GAIT)
     _add_engine(command)
     rate = "samples per second (default: 100 Hz)"
-    command.add_argument("--rate", metavar="RATE", type=_rate, default="100 Hz", help=rate)
+    command.add_argument(
+        "--rate", metavar="RATE", type=_quantity("Hz"), default="100 Hz", help=rate
+    )
     _add_path(command, "--out", "DIR", "the new folder to write", required=True)
 
 
@@ -327,7 +322,7 @@ def _compare_options(command: Command) -> None:
     runs = "folders written by `evolve`, finished or not, all with the same objective"
     _add_path(command, "runs", "RUN", runs, nargs="+")
     reach = "a distance to be reached, as '14.34 in'"
-    command.add_argument("--reach", metavar="LENGTH", type=_length, help=reach)
+    command.add_argument("--reach", metavar="LENGTH", type=_quantity("m"), help=reach)
     _add_path(command, "--out", "DIR", "write tables (CSV, JSON) and the figure into this folder")
 
 
@@ -465,21 +460,16 @@ def _integer(least: int) -> Callable[[str], int]:
     return parse
 
 
-def _length(text: str) -> float:
-    return _quantity(text, "m")
+def _quantity(unit: str) -> Callable[[str], float]:
+    def parse(text: str) -> float:
+        from tetra_drake.scenario.units import quantity_to_si
 
+        try:
+            return quantity_to_si(text, unit)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
 
-def _rate(text: str) -> float:
-    return _quantity(text, "Hz")
-
-
-def _quantity(text: str, unit: str) -> float:
-    from tetra_drake.scenario.units import quantity_to_si
-
-    try:
-        return quantity_to_si(text, unit)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+    return parse
 
 
 def _warn(text: str) -> None:

@@ -55,27 +55,6 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-@contextlib.contextmanager
-def whole_folder(path: str | Path) -> Iterator[Path]:
-    """Yields a temporary folder that becomes the new folder `path` if the block succeeds.
-
-    Raises InputError if there is such a file or folder already, or if it cannot be written.
-    """
-    path = Path(path)
-    if path.exists():
-        raise InputError(path, "", "exists, expected a new folder")
-    check_folder(path)
-    make_folder(path.parent, source=path)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as name:
-        folder = Path(name) / path.name
-        folder.mkdir()
-        try:
-            yield folder
-            folder.rename(path)
-        except OSError as error:
-            raise InputError(path, "", f"cannot be written: {error}") from error
-
-
 def _remove_stale(path: Path) -> None:
     """Removes temporary files of `path` whose processes have ended."""
     ours = re.compile(rf"\.{re.escape(path.stem)}\.(\d+)\.\w{{8}}{re.escape(path.suffix)}")

@@ -8,7 +8,7 @@ from helpers.actuations import MOTOR, WINCH
 
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.prototype.command_file import parse_command
+from tetra_drake.prototype.command_file import load_command
 from tetra_drake.prototype.export import COMMAND, export
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import load_gait, seeded_gait
@@ -118,8 +118,7 @@ def test_the_diagram_walks_by_the_file_of_a_recorded_gait(tmp_path):
     scenario = load_scenario("coulomb")
     gait = load_gait(RECORDED, scenario)
     export(scenario, gait, rate=100.0, out=tmp_path / "lab")
-    text = (tmp_path / "lab" / COMMAND).read_text()
-    command = parse_command(text, Robot.of(scenario), source="file")
+    command = load_command(tmp_path / "lab" / COMMAND, scenario)
     own = simulate(scenario=scenario, gait=gait).metrics.distance_in
     diagram = scenario.with_changes({"engine": "!Drake"})
     assert distance(diagram, command) == pytest.approx(own, rel=0.02)

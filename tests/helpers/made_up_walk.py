@@ -45,8 +45,9 @@ def make_walk(
     signals = 2.0 * np.sin(phase[:, np.newaxis] - np.arange(structure.signals))
     modes = np.zeros((*stands.shape, MODE_COLUMNS))
     modes[..., CONTACT] = stands
+    drives = np.zeros((len(times), 0))
     pushes = np.stack([-0.5 * normal, 0.0 * normal, normal], axis=-1)
-    walk = make_dataset(robot, Motion(times, states, signals, modes, pushes))
+    walk = make_dataset(robot, Motion(times, states, signals, modes, drives, pushes))
     driver = structure.cables["signal"]
     walk.tension[:] = 3.0 + np.where(driver < 0, 0.0, signals[:, driver])
     return walk

@@ -84,7 +84,8 @@ def slide_prism(robot: Robot, *, duration: float = 8.0) -> xarray.Dataset:
     states[:, [4, 11, 18]] += SPEED * times[:, np.newaxis]
     signals = np.sin(2.0 * np.pi / PERIOD * times[:, np.newaxis] - np.arange(3))
     modes = np.zeros((len(times), 6, MODE_COLUMNS))
+    drives = np.zeros((len(times), 0))
     weights = np.array([0.2, 0.0, 0.2, 0.0, 0.2, 0.0])
     pushes = np.zeros((len(times), 6, 3))
     pushes[..., 2] = weights
-    return make_dataset(robot, Motion(times, states, signals, modes, pushes))
+    return make_dataset(robot, Motion(times, states, signals, modes, drives, pushes))

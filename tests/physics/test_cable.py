@@ -6,7 +6,7 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.physics.actuator import DIRECT, DRIVE_COLUMNS, CableLaw
+from tetra_drake.physics.actuator import DIRECT, DRIVE_COLUMNS, Actuator, CableLaw
 from tetra_drake.physics.cable import PULL_COLUMNS, TENSION, cable_forces, cable_tension
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN
 from tetra_drake.robot.bodies import AddBodies
@@ -26,7 +26,7 @@ def forces_of_cables(
     nodes, pulls, force = np.empty((20, NODE_COLUMNS)), np.empty((24, PULL_COLUMNS)), np.empty(30)
     drives = np.empty((0, DRIVE_COLUMNS))
     points = structure.p_BN, structure.first_node
-    law = structure.cables, DIRECT, np.zeros(4), False
+    law = structure.cables, Actuator.of(DIRECT), False
     cable_forces(state, np.array(signals), *points, *law, drives, nodes, pulls, force)
     return force, pulls[:, TENSION]
 

@@ -1,6 +1,7 @@
 """The tally of a walk: work, signals, lifted bodies and tension of hand-made motions."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,18 +15,7 @@ from tetra_drake.physics.actuator import (
     WINCH,
 )
 from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, Cables
-from tetra_drake.physics.tally import (
-    EFFORT_COLUMNS,
-    FORCE,
-    LIMITED_TIME,
-    PEAK_FORCE,
-    PEAK_POWER,
-    PEAK_SPEED,
-    POWER,
-    SPEED,
-    Tally,
-    observe,
-)
+from tetra_drake.physics.tally import LIMITED_TIME, Tally, observe
 
 CABLES = Cables([3, 3], [4, 5], [0, PASSIVE], [1.0, 1.0], [0.0, 0.0], [0.0, 0.0])
 """The first is driven."""
@@ -45,8 +35,10 @@ def tallied(
     tally = Tally(*columns)._replace(
         begins=np.array([begins]), lengths=np.zeros(2), lifted=np.zeros(2), tension=np.full(1, 99.0)
     )
-    tally = tally._replace(effort=np.zeros(EFFORT_COLUMNS))
+    tally = tally._replace(peaks=np.zeros(3), sums=np.zeros(4))
     pulls, pushes = np.zeros((2, PULL_COLUMNS)), np.zeros((3, 3))
+    ground, actuator = SimpleNamespace(carriers=CARRIERS), SimpleNamespace(kind=kind)
+    robot = SimpleNamespace(cables=CABLES, ground=ground, actuator=actuator)
     for k, time in enumerate(times):
         pulls[:, LENGTH] = lengths[k]
         pulls[:, TENSION] = 1.0 if tensions is None else tensions[k]
@@ -55,7 +47,8 @@ def tallied(
         with np.errstate(divide="ignore", invalid="ignore"):
             signal = np.array([signals[k]])
             driven = NO_DRIVES if drives is None else drives[k]
-            observe(tally, CABLES, CARRIERS, kind, time, signal, driven, pulls, pushes)
+            forces = SimpleNamespace(drives=driven, pulls=pulls, pushes=pushes)
+            observe(tally, robot, time, signal, forces)
     return tally
 
 
@@ -120,11 +113,7 @@ PEAKS_AND_SUMS = {"peaks": [4.0, 0.2, 0.6], "sums": [12.0, 0.7, 1.4]}
 
 
 def effort_of(tally: Tally) -> dict[str, list[float]]:
-    effort = tally.effort
-    return {
-        "peaks": effort[[PEAK_FORCE, PEAK_SPEED, PEAK_POWER]].tolist(),
-        "sums": effort[[FORCE, SPEED, POWER]].tolist(),
-    }
+    return {"peaks": tally.peaks.tolist(), "sums": tally.sums[:LIMITED_TIME].tolist()}
 
 
 @pytest.mark.parametrize("kind", [DIRECT, TENSION_MOTOR])
@@ -134,7 +123,7 @@ def test_actuators_without_a_winch_wind_what_their_cables_shorten(kind):
     found = effort_of(tally)
     assert found["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
     assert found["sums"] == pytest.approx(PEAKS_AND_SUMS["sums"])
-    assert tally.effort[LIMITED_TIME] == 0.0
+    assert tally.sums[LIMITED_TIME] == 0.0
 
 
 def test_winches_wind_their_free_length_and_are_limited_for_a_time():
@@ -144,7 +133,7 @@ def test_winches_wind_their_free_length_and_are_limited_for_a_time():
     found = effort_of(tally)
     assert found["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
     assert found["sums"] == pytest.approx(PEAKS_AND_SUMS["sums"])
-    assert tally.effort[LIMITED_TIME] == pytest.approx(2.0 + 1.0)
+    assert tally.sums[LIMITED_TIME] == pytest.approx(2.0 + 1.0)
     assert tally.work[0] == pytest.approx(1.4), "of the tension"
 
 

@@ -1,17 +1,28 @@
 """The file of a command: it reads back as written, and bad ones are refused."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from helpers.actuations import FORCE, MOTOR, WINCH
 
 from tetra_drake.cli import main
-from tetra_drake.prototype.command_file import (
-    command_text,
-    load_command,
-    parse_command,
-)
+from tetra_drake.prototype.command_file import command_text, load_command
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
+
+
+@pytest.fixture
+def load(scenario, tmp_path, monkeypatch):
+    """Reads the content of a file, c.csv."""
+    monkeypatch.chdir(tmp_path)
+
+    def load_text(text: str) -> Command:
+        Path("c.csv").write_text(text)
+        return load_command("c.csv", scenario)
+
+    return load_text
+
 
 ACTUATIONS = {"force_N": FORCE, "free_length_mm": WINCH, "tension_N": MOTOR}
 
@@ -37,11 +48,11 @@ def test_a_free_length_is_in_millimetres(scenario):
     assert text.splitlines()[2] == ",".join(["0.500000", *["50.000000"] * 8])
 
 
-def test_columns_may_stand_in_any_order(robot):
+def test_columns_may_stand_in_any_order(robot, load):
     samples = np.arange(24.0).reshape(3, 8)
     rows = command_text(robot, Command("any", 0.01, samples)).splitlines()
     turned = "\n".join(",".join(row.split(",")[::-1]) for row in rows)
-    assert np.array_equal(parse_command(turned, robot, source="x").samples, samples)
+    assert np.array_equal(load(turned).samples, samples)
 
 
 FIRST, LAST = "T1-T2 outer bottom_left force_N", "T4-T5 outer bottom_right force_N"
@@ -54,7 +65,7 @@ BAD = {
         "T1-T2 outer bottom_right force_N.1",
         "",
     ),
-    "a column too few": ((FIRST + ",", ""), "", "is no table"),
+    "a column too few": ((FIRST + ",", ""), FIRST, "is missing"),
     "no number": (("0.010000,0.500000", "0.010000,"), f"line 3, {FIRST}", "''"),
     "NaN": (("0.010000,0.500000", "0.010000,nan"), f"line 3, {FIRST}", "'nan'"),
     "infinite": (("0.010000,0.500000", "0.010000,inf"), f"line 3, {FIRST}", "'inf'"),
@@ -66,39 +77,39 @@ BAD = {
 
 
 @pytest.mark.parametrize("wrong", BAD)
-def test_a_bad_file_is_refused(robot, wrong, refused):
+def test_a_bad_file_is_refused(robot, wrong, load, refused):
     (old, new), key, problem = BAD[wrong]
     text = command_text(robot, Command("half", 0.01, np.full((5, 8), 0.5)))
     assert old in text
     with refused("c.csv", key or new, problem):
-        parse_command(text.replace(old, new, 1), robot, source="c.csv")
+        load(text.replace(old, new, 1))
 
 
 @pytest.mark.parametrize(
     ("period", "problem"), [(1e-4, "samples 0.0001 s apart"), (0.0, "samples 0 s apart")]
 )
-def test_samples_closer_than_the_signals_are_refused(robot, period, problem, refused):
+def test_samples_closer_than_the_signals_are_refused(robot, period, problem, load, refused):
     text = command_text(robot, Command("dense", period, np.zeros((5, 8))))
     with refused("c.csv", "time_s", problem):
-        parse_command(text, robot, source="c.csv")
+        load(text)
 
 
-def test_a_file_that_only_goes_back_is_refused(robot, refused):
+def test_a_file_that_only_goes_back_is_refused(robot, load, refused):
     text = command_text(robot, Command("back", -0.01, np.zeros((5, 8))))
     with refused("c.csv", "time_s", "found samples -0.01 s apart"):
-        parse_command(text, robot, source="c.csv")
+        load(text)
 
 
 @pytest.mark.parametrize("rows", [1, 2])
-def test_a_file_without_two_samples_is_refused(robot, rows, refused):
+def test_a_file_without_two_samples_is_refused(robot, rows, load, refused):
     lines = command_text(robot, Command("short", 0.01, np.zeros((5, 8)))).splitlines()
     with refused("c.csv", "time_s", "at least two samples"):
-        parse_command("\n".join(lines[:rows]), robot, source="c.csv")
+        load("\n".join(lines[:rows]))
 
 
-def test_an_empty_file_is_refused(robot, refused):
+def test_an_empty_file_is_refused(load, refused):
     with refused("c.csv", "", "is no table"):
-        parse_command("", robot, source="c.csv")
+        load("")
 
 
 def test_simulate_refuses_a_bad_file_in_a_line_and_writes_nothing(tmp_path, monkeypatch, capsys):

@@ -50,7 +50,6 @@ def test_the_folder_loads_and_begins_where_the_robot_does(short, tmp_path):
     export(short, seeded_gait(short), rate=50.0, out=folder)
     names = {path.name for path in folder.iterdir()}
     assert names == {COMMAND, EXPECTED, LIMITS, SCENARIO, README}
-    assert [path.name for path in tmp_path.iterdir()] == ["lab"], "nothing temporary is left"
     assert load_command(folder / COMMAND, load_scenario(folder / SCENARIO)).period == 0.02
     expected = rows_of(folder / EXPECTED)
     assert len(expected) == 3 * 50 + 1
@@ -143,7 +142,7 @@ def test_an_export_that_fails_leaves_nothing(short, tmp_path):
     smaller = short.with_changes({"robot.tetrahedra": 3})
     with pytest.raises(InputError):
         export(smaller, wrong, rate=100.0, out=tmp_path / "new" / "lab")
-    assert not list((tmp_path / "new").iterdir())
+    assert not (tmp_path / "new").exists()
 
 
 def test_the_commands_write_and_play(short, tmp_path, monkeypatch, capsys):

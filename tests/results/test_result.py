@@ -28,6 +28,7 @@ def result_of(robot, states) -> SimulationResult:
         states=states,
         signals=np.zeros((len(states), robot.structure.signals)),
         modes=np.zeros((len(states), len(robot.structure.contacts), MODE_COLUMNS)),
+        drives=np.zeros((len(states), 0)),
     )
     work = IntegratorWork("none", 1.0, 1, 1)
     return make_result(robot, motion, totals=make_totals(), work=work, wall_time=1.0, record=False)

@@ -27,6 +27,7 @@ from tetra_drake.engines.interface import Engine, Outcome, Viewer
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
+from tetra_drake.physics.actuator import DIRECT
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.physics.inertia import XX
@@ -37,7 +38,6 @@ from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.actuator_kinds import Force
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.schema import Scenario
 
@@ -58,6 +58,8 @@ _POINT = 1e-8  # radius (m) of the spheres that touch the floor; a larger one sp
 _ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs of `contact` touch each other
 
 _STRETCH = 5000  # steps between two checks of whether a simulation is still stable
+
+_NO_DRIVES = np.zeros(0)  # as signals are forces
 
 _OBSERVED = 8  # steps from one observation to the next: with the default step, 1 ms
 
@@ -85,7 +87,7 @@ class MujocoEngine(Engine):
             kind = type(scenario.terrain).__name__
             problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline"
             raise InputError(scenario.name, "terrain", problem)
-        if not isinstance(scenario.actuation, Force):
+        if scenario.actuation.law().kind != DIRECT:
             kind = type(scenario.actuation).__name__
             problem = f"found !{kind}, but mujoco knows forces on cables only: !Force"
             raise InputError(scenario.name, "actuation", problem)
@@ -189,7 +191,7 @@ class _Simulator:
         state = np.empty(self._mujoco.mj_stateSize(self._model, kind))
         self._mujoco.mj_getState(self._model, data, state, kind)
         kept = np.tile(state, (len(steps_kept), 1))
-        observer.add(0.0, self.body_states(state[np.newaxis])[0], signals[0])
+        observer.add(0.0, self.body_states(state[np.newaxis])[0], signals[0], _NO_DRIVES)
         with Rollout(nthread=0) as rollout:
             for first in range(0, len(signals), _STRETCH):
                 check_time()
@@ -209,7 +211,8 @@ class _Simulator:
             return
         steps: list[int] = (first + chosen + 1).tolist()
         for step, state in zip(steps, self.body_states(states[chosen]), strict=True):
-            observer.add(self._step * step, state, signals[min(step, len(signals) - 1)])
+            now = signals[min(step, len(signals) - 1)]
+            observer.add(self._step * step, state, now, _NO_DRIVES)
 
     def _check(self, states: Array, first: int) -> None:
         """Raises Diverged if the states after step `first` and the next ones show a failure."""
@@ -243,7 +246,8 @@ class _Simulator:
         pushes = np.array([self._ground_forces(data, *row) for row in rows])
         modes = np.zeros((*pushes.shape[:2], MODE_COLUMNS))  # of friction: 0, as there are none
         modes[:, :, CONTACT] = pushes[:, :, 2] > 0.0
-        return Motion(times, self.body_states(states), signals, modes, pushes)
+        drives = np.tile(_NO_DRIVES, (len(times), 1))
+        return Motion(times, self.body_states(states), signals, modes, drives, pushes)
 
     def _ground_forces(self, data: Any, state: Array, signals: Array) -> Array:
         """(contacts, 3): MuJoCo's contact forces on the nodes along t1, t2 and n, in N."""

@@ -14,8 +14,6 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.simd.compiling import compiled
 from tetra_drake.simd.lanes import Table
 
-_NONE = np.zeros(0)
-
 _TOGETHER = 1000  # observations, as calls of kernels with many tables are slow
 
 
@@ -31,9 +29,7 @@ class Observer:
         self._forces = Forces.of(robot.model)
         self._waiting: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []
 
-    def add(
-        self, time: float, state: np.ndarray, signals: np.ndarray, drives: np.ndarray = _NONE
-    ) -> None:
+    def add(self, time: float, state: np.ndarray, signals: np.ndarray, drives: np.ndarray) -> None:
         """Adds a state (13 bodies,), the signals (m,) in N and the drives at a time (s)."""
         self._waiting.append((time, state, signals, drives))
         if len(self._waiting) == _TOGETHER:
@@ -72,15 +68,5 @@ def observe_states(
         update_modes(states[k], forces.nodes, robot.ground, forces.frames, modes)
         forces.drives[:, DRIVE] = drives[k]
         compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
-        observe(
-            tally,
-            robot.cables,
-            robot.ground.carriers,
-            robot.actuator.kind,
-            times[k],
-            signals[k],
-            forces.drives,
-            forces.pulls,
-            forces.pushes,
-        )
+        observe(tally, robot, times[k], signals[k], forces)
         look(tally, robot, states[k], forces.nodes)

@@ -10,10 +10,13 @@ A *drive* is the state of an actuator, one for each driven cable of a winch or a
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
 
 from tetra_drake.simd.compiling import inlined
-from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
+from tetra_drake.simd.lanes import Real, Table, maximum, minimum, named, select
 
 DIRECT, WINCH, TENSION_MOTOR = range(3)
 """Kinds of actuators."""
@@ -23,6 +26,15 @@ DRIVE, RATE, LIMITED, DRIVE_COLUMNS = range(4)
 motor, its rate per s, 1 where a limit binds or else 0; and their number."""
 
 
+class Limits(NamedTuple):
+    """What an actuator can do, in SI units; NaN where it has no limit."""
+
+    max_force: Real = math.nan
+    max_speed: Real = math.nan
+    time_constant: Real = math.nan
+    least_length: Real = math.nan
+
+
 class Actuator(NamedTuple):
     """The actuators of all driven cables."""
 
@@ -30,14 +42,10 @@ class Actuator(NamedTuple):
     limits: Table
     """The numbers of Limits."""
 
-
-class Limits(NamedTuple):
-    """What an actuator can do; SI units."""
-
-    max_force: Real
-    max_speed: Real
-    time_constant: Real
-    least_length: Real
+    @classmethod
+    def of(cls, kind: int, **limits: float) -> Self:
+        """Actuators of a kind, with values of Limits by name."""
+        return cls(kind, np.array(Limits(**limits)))
 
 
 class CableLaw(NamedTuple):
@@ -62,10 +70,21 @@ class Pull(NamedTuple):
 
 
 @inlined
+def actuator_pull(
+    actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
+) -> Pull:
+    """Pull of a winch or a tension motor, for a cable of `length` that lengthens at `rate`."""
+    limits = named(Limits, actuator.limits)
+    if actuator.kind == WINCH:
+        return winch_pull(drive, length, rate, signal, law, limits)
+    return motor_pull(drive, length, rate, signal, law, limits)
+
+
+@inlined
 def winch_pull(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> Pull:
-    """Pull of a winch whose cable has a free length `drive`, for a cable that lengthens at `rate`.
+    """Pull of a winch whose cable has a free length `drive`.
 
     It follows its command with a lag, pays out at max_speed at most, and winds at most at
     max_speed (1 - tension / max_force). Above max_force it is driven backward. The tension depends
@@ -97,7 +116,7 @@ def winch_pull(
 def motor_pull(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> Pull:
-    """Pull of a tension motor of tension `drive`, for a cable that lengthens at `rate`.
+    """Pull of a tension motor of tension `drive`.
 
     It follows its command with a lag, pulls with max_force at most, and less the faster it winds:
     max_force (1 - winding speed / max_speed).
@@ -114,10 +133,3 @@ def motor_pull(
         rate=(target - drive) / limits.time_constant,
         limited=select(limited, 1.0, 0.0),
     )
-
-
-@inlined
-def put_drives(drives: Table, step: Real, moved: Table) -> None:
-    """Writes the drives after a step (s) at their rates, which begins at `drives`, as `moved`."""
-    for i in range(drives.shape[0]):
-        moved[i, DRIVE] = drives[i, DRIVE] + step * drives[i, RATE]

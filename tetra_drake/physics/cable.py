@@ -11,12 +11,9 @@ from tetra_drake.physics.actuator import (
     DRIVE,
     LIMITED,
     RATE,
-    WINCH,
     Actuator,
     CableLaw,
-    Limits,
-    motor_pull,
-    winch_pull,
+    actuator_pull,
 )
 from tetra_drake.physics.kinematics import FORCE, P_WN, V_WN, gather_forces, move_nodes
 from tetra_drake.physics.vectors import (
@@ -29,7 +26,7 @@ from tetra_drake.physics.vectors import (
     vector_at,
 )
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Real, Table, inverse_sqrt, maximum, named
+from tetra_drake.simd.lanes import Real, Table, inverse_sqrt, maximum
 
 PASSIVE = -1
 """The `signal` of a cable that no signal drives."""
@@ -99,14 +96,17 @@ def add_cable_forces(
         signal = 0.0
         if driver != PASSIVE:
             signal = signals[driver]
-        rate, law = dot(v_AB, direction), law_of(cables, i)
+        rate = dot(v_AB, direction)
+        law = CableLaw(cables.stiffness[i], cables.damping[i], cables.free_length[i])
         if driver == PASSIVE or actuator.kind == DIRECT:
             slope = law.damping
             tension = cable_tension(length, rate, signal, law)
             if slack:
                 tension = maximum(tension, 0.0)
         else:
-            tension, slope = drive_cable(drives, drive, length, rate, signal, law, actuator)
+            pull = actuator_pull(actuator, drives[drive, DRIVE], length, rate, signal, law)
+            tension, slope = pull.tension, pull.slope
+            drives[drive, RATE], drives[drive, LIMITED] = pull.rate, pull.limited
             drive += 1
         force = scaled(tension, direction)
         add_vector(force, a, FORCE, nodes)
@@ -114,33 +114,6 @@ def add_cable_forces(
         if keep:
             put_vector(direction, i, DIRECTION, pulls)
             pulls[i, LENGTH], pulls[i, TENSION], pulls[i, SLOPE] = length, tension, slope
-
-
-@inlined
-def law_of(cables: Table, i: int) -> CableLaw:
-    """The constants of a cable."""
-    return CableLaw(cables.stiffness[i], cables.damping[i], cables.free_length[i])
-
-
-@inlined
-def drive_cable(
-    drives: Table,
-    i: int,
-    length: Real,
-    rate: Real,
-    signal: Real,
-    law: CableLaw,
-    actuator: Actuator,
-) -> tuple[Real, Real]:
-    """Tension and slope of a cable that a winch or a tension motor drives; writes the rate of its
-    drive, the i-th."""
-    limits = named(Limits, actuator.limits)
-    if actuator.kind == WINCH:
-        pull = winch_pull(drives[i, DRIVE], length, rate, signal, law, limits)
-    else:
-        pull = motor_pull(drives[i, DRIVE], length, rate, signal, law, limits)
-    drives[i, RATE], drives[i, LIMITED] = pull.rate, pull.limited
-    return pull.tension, pull.slope
 
 
 @compiled
@@ -159,7 +132,8 @@ def cable_forces(
     generalized_force: Table,
 ) -> None:
     """Writes [t_W; f_W] of all cables at each Bo, (6 bodies,), for a state of the bodies; also
-    `nodes`, `pulls` and the rates of `drives`. `kind` and `limits` are an Actuator's."""
+    `nodes`, `pulls` and the rates of `drives`. `kind` and `limits` are an Actuator's: a call from
+    Python takes longer if it has to unpack them."""
     move_nodes(state, p_BN, first_node, nodes)
     actuator = Actuator(kind, limits)
     add_cable_forces(nodes, signals, cables, actuator, slack, True, drives, pulls)

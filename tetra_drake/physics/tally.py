@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.physics.actuator import DIRECT, DRIVE, LIMITED, WINCH
-from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION, Cables
+from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION
 from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.physics.contact import NORMAL
+from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.model import Model
 from tetra_drake.simd.compiling import inlined
-from tetra_drake.simd.lanes import Real, Table, Truth, maximum, minimum, select
+from tetra_drake.simd.lanes import Real, Table, maximum, minimum, select
 
-PEAK_FORCE, FORCE, PEAK_SPEED, SPEED, PEAK_POWER, POWER, LIMITED_TIME, EFFORT_COLUMNS = range(8)
-"""Places in `effort`: the greatest tension (N), winding speed (m/s) and power (W) of an actuator;
-the integrals of tension, winding speed of either sign and positive power, and the time at a limit,
-sums over all actuators; and their number."""
+FORCE, SPEED, POWER, LIMITED_TIME = range(4)
+"""Places in the tally's `peaks` and `sums` of actuators."""
 
 
 class Tally(NamedTuple):
@@ -33,8 +32,11 @@ class Tally(NamedTuple):
     work: Table
     """(1,): the integral of max(0, -S dl/dt) of the driven cables, in J. With winches and tension
     motors, S is the tension."""
-    effort: Table
-    """(EFFORT_COLUMNS,): what the actuators do."""
+    peaks: Table
+    """(3,): greatest tension (N), winding speed (m/s) and power (W) of an actuator."""
+    sums: Table
+    """(4,): integrals, summed over all actuators, of tension, of winding speed of either sign and
+    of positive power; and the time at a limit."""
     roughness: Table
     """(1,): the integral of (dS/dt)² of all signals, in N²/s."""
     lifted: Table
@@ -45,99 +47,53 @@ class Tally(NamedTuple):
     """(1,): the least distance between struts, in m; see physics.clearance."""
 
 
-class Effort(NamedTuple):
-    """What actuators do in a step: the most of one, and sums over all."""
-
-    most_force: Real
-    """N."""
-    most_wound: Real
-    """Length wound, m."""
-    most_work: Real
-    """J."""
-    force: Real
-    way: Real
-    """Length wound or paid out, m."""
-    work: Real
-    """Positive work, J."""
-    limited: Real
-    """How many are at a limit."""
-
-
 @inlined
-def observe(
-    tally: Tally,
-    cables: Cables,
-    carriers: Table,
-    kind: int,
-    time: Real,
-    signals: Table,
-    drives: Table,
-    pulls: Table,
-    pushes: Table,
-) -> None:
-    """Adds the step that ends at a time (s), with the `drives` of actuators of a kind, the `pulls`
-    of cables and the `pushes` of the ground there. A second observation of the same time adds
-    nothing."""
+def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
+    """Adds the step that ends at a time (s) with these signals and forces. A second observation of
+    the same time adds nothing."""
+    cables, kind, drives, pulls = robot.cables, robot.actuator.kind, forces.drives, forces.pulls
     passed = time - tally.time[0]
     counts = (passed > 0.0) & (tally.time[0] >= tally.begins[0])
-    zero = 0.0 * passed
-    work, roughness, tension = zero, zero, tally.tension[0]
-    effort = Effort(zero, zero, zero, zero, zero, zero, zero)
+    counted, per_time = select(counts, passed, 0.0), select(counts, 1.0 / passed, 0.0)
+    work, roughness, tension = 0.0 * passed, 0.0 * passed, tally.tension[0]
     drive = 0
     for i in range(tally.lengths.size):
         driver = cables.signal[i]
         if driver != PASSIVE:
             force, left = 0.5 * (tally.signals[driver] + signals[driver]), pulls[i, LENGTH]
-            limited = zero
             if kind != DIRECT:
-                force, limited = pulls[i, TENSION], drives[drive, LIMITED]
+                force = pulls[i, TENSION]
                 left = drives[drive, DRIVE] if kind == WINCH else left
+                tally.sums[LIMITED_TIME] += counted * drives[drive, LIMITED]
                 drive += 1
-            wound = tally.lengths[i] - left
-            work += maximum(force * wound, 0.0)
+            wound = select(counts, tally.lengths[i] - left, 0.0)
             tally.lengths[i] = left
-            effort = with_actuator(effort, pulls[i, TENSION], wound, limited)
+            work += maximum(force * wound, 0.0)
+            add_actuator(tally, pulls[i, TENSION], wound, counted, per_time)
         tension = minimum(tension, pulls[i, TENSION])
     tally.tension[0] = tension
     for k in range(tally.signals.size):
         change = signals[k] - tally.signals[k]
         roughness += change * change
         tally.signals[k] = signals[k]
-    tally.work[0] += select(counts, work, 0.0)
+    tally.work[0] += work
     tally.roughness[0] += select(counts, roughness / passed, 0.0)
-    add_effort(tally.effort, effort, counts, passed)
-    add_lifted(tally, carriers, select(counts, passed, 0.0), pushes)
+    add_lifted(tally, robot.ground.carriers, counted, forces.pushes)
     tally.time[0] = time
 
 
 @inlined
-def with_actuator(effort: Effort, tension: Real, wound: Real, limited: Real) -> Effort:
-    """The effort of a step with another actuator, which has `wound` some of its cable (m) under a
-    tension (N)."""
-    work = tension * wound
-    return Effort(
-        most_force=maximum(effort.most_force, tension),
-        most_wound=maximum(effort.most_wound, wound),
-        most_work=maximum(effort.most_work, work),
-        force=effort.force + tension,
-        way=effort.way + abs(wound),
-        work=effort.work + maximum(work, 0.0),
-        limited=effort.limited + limited,
-    )
-
-
-@inlined
-def add_effort(sums: Table, effort: Effort, counts: Truth, passed: Real) -> None:
-    """Adds the effort of a step that has taken some time (s) if it counts."""
-    per_time = 1.0 / passed
-    speed, power = effort.most_wound * per_time, effort.most_work * per_time
-    sums[PEAK_FORCE] = maximum(sums[PEAK_FORCE], select(counts, effort.most_force, 0.0))
-    sums[PEAK_SPEED] = maximum(sums[PEAK_SPEED], select(counts, speed, 0.0))
-    sums[PEAK_POWER] = maximum(sums[PEAK_POWER], select(counts, power, 0.0))
-    sums[FORCE] += select(counts, passed * effort.force, 0.0)
-    sums[SPEED] += select(counts, effort.way, 0.0)
-    sums[POWER] += select(counts, effort.work, 0.0)
-    sums[LIMITED_TIME] += select(counts, passed * effort.limited, 0.0)
+def add_actuator(tally: Tally, tension: Real, wound: Real, passed: Real, per_time: Real) -> None:
+    """Adds an actuator that has `wound` some of its cable (m) under a tension (N) in the time that
+    has passed (s); all but the tension is 0 where a step does not count."""
+    peaks, sums, work = tally.peaks, tally.sums, tension * wound
+    force = select(passed > 0.0, tension, 0.0)
+    peaks[FORCE] = maximum(peaks[FORCE], force)
+    peaks[SPEED] = maximum(peaks[SPEED], wound * per_time)
+    peaks[POWER] = maximum(peaks[POWER], work * per_time)
+    sums[FORCE] += passed * tension
+    sums[SPEED] += abs(wound)
+    sums[POWER] += maximum(work, 0.0)
 
 
 @inlined

@@ -54,48 +54,41 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
 
     Raises InputError, naming file and place, for whatever is wrong in the file or does not fit.
     """
-    return parse_command(read_text(path, "command file"), Robot.of(scenario), source=path)
-
-
-def parse_command(text: str, robot: Robot, *, source: str | Path) -> Command:
-    """The command in the content of its file; raises InputError, see load_command()."""
+    robot, text = Robot.of(scenario), read_text(path, "command file")
     try:
-        cells = pandas.read_csv(io.StringIO(text), dtype=str, keep_default_na=False)
+        # Cells are read as texts, and cells beyond the heading are left out.
+        cells = pandas.read_csv(io.StringIO(text), dtype=str, na_filter=False)
     except ValueError as error:  # also what pandas raises for ragged rows and an empty file
-        raise InputError(source, "", f"is no table: {error}") from error
+        raise InputError(path, "", f"is no table: {error}") from error
     if not isinstance(cells.index, pandas.RangeIndex):
-        raise InputError(source, "", "is no table: rows have more cells than the heading")
+        raise InputError(path, "", "is no table: rows have more cells than the heading")
     wanted = [TIME, *command_columns(robot)]
     for name in cells.columns:
         if name not in wanted:
-            raise InputError(source, name, f"is no column of this robot; {hint(name, wanted)}")
+            raise InputError(path, name, f"is no column of this robot; {hint(name, wanted)}")
     for name in wanted:
         if name not in cells.columns:
-            raise InputError(source, name, "is missing")
-    table = cells[wanted].apply(pandas.to_numeric, errors="coerce").to_numpy(dtype=float)
-    wrong = np.argwhere(~np.isfinite(table))
-    if len(wrong):
-        row, column = wrong[0]
-        place = f"line {row + 2}, {wanted[column]}"
-        raise InputError(
-            source, place, f"found '{cells[wanted].iat[row, column]}', expected a number"
-        )
+            raise InputError(path, name, "is missing")
+        numbers = pandas.to_numeric(cells[name], errors="coerce")
+        for row in np.flatnonzero(~np.isfinite(numbers)):
+            problem = f"found '{cells[name][row]}', expected a number"
+            raise InputError(path, f"line {row + 2}, {name}", problem)
+        cells[name] = numbers
     _, unit = QUANTITIES[robot.model.actuator.kind]
-    period = _period(table[:, 0], robot.scenario.cpg.listing_step, source)
-    return Command(Path(source).name, period, unit * table[:, 1:])
+    table = cells[wanted].to_numpy(dtype=float)
+    period = _period(table[:, 0], scenario.cpg.listing_step, path)
+    return Command(Path(path).name, period, unit * table[:, 1:])
 
 
 def _period(times: np.ndarray, least: float, source: str | Path) -> float:
     """Time (s) between samples; InputError unless they are evenly spaced from 0 on."""
     if len(times) < 2 or abs(times[0]) > 1e-6:
         raise InputError(source, TIME, "expected at least two samples, the first at 0")
-    usual = float(np.median(np.diff(times)))
-    uneven = np.abs(np.diff(times) - usual) > _UNEVEN * abs(usual)
-    if uneven.any():
-        before = int(uneven.argmax())
-        problem = f"found {times[before + 1]:g} after {times[before]:g}, expected {usual:g} s more"
-        raise InputError(source, f"line {before + 3}, {TIME}", problem)
-    if usual < (1.0 - _UNEVEN) * least:
-        problem = f"found samples {usual:g} s apart, expected at least {least:g} s"
+    period = float(np.median(np.diff(times)))
+    if period < (1.0 - _UNEVEN) * least:
+        problem = f"found samples {period:g} s apart, expected at least {least:g} s"
         raise InputError(source, TIME, problem)
+    for row in np.flatnonzero(np.abs(np.diff(times) - period) > _UNEVEN * period):
+        problem = f"found {times[row + 1]:g} after {times[row]:g}, expected {period:g} s more"
+        raise InputError(source, f"line {row + 3}, {TIME}", problem)
     return float(times[-1]) / (len(times) - 1)

@@ -10,16 +10,15 @@ import numpy as np
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.files import whole_folder
+from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import fixed
-from tetra_drake.prototype.command_file import command_text, parse_command, table_text
+from tetra_drake.prototype.command_file import command_text, load_command, table_text
 from tetra_drake.prototype.loads import Loads, actuator_loads
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.units import INCH
 
 COMMAND, EXPECTED, LIMITS = "command.csv", "expected.csv", "limits.csv"
 SCENARIO, README = "scenario.yaml", "README.md"
@@ -36,43 +35,41 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
     Raises InputError, and SimulationFailure if the gait's own simulation fails.
     """
     check_rate(rate, scenario)
-    with whole_folder(out) as folder:
-        each = math.ceil(LEAST_RATE / rate)
-        finely = scenario.simulation.model_copy(update={"sample_period": 1.0 / (rate * each)})
-        recorded = scenario.with_sections(simulation=finely)
-        result = simulate(scenario=recorded, gait=gait, record=True)
-        assert result.trajectory is not None
-        robot = Robot.of(scenario)
-        loads, motion = (
-            actuator_loads(robot, result.trajectory),
-            result.trajectory[{"time": slice(None, None, each)}],
-        )
-        commands = command_text(robot, Command(gait.name, 1.0 / rate, loads.commands[::each]))
-        nodes = 1e3 * motion.p_WN.values.reshape(motion.time.size, -1)
-        axes = [f"{node} {axis}_mm" for node in robot.structure.node_names for axis in "xyz"]
-        verdict = (
-            f"{load_verdict(loads, result.trajectory.time.values)}\n{_played(robot, commands)}"
-        )
-        verdict += f"; the gait itself goes {fixed(result.metrics.distance / INCH)} in."
-        readme = resources.files("tetra_drake") / "prototype/README.template.md"
-        about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
-        (folder / COMMAND).write_text(commands)
-        (folder / EXPECTED).write_text(table_text(axes, motion.time.values, nodes))
-        (folder / LIMITS).write_text(loads.table.to_csv(float_format="%.6g"))
-        (folder / SCENARIO).write_text(dump_scenario(scenario))
-        (folder / README).write_text(readme.read_text("utf-8").format(**about))
+    out = Path(out)
+    if out.exists():
+        raise InputError(out, "", "exists, expected a new folder")
+    check_folder(out)
+    each = math.ceil(LEAST_RATE / rate)
+    finely = scenario.simulation.model_copy(update={"sample_period": 1.0 / (rate * each)})
+    recorded = scenario.with_sections(simulation=finely)
+    result = simulate(scenario=recorded, gait=gait, record=True)
+    assert result.trajectory is not None
+    robot, motion = Robot.of(scenario), result.trajectory.isel(time=slice(None, None, each))
+    loads = actuator_loads(robot, result.trajectory)
+    command = Command(gait.name, 1.0 / rate, loads.commands[::each])
+    axes = [f"{node} {axis}_mm" for node in robot.structure.node_names for axis in "xyz"]
+    positions = 1e3 * motion.p_WN.values.reshape(-1, len(axes))
+    write_whole(out / COMMAND, command_text(robot, command))
+    write_whole(out / EXPECTED, table_text(axes, motion.time.values, positions))
+    write_whole(out / LIMITS, loads.table.to_csv(float_format="%.6g"))
+    write_whole(out / SCENARIO, dump_scenario(scenario))
+
+    played, distance = _played(scenario, out / COMMAND), fixed(result.metrics.distance_in)
+    verdict = load_verdict(loads, result.trajectory.time.values)
+    verdict += f"\n{played}; the gait itself goes {distance} in."
+    readme = (resources.files("tetra_drake") / "prototype/README.template.md").read_text("utf-8")
+    about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
+    write_whole(out / README, readme.format(**about))
     return verdict
 
 
 def check_rate(rate: float, scenario: Scenario) -> None:
     """Raises InputError for a rate (Hz) at which the scenario's gaits cannot be exported."""
-    most, periods = 1.0 / scenario.cpg.listing_step, scenario.simulation.duration * rate
-    if not 0.0 < rate <= most * (1.0 + 1e-9):
-        problem = f"found {rate:g} Hz, expected more than 0 and at most {most:g} Hz"
-        raise InputError("--rate", "", problem)
-    if abs(periods - max(round(periods), 1)) > 1e-6 * periods:
-        problem = f"found {rate:g} Hz, which gives {periods:g} samples, expected a whole number"
-        raise InputError("--rate", "", problem)
+    most, duration = 1.0 / scenario.cpg.listing_step, scenario.simulation.duration
+    in_range, periods = 0.0 < rate <= most * (1.0 + 1e-9), duration * rate
+    if not in_range or abs(periods - round(periods)) > 1e-6 * periods:
+        expected = f"at most {most:g} Hz, and a whole number of samples in {duration:g} s"
+        raise InputError("--rate", "", f"found {rate:g} Hz, expected {expected}")
 
 
 def load_verdict(loads: Loads, times: np.ndarray) -> str:
@@ -90,11 +87,10 @@ def load_verdict(loads: Loads, times: np.ndarray) -> str:
     return f"{table}\nThe actuators cannot play it: {binds}."
 
 
-def _played(robot: Robot, text: str) -> str:
+def _played(scenario: Scenario, file: Path) -> str:
     """How far the simulation of a command file goes."""
-    command = parse_command(text, robot, source=COMMAND)
     try:
-        result = simulate(scenario=robot.scenario, command=command)
+        result = simulate(scenario=scenario, command=load_command(file, scenario))
     except SimulationFailure as failure:
-        return f"Played from {COMMAND}, the {failure}"
-    return f"Played from {COMMAND}, the robot goes {fixed(result.metrics.distance_in)} in"
+        return f"Played from {file.name}, the {failure}"
+    return f"Played from {file.name}, the robot goes {fixed(result.metrics.distance_in)} in"

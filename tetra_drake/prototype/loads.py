@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 import pandas
 import xarray
 
-from tetra_drake.physics.actuator import (
-    DIRECT,
-    WINCH,
-    CableLaw,
-    Limits,
-    Pull,
-    motor_pull,
-    winch_pull,
-)
+from tetra_drake.physics.actuator import DIRECT, WINCH, CableLaw, Limits, Pull, actuator_pull
+from tetra_drake.physics.cable import cable_tension
 from tetra_drake.robot.robot import Robot
 
 _HAIR = 1e-9
@@ -39,48 +31,32 @@ class Loads(NamedTuple):
 
 def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
     """The loads in a trajectory of a robot that walks by a gait."""
-    driven, (kind, numbers) = robot.driven, robot.model.actuator
-    laws, limits = robot.structure.cables[driven], Limits(*numbers)
-    length, tension = (trajectory[name].values[:, driven] for name in ("length", "tension"))
-    signal, left = trajectory.signal.values[:, laws["signal"]], length
-    a, b = laws["node_a"], laws["node_b"]
+    cables, actuator = robot.structure.cables[robot.driven], robot.model.actuator
+    law, limits = CableLaw(*(cables[name] for name in CableLaw._fields)), Limits(*actuator.limits)
+    walk = trajectory.isel(cable=robot.driven)
+    tension, length, free_length = walk.tension.values, walk.length.values, walk.free_length.values
+    signal = trajectory.signal.values[:, cables["signal"]]
+    a, b = cables["node_a"], cables["node_b"]
     p_WN, v_WN = trajectory.p_WN.values, trajectory.v_WN.values
     rate = ((p_WN[:, b] - p_WN[:, a]) * (v_WN[:, b] - v_WN[:, a])).sum(axis=2) / length
-    if kind == DIRECT:
-        limited, unlimited = np.full_like(rate, math.nan), Limits(*[math.nan] * len(numbers))
-        return Loads(signal, limited, _table(robot, tension, -rate, left, limited, unlimited))
-    pull_of: Callable[..., Pull] = winch_pull if kind == WINCH else motor_pull
-    drive = trajectory.free_length.values[:, driven] if kind == WINCH else tension
 
-    def rate_of_drive(*now: float) -> tuple[float, float]:
-        pull = pull_of(*now[:4], CableLaw(*now[4:]), limits)
-        return pull.rate, pull.limited
+    @np.vectorize
+    def pull(drive: float, length: float, rate: float, signal: float, *law: float) -> Pull:
+        return actuator_pull(actuator, drive, length, rate, signal, CableLaw(*law))
 
-    law = [laws[name] for name in CableLaw._fields]
-    along = np.vectorize(rate_of_drive)
-    drive_rate, limited = along(drive + _HAIR, length, rate, signal, *law)
-    if kind == WINCH:
-        commands, left, rate = laws["free_length"] - signal / laws["stiffness"], drive, drive_rate
+    if actuator.kind == DIRECT:
+        commands, left, limited = signal, length, np.full_like(length, math.nan)
+    elif actuator.kind == WINCH:
+        commands, left = law.free_length - signal / law.stiffness, free_length
+        _, _, rate, limited = pull(left + _HAIR, length, rate, signal, *law)
     else:
-        commands = tension + limits.time_constant * drive_rate
-        limits = limits._replace(least_length=math.nan)
-    return Loads(commands, limited, _table(robot, tension, -rate, left, limited, limits))
-
-
-def _table(
-    robot: Robot,
-    tension: np.ndarray,
-    speed: np.ndarray,
-    left: np.ndarray,
-    limited: np.ndarray,
-    limits: Limits,
-) -> pandas.DataFrame:
-    """The table of Loads; all arrays are (times, driven cables), `speed` is that of winding."""
-    power = tension * speed
+        commands = np.clip(cable_tension(length, rate, signal, law), 0.0, limits.max_force)
+        left, limited = length, pull(tension + _HAIR, length, rate, signal, *law)[3]
+    power = -tension * rate
     columns = {
         "peak_force_N": tension.max(axis=0),
         "limit_of_force_N": limits.max_force,
-        "peak_speed_mm_per_s": 1e3 * np.abs(speed).max(axis=0),
+        "peak_speed_mm_per_s": 1e3 * np.abs(rate).max(axis=0),
         "limit_of_speed_mm_per_s": 1e3 * limits.max_speed,
         "travel_mm": 1e3 * np.ptp(left, axis=0),
         "least_length_mm": 1e3 * left.min(axis=0),
@@ -90,5 +66,4 @@ def _table(
         "mean_power_W": np.maximum(power, 0.0).mean(axis=0),
         "time_at_a_limit_percent": 100.0 * limited.mean(axis=0),
     }
-    names = [robot.structure.cable_names[cable] for cable in robot.driven]
-    return pandas.DataFrame(columns, index=pandas.Index(names, name="cable"))
+    return Loads(commands, limited, pandas.DataFrame(columns, index=walk.cable.to_index()))

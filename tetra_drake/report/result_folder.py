@@ -91,11 +91,8 @@ def save_result_folder(
     result: SimulationResult,
     commanded: bool = False,
 ) -> None:
-    """Writes the files of a simulation that recorded its trajectory.
-
-    commanded: True if a command was played; then the gait, which is the command's, is left out.
-    Raises InputError if the folder cannot be written to.
-    """
+    """Writes the files of a simulation that recorded its trajectory; the gait of one that was
+    `commanded` is left out. Raises InputError if the folder cannot be written to."""
     from tetra_drake.results.result import save_result
     from tetra_drake.results.trajectory import save_dataset
 
@@ -149,8 +146,6 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
         if name not in trajectory.coords or trajectory[name].values.tolist() != expected:
             raise InputError(path, name, f"is not that of the robot in {SCENARIO}")
     for name, dimensions in {"time": ("time",), **DIMENSIONS}.items():
-        if name == "free_length" and name not in trajectory:
-            continue  # of winches only
         if name not in trajectory or trajectory[name].dims != dimensions:
             raise InputError(path, name, f"is missing, or not over {', '.join(dimensions)}")
         values = trajectory[name].values

@@ -89,6 +89,7 @@ def save_structure_page(study: RestStudy, path: Path) -> None:
         states=np.tile(robot.rest.state, (2, 1)),
         signals=np.zeros((2, robot.structure.signals)),
         modes=modes,
+        drives=np.tile(robot.starting_drives(), (2, 1)),
     )
     title = f"{robot.scenario.name} at rest"
     save_replay(path, robot=robot, trajectory=make_dataset(robot, motion), title=title)

@@ -9,18 +9,7 @@ import numpy as np
 
 from tetra_drake.formatting import fixed
 from tetra_drake.physics.actuator import DIRECT
-from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.tally import (
-    EFFORT_COLUMNS,
-    FORCE,
-    LIMITED_TIME,
-    PEAK_FORCE,
-    PEAK_POWER,
-    PEAK_SPEED,
-    POWER,
-    SPEED,
-    Tally,
-)
+from tetra_drake.physics.tally import Tally
 from tetra_drake.results.measures import travelling_index
 from tetra_drake.results.path import CentrePath, curvature
 from tetra_drake.robot.robot import Robot
@@ -39,7 +28,8 @@ def empty_tally(robot: Robot) -> Tally:
         signals=np.zeros(structure.signals),
         lengths=np.zeros(len(structure.cables)),
         work=np.zeros(1),
-        effort=np.zeros(EFFORT_COLUMNS),
+        peaks=np.zeros(3),
+        sums=np.zeros(4),
         roughness=np.zeros(1),
         lifted=np.zeros(len(structure.bodies)),
         tension=np.array([math.inf]),
@@ -78,10 +68,9 @@ def compute_metrics(
     steady_time = max(0.0, totals.time[0] - totals.begins[0])
     per_time = 1.0 / float(steady_time or 1)
     lifted = (per_time * totals.lifted).tolist()
-    driven = int(np.count_nonzero(structure.cables["signal"] != PASSIVE))
-    effort = totals.effort.tolist()
-    mean_effort = [per_time / (driven or 1) * item for item in effort]
-    limited = math.nan if robot.model.actuator.kind == DIRECT else mean_effort[LIMITED_TIME]
+    peak_force, peak_speed, peak_power = totals.peaks.tolist()
+    per_actuator = per_time / max(robot.driven.size, 1)
+    force, speed, power, limited = (per_actuator * totals.sums).tolist()
     return Metrics(
         distance=float(last[0, 0] - first[0, 0]),
         steady_distance=float(last[0, 0] - middle[0, 0]),
@@ -98,13 +87,13 @@ def compute_metrics(
         clearance=float(totals.clearance[0]),
         tension=float(totals.tension[0]),
         travelling_index=travelling_index(signals),
-        peak_actuator_force=effort[PEAK_FORCE],
-        mean_actuator_force=mean_effort[FORCE],
-        peak_actuator_speed=effort[PEAK_SPEED],
-        mean_actuator_speed=mean_effort[SPEED],
-        peak_actuator_power=effort[PEAK_POWER],
-        mean_actuator_power=mean_effort[POWER],
-        actuator_limited=limited,
+        peak_actuator_force=peak_force,
+        mean_actuator_force=force,
+        peak_actuator_speed=peak_speed,
+        mean_actuator_speed=speed,
+        peak_actuator_power=peak_power,
+        mean_actuator_power=power,
+        actuator_limited=math.nan if robot.model.actuator.kind == DIRECT else limited,
         lifted_shares=tuple(lifted),
     )
 

@@ -36,7 +36,7 @@ DIMENSIONS = {
     "in_contact": ("time", "contact"),
     "friction_mode": ("time", "contact", "horizontal"),
 }
-"""Dimensions of each variable of a trajectory; `free_length` is there with winches only."""
+"""Dimensions of each variable of a trajectory."""
 
 
 def sample_times(duration: float, period: float) -> np.ndarray:
@@ -57,11 +57,11 @@ class Motion:
     modes: np.ndarray
     """(k, contacts, MODE_COLUMNS): `modes` of physics.contact, those of the step in which, or at
     whose end, the time lies."""
+    drives: np.ndarray
+    """(k, drives): free lengths (m) of winches, or tensions (N) of tension motors."""
     pushes: np.ndarray | None = None
     """(k, contacts, 3): forces of the ground along t1, t2 and n, of an engine that has a law of its
     own; otherwise they follow from states and modes."""
-    drives: np.ndarray | None = None
-    """(k, drives): free lengths (m) of winches, or tensions (N) of tension motors."""
 
     def at(self, times: np.ndarray) -> Motion:
         """The motion at some of its times."""
@@ -71,8 +71,8 @@ class Motion:
             states=self.states[rows],
             signals=self.signals[rows],
             modes=self.modes[rows],
+            drives=self.drives[rows],
             pushes=None if self.pushes is None else self.pushes[rows],
-            drives=None if self.drives is None else self.drives[rows],
         )
 
 
@@ -100,14 +100,13 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
         "q_WB": (poses[..., :4], "1", "orientation of the body"),
         "tension": (pulls[..., TENSION], "N", "cable tension"),
         "length": (pulls[..., LENGTH], "m", "cable length"),
+        "free_length": (_free_lengths(robot, motion), "m", "free length of the cable"),
         "signal": (motion.signals, "N", "actuation signal"),
         "normal_force": (pushes[..., 2], "N", "force along the normal of the ground"),
         "friction_force": (pushes[..., :2], "N", "friction force"),
         "in_contact": (modes[..., 0], "1", "1 on the ground"),
         "friction_mode": (modes[..., 1:], "1", slip),
     }
-    if robot.model.actuator.kind == WINCH:
-        variables["free_length"] = (_free_lengths(robot, motion), "m", "free length of the cable")
     return xarray.Dataset(
         {
             name: (DIMENSIONS[name], values, {"units": unit, "long_name": meaning})
@@ -118,10 +117,10 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
 
 
 def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:
-    """(k, cables): free lengths in m, of driven cables those that winches have wound."""
-    cables = robot.structure.cables
-    lengths = np.tile(cables["free_length"], (len(motion.times), 1))
-    lengths[:, cables["signal"] != PASSIVE] = motion.drives
+    """(k, cables): free lengths in m, those of winches as wound."""
+    lengths = np.tile(robot.structure.cables["free_length"], (len(motion.times), 1))
+    if robot.model.actuator.kind == WINCH:
+        lengths[:, robot.driven] = motion.drives
     return lengths
 
 
@@ -131,8 +130,7 @@ def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     pulls = np.empty((samples, len(model.cables), PULL_COLUMNS))
     pushes = np.empty((samples, len(model.ground.contacts), PUSH_COLUMNS))
     forces = Forces.of(model)
-    drives = np.zeros((samples, 0)) if motion.drives is None else motion.drives
-    given = motion.states, motion.modes, motion.signals, drives
+    given = motion.states, motion.modes, motion.signals, motion.drives
     forces_along(model, *given, forces, pulls, pushes)
     return pulls, pushes if motion.pushes is None else motion.pushes
 

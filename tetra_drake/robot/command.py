@@ -33,7 +33,7 @@ class Command:
 
     @property
     def gait(self) -> Gait:
-        """A gait of the command's name for a robot that follows it: a network that is never run."""
+        """A gait of the command's name, with a network that never acts."""
         return Gait(name=self.name, weights=(), tau_a=1.0, tau_b=1.0)
 
 
@@ -51,8 +51,11 @@ def commanded_robot(scenario: Scenario, command: Command) -> Robot:
         raise InputError(f"command {command.name}", "samples", problem)
     cables = plain.structure.cables.copy()
     cables["signal"][driven] = np.arange(driven.size)
+    signals = held_samples(command, scenario.cpg.listing_step, scenario.simulation.duration)
     if kind == TENSION_MOTOR:
         cables["stiffness"][driven] = cables["damping"][driven] = 0.0
+    if kind == WINCH:
+        signals = cables["stiffness"][driven] * (cables["free_length"][driven] - signals)
     layout = dataclasses.replace(
         plain.actuation.layout,
         oscillators=tuple(plain.structure.cable_names[cable] for cable in driven),
@@ -63,10 +66,6 @@ def commanded_robot(scenario: Scenario, command: Command) -> Robot:
     without_network = {"signals": "listing", "feedback": [], "start_up": 0.0}
     cpg = scenario.cpg.model_copy(update=without_network)
     robot = Robot.of(scenario.with_sections(cpg=cpg), structure)
-    signals = held_samples(command, cpg.listing_step, scenario.simulation.duration)
-    if kind == WINCH:
-        laws = cables[driven]
-        signals = laws["stiffness"] * (laws["free_length"] - signals)
     return dataclasses.replace(robot, commanded=signals)
 
 

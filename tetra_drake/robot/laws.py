@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tetra_drake.physics.actuator import DIRECT, TENSION_MOTOR, WINCH, Actuator, Limits
 from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.model import Bodies, Couplings, Model
 from tetra_drake.robot.equilibrium import Rest, find_rest
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.actuator_kinds import ActuatorKind, Force, Winch
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat
 
@@ -22,7 +20,7 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
         p_BN=structure.p_BN,
         first_node=structure.first_node,
         cables=structure.cables,
-        actuator=_actuator(scenario.actuation),
+        actuator=scenario.actuation.law(),
         couplings=_couplings(structure),
         ground=make_ground(scenario, structure),
         bodies=Bodies(
@@ -43,15 +41,6 @@ def rest_of(scenario: Scenario, structure: Structure, start: np.ndarray | None =
     model = make_model(scenario.with_sections(terrain=Flat()), structure)
     start = structure.initial_state if start is None else start
     return find_rest(model, start, bodies=structure.bodies, source=scenario.name)
-
-
-def _actuator(kind: ActuatorKind) -> Actuator:
-    """The constants of actuators of a kind."""
-    if isinstance(kind, Force):
-        return Actuator(DIRECT, np.zeros(len(Limits._fields)))
-    least_length = kind.least_length if isinstance(kind, Winch) else 0.0
-    limits = Limits(kind.max_force, kind.max_speed, kind.time_constant, least_length)
-    return Actuator(WINCH if isinstance(kind, Winch) else TENSION_MOTOR, np.array(limits))
 
 
 def _struts(structure: Structure) -> Struts:

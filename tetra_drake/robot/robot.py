@@ -42,9 +42,9 @@ class Robot:
     structure: Structure
     model: Model
     """The numbers of its bodies, cables and ground, as kernels take them."""
-    commanded: np.ndarray | None = None
+    commanded: np.ndarray
     """(samples, m): the signals in N at 0, one `cpg.listing_step`, two ... to beyond the duration,
-    if a command gives them (see robot.command). None if a network does."""
+    if a command gives them (see robot.command). No samples if a network does."""
 
     @classmethod
     def of(cls, scenario: Scenario, structure: Structure | None = None) -> Self:
@@ -53,7 +53,8 @@ class Robot:
         Raises InputError if it would start in the ground, or off its terrain.
         """
         structure = structure or MakeStructure(scenario)
-        return cls(scenario, structure, make_model(scenario, structure))
+        model, no_command = make_model(scenario, structure), np.zeros((0, structure.signals))
+        return cls(scenario, structure, model, commanded=no_command)
 
     @property
     def actuation(self) -> Actuation:
@@ -144,7 +145,7 @@ class Robot:
             return np.zeros(0)
         if kind == WINCH:
             return driven["free_length"].copy()
-        if self.commanded is not None:
+        if len(self.commanded):
             return np.maximum(self.commanded[0], 0.0)
         p_WN = node_positions(self.structure, self.structure.initial_state)
         lengths = np.linalg.norm(p_WN[driven["node_b"]] - p_WN[driven["node_a"]], axis=1)

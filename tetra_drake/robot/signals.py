@@ -16,7 +16,6 @@ from tetra_drake.files import whole_file
 from tetra_drake.physics.oscillator import make_neurons, network_output
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import POUND_FORCE
 
 
@@ -37,14 +36,17 @@ def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None)
     midway = 0.5 * (turns[:-1] + turns[1:]) if turns.size > 1 else turns
     inputs = robot.tonic_input(midway)
     neurons = make_neurons(initial_neurons(cpg, oscillators))
-    output = np.empty((sample_count(robot.scenario), oscillators))
+    output = np.empty((sample_count(robot), oscillators))
     listing = cpg.signals == "listing"
     network_output(network, inputs, cpg.listing_step, listing, neurons, output)
     return output
 
 
-def sample_count(scenario: Scenario) -> int:
-    """The number of samples of raw_output(); the signals keep the last value."""
+def sample_count(robot: Robot) -> int:
+    """Number of samples of a robot's command or else of raw_output(); the signals keep the last."""
+    if len(robot.commanded):
+        return len(robot.commanded)
+    scenario = robot.scenario
     steps = scenario.simulation.duration / scenario.cpg.listing_step
     return round(steps) if scenario.cpg.signals == "listing" else math.ceil(steps) + 1
 
@@ -55,7 +57,7 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
     Between samples the signals are linear. Start-up is not applied. If the robot follows a
     command, the signals are those, and the gait has no part in them.
     """
-    if robot.commanded is not None:
+    if len(robot.commanded):
         return robot.commanded
     raw = raw_output(robot, gait, steering)
     return robot.scenario.cpg.gain * np.vstack([raw, raw[-1:], raw[-1:]])

@@ -1,8 +1,16 @@
-"""Kinds of actuators: what the signals of the oscillators do to the cables."""
+"""Kinds of actuators: what the signals of the oscillators do to the cables.
 
-from typing import Annotated, ClassVar
+Their kernels, which need numba, are imported only where a law is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tetra_drake.scenario.sections import Kinds, Section, quantity
+
+if TYPE_CHECKING:
+    from tetra_drake.physics.actuator import Actuator
 
 
 class Force(Section):
@@ -11,24 +19,40 @@ class Force(Section):
     lacking: ClassVar[tuple[str, ...]] = ("actuator_limited",)
     """Metrics that walks with such actuators do not have."""
 
+    def law(self) -> Actuator:
+        """Law as the kernels take it."""
+        from tetra_drake.physics.actuator import DIRECT, Actuator
 
-class Winch(Section):
-    """A winch on each driven cable, which then never pushes: signals command its free length.
+        return Actuator.of(DIRECT)
 
-    It winds at most at max_speed (1 - tension / max_force); above max_force it is driven backward.
-    """
+
+class LimitedActuator(Section):
+    """An actuator of limited force and speed on each driven cable, which then never pushes."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
 
     max_force: float = quantity("N", gt=0)
     max_speed: float = quantity("m/s", gt=0)
     time_constant: float = quantity("s", gt=0)
-    """Time constant of the lag with which the free length follows its command."""
+    """Time constant of the lag with which free length or tension follows its command."""
+
+
+class Winch(LimitedActuator):
+    """A winch on each driven cable: signals command its free length.
+
+    It winds at most at max_speed (1 - tension / max_force); above max_force it is driven backward.
+    """
+
     least_length: float = quantity("m", default=0.0, ge=0)
     """Least free length of a cable."""
 
+    def law(self) -> Actuator:
+        from tetra_drake.physics.actuator import WINCH, Actuator
 
-class TensionMotor(Section):
+        return Actuator.of(WINCH, **dict(self))
+
+
+class TensionMotor(LimitedActuator):
     """A motor on each driven cable that controls its tension: signals, spring and damper of the
     cable together command it.
 
@@ -36,15 +60,11 @@ class TensionMotor(Section):
     max_force.
     """
 
-    lacking: ClassVar[tuple[str, ...]] = ()
+    def law(self) -> Actuator:
+        from tetra_drake.physics.actuator import TENSION_MOTOR, Actuator
 
-    max_force: float = quantity("N", gt=0)
-    max_speed: float = quantity("m/s", gt=0)
-    time_constant: float = quantity("s", gt=0)
-    """Time constant of the lag with which the tension follows its command."""
+        return Actuator.of(TENSION_MOTOR, **dict(self))
 
 
-ActuatorKind = Force | Winch | TensionMotor
-
-Actuation = Annotated[ActuatorKind, Kinds()]
+Actuation = Annotated[Force | Winch | TensionMotor, Kinds()]
 """The tagged kinds of actuators; without a tag it is the first."""

@@ -12,7 +12,7 @@ from tetra_drake.robot.robot import Robot
 
 
 class CableNetwork(LeafSystem):
-    """The cables between the tetrahedra (thesis Eq. 6); no state.
+    """The cables between the tetrahedra (thesis Eq. 6), and what drives them.
 
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|

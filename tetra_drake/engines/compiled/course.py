@@ -14,7 +14,6 @@ from tetra_drake.engines.compiled.loop import (
     ASKED_ROWS,
     CLOCK_ROWS,
     DONE,
-    SAMPLES,
     STEP_TOO_SMALL,
     TOO_FAST,
     TOO_MANY_EVALUATIONS,
@@ -23,7 +22,7 @@ from tetra_drake.engines.compiled.loop import (
 )
 from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
-from tetra_drake.physics.actuator import DIRECT, DRIVE, Limits
+from tetra_drake.physics.actuator import DRIVE, Limits
 from tetra_drake.physics.cable import Cables
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.inertia import INERTIA_COLUMNS
@@ -107,16 +106,17 @@ class PreparedGait:
     def recent_signals(self) -> int:
         """Number of signal samples that an engine holds: those within a step, and as many
         for lanes that run ahead, or all those of a command; a power of two."""
-        scenario, commanded = self.robot.scenario, self.robot.commanded
-        if commanded is not None:
-            return 1 << math.ceil(math.log2(len(commanded)))
+        scenario = self.robot.scenario
         within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
-        return 1 << math.ceil(math.log2(2.0 * within + 32.0))
+        least = max(2.0 * within + 32.0, len(self.robot.commanded))
+        return 1 << math.ceil(math.log2(least))
 
 
 def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
     scenario, model = robot.scenario, robot.model
     cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
+    # Up to its time constant, NaN if it has none, Heun's method is stable for an actuator.
+    max_step = np.fmin(engine.max_step, Limits(*model.actuator.limits).time_constant)
     cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
     ground = model.ground._replace(heights=None)  # of which lanes have different numbers
     return Constants(
@@ -129,49 +129,30 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
         gains=np.array([gain for _, gain in gait.gains]),
         gain=np.array([cpg.gain]),
         period=np.array([cpg.listing_step]),
-        samples=np.array([_sample_count(robot)], dtype=float),
+        samples=np.array([sample_count(robot)], dtype=float),
         start_up=np.array([cpg.start_up]),
         tolerance=np.array([engine.tolerance]),
-        max_step=np.array([_max_step(robot)]),
+        max_step=np.array([max_step]),
         look_ahead=np.array([engine.look_ahead]),
         max_evaluations=np.array([scenario.simulation.max_evaluations], dtype=float),
     )
 
 
-def _sample_count(robot: Robot) -> int:
-    """Number of samples of the signals."""
-    return sample_count(robot.scenario) if robot.commanded is None else len(robot.commanded)
-
-
 def _jumps(robot: Robot) -> np.ndarray:
     """Times (s) at which a change of the robot's command begins or ends."""
-    if robot.commanded is None:
-        return np.zeros(0)
     changes = (np.diff(robot.commanded, axis=0) != 0.0).any(axis=1)
     ends = np.append(changes, False) | np.append(False, changes)
     return robot.scenario.cpg.listing_step * np.flatnonzero(ends)
 
 
-def _max_step(robot: Robot) -> float:
-    """Longest step (s): that of the engine, and no longer than the actuators' time constant, up to
-    which Heun's method is stable."""
-    longest, actuator = robot.scenario.settings_of(Compiled).max_step, robot.model.actuator
-    if actuator.kind == DIRECT:
-        return longest
-    return min(longest, Limits(*actuator.limits).time_constant)
-
-
 def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
-    structure, commanded = robot.structure, robot.commanded
+    scenario, structure, commanded = robot.scenario, robot.structure, robot.commanded
     bodies, signals = len(structure.bodies), structure.signals
     contacts, cables = len(structure.contacts), len(structure.cables)
     velocities, forces = np.zeros(BLOCK * bodies), Forces.of(robot.model)
-    drives = np.zeros_like(forces.drives)
-    drives[:, DRIVE] = robot.starting_drives()
-    clock = np.zeros(CLOCK_ROWS)
-    clock[SAMPLES] = 0 if commanded is None else len(commanded)
+    forces.drives[:, DRIVE] = robot.starting_drives()
     return Walk(
-        clock=clock,
+        clock=np.zeros(CLOCK_ROWS),
         asked=np.zeros(ASKED_ROWS),
         step=Step(
             state=structure.initial_state,
@@ -189,11 +170,11 @@ def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
         forces=forces,
         modes=robot.starting_modes(),
         acceleration=velocities,
-        signals=np.zeros(signals) if commanded is None else commanded[0],
+        signals=commanded[0] if len(commanded) else np.zeros(signals),
         end_signals=np.zeros(signals),
-        drives=drives,
-        end_drives=drives,
-        neurons=make_neurons(initial_neurons(robot.scenario.cpg, signals)),
+        drives=forces.drives,
+        end_drives=forces.drives[:, DRIVE],
+        neurons=make_neurons(initial_neurons(scenario.cpg, signals)),
         output=np.zeros(signals),
         tonic=robot.tonic_input(turns)[0],
         inputs=np.zeros(2 * signals),

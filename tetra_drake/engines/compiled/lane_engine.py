@@ -18,6 +18,7 @@ from tetra_drake.engines.compiled.loop import (
     MARK,
     PLANNED,
     ROUND,
+    SAMPLES,
     STATUS,
     TAKEN,
     TIME,
@@ -112,15 +113,15 @@ class LaneEngine:
         self._constants.robot.ground.grid.array[FIRST, lane] = lane * self._heights.shape[1]
 
         log, clock = self._log, self._walk.clock.array
-        turns = prepared.turns
+        turns, commanded = prepared.turns, prepared.robot.commanded
         log.times[lane] = log.marks[lane] = math.inf
         log.times[lane, : len(prepared.times)] = prepared.times
         log.marks[lane, : len(prepared.marks)] = prepared.marks
         log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
         log.states[lane, 0], log.modes[lane, 0] = walk.step.state, walk.modes
         log.signals[lane, 0] = walk.signals
-        if prepared.robot.commanded is not None:
-            log.recent[lane, : len(prepared.robot.commanded)] = prepared.robot.commanded
+        log.recent[lane, : len(commanded)] = commanded
+        clock[SAMPLES, lane] = len(commanded)
         log.drives[lane, 0] = walk.drives[:, DRIVE]
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)

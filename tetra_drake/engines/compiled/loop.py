@@ -22,7 +22,7 @@ from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.errors import MAX_SPEED
-from tetra_drake.physics.actuator import DRIVE, RATE, put_drives
+from tetra_drake.physics.actuator import DRIVE, RATE
 from tetra_drake.physics.cable import LENGTH
 from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.feedback import Senses, sense
@@ -120,8 +120,9 @@ class Walk(NamedTuple):
     """(n,), at the lane's time; `end_signals` at the end of its step."""
     end_signals: Table
     drives: Table
-    """(drives, DRIVE_COLUMNS), at the lane's time; `end_drives` at the end of its step."""
+    """(drives, DRIVE_COLUMNS), at the lane's time."""
     end_drives: Table
+    """(drives,): free lengths or tensions at the end of the lane's step."""
     neurons: Table
     """(2n, NEURON_COLUMNS)."""
     output: Table
@@ -233,17 +234,7 @@ def arrive(constants: Constants, walk: Walk) -> None:
         forces.drives[i, DRIVE] = walk.drives[i, DRIVE]
     update_modes(state, forces.nodes, robot.ground, forces.frames, walk.modes)
     compute_forces(robot, state, walk.modes, walk.signals, True, forces, walk.step.force)
-    observe(
-        walk.tally,
-        robot.cables,
-        robot.ground.carriers,
-        robot.actuator.kind,
-        walk.clock[TIME],
-        walk.signals,
-        forces.drives,
-        forces.pulls,
-        forces.pushes,
-    )
+    observe(walk.tally, robot, walk.clock[TIME], walk.signals, forces)
 
 
 @inlined
@@ -268,17 +259,15 @@ def foresee_drives(walk: Walk) -> None:
     drives = walk.forces.drives
     for i in range(drives.shape[0]):
         walk.drives[i, RATE] = drives[i, RATE]
-    put_drives(walk.drives, walk.clock[STEP], drives)
+        drives[i, DRIVE] = walk.drives[i, DRIVE] + walk.clock[STEP] * drives[i, RATE]
 
 
 @inlined
 def correct_drives(walk: Walk) -> None:
     """Writes the drives at the end of the step, by the mean of the rates at both ends."""
-    drives, end = walk.forces.drives, walk.end_drives
-    for i in range(drives.shape[0]):
-        end[i, DRIVE] = walk.drives[i, DRIVE]
-        end[i, RATE] = 0.5 * (walk.drives[i, RATE] + drives[i, RATE])
-    put_drives(end, walk.clock[STEP], end)
+    for i in range(walk.drives.shape[0]):
+        rate = 0.5 * (walk.drives[i, RATE] + walk.forces.drives[i, RATE])
+        walk.end_drives[i] = walk.drives[i, DRIVE] + walk.clock[STEP] * rate
 
 
 @inlined
@@ -290,8 +279,7 @@ def move_on(walk: Walk, walks: Truth, accepted: Truth) -> None:
     for k in range(walk.signals.size):
         walk.signals[k] = select(accepted, walk.end_signals[k], walk.signals[k])
     for i in range(walk.drives.shape[0]):
-        end_drive = walk.end_drives[i, DRIVE]
-        walk.drives[i, DRIVE] = select(accepted, end_drive, walk.drives[i, DRIVE])
+        walk.drives[i, DRIVE] = select(accepted, walk.end_drives[i], walk.drives[i, DRIVE])
     clock[TIME] = select(accepted, clock[END], clock[TIME])
     clock[TRIED] += select(walks, 1.0, 0.0)
     clock[TAKEN] += select(accepted, 1.0, 0.0)
@@ -481,7 +469,7 @@ def keep_samples(constants: Constants, walk: Walk, log: Log, live: bool) -> None
                 log.signals[lane, i, k] = between if live else signals[k, lane]
             drives, end_drives = by_lane(walk.drives), by_lane(walk.end_drives)
             for k in range(walk.drives.shape[0]):
-                first, last = drives[k, DRIVE, lane], end_drives[k, DRIVE, lane]
+                first, last = drives[k, DRIVE, lane], end_drives[k, lane]
                 log.drives[lane, i, k] = first + part * (last - first)
             log.kept[lane] = i + 1
             clock[DUE, lane] = log.times[lane, i + 1]
