@@ -26,7 +26,7 @@ def forces_of_cables(
     nodes, pulls, force = np.empty((20, NODE_COLUMNS)), np.empty((24, PULL_COLUMNS)), np.empty(30)
     drives = np.empty((0, DRIVE_COLUMNS))
     points = structure.p_BN, structure.first_node
-    law = structure.cables, Actuator.of(DIRECT), False
+    law = structure.cables, *Actuator.of(DIRECT), False
     cable_forces(state, np.array(signals), *points, *law, drives, nodes, pulls, force)
     return force, pulls[:, TENSION]
 
