@@ -249,7 +249,7 @@ STRENGTH = {"prism": 12.0, "six_bar": 6.0, "coulomb": 4.0}
 @pytest.mark.parametrize(
     ("name", "seed", "kind"),
     [
-        ("prism", 2, "winch"),
+        pytest.param("prism", 2, "winch", marks=pytest.mark.slow),
         ("prism", 2, "motor"),
         *(pytest.param("six_bar", seed, "winch", marks=pytest.mark.slow) for seed in (2, 3)),
         *(pytest.param("coulomb", seed, "winch", marks=pytest.mark.slow) for seed in (1, 2, 3)),

@@ -65,7 +65,7 @@ BAD = {
         "T1-T2 outer bottom_right force_N.1",
         "",
     ),
-    "a column too few": ((FIRST + ",", ""), FIRST, "is missing"),
+    "a column too few": ((FIRST + ",", ""), "", "more cells than the heading"),
     "no number": (("0.010000,0.500000", "0.010000,"), f"line 3, {FIRST}", "''"),
     "NaN": (("0.010000,0.500000", "0.010000,nan"), f"line 3, {FIRST}", "'nan'"),
     "infinite": (("0.010000,0.500000", "0.010000,inf"), f"line 3, {FIRST}", "'inf'"),

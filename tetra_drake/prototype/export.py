@@ -84,7 +84,7 @@ def load_verdict(loads: Loads, times: np.ndarray) -> str:
     first, cable = np.argwhere(loads.limited)[0]
     share, name = fixed(100.0 * loads.limited.mean()), loads.table.index[cable]
     binds = f"a limit binds {share} % of the time, first at {times[first]:.3f} s ({name})"
-    return f"{table}\nThe actuators cannot play it: {binds}."
+    return f"{table}\nThe actuators cannot play all of it: {binds}."
 
 
 def _played(scenario: Scenario, file: Path) -> str:
