@@ -107,7 +107,10 @@ def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
 def test_a_weak_motor_is_told_to_be_too_weak(short, tmp_path):
     weak = short.with_changes(MOTOR).with_changes({"actuation.max_force": "2 N"})
     verdict = export(weak, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
-    assert "cannot play all of it" in verdict and "first at 0.000 s (T1-T2 outer bottom_left)" in verdict
+    assert (
+        "cannot play all of it" in verdict
+        and "first at 0.000 s (T1-T2 outer bottom_left)" in verdict
+    )
     strong = export(
         short.with_changes(MOTOR), seeded_gait(short), rate=100.0, out=tmp_path / "other"
     )
