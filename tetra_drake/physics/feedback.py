@@ -6,9 +6,9 @@ opposite and loads with equal signs).
 
     length  the relative elongation of the oscillator's cables beyond their settled lengths, mean
             over its group: + on the extensor, - on the flexor
-    load    the share of the robot's weight on the feet of the tetrahedron ahead of the junction:
-            + on both
-    pitch   the sine of the angle by which that tetrahedron's tip points up: + and -
+    load    the share of the robot's weight on the feet of the body ahead, the last one that the
+            oscillator's cables join: + on both
+    pitch   the sine of the angle by which that body's x axis points up: + and -
 """
 
 from __future__ import annotations

@@ -31,7 +31,13 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
     unit: length of NTRT's unit, such as "dm". Raises InputError that names file and key.
     """
     file = structure_file(str(name_or_file), Path())
+    if not file.exists():
+        raise InputError(name_or_file, "", f"no such structure file (shipped: {_shipped()})")
     return Structure.from_tree(_tree_of_file(file, unit, source=file, key="unit"), file)
+
+
+def _shipped() -> str:
+    return ", ".join(shipped_structures())
 
 
 def structure_file(name: str, folder: Path) -> Path:
@@ -53,8 +59,8 @@ def with_structure(tree: Tree, source: object) -> Tree:
     changes = {key: value for key, value in robot.items() if key not in (TAG, "file")}
     name = robot["file"]
     if not isinstance(name, str) or not os.path.exists(structure_file(name, Path())):
-        expected = f"structure file (shipped: {', '.join(shipped_structures())})"
-        raise InputError(source, "robot.file", f"{described(name)}: no such {expected}")
+        problem = f"{described(name)}: no such structure file (shipped: {_shipped()})"
+        raise InputError(source, "robot.file", problem)
     file = structure_file(name, Path())
     content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
     Structure.from_tree(content, file)

@@ -16,7 +16,7 @@ class Feedback(LeafSystem):
     | port          | shape        | unit | meaning                                          |
     |---------------|--------------|------|--------------------------------------------------|
     | state         | (13 n,)      | SI   | [q; v] of n free bodies, from the plant          |
-    | lengths       | (6 (n - 1),) | m    | length of each cable, from the cables            |
+    | lengths       | (cables,)    | m    | length of each cable, from the cables            |
     | normal_forces | (contacts,)  | N    | at each contact node, from the ground            |
     | feedback      | (2m,)        | 1    | f of Eq. 7 for the neurons of m oscillators      |
     """

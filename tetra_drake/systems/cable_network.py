@@ -12,7 +12,7 @@ from tetra_drake.robot.robot import Robot
 
 
 class CableNetwork(LeafSystem):
-    """The cables between the tetrahedra (thesis Eq. 6), and what drives them.
+    """The cables between the bodies (thesis Eq. 6); no state.
 
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|
@@ -20,8 +20,8 @@ class CableNetwork(LeafSystem):
     | signals           | (m,)           | N      | actuation, one per oscillator            |
     | drives            | (drives,)      | m or N | of winches or motors, from `actuators`   |
     | generalized_force | (6 n,)         | N m, N | [t_W; f_W] at each body's origin         |
-    | tensions          | (6 (n - 1),)   | N      | tension of each cable                    |
-    | lengths           | (6 (n - 1),)   | m      | length of each cable                     |
+    | tensions          | (cables,)      | N      | tension of each cable                    |
+    | lengths           | (cables,)      | m      | length of each cable                     |
     | rates             | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 
     With `robot.cables.slack`, a cable that would have to push goes slack. Ports of drives are there
