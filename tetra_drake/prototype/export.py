@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from importlib import resources
 from pathlib import Path
 
@@ -49,17 +50,21 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
     command = Command(gait.name, 1.0 / rate, loads.commands[::each])
     axes = [f"{node} {axis}_mm" for node in robot.structure.node_names for axis in "xyz"]
     positions = 1e3 * motion.p_WN.values.reshape(-1, len(axes))
-    write_whole(out / COMMAND, command_text(robot, command))
-    write_whole(out / EXPECTED, table_text(axes, motion.time.values, positions))
-    write_whole(out / LIMITS, loads.table.to_csv(float_format="%.6g"))
-    write_whole(out / SCENARIO, dump_scenario(scenario))
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as temporary:
+        folder = Path(temporary) / out.name
+        write_whole(folder / COMMAND, command_text(robot, command))
+        write_whole(folder / EXPECTED, table_text(axes, motion.time.values, positions))
+        write_whole(folder / LIMITS, loads.table.to_csv(float_format="%.6g"))
+        write_whole(folder / SCENARIO, dump_scenario(scenario))
 
-    played, distance = _played(scenario, out / COMMAND), fixed(result.metrics.distance_in)
-    verdict = load_verdict(loads, result.trajectory.time.values)
-    verdict += f"\n{played}; the gait itself goes {distance} in."
-    readme = (resources.files("tetra_drake") / "prototype/README.template.md").read_text("utf-8")
-    about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
-    write_whole(out / README, readme.format(**about))
+        played, distance = _played(scenario, folder / COMMAND), fixed(result.metrics.distance_in)
+        verdict = load_verdict(loads, result.trajectory.time.values)
+        verdict += f"\n{played}; the gait itself goes {distance} in."
+        template = resources.files("tetra_drake") / "prototype/README.template.md"
+        about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
+        write_whole(folder / README, template.read_text("utf-8").format(**about))
+        folder.rename(out)
     return verdict
 
 
