@@ -56,7 +56,7 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
     """
     robot, text = Robot.of(scenario), read_text(path, "command file")
     try:
-        # Cells are read as texts, and cells beyond the heading are left out.
+        # Cells are read as texts, so that what is no number can be shown.
         cells = pandas.read_csv(io.StringIO(text), dtype=str, na_filter=False)
     except ValueError as error:  # also what pandas raises for ragged rows and an empty file
         raise InputError(path, "", f"is no table: {error}") from error

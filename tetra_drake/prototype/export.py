@@ -40,14 +40,14 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
     if out.exists():
         raise InputError(out, "", "exists, expected a new folder")
     check_folder(out)
-    each = math.ceil(LEAST_RATE / rate)
-    finely = scenario.simulation.model_copy(update={"sample_period": 1.0 / (rate * each)})
+    refinement = math.ceil(LEAST_RATE / rate)
+    finely = scenario.simulation.model_copy(update={"sample_period": 1.0 / (rate * refinement)})
     recorded = scenario.with_sections(simulation=finely)
     result = simulate(scenario=recorded, gait=gait, record=True)
     assert result.trajectory is not None
-    robot, motion = Robot.of(scenario), result.trajectory.isel(time=slice(None, None, each))
+    robot, motion = Robot.of(scenario), result.trajectory.isel(time=slice(None, None, refinement))
     loads = actuator_loads(robot, result.trajectory)
-    command = Command(gait.name, 1.0 / rate, loads.commands[::each])
+    command = Command(gait.name, 1.0 / rate, loads.commands[::refinement])
     axes = [f"{node} {axis}_mm" for node in robot.structure.node_names for axis in "xyz"]
     positions = 1e3 * motion.p_WN.values.reshape(-1, len(axes))
     out.parent.mkdir(parents=True, exist_ok=True)

@@ -12,8 +12,8 @@ from typing import Self
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.actuator import DIRECT, WINCH
-from tetra_drake.physics.cable import PASSIVE
+from tetra_drake.physics.actuator import DIRECT, WINCH, CableLaw
+from tetra_drake.physics.cable import PASSIVE, cable_tension
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground, modes_after_step
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.forces import Forces
@@ -149,7 +149,8 @@ class Robot:
             return np.maximum(self.commanded[0], 0.0)
         p_WN = node_positions(self.structure, self.structure.initial_state)
         lengths = np.linalg.norm(p_WN[driven["node_b"]] - p_WN[driven["node_a"]], axis=1)
-        return np.maximum(driven["stiffness"] * (lengths - driven["free_length"]), 0.0)
+        law = CableLaw(*(driven[name] for name in CableLaw._fields))
+        return np.maximum(np.asarray(cable_tension(lengths, 0.0, 0.0, law)), 0.0)
 
     def starting_modes(self) -> np.ndarray:
         """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
