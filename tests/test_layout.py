@@ -15,8 +15,8 @@ import tetra_drake
 PACKAGE = Path(tetra_drake.__file__).parent
 ORDER = (
     *("errors", "files", "formatting", "machine", "simd", "physics", "scenario", "robot"),
-    *("systems", "results", "engines", "prototype", "optimizers", "evolution", "analysis"),
-    *("visualization", "figures", "report", "experiment", "cli"),
+    *("systems", "visualization", "results", "engines", "prototype", "optimizers", "evolution"),
+    *("analysis", "figures", "report", "experiment", "cli"),
 )
 """A folder, or a module beside the folders, imports only those before it."""
 

@@ -3,7 +3,7 @@
     import tetra_drake as td
 
     scenario = td.load_scenario("thesis")
-    result = td.simulate(scenario=scenario, gait=td.load_gait("gait.json", scenario), record=True)
+    result = td.simulate(scenario, td.load_gait("gait.json", scenario), record=True)
     run = td.evolve(scenario, "runs/mine", seed=1)
 
 Each name is imported when it is first used, so `import tetra_drake` loads neither Drake nor numba.
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tetra_drake.evolution.run import load_run as load_run
     from tetra_drake.experiment import evolve as evolve
     from tetra_drake.prototype.command_file import load_command as load_command
+    from tetra_drake.report.result_folder import load_result as load_result
     from tetra_drake.robot.gait import load_gait as load_gait
     from tetra_drake.scenario.load import load_scenario as load_scenario
 
@@ -29,6 +30,7 @@ _HOMES = {
     "evolve": "tetra_drake.experiment",
     "load_command": "tetra_drake.prototype.command_file",
     "load_gait": "tetra_drake.robot.gait",
+    "load_result": "tetra_drake.report.result_folder",
     "load_run": "tetra_drake.evolution.run",
     "load_scenario": "tetra_drake.scenario.load",
     "simulate": "tetra_drake.engines.simulate",

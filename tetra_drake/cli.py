@@ -109,11 +109,11 @@ def _simulate(options: Options) -> None:
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
 
+    gait: Gait | None
     scenario, gait = _chosen_gait(options)
     scenario, command = scenario.with_changes(_engine_change(options)), None
     if options.command_file is not None:
-        command = load_command(options.command_file, scenario)
-        gait = command.gait
+        gait, command = None, load_command(options.command_file, scenario)
     if options.meshcat:
         check_can_be_watched(scenario)
     check_result_folder(options.out)
@@ -123,12 +123,9 @@ def _simulate(options: Options) -> None:
         from tetra_drake.visualization.live import open_view
 
         view = open_view(scenario, say=lambda text: print(text, flush=True))
-    what: dict[str, Any] = {"command": command} if command else {"gait": gait}
-    result = simulate(scenario=scenario, record=True, viewer=view, **what)
-    print(result_text(scenario, gait, result))
-    save_result_folder(
-        options.out, scenario=scenario, gait=gait, result=result, commanded=bool(command)
-    )
+    result = simulate(scenario, gait, command=command, record=True, viewer=view)
+    print(result_text(result))
+    save_result_folder(options.out, result)
     print(
         f"wrote result.json, trajectory.nc, scenario.yaml and replay.html to {options.out}/\n"
         f"to watch the robot, open in a browser: {options.out / REPLAY}"

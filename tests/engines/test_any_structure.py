@@ -107,7 +107,7 @@ def test_a_structure_whose_cables_nothing_drives_is_refused(refused):
 def test_what_a_structure_lacks_is_null_in_its_result(tmp_path):
     scenario = briefly("prism")
     gait = seeded_gait(scenario, 3)
-    save_result(tmp_path / "result.json", scenario, gait, simulate(scenario=scenario, gait=gait))
+    save_result(tmp_path / "result.json", simulate(scenario, gait))
     saved = json.loads((tmp_path / "result.json").read_text())
     lacking = {name for name, value in saved["metrics"].items() if value is None}
     assert lacking == {*METRICS_OF_A_ROW, *scenario.actuation.lacking}

@@ -47,7 +47,7 @@ def result(tiny, gait):
 @pytest.fixture(scope="package")
 def written(tmp_path_factory, tiny, gait, result):
     folder = tmp_path_factory.mktemp("written") / "out"
-    save_result_folder(folder, scenario=tiny, gait=gait, result=result)
+    save_result_folder(folder, result)
     return folder
 
 

@@ -3,13 +3,14 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray
 from helpers.synthetic_run import write_run
 
 from tetra_drake.errors import InputError
 from tetra_drake.report.replay_page import load_or_simulate, write_replay
-from tetra_drake.report.result_folder import check_result_folder, save_result_folder
+from tetra_drake.report.result_folder import check_result_folder, load_result, save_result_folder
 from tetra_drake.results.metrics import headline
 from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.units import shown
@@ -111,5 +112,14 @@ def test_a_result_stands_for_files_that_are_complete(folder, tiny, gait, result,
 
     monkeypatch.setattr("tetra_drake.results.trajectory.save_dataset", fail)
     with pytest.raises(OSError, match="disk full"):
-        save_result_folder(folder, scenario=tiny, gait=gait, result=result)
+        save_result_folder(folder, result)
     assert not (folder / "result.json").exists()
+
+
+def test_a_folder_gives_the_result_back(folder, result):
+    read = load_result(folder)
+    assert read == result
+    assert read.gait == result.gait and read.scenario == result.scenario
+    xarray.testing.assert_identical(read.trajectory, result.trajectory)
+    np.testing.assert_array_equal(read.path.centre, result.path.centre)
+    np.testing.assert_array_equal(read.path.heading, result.path.heading)

@@ -143,7 +143,7 @@ def test_each_trial_and_each_setting_that_differs_from_the_thesis_has_a_row(page
 
 def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page):
     space = ParameterSpace.of(study.run.manifest.scenario)
-    for name, value in zip(space.names, space.vector(study.best.motion.gait), strict=True):
+    for name, value in zip(space.names, space.vector(study.best.result.gait), strict=True):
         assert page.row(name) == [f"{value:.4f}"]
     # As recorded; simulated again, this gait moves elsewhere, which a note says.
     assert "2.00 inches" in page.texts["h1"][0]

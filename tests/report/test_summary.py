@@ -18,21 +18,25 @@ def numbers(text):
     return {name.strip(): value for name, _, value in (line.rpartition("  ") for line in lines)}
 
 
-def test_the_metrics_are_printed_in_the_units_of_people_the_objectives_first(tiny, gait, result):
+def test_the_metrics_are_printed_in_the_units_of_people_the_objectives_first(tiny, result):
     metrics = dataclasses.replace(result.metrics, distance=2.0 * INCH, heading_change=math.pi)
     result = dataclasses.replace(result, metrics=metrics, fitness=1.5)
-    shown = numbers(result_text(tiny, gait, result))
+    shown = numbers(result_text(result))
     expected = {"distance (in)": "2.000", "fitness": "1.500", "heading change (deg)": "180.000"}
     assert shown | expected == shown
     assert list(shown)[1] == "distance (in)"
     turning = tiny.with_changes({"objective": {"heading_change": "1 /rad"}})
-    assert list(numbers(result_text(turning, gait, result)))[1] == "heading change (deg)"
+    assert (
+        list(numbers(result_text(dataclasses.replace(result, scenario=turning))))[1]
+        == "heading change (deg)"
+    )
 
 
-def test_requirements_that_are_not_met_are_named(tiny, gait, result):
-    assert "requirement" not in result_text(tiny, gait, result)
+def test_requirements_that_are_not_met_are_named(tiny, result):
+    assert "requirement" not in result_text(result)
     strict = tiny.with_changes({"require": {"distance": "4000 in", "twist": "0 in"}})
-    (line,) = (line for line in result_text(strict, gait, result).splitlines() if "requir" in line)
+    strict_result = dataclasses.replace(result, scenario=strict)
+    (line,) = (line for line in result_text(strict_result).splitlines() if "requir" in line)
     assert line.split()[0] == "distance" and "4000 in" in line
 
 

@@ -31,7 +31,9 @@ def result_of(robot, states) -> SimulationResult:
         drives=np.zeros((len(states), 0)),
     )
     work = IntegratorWork("none", 1.0, 1, 1)
-    return make_result(robot, motion, totals=make_totals(), work=work, wall_time=1.0, record=False)
+    totals = make_totals()
+    gait = seeded_gait(robot.scenario)
+    return make_result(robot, gait, motion, totals=totals, work=work, wall_time=1.0, record=False)
 
 
 def on_a_circle(robot, *, per_second, radius=RADIUS) -> np.ndarray:
@@ -76,17 +78,16 @@ def test_mirrored_states_negate_turning_and_bending(robot):
     assert right.path_curvature == pytest.approx(-left.path_curvature, rel=1e-9)
 
 
-def test_the_path_is_written(scenario, robot, tmp_path):
-    gait = seeded_gait(scenario)
+def test_the_path_is_written(robot, tmp_path):
     result = result_of(robot, on_a_circle(robot, per_second=-0.5))
-    save_result(tmp_path / "result.json", scenario, gait, result)
+    save_result(tmp_path / "result.json", result)
     content = json.loads((tmp_path / "result.json").read_text())
     assert content["path_radius_in"] == pytest.approx(RADIUS / INCH, rel=1e-4)
     assert content["metrics"]["heading_change"] == pytest.approx(-7.5)
-    columns = (result.path.times, *result.path.centre[:, :2].T, result.path.heading)
+    columns = (result.path.times, *result.path.centre.T, result.path.heading)
     assert list(content["path"].values()) == [column.tolist() for column in columns]
-    assert list(content["path"]) == ["time_s", "x_m", "y_m", "heading_rad"]
+    assert list(content["path"]) == ["time_s", "x_m", "y_m", "z_m", "heading_rad"]
 
     standing = result_of(robot, on_a_circle(robot, per_second=0.0))
-    save_result(tmp_path / "result.json", scenario, gait, standing)
+    save_result(tmp_path / "result.json", standing)
     assert json.loads((tmp_path / "result.json").read_text())["path_radius_in"] is None

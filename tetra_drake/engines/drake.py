@@ -82,6 +82,7 @@ class DrakeEngine(Engine):
         steps, derivative_evaluations, jacobian_evaluations = work.total()
         return make_result(
             robot,
+            gait,
             sampler.motion(),
             totals=observer.totals(),
             work=IntegratorWork(

@@ -122,6 +122,7 @@ class MujocoEngine(Engine):
         signals_kept = signals_at(robot, gait, times, steering=steering)
         return make_result(
             robot,
+            gait,
             simulator.motion(times, states, signals_kept),
             totals=totals,
             work=IntegratorWork(INTEGRATOR, step, steps, steps),

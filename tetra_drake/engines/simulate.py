@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,9 +18,9 @@ from tetra_drake.scenario.schema import Scenario
 
 
 def simulate(
-    *,
     scenario: Scenario | str | Path,
     gait: Gait | None = None,
+    *,
     command: Command | None = None,
     record: bool = False,
     viewer: Viewer | None = None,
@@ -48,18 +49,19 @@ def simulate(
     if command is not None:
         if gait is not None or steering is not None:
             raise InputError("simulate", "command", "excludes a gait, and steering")
-        robot, gait = commanded_robot(scenario, command), command.gait
-    elif gait is not None:
-        robot = Robot.of(scenario)
-    else:
+        robot = commanded_robot(scenario, command)
+        result = engine.simulate(robot, command.gait, record=record, viewer=viewer)
+        return dataclasses.replace(result, scenario=scenario)  # the one with a network
+    if gait is None:
         raise InputError("simulate", "gait", "is needed, or a command")
+    robot = Robot.of(scenario)
     return engine.simulate(robot, gait, record=record, viewer=viewer, steering=steering)
 
 
 def simulate_many(
-    *,
     scenario: Scenario | str | Path | Sequence[Scenario],
     gaits: Sequence[Gait],
+    *,
     record: bool = False,
     workers: int | None = None,
 ) -> list[Outcome]:

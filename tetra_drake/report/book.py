@@ -13,13 +13,12 @@ from typing import Any
 import pandas
 
 from tetra_drake.analysis.elites import elites
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.style import save_figure
-from tetra_drake.report.result_folder import GaitMotion, simulate_gait
-from tetra_drake.robot.robot import MakeStructure, Robot
-from tetra_drake.scenario.units import INCH
+from tetra_drake.results.result import SimulationResult
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,8 @@ class RecordedGait:
 
     recorded: pandas.Series
     """Row of the run's evaluations."""
-    motion: GaitMotion
+    result: SimulationResult
+    """As simulated again, with its trajectory."""
 
     @property
     def label(self) -> str:
@@ -42,7 +42,7 @@ class RecordedGait:
     @property
     def distance_in(self) -> float:
         """Distance (in) as simulated again."""
-        return self.motion.metrics["distance"] / INCH
+        return self.result.metrics.distance_in
 
 
 @dataclass(frozen=True)
@@ -76,16 +76,16 @@ def study_run(run: Run) -> Study:
 
 def simulate_again(run: Run, trial: int, index: int) -> RecordedGait:
     """A gait of a run, simulated again. Raises SimulationFailure."""
-    motion = simulate_gait(run.manifest.scenario, run.gait(trial, index))
-    return RecordedGait(run.evaluation(trial, index), motion)
+    result = simulate(run.manifest.scenario, run.gait(trial, index), record=True)
+    return RecordedGait(run.evaluation(trial, index), result)
 
 
-def draw_trajectory(gait: GaitMotion, folder: Path) -> dict[str, str]:
+def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:
     """Writes the figures of one simulation; returns their captions by name of file, no suffix.
 
     Raises InputError if the folder cannot be written to.
     """
-    trajectory, robot = gait.trajectory, Robot.of(gait.scenario)
+    trajectory, robot = result.recorded, result.robot
     pictures: list[tuple[Any, ...]] = [
         (motion.time_lapse, trajectory, robot.structure),
         (motion.path_of_the_centre, trajectory, robot.structure),
@@ -109,11 +109,11 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
         pictures.append((fitness.initial_fitness, run, study.trial))
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
-    walks = [(gait.label, gait.motion.trajectory) for gait in (study.initial, study.best)]
-    structure = MakeStructure(run.manifest.scenario)
+    walks = [(gait.label, gait.result.recorded) for gait in (study.initial, study.best)]
+    structure = study.best.result.robot.structure
     pictures.append((motion.before_and_after, walks, structure))
     captions = _save(folder, *pictures)
-    return captions | draw_trajectory(study.best.motion, folder)
+    return captions | draw_trajectory(study.best.result, folder)
 
 
 def _save(folder: Path, *pictures: tuple[Any, ...]) -> dict[str, str]:

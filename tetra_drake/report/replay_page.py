@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.source import load_source
 from tetra_drake.files import check_folder
-from tetra_drake.report.result_folder import RESULT, GaitMotion, load_result_folder, simulate_gait
+from tetra_drake.report.result_folder import RESULT, load_result
+from tetra_drake.results.result import SimulationResult
 
 
 def write_replay(
@@ -30,14 +32,14 @@ def write_replay(
         if file.is_dir():
             raise InputError(file, "", "is a directory, expected a file to write")
         check_folder(file.parent)
-    motion = load_or_simulate(source, scenario=scenario, warn=warn)
-    motion.save_replay(out, viewer=viewer)
-    return motion.title
+    result = load_or_simulate(source, scenario=scenario, warn=warn)
+    result.save_replay(out, viewer=viewer)
+    return result.title
 
 
 def load_or_simulate(
     source: Path, *, scenario: str | None = None, warn: Callable[[str], None] = lambda text: None
-) -> GaitMotion:
+) -> SimulationResult:
     """The motion in a result folder, or of a gait file or a run's fittest gait, simulated.
 
     `scenario` is for gait files only, as folders have scenarios; `warn`: see load_source().
@@ -48,8 +50,8 @@ def load_or_simulate(
         raise InputError("--scenario", "", f"is for gait files; {source} has one of its own")
     is_run = (source / MANIFEST).exists()
     if (source / RESULT).exists() and not is_run:
-        return load_result_folder(source)
+        return load_result(source)
     if not source.is_file() and not is_run:
         raise InputError(source, "", "expected a folder of `simulate` or `evolve`, or a gait file")
     loaded = load_source(source, scenario=scenario, warn=warn)
-    return simulate_gait(loaded.scenario, loaded.best)
+    return simulate(loaded.scenario, loaded.best, record=True)

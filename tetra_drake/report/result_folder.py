@@ -10,70 +10,29 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import check_folder, read_text, write_whole
-from tetra_drake.results.metrics import headline
+from tetra_drake.results.path import CentrePath
+from tetra_drake.results.result import IntegratorWork, SimulationResult, save_result
 from tetra_drake.results.trajectory import DIMENSIONS, labels
-from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.metric_units import METRICS, Metrics
+from tetra_drake.scenario.sections import Section
 
 if TYPE_CHECKING:
     import xarray
 
-    from tetra_drake.results.result import SimulationResult
-
 SCENARIO, TRAJECTORY = "scenario.yaml", "trajectory.nc"
 REPLAY, RESULT = "replay.html", "result.json"
-
-
-@dataclass(frozen=True)
-class GaitMotion:
-    """A gait and its motion, with all that is needed to show it."""
-
-    scenario: Scenario
-    gait: Gait
-    trajectory: xarray.Dataset
-    """Motion and forces; see results.trajectory.make_dataset."""
-    metrics: Mapping[str, float]
-    """Values in SI of all METRICS."""
-
-    @property
-    def title(self) -> str:
-        """The gait's name and what it did."""
-        return f"{self.gait.name}: {headline(self.scenario, self.metrics)}"
-
-    def save_replay(self, path: Path, *, viewer: Path | None = None) -> None:
-        """Writes the page that plays the motion; see visualization.replay.save_replay."""
-        from tetra_drake.visualization.replay import save_replay
-
-        save_replay(
-            path,
-            robot=Robot.of(self.scenario),
-            trajectory=self.trajectory,
-            title=self.title,
-            viewer=viewer,
-        )
-
-
-def simulate_gait(scenario: Scenario, gait: Gait) -> GaitMotion:
-    """Simulates a gait and keeps its motion. Raises SimulationFailure."""
-    from tetra_drake.engines.simulate import simulate
-
-    result = simulate(scenario=scenario, gait=gait, record=True)
-    assert result.trajectory is not None
-    return GaitMotion(scenario, gait, result.trajectory, vars(result.metrics))
 
 
 def check_result_folder(folder: Path) -> None:
@@ -83,55 +42,95 @@ def check_result_folder(folder: Path) -> None:
         raise InputError(folder, "", "holds a run of `evolve`, expected another folder")
 
 
-def save_result_folder(
-    folder: Path,
-    *,
-    scenario: Scenario,
-    gait: Gait,
-    result: SimulationResult,
-    commanded: bool = False,
-) -> None:
-    """Writes the files of a simulation that recorded its trajectory; the gait of one that was
-    `commanded` is left out. Raises InputError if the folder cannot be written to."""
-    from tetra_drake.results.result import save_result
+def save_result_folder(folder: Path, result: SimulationResult) -> None:
+    """Writes the files of a simulation that recorded its trajectory; raises InputError if it did
+    not, or if the folder cannot be written to."""
     from tetra_drake.results.trajectory import save_dataset
 
-    assert result.trajectory is not None
-    motion = GaitMotion(scenario, gait, result.trajectory, vars(result.metrics))
+    trajectory = result.recorded
     # Written last and removed first: where there is a result.json, the other files belong to it.
     if (folder / RESULT).is_file():
         (folder / RESULT).unlink()
-    write_whole(folder / SCENARIO, dump_scenario(scenario))
-    save_dataset(motion.trajectory, folder / TRAJECTORY)
-    motion.save_replay(folder / REPLAY)
-    save_result(folder / RESULT, scenario, None if commanded else gait, result)
+    write_whole(folder / SCENARIO, dump_scenario(result.scenario))
+    save_dataset(trajectory, folder / TRAJECTORY)
+    result.save_replay(folder / REPLAY)
+    save_result(folder / RESULT, result)
 
 
-def load_result_folder(folder: Path) -> GaitMotion:
-    """Reads a simulation's scenario, gait and trajectory back.
+def load_result(folder: str | Path) -> SimulationResult:
+    """Reads the folder of a simulation back, with its scenario, gait and trajectory.
 
     Raises InputError, naming the file, if one is missing, damaged, or not of this scenario.
     """
+    folder = Path(folder)
     for name in (RESULT, SCENARIO, TRAJECTORY):
         if not (folder / name).is_file():
             problem = f"holds no {name}, so it was not written by `simulate`"
             raise InputError(folder, name, problem)
     scenario = load_scenario(folder / SCENARIO)
-    return GaitMotion(
+    gait = load_gait(folder / RESULT, scenario, key="gait")
+    trajectory = _load_trajectory(folder / TRAJECTORY, Robot.of(scenario).structure)
+    file = _read_result_file(folder / RESULT)
+    return SimulationResult(
         scenario=scenario,
-        gait=load_gait(folder / RESULT, scenario, key="gait"),
-        trajectory=_load_trajectory(folder / TRAJECTORY, Robot.of(scenario).structure),
-        metrics=_load_metrics(folder / RESULT),
+        name=gait.name,
+        gait=gait,
+        metrics=Metrics(**file.metrics),
+        fitness=_number(file.fitness),
+        duration=file.duration_s,
+        wall_time=file.wall_time_s,
+        integrator=IntegratorWork(**file.integrator),
+        engine=file.engine,
+        path=file.path.columns(),
+        trajectory=trajectory,
     )
 
 
-def _load_metrics(path: Path) -> dict[str, float]:
-    """The metrics in result.json, NaN where one is null; InputError if one is missing."""
-    numbers = json.loads(read_text(path, "result")).get("metrics")
+class _Path(Section):
+    """The path of the centre in result.json."""
+
+    time_s: list[float]
+    x_m: list[float]
+    y_m: list[float]
+    z_m: list[float]
+    heading_rad: list[float | None]
+
+    def columns(self) -> CentrePath:
+        """The path as arrays."""
+        centre = np.column_stack([self.x_m, self.y_m, self.z_m])
+        heading = np.array([_number(angle) for angle in self.heading_rad])
+        return CentrePath(np.array(self.time_s), centre, heading)
+
+
+class _ResultFile(Section):
+    """What is read of result.json, beside the gait."""
+
+    metrics: dict[str, Any]
+    fitness: float | None
+    duration_s: float
+    wall_time_s: float
+    engine: str
+    integrator: dict[str, Any]
+    path: _Path
+
+
+def _read_result_file(path: Path) -> _ResultFile:
+    """The numbers of result.json; InputError if one is missing."""
+    content = json.loads(read_text(path, "result"))
+    read = {name: content[name] for name in _ResultFile.model_fields if name in content}
+    file = _ResultFile.from_tree(read, path)
+    shares = file.metrics.get("lifted_shares", [])
+    numbers: dict[str, Any] = {"lifted_shares": tuple(shares)}
     for name in METRICS:
-        if not isinstance(numbers, dict) or not isinstance(numbers.get(name, ""), float | None):
+        if not isinstance(file.metrics.get(name, ""), float | None):
             raise InputError(path, f"metrics.{name}", "is missing, or no number")
-    return {name: math.nan if numbers[name] is None else numbers[name] for name in METRICS}
+        numbers[name] = _number(file.metrics[name])
+    return file.model_copy(update={"metrics": numbers})
+
+
+def _number(value: float | None) -> float:
+    """NaN for a number that JSON cannot hold."""
+    return math.nan if value is None else value
 
 
 def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:

@@ -17,7 +17,7 @@ from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, fixed, render
 from tetra_drake.machine import versions
 from tetra_drake.report.book import Study, draw_run, draw_trajectory, simulate_again, study_run
-from tetra_drake.report.result_folder import RESULT, load_result_folder
+from tetra_drake.report.result_folder import RESULT, load_result
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import ParameterSpace, save_gait
@@ -43,7 +43,7 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
         draw_run(study_run(load_run(source)), folder)
     elif (source / RESULT).exists():
         check_folder(folder)
-        draw_trajectory(load_result_folder(source), folder)
+        draw_trajectory(load_result(source), folder)
     else:
         problem = f"holds neither {MANIFEST}, as `evolve` writes, nor {RESULT}, as `simulate`"
         raise InputError(source, "", problem)
@@ -61,7 +61,7 @@ def write_report(directory: Path) -> list[Path]:
     study = study_run(load_run(directory))
     captions = draw_run(study, figures)
     _write_map(study, directory)
-    study.best.motion.save_replay(replay)
+    study.best.result.save_replay(replay)
     write_whole(report, render_report(study, captions, folder=figures))
     return [figures, replay, report]
 
@@ -74,11 +74,11 @@ def _write_map(study: Study, directory: Path) -> None:
     if on_map:
         write_whole(directory / ELITES / ELITES_CSV, elites(run).to_csv(index=False))
     for names, row in on_map:
-        motion = simulate_again(run, row["trial"], row["index"]).motion
+        trial, index = row["trial"], row["index"]
         gait_file, page = _map_files(names, row, study)
-        save_gait(motion.gait, directory / gait_file, motion.scenario)
+        save_gait(run.gait(trial, index), directory / gait_file, run.manifest.scenario)
         if page != Path(REPLAY):
-            motion.save_replay(directory / page)
+            simulate_again(run, trial, index).result.save_replay(directory / page)
 
 
 def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[Path, Path]:
@@ -101,7 +101,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         map_files |= dict.fromkeys(names, gait_file)
         map_pages[names[0]] = page
     space = ParameterSpace.of(manifest.scenario)
-    values = [fixed(value, 4) for value in space.vector(study.best.motion.gait)]
+    values = [fixed(value, 4) for value in run.vector(study.trial, study.best.recorded["index"])]
     again, changed = {}, {}
     for gait in (study.best, study.initial):
         again[gait.label] = gait.distance_in

@@ -15,7 +15,6 @@ from tetra_drake.formatting import Table, fixed, signed
 from tetra_drake.optimizers.steady_state import CHILDREN
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import customary
@@ -48,10 +47,10 @@ def metrics_table(gaits: Mapping[str, Mapping[str, Any] | pandas.Series]) -> Tab
     return Table(["", *gaits], with_numbers)
 
 
-def result_text(scenario: Scenario, gait: Gait, result: SimulationResult) -> str:
+def result_text(result: SimulationResult) -> str:
     """The metrics of a simulation, what it missed, and what it took."""
-    metrics = result.metrics
-    lines = [f"{gait.name}: {result.duration:g} s on scenario {scenario.name}"]
+    scenario, metrics = result.scenario, result.metrics
+    lines = [f"{result.name}: {result.duration:g} s on scenario {scenario.name}"]
     if ground := ground_text(scenario):
         lines.append(f"ground: {ground}")
     table = metrics_table({"": {"fitness": result.fitness} | vars(metrics)})

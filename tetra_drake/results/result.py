@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,10 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tetra_drake.errors import InputError
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.machine import versions
 from tetra_drake.physics.tally import Tally
-from tetra_drake.results.metrics import compute_fitness, compute_metrics
+from tetra_drake.results.metrics import compute_fitness, compute_metrics, headline
 from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
@@ -47,6 +49,11 @@ class IntegratorWork:
 class SimulationResult:
     """Result of simulate()."""
 
+    scenario: Scenario = field(repr=False, compare=False)
+    name: str
+    """Name of the gait, or of the command that was played."""
+    gait: Gait | None = field(repr=False, compare=False)
+    """None if a command was played."""
     metrics: Metrics
     fitness: float
     duration: float
@@ -61,6 +68,32 @@ class SimulationResult:
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
     """See results.trajectory.make_dataset; None unless asked for."""
 
+    @functools.cached_property
+    def robot(self) -> Robot:
+        """The scenario's robot."""
+        return Robot.of(self.scenario)
+
+    @property
+    def recorded(self) -> xarray.Dataset:
+        """The trajectory; raises InputError if the simulation recorded none."""
+        if self.trajectory is None:
+            problem = "was not recorded; simulate with record=True"
+            raise InputError(f"result of {self.name}", "trajectory", problem)
+        return self.trajectory
+
+    @property
+    def title(self) -> str:
+        """The gait's name and what it did."""
+        return f"{self.name}: {headline(self.scenario, vars(self.metrics))}"
+
+    def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
+        """Writes the page that plays the motion; see visualization.replay.save_replay."""
+        from tetra_drake.visualization.replay import save_replay
+
+        save_replay(
+            path, robot=self.robot, trajectory=self.recorded, title=self.title, viewer=viewer
+        )
+
 
 def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
     """The times (s), ascending, at which make_result() needs the motion of a simulation."""
@@ -73,6 +106,7 @@ def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
 
 def make_result(
     robot: Robot,
+    gait: Gait,
     motion: Motion,
     *,
     totals: Tally,
@@ -105,6 +139,9 @@ def make_result(
         signals=way.signals[instants >= simulation.steady_from],
     )
     return SimulationResult(
+        scenario=robot.scenario,
+        name=gait.name,
+        gait=None if len(robot.commanded) else gait,
         metrics=metrics,
         fitness=compute_fitness(metrics, robot.scenario.objective),
         duration=simulation.duration,
@@ -122,11 +159,10 @@ def _poses(states: np.ndarray, structure: Structure) -> np.ndarray:
     return states[:, : 7 * bodies].reshape(len(states), bodies, 7)
 
 
-def save_result(
-    path: str | Path, scenario: Scenario, gait: Gait | None, result: SimulationResult
-) -> None:
+def save_result(path: str | Path, result: SimulationResult) -> None:
     """Writes result.json: metrics in SI, lengths in inches beside them, times in s, and the path of
     the centre as columns. There is no gait if a command was played."""
+    scenario, gait = result.scenario, result.gait
     way, radius = result.path, result.metrics.path_radius
     content = {
         "schema": SCHEMA,
@@ -146,6 +182,7 @@ def save_result(
             "time_s": way.times.tolist(),
             "x_m": way.centre[:, 0].tolist(),
             "y_m": way.centre[:, 1].tolist(),
+            "z_m": way.centre[:, 2].tolist(),
             "heading_rad": [json_number(angle) for angle in way.heading.tolist()],
         },
     }

@@ -43,6 +43,7 @@ class PreparedGait:
     """A gait on a scenario, prepared for a lane: arrays without lanes."""
 
     robot: Robot
+    gait: Gait
     record: bool
     times: np.ndarray
     """The times (s) of the samples to keep, those of motion_times()."""
@@ -71,6 +72,7 @@ class PreparedGait:
         turns, solver = robot.turns(gait, steering), Solver.of(robot.model)
         return cls(
             robot=robot,
+            gait=gait,
             record=record,
             times=motion_times(simulation, record=record),
             marks=marks[marks <= simulation.duration],
@@ -206,6 +208,7 @@ def make_outcome(prepared: PreparedGait, course: Course) -> SimulationResult:
     tolerance = scenario.settings_of(Compiled).tolerance
     return make_result(
         prepared.robot,
+        prepared.gait,
         course.motion,
         totals=course.totals,
         work=IntegratorWork("ros2", tolerance, course.steps, course.evaluations),
