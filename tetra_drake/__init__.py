@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tetra_drake.robot.gait import load_gait as load_gait
     from tetra_drake.scenario.load import load_scenario as load_scenario
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 _HOMES = {
     "evolve": "tetra_drake.experiment",
