@@ -1,0 +1,22 @@
+"""A first gait: simulate it, read its numbers, watch it, draw it."""
+
+# %% A scenario has every number of the robot and its world; a gait is what its oscillators do.
+from pathlib import Path
+
+import tetra_drake as td
+from tetra_drake.figures.gait_diagram import gait_diagram
+
+scenario = td.load_scenario("coulomb")  # the thesis's robot, on feet that hold
+gait = td.seeded_gait(scenario, seed=80)  # a random one
+result = td.simulate(scenario, gait, record=True)
+print(result.metrics)
+
+# %% A page for any browser. In a notebook, result.show() shows it.
+result.save_replay("first_gait.html")
+
+# %% The trajectory is an xarray dataset in SI units, with names along its axes.
+outer = result.trajectory.tension.sel(cable_group="outer", time=slice(5.0, None))
+print("greatest tension of an outer cable:", f"{outer.max().item():.2f} N")
+
+# %% Which feet are on the ground when, what the oscillators do, how fast the robot is.
+gait_diagram(result).savefig(Path(__file__).with_suffix(".png"), dpi=120)

@@ -1,0 +1,33 @@
+"""Feedback: oscillators that sense the stretch of their cables, on rough ground."""
+
+# %% With `cpg.feedback` a gait has a gain for each sense, which evolution sets.
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import tetra_drake as td
+
+small = {"optimizer": "!CmaEs", "evolution.trials": 1, "evolution.evaluations": 300}
+with_feedback = td.load_scenario("feedback").with_changes(small)
+without = with_feedback.with_changes({"cpg.feedback": []})
+
+# %% Two searches of equal size on the same ground.
+gaits = {}
+for name, scenario in {"with feedback": with_feedback, "without": without}.items():
+    out = f"out/{name.replace(' ', '_')}"
+    run = td.evolve(scenario, out, overwrite=True, reevaluate=False, report=False)
+    gaits[name] = scenario, run.best_gait()
+print(gaits["with feedback"][1])
+
+# %% Both gaits on ground that they have not seen. One trial each decides nothing: see runs/.
+figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+axes = figure.subplots()
+for name, (scenario, gait) in gaits.items():
+    unseen = [scenario.with_changes({"terrain.seed": seed}) for seed in range(1, 21)]
+    walks = td.simulate_many(unseen, [gait] * len(unseen))
+    inches = np.sort([walk.metrics.distance_in for walk in walks])
+    axes.plot(np.arange(1, 21), inches, "o-", label=f"{name}: mean {inches.mean():.1f} in")
+axes.set(xlabel="terrain, sorted by distance", ylabel="distance in 15 s (in)", xticks=[1, 10, 20])
+axes.legend()
+figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
