@@ -111,8 +111,8 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
 def test_a_robot_of_another_length_is_evolved_and_drawn(tiny, tmp_path):
     scenario = tiny.with_changes({"robot.tetrahedra": 2, "simulation.duration": "2.0 s"})
     run = tetra_drake.evolve(scenario, tmp_path / "run", workers=1, reevaluate=False)
-    trial, index = run.fittest()
-    assert len(run.vector(trial, index)) == 2  # no weights
+    best = run.fittest()
+    assert len(run.vector(best["trial"], best["index"])) == 2  # no weights
     assert run.statuses[0].failures == 0
     assert len(list((run.directory / "figures").glob("*.svg"))) >= 9
     replay = commands(read_page(run.directory / "replay.html"), "set_object")

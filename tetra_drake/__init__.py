@@ -15,6 +15,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tetra_drake.analysis.sweep import sweep as sweep
     from tetra_drake.engines.simulate import simulate as simulate
     from tetra_drake.engines.simulate import simulate_many as simulate_many
     from tetra_drake.evolution.run import load_run as load_run
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from tetra_drake.prototype.command_file import load_command as load_command
     from tetra_drake.report.result_folder import load_result as load_result
     from tetra_drake.robot.gait import load_gait as load_gait
+    from tetra_drake.robot.gait import seeded_gait as seeded_gait
     from tetra_drake.scenario.load import load_scenario as load_scenario
 
 __version__ = "0.2.0"
@@ -33,8 +35,10 @@ _HOMES = {
     "load_result": "tetra_drake.report.result_folder",
     "load_run": "tetra_drake.evolution.run",
     "load_scenario": "tetra_drake.scenario.load",
+    "seeded_gait": "tetra_drake.robot.gait",
     "simulate": "tetra_drake.engines.simulate",
     "simulate_many": "tetra_drake.engines.simulate",
+    "sweep": "tetra_drake.analysis.sweep",
 }
 
 __all__ = ["__version__", *_HOMES]

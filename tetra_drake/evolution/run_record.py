@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -96,6 +97,17 @@ class RunRecord:
         if method is not None:
             manifest.method.check_same(method, directory)
         return cls(directory, manifest, _lock(directory))
+
+    @staticmethod
+    def remove(directory: Path) -> None:
+        """Removes a run with all that its directory holds, if there is such a directory.
+
+        Raises InputError if it holds no run, or if a process is at work on it.
+        """
+        if directory.exists():
+            read_manifest(directory)
+            with _lock(directory):
+                shutil.rmtree(directory)
 
     def __enter__(self) -> RunRecord:
         return self

@@ -78,7 +78,7 @@ def _write_map(study: Study, directory: Path) -> None:
         gait_file, page = _map_files(names, row, study)
         save_gait(run.gait(trial, index), directory / gait_file, run.manifest.scenario)
         if page != Path(REPLAY):
-            simulate_again(run, trial, index).result.save_replay(directory / page)
+            simulate_again(run, row).result.save_replay(directory / page)
 
 
 def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[Path, Path]:

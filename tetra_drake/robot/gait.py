@@ -242,6 +242,11 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     return gait
 
 
+def given_gait(gait: Gait | str | Path, scenario: Scenario) -> Gait:
+    """A gait, read from its file if that is given."""
+    return gait if isinstance(gait, Gait) else load_gait(gait, scenario)
+
+
 def _read_file(path: str | Path, key: str) -> GaitFile:
     """Content of a gait file, or of a JSON file under `key`."""
     text = read_text(path, "gait file")

@@ -34,6 +34,11 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     return scenario
 
 
+def given_scenario(scenario: Scenario | str | Path) -> Scenario:
+    """A scenario, loaded if its name or file is given."""
+    return scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+
+
 def dump_scenario(scenario: Scenario) -> str:
     """The scenario as a complete scenario file: SI units, loads back to the same numbers."""
     return dump_yaml(tree_of(scenario))
