@@ -18,7 +18,6 @@ from tetra_drake.analysis.statistics import interquartile_mean, interval, json_r
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import FITNESS
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.scenario.load import differences
 
 if TYPE_CHECKING:
     import pandas
@@ -190,7 +189,7 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
             raise InputError(run.directory, "objective", f"{problem} about each other")
         changed = [
             f"{key} {value}"
-            for key, value in differences(run.scenario, base.scenario)
+            for key, value in run.scenario.differences(base.scenario)
             if key.split(".")[0] not in _SEARCH
         ]
         if changed:

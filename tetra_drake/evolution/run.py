@@ -20,6 +20,7 @@ from tetra_drake.evolution.entries import (
 )
 from tetra_drake.evolution.manifest import Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
+from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
@@ -38,7 +39,8 @@ _INDICES = {"placed", "best_evaluation"}
 
 @dataclass(frozen=True)
 class Run:
-    """A recorded run, finished or not; metrics in SI, times in s."""
+    """A recorded run, finished or not; metrics in SI, times in s. A gait's row is one of
+    `evaluations`."""
 
     directory: Path
     manifest: Manifest
@@ -58,6 +60,23 @@ class Run:
     reevaluations: pandas.DataFrame
     """Gaits evaluated once more on the Drake diagram: columns as in evaluations, without
     `placed`; empty if there are none."""
+
+    def __str__(self) -> str:
+        method, trials = self.manifest.method, self.statuses
+        ended = sum(bool(trial.stop) for trial in trials)
+        failures = sum(trial.failures for trial in trials)
+        lines = [
+            f"run {self.directory}: scenario {self.scenario.name}, seed {self.manifest.seed}",
+            f"optimiser {method.optimizer}, objective {method.objective}; {len(self.evaluations)} "
+            f"evaluations ({failures} failed), {ended} of {len(trials)} trials ended",
+        ]
+        if not self.best().empty:
+            best = self.fittest()
+            lines.append(f"best gait: {gait_label(best)}, {headline(self.scenario, best)}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<Run {self.directory}>"
 
     @property
     def scenario(self) -> Scenario:

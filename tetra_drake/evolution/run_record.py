@@ -42,7 +42,6 @@ from tetra_drake.files import check_folder, make_folder
 from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Gait, Vector, save_gait
-from tetra_drake.scenario.load import differences
 from tetra_drake.scenario.schema import Scenario
 
 LOCK = ".lock"
@@ -91,7 +90,7 @@ class RunRecord:
         if seed not in (None, manifest.seed):
             raise InputError(directory, "seed", f"the run has seed {manifest.seed}, not {seed}")
         if scenario is not None:
-            for key, value in differences(manifest.scenario, scenario):
+            for key, value in manifest.scenario.differences(scenario):
                 problem = f"the run has {value}; it is resumed with its own scenario"
                 raise InputError(directory, key, problem)
         if method is not None:

@@ -70,6 +70,17 @@ class SimulationResult:
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
     """See results.trajectory.make_dataset; None unless asked for."""
 
+    def __str__(self) -> str:
+        kept = "not recorded" if self.trajectory is None else "recorded"
+        return (
+            f"{self.title}\n"
+            f"scenario {self.scenario.name}, engine {self.engine}, trajectory {kept}, "
+            f"fitness {self.fitness:.4g}\n{self.metrics}"
+        )
+
+    def __repr__(self) -> str:
+        return f"<SimulationResult {self.title}>"
+
     @functools.cached_property
     def robot(self) -> Robot:
         """The scenario's robot."""
