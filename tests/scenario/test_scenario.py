@@ -308,4 +308,4 @@ def test_a_printed_scenario_tells_what_differs_from_the_thesis(tmp_path):
         ["optimizer", "population", "12,", "weight_mutation", "0.5"],
     ]
     recorded = load_scenario(write(tmp_path, dump_scenario(loaded)))
-    assert "strut_length 0.1778 m, spacing 0.0882" in str(recorded), "rounded"
+    assert "strut_length 0.1778 m, spacing 0.0872105 m" in str(recorded), "rounded"
