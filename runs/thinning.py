@@ -18,6 +18,8 @@ from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import pandas
+
 from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.entries import (
     BEST_GAIT,
@@ -72,9 +74,19 @@ def _that_matter(run: Run) -> set[tuple[Any, Any]]:
     """Trial and index of the evaluations that keep their genomes."""
     table = run.evaluations
     rises = table[table["fitness"] == table.groupby("trial")["fitness"].cummax()]
-    last = [run.last_population(trial) for trial in table["trial"].unique()]
+    last = [last_population(run, trial) for trial in table["trial"].unique()]
     chosen = [run.initial(), rises, run.best(BEST_GAITS), run.reevaluations, elites(run), *last]
     return {(row["trial"], row["index"]) for table in chosen for _, row in table.iterrows()}
+
+
+def last_population(run: Run, trial: int) -> pandas.DataFrame:
+    """The population of a trial after its last iteration: rows of `evaluations`."""
+    rows = run.evaluations[run.evaluations["trial"] == trial]
+    if "placed" not in rows:
+        return rows.iloc[:0]
+    # The last row of a place is its member.
+    rows = rows.dropna(subset="placed").drop_duplicates("placed", keep="last")
+    return rows.sort_values("placed")
 
 
 def _that_choose(scenario: Scenario) -> set[str]:

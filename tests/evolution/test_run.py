@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.analytic import Bowl, record_run, small_scenario
 from helpers.synthetic_run import write_run
+from thinning import last_population
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines, read_lines
@@ -102,7 +103,7 @@ def test_the_best_gait_is_saved_and_the_last_population_is_that_of_the_mean(run_
     directory = run_small()
     run = load_run(directory)
     for trial in (0, 1):
-        population = run.last_population(trial)
+        population = last_population(run, trial)
         assert population["placed"].tolist() == list(range(12))
         assert population["fitness"].mean() == pytest.approx(run.statuses[trial].mean_fitness)
         best = int(run.best()["index"].iloc[trial])

@@ -63,43 +63,43 @@ def sweep(
         walkers * len(scenarios),
         workers=workers,
     )
-    coordinates = {}
+    labels = {}
     for place, (key, values) in enumerate(changes.items()):
         along = [each[place] for each in combinations]
         firsts = [scenarios[along.index(value)] for value in values]
-        name = _dimension(key, changes)
-        coordinates[name] = _coordinate(name, key, values, firsts)
-    coordinates["gait"] = ("gait", [gait.name for gait in walkers], {})
-    shape = [len(labels) for _, labels, _ in coordinates.values()]
+        labels[_dimension(key, changes)] = _labels(key, values, firsts)
+    labels["gait"] = [gait.name for gait in walkers], {}
+    shape = [len(values) for values, _ in labels.values()]
+    rows = [_numbers(outcome) for outcome in outcomes]
     variables = {}
     for name, unit in {"fitness": "", **METRICS}.items():
-        numbers = np.array([_number(outcome, name) for outcome in outcomes]).reshape(shape)
-        variables[name] = (list(coordinates), numbers, {"units": unit or "1"})
+        numbers = np.reshape([row[name] for row in rows], shape)
+        variables[name] = list(labels), numbers, {"units": unit or "1"}
+    coordinates = {name: (name, *given) for name, given in labels.items()}
     return xarray.Dataset(variables, coordinates, {"scenario": base.name})
 
 
-def _dimension(key: str, changes: Mapping[str, Any]) -> str:
+def _dimension(key: str, changes: Iterable[str]) -> str:
     """The last part of a key, or all of it if the dataset has another use for the last part."""
     name = key.rpartition(".")[2]
     others = [other.rpartition(".")[2] for other in changes if other != key]
     return key if name in ("gait", "fitness", *METRICS, *others) else name
 
 
-def _coordinate(
-    name: str, key: str, values: Sequence[Any], scenarios: Sequence[Scenario]
-) -> tuple[str, list[Any], dict[str, str]]:
-    """Dimension, labels and attributes of a coordinate: SI numbers of the scenarios with these
-    values, or the values as given where they are no numbers."""
+def _labels(
+    key: str, values: Iterable[Any], scenarios: Sequence[Scenario]
+) -> tuple[list[Any], dict[str, str]]:
+    """The SI numbers at a key of scenarios, and their unit; where they are no numbers, the values
+    as given."""
     numbers = [flattened(changed.model_dump()).get(key) for changed in scenarios]
     if not all(isinstance(number, int | float) for number in numbers):
-        return name, [value if isinstance(value, str) else str(value) for value in values], {}
-    units = flattened(tree_of(scenarios[0], show=lambda _, unit: unit, sparse=False))
-    unit = units[key]
-    return name, numbers, {"units": unit if isinstance(unit, str) else "1"}
+        return [str(value) for value in values], {}
+    unit = flattened(tree_of(scenarios[0], show=lambda _, unit: unit, sparse=False))[key]
+    return numbers, {"units": unit if isinstance(unit, str) else "1"}
 
 
-def _number(outcome: Outcome, name: str) -> float:
-    """Fitness or a metric of a simulation; NaN if it failed."""
+def _numbers(outcome: Outcome) -> dict[str, float]:
+    """Fitness and metrics of a simulation; NaN if it failed."""
     if isinstance(outcome, SimulationFailure):
-        return math.nan
-    return outcome.fitness if name == "fitness" else float(getattr(outcome.metrics, name))
+        return dict.fromkeys(("fitness", *METRICS), math.nan)
+    return {"fitness": outcome.fitness, **vars(outcome.metrics)}

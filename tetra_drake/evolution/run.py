@@ -66,9 +66,10 @@ class Run:
         ended = sum(bool(trial.stop) for trial in trials)
         failures = sum(trial.failures for trial in trials)
         lines = [
-            f"run {self.directory}: scenario {self.scenario.name}, seed {self.manifest.seed}",
-            f"optimiser {method.optimizer}, objective {method.objective}; {len(self.evaluations)} "
-            f"evaluations ({failures} failed), {ended} of {len(trials)} trials ended",
+            f"run {self.directory}: scenario {self.scenario.name}, seed {self.manifest.seed}, "
+            f"optimiser {method.optimizer}, objective {method.objective}",
+            f"{len(self.evaluations)} evaluations ({failures} failed), "
+            f"{ended} of {len(trials)} trials ended",
         ]
         if not self.best().empty:
             best = self.fittest()
@@ -129,15 +130,6 @@ class Run:
     def initial(self) -> pandas.DataFrame:
         """The evaluations of iteration 0."""
         return self.evaluations[self.evaluations["iteration"] == 0]
-
-    def last_population(self, trial: int) -> pandas.DataFrame:
-        """The population of a trial after its last iteration: rows of `evaluations`."""
-        rows = self.evaluations[self.evaluations["trial"] == trial]
-        if "placed" not in rows:
-            return rows.iloc[:0]
-        # The last row of a place is its member.
-        rows = rows.dropna(subset="placed").drop_duplicates("placed", keep="last")
-        return rows.sort_values("placed")
 
     def vector(self, trial: int, index: int) -> Vector:
         """The parameters of an evaluation; InputError if thinning has left them out."""

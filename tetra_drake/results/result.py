@@ -23,7 +23,7 @@ from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.metric_units import Metrics
+from tetra_drake.scenario.metric_units import METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import SimulationSection
 from tetra_drake.scenario.units import INCH
@@ -195,12 +195,13 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
     """Writes result.json: metrics in SI, lengths in inches beside them, times in s, and the path of
     the centre as columns. There is no gait if a command was played."""
     scenario, gait = result.scenario, result.gait
-    way, radius = result.path, result.metrics.path_radius
+    way, metrics, radius = result.path, vars(result.metrics), result.metrics.path_radius
+    lengths = [name for name, unit in METRICS.items() if unit == "m"]
     content = {
         "schema": SCHEMA,
         "scenario": scenario.name,
         "metrics": result.metrics.to_json(),
-        **result.metrics.in_inches(),
+        **{f"{name}_in": json_number(metrics[name] / INCH) for name in lengths},
         "path_radius_in": json_number(radius / INCH),
         "fitness": result.fitness,
         "duration_s": result.duration,

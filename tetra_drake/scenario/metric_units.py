@@ -10,7 +10,7 @@ from typing import Any
 
 from tetra_drake.files import json_number
 from tetra_drake.formatting import Table
-from tetra_drake.scenario.units import INCH, customary
+from tetra_drake.scenario.units import INCH, customary, shown
 
 STRAIGHT = 0.01
 """Curvature (1/m) below which a path counts as straight: over the thesis's fifteen inches, it bends
@@ -18,10 +18,6 @@ by a fifth of a millimetre."""
 
 LEAST_WAY = 1e-3
 """m: a robot that goes less far counts as gone so far in its cost of transport."""
-
-
-_NOTHING = 1e-9
-"""What is printed as 0, in SI: rounding of sums."""
 
 
 def _metric(unit: str, *, least: bool = False, most: bool = False, of_a_row: bool = False) -> Any:
@@ -101,19 +97,17 @@ class Metrics:
 
     def __str__(self) -> str:
         """A table of the metrics that the robot has, in SI and in the units that people read."""
-        cells = []
+        rows = []
         for name, unit in METRICS.items():
-            value = getattr(self, name)
+            value = round(getattr(self, name), 9) + 0.0  # neither -0 nor rounding errors
             if not math.isnan(value):
-                size, read = customary(unit)
-                number = value if abs(value) > _NOTHING else 0.0
-                other = f"{number / size:.4g} {read}" if read != unit else ""
-                cells.append([name, f"{number:.4g} {unit}".rstrip(), other])
-        half = (len(cells) + 1) // 2
-        pairs = itertools.zip_longest(cells[:half], cells[half:], fillvalue=["", "", ""])
+                read = shown(value, unit) if customary(unit)[1] != unit else ""
+                rows.append([name, f"{value:.4g} {unit}".rstrip(), read])
+        half = (len(rows) + 1) // 2
+        pairs = itertools.zip_longest(rows[:half], rows[half:], fillvalue=[""] * 3)
         headings = ["metric", "SI", "in, lbf, deg"]
-        rows = [left + right for left, right in pairs]
-        return Table(headings + headings, rows, text_columns=range(6)).text()
+        side_by_side = [left + right for left, right in pairs]
+        return Table(headings * 2, side_by_side, text_columns=range(6)).text()
 
     @property
     def distance_in(self) -> float:
@@ -125,11 +119,6 @@ class Metrics:
         """Radius in m of the path of the centre in the steady stretch; inf if it is straight."""
         bend = abs(self.path_curvature)
         return 1.0 / bend if bend > STRAIGHT else math.inf
-
-    def in_inches(self) -> dict[str, Any]:
-        """The lengths in inches, as JSON holds them: distance_in, steady_distance_in ..."""
-        lengths = [name for name, unit in METRICS.items() if unit == "m"]
-        return {f"{name}_in": json_number(getattr(self, name) / INCH) for name in lengths}
 
     def to_json(self) -> dict[str, Any]:
         """The metrics by name, as JSON holds them: None for one that is not finite."""

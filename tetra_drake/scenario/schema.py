@@ -114,12 +114,10 @@ class Scenario(Section):
     def differences(self, base: Scenario) -> list[tuple[str, str]]:
         """(key, value) of what differs from `base`, the name aside, in the units in which it was
         written."""
-        ours, theirs, written = _values(self), _values(base), flattened(self.tree)
-        found = []
-        for key, value in ours.items():
-            if key != "name" and _text(value) != _text(theirs.get(key)):
-                found.append((key.removesuffix(f".{TAG}"), _text(written.get(key, value))))
-        return found
+        full = [tree_of(each, show="{:.6g} {}".format, sparse=False) for each in (self, base)]
+        ours, theirs, written = (_texts(tree) for tree in (*full, self.tree))
+        changed = [key for key in ours if ours[key] != theirs.get(key, "null") and key != "name"]
+        return [(key.removesuffix(f".{TAG}"), written.get(key, ours[key])) for key in changed]
 
     def __eq__(self, other: object) -> bool:
         # Units in which a number was written do not matter.
@@ -290,14 +288,10 @@ def _thesis() -> Scenario:
     return Scenario.from_tree(parse_yaml(read_text(file, "scenario file"), file), file)
 
 
-def _values(scenario: Scenario) -> dict[str, Any]:
-    """The values of a scenario by their keys; quantities as rounded texts."""
-    return flattened(tree_of(scenario, show="{:.6g} {}".format, sparse=False))
-
-
-def _text(value: Any) -> str:
-    """A value of a tree as text."""
-    return rounded(json.dumps(value)).replace('"', "")
+def _texts(tree: Tree) -> dict[str, str]:
+    """The values of a tree as texts, by their keys."""
+    values = flattened(tree).items()
+    return {key: rounded(json.dumps(value)).replace('"', "") for key, value in values}
 
 
 def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
