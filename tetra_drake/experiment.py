@@ -20,7 +20,7 @@ from tetra_drake.evolution.executors import (
     process_executor,
     thread_executor,
 )
-from tetra_drake.evolution.manifest import FITNESS, Manifest, Method, read_manifest
+from tetra_drake.evolution.manifest import Manifest, Method, read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import RunRecord
@@ -171,17 +171,9 @@ def _reevaluate(
 
 
 def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
-    """Introduction of a run: scenario, size, method, and where the results will be."""
-    scenario, method = manifest.scenario, manifest.method
-    among = scenario.disturbances
-    draws = f", each gait among {among.draws} draws of disturbances" if among else ""
-    objective = "" if method.objective == FITNESS else f", objective {method.objective}"
-    text = (
-        f"{directory}: scenario {scenario.name}, seed {manifest.seed}, optimiser "
-        f"{method.optimizer}, trials {scenario.evolution.trials}, each of at most "
-        f"{scenario.evolution.evaluations} evaluations, engine {scenario.engine_name}, "
-        f"workers {workers}{draws}{objective}"
-    )
+    """Introduction of a run: method, scenario, and where the results will be."""
+    text = f"{directory}: {manifest.method}, seed {manifest.seed}, {workers} workers\n"
+    text += str(manifest.scenario)
     if report:
         text += (
             f"\nat the end: {directory / 'replay.html'}, the best gait walking, and "

@@ -62,14 +62,13 @@ class Run:
     `placed`; empty if there are none."""
 
     def __str__(self) -> str:
-        method, trials = self.manifest.method, self.statuses
+        manifest, trials = self.manifest, self.statuses
         ended = sum(bool(trial.stop) for trial in trials)
         failures = sum(trial.failures for trial in trials)
         lines = [
-            f"run {self.directory}: scenario {self.scenario.name}, seed {self.manifest.seed}, "
-            f"optimiser {method.optimizer}, objective {method.objective}",
-            f"{len(self.evaluations)} evaluations ({failures} failed), "
-            f"{ended} of {len(trials)} trials ended",
+            f"{self.directory}: {manifest.method}, seed {manifest.seed}",
+            f"scenario {self.scenario.name}: {len(self.evaluations)} evaluations "
+            f"({failures} failed), {ended} of {len(trials)} trials ended",
         ]
         if not self.best().empty:
             best = self.fittest()

@@ -76,11 +76,8 @@ class Gait:
         oscillators = [str(i + 1) for i in range(count)]
         rows = []
         for onto in oscillators:
-            cells = [onto]
-            for source in oscillators:
-                pair = [texts.get(f"{source}->{onto} {kind}", "-") for kind in KINDS]
-                cells.append("-" if pair == ["-", "-"] else "/".join(pair))
-            rows.append(cells)
+            row = [[texts.get(f"{i}->{onto} {kind}", "-") for kind in KINDS] for i in oscillators]
+            rows.append([onto, *("/".join(pair).replace("-/-", "-") for pair in row)])
         lines.append(f"weights ({'/'.join(KINDS)}), a column for each oscillator they come from")
         return "\n".join([*lines, Table(["onto", *oscillators], rows).text()])
 
