@@ -18,6 +18,8 @@ from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import pandas
+
 from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.entries import (
     BEST_GAIT,
@@ -50,8 +52,8 @@ def thin(source: Path, out: Path) -> None:
     run = load_run(source)
     manifest = json.loads((source / MANIFEST).read_text(encoding="utf-8")) | {"thinned": True}
     whole = {(int(trial), int(index)) for trial, index in _that_matter(run)}
-    metrics = _that_choose(run.manifest.scenario)
-    for trial in range(run.manifest.scenario.evolution.trials):
+    metrics = _that_choose(run.scenario)
+    for trial in range(run.scenario.evolution.trials):
         old, new = trial_folder(source, trial), trial_folder(out, trial)
         entries = read_entries(old / EVALUATIONS)
         thinned = [e if (trial, e["index"]) in whole else _thinned(e, metrics) for e in entries]
@@ -72,9 +74,19 @@ def _that_matter(run: Run) -> set[tuple[Any, Any]]:
     """Trial and index of the evaluations that keep their genomes."""
     table = run.evaluations
     rises = table[table["fitness"] == table.groupby("trial")["fitness"].cummax()]
-    last = [run.last_population(trial) for trial in table["trial"].unique()]
+    last = [last_population(run, trial) for trial in table["trial"].unique()]
     chosen = [run.initial(), rises, run.best(BEST_GAITS), run.reevaluations, elites(run), *last]
     return {(row["trial"], row["index"]) for table in chosen for _, row in table.iterrows()}
+
+
+def last_population(run: Run, trial: int) -> pandas.DataFrame:
+    """The population of a trial after its last iteration: rows of `evaluations`."""
+    rows = run.evaluations[run.evaluations["trial"] == trial]
+    if "placed" not in rows:
+        return rows.iloc[:0]
+    # The last row of a place is its member.
+    rows = rows.dropna(subset="placed").drop_duplicates("placed", keep="last")
+    return rows.sort_values("placed")
 
 
 def _that_choose(scenario: Scenario) -> set[str]:

@@ -7,6 +7,7 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 from helpers.analytic import Bowl, RandomSearch, read_record, record_run, small_scenario
+from thinning import last_population
 
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.run import load_run
@@ -109,7 +110,7 @@ def test_another_optimiser_reports_its_own_numbers(tmp_path):
     assert [(status.evaluations, status.stop) for status in statuses] == [(8, "done")] * 2
     run = load_run(tmp_path / "run")
     assert "placed" not in run.evaluations
-    assert run.last_population(0).empty
+    assert last_population(run, 0).empty
     farthest = run.evaluations.groupby("trial")["distance"].max()
     assert run.iterations.groupby("trial")["farthest"].last().tolist() == farthest.tolist()
     assert set(run.iterations["note"]) == {"wide"}

@@ -66,7 +66,6 @@ def test_metrics_are_the_displacements_of_figure_13(robot: Robot) -> None:
     ahead = (4 * 2.94 + 6.0 * (2.0 / 3.0) ** 0.5) * INCH
     assert metrics.lead == pytest.approx(ahead + 0.6 - 0.5)
     assert metrics.distance_in == pytest.approx(0.5 / INCH)
-    assert metrics.in_inches()["twist_in"] == pytest.approx(0.05 / INCH)
 
 
 def test_turning_and_bending_count_from_their_instants(robot: Robot) -> None:
@@ -125,12 +124,6 @@ def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(robot: Robot) -
     assert weightless.cost_of_transport == math.inf
     assert weightless.to_json()["cost_of_transport"] is None
     assert weightless.to_json()["actuator_work"] == 0.3
-
-
-def test_only_lengths_are_given_in_inches(robot: Robot) -> None:
-    lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift", "clearance"}
-    inches = metrics_of(robot, CIRCLE, 0.0).in_inches()
-    assert inches.keys() == {f"{name}_in" for name in lengths}
 
 
 def test_the_page_of_scenarios_lists_each_metric() -> None:

@@ -82,6 +82,12 @@ def test_the_path_is_written(robot, tmp_path):
     result = result_of(robot, on_a_circle(robot, per_second=-0.5))
     save_result(tmp_path / "result.json", result)
     content = json.loads((tmp_path / "result.json").read_text())
+    lengths = {"distance", "steady_distance", "twist", "lead", "lateral_drift", "clearance"}
+    assert {key for key in content if key.endswith("_in")} == {
+        "path_radius_in",
+        *(f"{name}_in" for name in lengths),
+    }
+    assert content["distance_in"] == pytest.approx(result.metrics.distance / INCH)
     assert content["path_radius_in"] == pytest.approx(RADIUS / INCH, rel=1e-4)
     assert content["metrics"]["heading_change"] == pytest.approx(-7.5)
     columns = (result.path.times, *result.path.centre.T, result.path.heading)

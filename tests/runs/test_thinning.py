@@ -8,7 +8,7 @@ import pandas
 import pytest
 from helpers.analytic import Bowl
 from helpers.synthetic_run import tiny_scenario, write_run
-from thinning import thin
+from thinning import last_population, thin
 
 from tetra_drake.analysis.comparison import compare
 from tetra_drake.analysis.elites import elites
@@ -77,7 +77,7 @@ def test_every_evaluation_is_there_and_those_that_matter_are_whole(runs):
     assert len(thinned.whole) < 0.8 * len(run.whole) == 0.8 * len(run.evaluations)
     fitness = run.evaluations.groupby("trial")["fitness"]
     rises = run.evaluations[run.evaluations["fitness"] == fitness.cummax()]
-    last = pandas.concat([run.last_population(0), run.last_population(1)])
+    last = pandas.concat([last_population(run, 0), last_population(run, 1)])
     again = run.evaluations.query("trial == 0 and index == @AGAIN")
     assert AGAIN not in rises["index"].values and AGAIN not in last["index"].values
     for matter in (run.initial(), rises, run.best(BEST_GAITS), last, again, elites(run)):
@@ -102,7 +102,7 @@ def test_what_does_not_matter_has_three_digits_and_seems_no_better(runs):
 
 def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
     run, thinned = runs
-    assert thinned.fittest() == run.fittest()
+    assert thinned.fittest().equals(run.fittest())
     assert thinned.best(99)["tau_a_s"].notna().all()
     assert run_text(thinned).replace(str(thinned.directory), str(run.directory)) == run_text(run)
     on_map = [table[["trial", "index"]].to_numpy().tolist() for table in map(elites, runs)]

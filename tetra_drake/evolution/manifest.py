@@ -59,6 +59,9 @@ class Method:
             optimizer=_name(scenario.optimizer if optimizer is None else optimizer),
         )
 
+    def __str__(self) -> str:
+        return f"optimiser {self.optimizer}, objective {self.objective}"
+
     @property
     def given_from_python(self) -> list[str]:
         """The parts that a command line cannot give: "objective", "optimizer"."""

@@ -21,7 +21,7 @@ from tetra_drake.report.result_folder import RESULT, load_result
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import ParameterSpace, save_gait
-from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
+from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.metric_units import METRICS, inverse
 from tetra_drake.scenario.units import shown
 
@@ -78,7 +78,7 @@ def _write_map(study: Study, directory: Path) -> None:
         gait_file, page = _map_files(names, row, study)
         save_gait(run.gait(trial, index), directory / gait_file, run.manifest.scenario)
         if page != Path(REPLAY):
-            simulate_again(run, trial, index).result.save_replay(directory / page)
+            simulate_again(run, row).result.save_replay(directory / page)
 
 
 def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[Path, Path]:
@@ -118,7 +118,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         again=again,
         changed=changed,
         versions=versions(),
-        differences=differences(manifest.scenario, load_scenario("thesis")),
+        differences=manifest.scenario.differences(load_scenario("thesis")),
         results=results(run),
         trials=trials_table(run),
         objective=_terms(manifest.scenario.objective, inverse),

@@ -90,10 +90,9 @@ def run_text(run: Run) -> str:
         Table(["", "this run"], results(run)).text(),
     ]
     if not run.best().empty:
-        trial, best = run.fittest()
-        first = run.initial_best(trial)
-        gaits = {"initial": run.evaluation(trial, first), "fittest": run.evaluation(trial, best)}
-        label = gait_label(gaits["fittest"])
+        best = run.fittest()
+        gaits = {"initial": run.initial_best(best["trial"]), "fittest": best}
+        label = gait_label(best)
         texts.append(f"The fittest gait, {label}, beside its trial's fittest initial one:")
         texts.append(metrics_table(gaits).text())
     replay, report = run.directory / "replay.html", run.directory / "report.html"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import Any
 
 from tetra_drake.files import json_number
-from tetra_drake.scenario.units import INCH
+from tetra_drake.formatting import Table
+from tetra_drake.scenario.units import INCH, customary, shown
 
 STRAIGHT = 0.01
 """Curvature (1/m) below which a path counts as straight: over the thesis's fifteen inches, it bends
@@ -93,6 +95,20 @@ class Metrics:
     lifted_shares: tuple[float, ...] = ()
     """The share of `lifted` of each body, from T1 on."""
 
+    def __str__(self) -> str:
+        """A table of the metrics that the robot has, in SI and in the units that people read."""
+        rows = []
+        for name, unit in METRICS.items():
+            value = round(getattr(self, name), 9) + 0.0  # neither -0 nor rounding errors
+            if not math.isnan(value):
+                read = shown(value, unit) if customary(unit)[1] != unit else ""
+                rows.append([name, f"{value:.4g} {unit}".rstrip(), read])
+        half = (len(rows) + 1) // 2
+        pairs = itertools.zip_longest(rows[:half], rows[half:], fillvalue=[""] * 3)
+        headings = ["metric", "SI", "in, lbf, deg"]
+        side_by_side = [left + right for left, right in pairs]
+        return Table(headings * 2, side_by_side, text_columns=range(6)).text()
+
     @property
     def distance_in(self) -> float:
         """The distance in inches, as the thesis gives it."""
@@ -103,11 +119,6 @@ class Metrics:
         """Radius in m of the path of the centre in the steady stretch; inf if it is straight."""
         bend = abs(self.path_curvature)
         return 1.0 / bend if bend > STRAIGHT else math.inf
-
-    def in_inches(self) -> dict[str, Any]:
-        """The lengths in inches, as JSON holds them: distance_in, steady_distance_in ..."""
-        lengths = [name for name, unit in METRICS.items() if unit == "m"]
-        return {f"{name}_in": json_number(getattr(self, name) / INCH) for name in lengths}
 
     def to_json(self) -> dict[str, Any]:
         """The metrics by name, as JSON holds them: None for one that is not finite."""

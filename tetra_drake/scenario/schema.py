@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
+import json
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
 
 from pydantic import PrivateAttr, model_validator
 
 from tetra_drake.errors import InputError
+from tetra_drake.files import read_text
 from tetra_drake.scenario.actuator_kinds import Actuation, Force
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
@@ -38,12 +42,16 @@ from tetra_drake.scenario.settings import (
 )
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
-from tetra_drake.scenario.yaml_text import dump_yaml
+from tetra_drake.scenario.units import rounded
+from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
 
 MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
 """Upper limits of the values of all signals in one simulation: some 3 GB."""
+
+_WIDTH = 100
+"""Characters of a line of a printed scenario."""
 
 MOST_SAMPLES = 2_000_000
 """Upper limit of the recorded poses of all bodies in one simulation: some 2 GB."""
@@ -79,7 +87,37 @@ class Scenario(Section):
     """The scenario as its files have it, with the units of who wrote them."""
 
     def __str__(self) -> str:
+        """A few lines: what is simulated, and by section what differs from the thesis."""
+        lines = [
+            f"scenario {self.name}: {self.robot.body_count} bodies, {self.oscillators} oscillators,"
+            f" {self.simulation.duration:g} s, engine {self.engine_name}; evolution"
+            f" {self.evolution.trials} x {self.evolution.evaluations} gaits"
+        ]
+        sections: dict[str, list[str]] = {}
+        for key, text in self.differences(_thesis()):
+            section, _, name = key.partition(".")
+            sections.setdefault(section, []).append(f"{name} {text}".strip())
+        for section, texts in sections.items():
+            line = f"  {section:<13} {', '.join(texts)}"
+            if len(line) > _WIDTH:
+                line = f"{line[: _WIDTH - 5].rpartition(', ')[0]}, ..."
+            lines.append(line)
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<Scenario {self.name}>"
+
+    def to_yaml(self) -> str:
+        """All settings as a scenario file, in the units in which they were written."""
         return dump_yaml(self.tree)
+
+    def differences(self, base: Scenario) -> list[tuple[str, str]]:
+        """(key, value) of what differs from `base`, the name aside, in the units in which it was
+        written."""
+        full = [tree_of(each, show="{:.6g} {}".format, sparse=False) for each in (self, base)]
+        ours, theirs, written = (_texts(tree) for tree in (*full, self.tree))
+        changed = [key for key in ours if ours[key] != theirs.get(key, "null") and key != "name"]
+        return [(key.removesuffix(f".{TAG}"), written.get(key, ours[key])) for key in changed]
 
     def __eq__(self, other: object) -> bool:
         # Units in which a number was written do not matter.
@@ -241,6 +279,19 @@ class Scenario(Section):
                 except InputError as error:
                     problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
                     refuse(place, problem)
+
+
+@functools.cache
+def _thesis() -> Scenario:
+    """The scenario that others are compared with in print."""
+    file = Path(__file__).parent / "thesis.yaml"
+    return Scenario.from_tree(parse_yaml(read_text(file, "scenario file"), file), file)
+
+
+def _texts(tree: Tree) -> dict[str, str]:
+    """The values of a tree as texts, by their keys."""
+    values = flattened(tree).items()
+    return {key: rounded(json.dumps(value)).replace('"', "") for key, value in values}
 
 
 def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
