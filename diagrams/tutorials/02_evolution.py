@@ -1,6 +1,6 @@
 """Evolution: gaits that walk far, found by CMA-ES on the compiled engine in some seconds."""
 
-# %% What to search for stands in the scenario. Here it is changed from Python; a file does the same.
+# %% What to search for stands in the scenario, changed here from Python.
 from pathlib import Path
 
 import tetra_drake as td

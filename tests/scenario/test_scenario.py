@@ -309,3 +309,10 @@ def test_a_printed_scenario_tells_what_differs_from_the_thesis(tmp_path):
     ]
     recorded = load_scenario(write(tmp_path, dump_scenario(loaded)))
     assert "strut_length 0.1778 m, spacing 0.0872105 m" in str(recorded), "rounded"
+
+
+def test_a_kind_is_changed_with_its_settings_as_in_a_file(scenario, refused):
+    changed = scenario.with_changes({"friction": "!Coulomb {static: 0.3, kinetic: 0.2}"})
+    assert changed.friction == Coulomb(static=0.3, kinetic=0.2)
+    with refused("!Coulomb {static:", "", "YAML"):
+        scenario.with_changes({"friction": "!Coulomb {static:"})

@@ -13,6 +13,7 @@ from pydantic import PrivateAttr, model_validator
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario.actuator_kinds import Actuation, Force
+from tetra_drake.scenario.changes import tree_of_changes
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
@@ -29,7 +30,6 @@ from tetra_drake.scenario.sections import (
     quantity,
     refuse,
     tree_of,
-    tree_of_changes,
 )
 from tetra_drake.scenario.settings import (
     CpgSection,
@@ -161,9 +161,9 @@ class Scenario(Section):
         """A checked copy with other values: {"robot.tetrahedra": 7, "friction": "!Coulomb"}.
 
         The same rules hold as in a file that is based on this scenario: quantities have units,
-        mappings are merged, and the spacing follows what is changed. A kind may be given by its tag
-        ("engine": "!Compiled"). Sections, whose numbers are SI, replace what they change as a
-        whole: {"friction": Coulomb()}. Raises InputError, naming the key.
+        mappings are merged, and the spacing follows what is changed. A kind may be given as a file
+        has it ("friction": "!Coulomb {static: 0.3}"). Sections, whose numbers are SI, replace what
+        they change as a whole: {"friction": Coulomb()}. Raises InputError, naming the key.
         """
         source = f"scenario {self.name}"
         return self._merged(_replacing(tree_of_changes(changes, source), changes), source)

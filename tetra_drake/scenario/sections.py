@@ -330,32 +330,3 @@ def flattened(tree: Tree, key: str = "") -> dict[str, Any]:
         inner = _joined(key, name)
         values |= flattened(value, inner) if isinstance(value, dict) else {inner: value}
     return values
-
-
-def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
-    """Changes by dotted keys, and mappings of keys, as the tree that a file would hold."""
-    tree: Tree = {}
-    for key in sorted(changes, key=lambda key: key.count(".")):  # "robot" before "robot.gravity"
-        *sections, name = key.split(".")
-        place: Any = tree
-        for section in sections:
-            if type(place) is dict:
-                place = place.setdefault(section, {})
-        if type(place) is not dict or name in place:
-            raise InputError(source, key, "is given twice")
-        place[name] = _given(changes[key])
-    return tree
-
-
-def _given(value: Any) -> Any:
-    """A value from Python as a file would hold it."""
-    value = python_value(value)
-    if isinstance(value, Section):
-        return Whole({TAG: type(value).__name__} | tree_of(value, sparse=False))
-    if isinstance(value, str) and value.startswith("!"):
-        return {TAG: value.removeprefix("!")}
-    if isinstance(value, list):
-        return [_given(item) for item in value]
-    if isinstance(value, Mapping):
-        return {name: _given(item) for name, item in value.items()}
-    return value
