@@ -17,11 +17,14 @@ from tetra_drake.figures.style import (
     Units,
     common_style,
     figure_of,
+    inches,
+    name_panel,
     own_words,
     page,
     shown_part,
     split,
     units_named,
+    write_beside,
 )
 from tetra_drake.formatting import fixed
 from tetra_drake.results import measures
@@ -78,7 +81,7 @@ def gait_diagram(
     host = page(axes, height_in=sum(heights) + _MARGINS)
     panels = split(host, heights=heights, gap_y=18.0, above=15.0)[:, 0]
     # A caller's axes may be small.
-    scale = min(1.0, float(host.bbox.height) / figure_of(host).dpi / sum(heights))
+    scale = min(1.0, inches(host)[1] / sum(heights))
     if structure.signals:
         _draw_signals(panels[0], trajectory, unit, names=int(scale * heights[0] / _NAME_HEIGHT))
     each = len(rows) <= _FEW_FEET and scale * _FOOT_HEIGHT > 0.8 * _NAME_HEIGHT
@@ -142,11 +145,7 @@ def _draw_signals(panel: Axes, trajectory: xarray.Dataset, unit: Units, *, names
     panel.set_yticks(range(0, len(oscillators), every), own_words(oscillators)[::every])
     panel.set_ylim(-0.6, len(oscillators) - 0.4)
     panel.grid(visible=False, axis="y")
-    _name(panel, f"actuation signals, up to {fixed(largest)} {unit.force_name}")
-
-
-def _name(panel: Axes, name: str) -> None:
-    panel.set_title(name, loc="left", fontsize=rcParams["axes.labelsize"])
+    name_panel(panel, f"actuation signals, up to {fixed(largest)} {unit.force_name}")
 
 
 def _draw_stance(
@@ -163,23 +162,18 @@ def _draw_stance(
         colour = _STANCE.get(side, _OTHER_FOOT)
         panel.broken_barh(spans, (row - _BAR / 2, _BAR), facecolors=colour)
         if each:
-            _write_beside(panel, row, f"{fixed(100.0 * measures.share_of_time(stance), 0)} %")
+            write_beside(panel, row, f"{fixed(100.0 * measures.share_of_time(stance), 0)} %")
     if each:
         panel.set_yticks(list(rows.values()), [foot_name(foot) for foot in rows])
         panel.set_title("duty factor", loc="right", fontsize=rcParams["ytick.labelsize"])
-        _name(panel, "stance")
+        name_panel(panel, "stance")
     else:
         panel.set_yticks([float(np.mean(of)) for of in by_body.values()], list(by_body))
         has_sides = any(foot.endswith("_left") for foot in rows)
-        _name(panel, "stance, left foot above right one" if has_sides else "stance")
+        name_panel(panel, "stance, left foot above right one" if has_sides else "stance")
     panel.tick_params(axis="y", length=0)
     panel.set_ylim(-_EDGE, max(rows.values(), default=0.5) + 0.5 + _EDGE)
     panel.grid(visible=False, axis="y")
-
-
-def _write_beside(panel: Axes, height: float, text: str) -> None:
-    size, transform = rcParams["ytick.labelsize"], panel.get_yaxis_transform()
-    panel.text(1.01, height, text, transform=transform, va="center", fontsize=size)
 
 
 def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, unit: Units) -> None:
@@ -194,9 +188,9 @@ def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, u
     panel.axhline(0.0, color="0.8", linewidth=0.5)
     panel.axhline(mean, **REFERENCE)
     panel.plot(trajectory.time, speed, **_SPEED)
-    _write_beside(panel, mean, f"mean\n{fixed(mean, unit.digits)}")
+    write_beside(panel, mean, f"mean\n{fixed(mean, unit.digits)}")
     panel.set(xlabel="time (s)", xlim=trajectory.time.values[[0, -1]])
-    _name(panel, f"{name} ({unit.length_name}/s)")
+    name_panel(panel, f"{name} ({unit.length_name}/s)")
 
 
 def _mark_cycles(

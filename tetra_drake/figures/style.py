@@ -8,9 +8,9 @@ save_figure() writes. Neither a display nor pyplot is needed.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import math
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +23,7 @@ import xarray
 from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 from matplotlib.transforms import Bbox
@@ -56,6 +56,11 @@ WIDTH_IN = 7.0
 
 SHADE = "0.9"
 """Grey behind marked intervals of time."""
+
+BELOW = 30.0
+"""Points that numbers and label of an x axis take."""
+
+_LETTER, _LINE_LETTERS = 0.062, 6  # inches per letter of a legend; of a line and its space
 
 REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 """Line style of values to compare with."""
@@ -234,19 +239,6 @@ def make_figure(
     return figure, figure.subplots(rows, columns, squeeze=False, **layout)
 
 
-def add_grid(figure: Figure | SubFigure, names: Sequence[str], *, columns: int) -> dict[str, Axes]:
-    """Adds one titled panel per name, row by row, all of one scale."""
-    rows = math.ceil(len(names) / columns)
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for unused in panels[len(names) :]:
-        unused.remove()
-    for lowest in panels[: len(names)][-columns:]:
-        lowest.tick_params(labelbottom=True)
-    for name, panel in zip(names, panels, strict=False):
-        panel.set_title(textwrap.fill(name.replace("_", " "), 110 // columns), loc="left")
-    return dict(zip(names, panels, strict=False))
-
-
 def own_words(names: Sequence[str]) -> list[str]:
     """Names without the words that all of them have but the first, such as "T1-T2 left" of "T1-T2
     outer bottom_left"."""
@@ -255,10 +247,43 @@ def own_words(names: Sequence[str]) -> list[str]:
     return [" ".join(word for word in of if word not in common) for of in words]
 
 
-def legend_below(figure: Figure, lines: Mapping[str, Any], *others: Artist) -> None:
-    """Adds a legend of line styles, by label, and other artists below the axes."""
+def name_panel(panel: Axes, name: str) -> None:
+    """Writes the name of a panel above it, smaller than the title of the figure."""
+    panel.set_title(name, loc="left", fontsize=rcParams["axes.labelsize"], pad=3.0)
+
+
+def write_beside(panel: Axes, height: float, text: str, *, color: str = "black") -> None:
+    """Writes a text to the right of a panel at a height of its data."""
+    size, transform = rcParams["ytick.labelsize"], panel.get_yaxis_transform()
+    panel.text(1.01, height, text, transform=transform, va="center", fontsize=size, color=color)
+
+
+def legend_below(host: Axes, lines: Mapping[str, Any], *others: Artist) -> float:
+    """Adds a legend of line styles, by label, and other artists at the lower edge of axes that are
+    split; returns the points that it and the label of an x axis take."""
     handles = [*(Line2D([], [], label=text, **style) for text, style in lines.items()), *others]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    lengths = [_LETTER * (len(str(handle.get_label())) + _LINE_LETTERS) for handle in handles]
+    columns, width = len(handles), inches(host)[0]
+    if sum(lengths) > width:
+        columns = max(1, int(width / max(lengths)))
+    place: Any = {"loc": "lower center", "bbox_to_anchor": (0.5, 0.0), "borderaxespad": 0.0}
+    host.legend(handles=handles, ncols=columns, frameon=False, **place)
+    return BELOW + 15.0 * math.ceil(len(handles) / columns)
+
+
+def inches(axes: Axes) -> tuple[float, float]:
+    """Width and height of axes on paper, in inches, before the figure is laid out."""
+    dpi = figure_of(axes).dpi
+    return axes.bbox.width / dpi, axes.bbox.height / dpi
+
+
+def spread(values: np.ndarray, least: float) -> np.ndarray:
+    """Values moved as little upward as keeps them at least so far apart, in their order."""
+    moved = values.astype(float)
+    order = np.argsort(moved)
+    for lower, upper in itertools.pairwise(order):
+        moved[upper] = max(moved[upper], moved[lower] + least)
+    return moved - (moved - values).mean()
 
 
 def save_findings(
@@ -283,11 +308,12 @@ def save_findings(
 def save_figure(
     figure: Figure, folder: str | Path, name: str, *, kinds: Sequence[str] = ("svg", "png")
 ) -> None:
-    """Writes NAME.svg and NAME.png to the folder, each whole or not at all.
+    """Writes NAME.svg and NAME.png, or the given kinds of "svg", "png" and "pdf", to the folder,
+    each whole or not at all.
 
     Equal data give equal bytes. Raises InputError if a file cannot be written.
     """
+    dates: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     for kind in kinds:
-        metadata = {"Date": None} if kind == "svg" else None
         with whole_file(Path(folder) / f"{name}.{kind}") as file:
-            figure.savefig(file, format=kind, metadata=metadata)
+            figure.savefig(file, format=kind, metadata=dates.get(kind))
