@@ -114,7 +114,7 @@ def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -
         xmargin=0.02,
     )
     name_panel(axes, "distance in each draw, by gait")
-    axes.set_title(f"keeps {100.0 * (1.0 - LOSS):g} %", loc="right", fontsize="medium", pad=3.0)
+    axes.set_title("draws kept", loc="right", fontsize="medium", pad=3.0)
     axes.grid(visible=False, axis="y")
 
 
@@ -131,12 +131,13 @@ def _draw_correlations(axes: Axes, changes: pandas.DataFrame, noise: float) -> N
     axes.axvspan(0.0, noise, color=SHADE, linewidth=0.0, zorder=0)
     sizes, sky_blue = changes["correlation_size"], OKABE_ITO["sky_blue"]
     axes.barh(range(len(changes)), sizes, height=0.6, color=sky_blue)
-    axes.set(xlabel="size of rank correlation", xlim=(0.0, None))
+    axes.set_xlabel("size of rank correlation")
     name_panel(axes, "all changes together")
     _finish(axes, list(changes.index))
 
 
 def _finish(axes: Axes, labels: list[str]) -> None:
     axes.set_yticks(range(len(labels)), labels)
-    axes.set(ylim=(-0.7, len(labels) - 0.3))
+    axes.set(xmargin=0.05, ylim=(-0.7, len(labels) - 0.3))
+    axes.set_xlim(left=0.0)
     axes.grid(visible=False, axis="y")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -50,9 +51,10 @@ _MARGIN = 0.6 * INCH  # free space around a robot
 _PROFILE = 0.05 * INCH  # distance between points of the ground's profile
 
 # Inches on paper.
-_ROOM = (WIDTH_IN - 0.8, 6.5)  # for time lapses on a page of their own
+_ROOM = (WIDTH_IN - 0.3, 6.8)  # for time lapses on a page of their own
 _TITLE, _GAP = 0.25, 0.12  # above each robot of a time lapse, and between two
 _EDGES = 1.05  # above and below all of them
+_NUMBERS = 0.5  # left of paths
 _LETTER, _NAME_HEIGHT = 0.075, 0.15  # of the name of a body
 _SQUARE = 5.0  # largest height of a path
 
@@ -123,7 +125,8 @@ def before_and_after(
     of the same trial."""
     unit = units_named(units)
     host = page(axes, height_in=3.8)
-    looks = {f"before: {initial.name}": _BEFORE, f"after: {best.name}": _AFTER}
+    before, after = (textwrap.shorten(result.name, 80) for result in (initial, best))
+    looks = {f"before: {before}": _BEFORE, f"after: {after}": _AFTER}
     panel = split(host, below=legend_below(host, looks))[0, 0]
     ends = []
     for result, style in zip((initial, best), (_BEFORE, _AFTER), strict=True):
@@ -202,9 +205,8 @@ def path_of_the_centre(
     if np.ptp(points[:, Y]) < _STRAIGHT * np.ptp(points[:, X]):
         return _draw_height(page(axes, height_in=2.6), points, result.robot, unit)
     arrow = _ARROW * max(*np.ptp(points[:, :2], axis=0), _MARGIN / unit.length)
-    low, high = points[:, :2].min(axis=0) - 1.5 * arrow, points[:, :2].max(axis=0) + 1.5 * arrow
-    ratio = (high - low)[1] / (high - low)[0]
-    host = page(axes, height_in=min(_ROOM[0] * ratio, _SQUARE) + 1.0)
+    ratio = np.ptp(points[:, Y]) / max(np.ptp(points[:, X]), arrow)
+    host = page(axes, height_in=min((_ROOM[0] - _NUMBERS) * ratio, _SQUARE) + 1.4)
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
     if structure.is_row:
         looks["heading"] = _HEADING_MARK
@@ -214,7 +216,7 @@ def path_of_the_centre(
         _draw_headings(panel, path, points, arrow, _nearest(trajectory, _even(path, instants)))
     panel.plot(points[0, X], points[0, Y], **_START)
     panel.plot(points[-1, X], points[-1, Y], **_END)
-    panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    panel.margins(0.1)
     panel.set_aspect("equal", adjustable="datalim")
     panel.set(xlabel=f"x ({unit.length_name})", ylabel=f"y ({unit.length_name})")
     host.set_title("Path of the centre from above", loc="left")
@@ -273,12 +275,14 @@ def one_step(
     step = shown_part(result.recorded, ends)
     nodes, (lifted, least) = step.p_WN.values / unit.length, _clear_of_ground(step, robot)
     samples = _nearest(step, np.linspace(*ends, instants))
-    views = {view: _extents(nodes, view, unit) for view in (OVERHEAD, SIDE)}
-    wide, tall = np.ptp(views[SIDE][0]), max(np.ptp(high) for _, high in views.values())
+    profiles = [_profile(step.p_WN.values, sample, robot) / unit.length for sample in samples]
+    points = np.concatenate([nodes.reshape(-1, 3), *profiles])
+    views = {OVERHEAD: _extents(nodes, OVERHEAD, unit), SIDE: _extents(points, SIDE, unit)}
+    wide, tall = np.ptp(views[OVERHEAD][0]), max(np.ptp(high) for _, high in views.values())
     names = structure.bodies if structure.is_row else (structure.followed,)
     beside = tall > _TALL * wide  # instants are beside each other, else below
     rows, columns = (2, instants) if beside else (instants, 2)
-    width = _ROOM[0] / columns - _GAP
+    width = (_ROOM[0] - _NUMBERS) / columns - _GAP
     heights = [rows * (width * tall / wide + _TITLE) + 0.6, 0.95 * math.ceil(len(names) / _PATHS)]
     host = page(axes, height_in=sum(heights) + 1.4)
     looks = {
@@ -291,16 +295,15 @@ def one_step(
     grid = _lapse_panels(above, rows, columns)
     panels = grid.T if beside else grid
     followed = followed_nodes(nodes, structure)
-    for sample, row in zip(samples, panels, strict=True):
+    for sample, profile, row in zip(samples, profiles, panels, strict=True):
         for view, panel in zip(views, row, strict=True):
             if view == SIDE:
-                profile = _profile(nodes * unit.length, sample, robot) / unit.length
                 panel.plot(profile[:, X], profile[:, Z], **_GROUND)
             panel.plot(followed[: sample + 1, :, X], followed[: sample + 1, :, view], **_PATH)
             colours = [_LIFTED if up else _ON_GROUND for up in lifted[sample]]
             _draw_struts(panel, nodes[sample][:, [X, view]], structure, colours)
             low, high = views[view][1]
-            panel.set(xlim=views[view][0], aspect="equal")
+            panel.set(xlim=views[OVERHEAD][0], aspect="equal")
             panel.set(ylim=((low + high - tall) / 2, (low + high + tall) / 2))
         name_panel(row[0], f"{float(step.time[sample]) - ends[0]:.2f} s")
     for view, panel in zip(views, panels[0], strict=True):

@@ -267,7 +267,9 @@ def legend_below(host: Axes, lines: Mapping[str, Any], *others: Artist) -> float
     if sum(lengths) > width:
         columns = max(1, int(width / max(lengths)))
     place: Any = {"loc": "lower center", "bbox_to_anchor": (0.5, 0.0), "borderaxespad": 0.0}
-    host.legend(handles=handles, ncols=columns, frameon=False, **place)
+    legend = host.legend(handles=handles, ncols=columns, frameon=False, **place)
+    for text in legend.get_texts():
+        text.set_parse_math(False)  # a name may hold a dollar sign
     return BELOW + 15.0 * math.ceil(len(handles) / columns)
 
 
