@@ -146,38 +146,31 @@ def _keep_style(axes: Axes) -> None:
 
 @dataclass(frozen=True)
 class _Place:
-    """Place of a panel in its host: shares of the room that gaps between panels and the margins of
-    the host leave. Matplotlib asks for it whenever it draws, so gaps keep their size on paper."""
+    """Place of a panel in its host: edges as shares of the host's size, and points beside these.
+    Matplotlib asks for it whenever it draws, so gaps keep their size on paper."""
 
     host: Axes
-    left: float
-    bottom: float
-    width: float
-    height: float
-    column: int
-    row: int
-    """From below."""
-    gaps: tuple[float, float]
-    """Points between columns and between rows."""
-    room: tuple[float, float]
-    """Points that gaps and margins take across and up."""
-    below: float
-    """Points below the panels."""
+    shares: np.ndarray
+    """(2, 2): left and bottom, right and top."""
+    points: np.ndarray
+    """(2, 2)."""
 
     def __call__(self, axes: object, renderer: object) -> Bbox:
         """The place within the figure."""
-        figure = self.host.get_figure(root=False)
+        figure, whole = self.host.get_figure(root=False), self.host.bbox
         assert figure is not None
-        point, whole = figure.dpi / 72.0, self.host.bbox
-        width = max(whole.width - point * self.room[0], 1.0)
-        height = max(whole.height - point * self.room[1], 1.0)
-        place = Bbox.from_bounds(
-            whole.x0 + self.left * width + point * self.column * self.gaps[0],
-            whole.y0 + self.bottom * height + point * (self.below + self.row * self.gaps[1]),
-            self.width * width,
-            self.height * height,
-        )
-        return place.transformed(figure.transSubfigure.inverted())
+        edges = whole.p0 + self.shares * whole.size + self.points * figure.dpi / 72.0
+        return Bbox(edges).transformed(figure.transSubfigure.inverted())
+
+
+def _edges(
+    sizes: Sequence[float], *, gap: float, before: float = 0.0, after: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shares and points (panels, 2) of the edges of panels of relative sizes in one direction."""
+    ends = np.cumsum([0.0, *sizes]) / sum(sizes)
+    shares = np.column_stack([ends[:-1], ends[1:]])
+    places, room = np.arange(len(sizes)), gap * (len(sizes) - 1) + before + after
+    return shares, before + gap * places[:, np.newaxis] - room * shares
 
 
 def split(
@@ -198,29 +191,21 @@ def split(
     that stay free. All panels share an x axis, or a y axis, if they shall.
     """
     host.set_axis_off()
+    x_shares, x_points = _edges(widths, gap=gap_x)
+    y_shares, y_points = _edges(heights[::-1], gap=gap_y, before=below, after=above)
     rows, columns = len(heights), len(widths)
-    room = (gap_x * (columns - 1), gap_y * (rows - 1) + above + below)
     panels = np.empty((rows, columns), dtype=object)
     first = None
     for row, column in np.ndindex(rows, columns):
-        place = _Place(
-            host,
-            left=sum(widths[:column]) / sum(widths),
-            bottom=sum(heights[row + 1 :]) / sum(heights),
-            width=widths[column] / sum(widths),
-            height=heights[row] / sum(heights),
-            column=column,
-            row=rows - 1 - row,
-            gaps=(gap_x, gap_y),
-            room=room,
-            below=below,
-        )
+        up = rows - 1 - row
+        shares = np.column_stack([x_shares[column], y_shares[up]])
+        points = np.column_stack([x_points[column], y_points[up]])
         panel = host.inset_axes(
             (0.0, 0.0, 1.0, 1.0),
             sharex=first if share_x else None,
             sharey=first if share_y else None,
         )
-        panel.set_axes_locator(place)
+        panel.set_axes_locator(_Place(host, shares, points))
         _keep_style(panel)
         first = first or panel
         if share_x and row < rows - 1:
