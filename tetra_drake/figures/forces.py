@@ -164,9 +164,8 @@ def _panels_over_time(
     below = legend_below(host, looks, *others)
     size: Any = {"heights": [1.0] * rows, "widths": [1.0] * columns}
     grid = split(host, **size, gap_x=24.0, gap_y=17.0, above=14.0, below=below, share_y=True)
-    unused = grid.ravel()[len(names) :]
-    for panel in unused:
-        panel.remove()
+    for unused in grid.ravel()[len(names) :]:
+        unused.remove()
     for panel in grid.ravel()[: len(names)][-columns:]:
         panel.set_xlabel("time (s)")
         panel.tick_params(labelbottom=True)

@@ -213,7 +213,8 @@ def path_of_the_centre(
     panel = split(host, below=legend_below(host, looks))[0, 0]
     panel.plot(points[:, X], points[:, Y], **_PATH)
     if structure.is_row:
-        _draw_headings(panel, path, points, arrow, _nearest(trajectory, _even(path, instants)))
+        samples = _nearest(trajectory, np.linspace(path.times[0], path.times[-1], instants))
+        _draw_headings(panel, path, points, arrow, samples)
     panel.plot(points[0, X], points[0, Y], **_START)
     panel.plot(points[-1, X], points[-1, Y], **_END)
     panel.margins(0.1)
@@ -221,10 +222,6 @@ def path_of_the_centre(
     panel.set(xlabel=f"x ({unit.length_name})", ylabel=f"y ({unit.length_name})")
     host.set_title("Path of the centre from above", loc="left")
     return figure_of(host)
-
-
-def _even(path: CentrePath, count: int) -> np.ndarray:
-    return np.linspace(path.times[0], path.times[-1], count)
 
 
 def _draw_headings(
@@ -242,10 +239,7 @@ def _draw_height(panel: Axes, points: np.ndarray, robot: Robot, unit: Units) -> 
     if not robot.ground.flat:
         heights = ground_heights(points[:, :2] * unit.length, robot.ground) / unit.length
         panel.plot(points[:, X], heights, **_GROUND)
-    panel.set(
-        xlabel=f"x ({unit.length_name})",
-        ylabel=f"height ({unit.length_name})",
-    )
+    panel.set(xlabel=f"x ({unit.length_name})", ylabel=f"height ({unit.length_name})")
     panel.margins(x=0.02, y=0.1)
     panel.set_title("Height of the centre along its path", loc="left")
     return figure_of(panel)
@@ -276,12 +270,11 @@ def one_step(
     nodes, (lifted, least) = step.p_WN.values / unit.length, _clear_of_ground(step, robot)
     samples = _nearest(step, np.linspace(*ends, instants))
     profiles = [_profile(step.p_WN.values, sample, robot) / unit.length for sample in samples]
-    points = np.concatenate([nodes.reshape(-1, 3), *profiles])
-    views = {OVERHEAD: _extents(nodes, OVERHEAD, unit), SIDE: _extents(points, SIDE, unit)}
-    wide, tall = np.ptp(views[OVERHEAD][0]), max(np.ptp(high) for _, high in views.values())
+    views = _views(nodes, np.concatenate([nodes.reshape(-1, 3), *profiles]), unit)
+    wide, tall = (float(np.ptp(limits)) for limits in views[SIDE])
     names = structure.bodies if structure.is_row else (structure.followed,)
-    beside = tall > _TALL * wide  # instants are beside each other, else below
-    rows, columns = (2, instants) if beside else (instants, 2)
+    # The instants of a tall robot are beside each other, of another one below each other.
+    rows, columns = (2, instants) if tall > _TALL * wide else (instants, 2)
     width = (_ROOM[0] - _NUMBERS) / columns - _GAP
     heights = [rows * (width * tall / wide + _TITLE) + 0.6, 0.95 * math.ceil(len(names) / _PATHS)]
     host = page(axes, height_in=sum(heights) + 1.4)
@@ -293,25 +286,18 @@ def one_step(
     below = legend_below(host, looks)
     above, paths = split(host, heights=heights, gap_y=18.0, below=below)[:, 0]
     grid = _lapse_panels(above, rows, columns)
-    panels = grid.T if beside else grid
+    panels = grid if columns == 2 else grid.T
     followed = followed_nodes(nodes, structure)
     for sample, profile, row in zip(samples, profiles, panels, strict=True):
-        for view, panel in zip(views, row, strict=True):
-            if view == SIDE:
-                panel.plot(profile[:, X], profile[:, Z], **_GROUND)
+        colours = [_LIFTED if up else _ON_GROUND for up in lifted[sample]]
+        row[1].plot(profile[:, X], profile[:, Z], **_GROUND)
+        for (view, limits), panel in zip(views.items(), row, strict=True):
             panel.plot(followed[: sample + 1, :, X], followed[: sample + 1, :, view], **_PATH)
-            colours = [_LIFTED if up else _ON_GROUND for up in lifted[sample]]
             _draw_struts(panel, nodes[sample][:, [X, view]], structure, colours)
-            low, high = views[view][1]
-            panel.set(xlim=views[OVERHEAD][0], aspect="equal")
-            panel.set(ylim=((low + high - tall) / 2, (low + high + tall) / 2))
+            panel.set(xlim=limits[0], ylim=limits[1], aspect="equal")
         name_panel(row[0], f"{float(step.time[sample]) - ends[0]:.2f} s")
     for view, panel in zip(views, panels[0], strict=True):
-        place = "from above" if view == OVERHEAD else "from the side"
-        if beside:
-            panel.set_ylabel(place)
-        else:
-            panel.set_title(place, loc="right", fontsize="medium", pad=3.0)
+        _name_view(panel, view, beside=columns == 2)
         _name_bodies(panel, nodes[samples[0]][:, [X, view]], structure, width_in=width)
     for panel in grid[-1]:
         panel.set_xlabel(f"x ({unit.length_name})")
@@ -322,19 +308,36 @@ def one_step(
     return figure_of(host)
 
 
+def _name_view(panel: Axes, view: int, *, beside: bool) -> None:
+    """Names a view above a panel if the other one is beside it, else to its left."""
+    name = "from above" if view == OVERHEAD else "from the side"
+    if beside:
+        panel.set_title(name, loc="right", fontsize="medium", pad=3.0)
+    else:
+        panel.set_ylabel(name)
+
+
+def _views(
+    nodes: np.ndarray, with_ground: np.ndarray, unit: Units
+) -> dict[int, tuple[tuple[float, float], tuple[float, float]]]:
+    """Limits across and up the page of each view, all of one size."""
+    above, side = _extents(nodes, OVERHEAD, unit), _extents(with_ground, SIDE, unit)
+    tall = max(np.ptp(above[1]), np.ptp(side[1]))
+    views = {}
+    for view, (_, limits) in ((OVERHEAD, above), (SIDE, side)):
+        middle = sum(limits) / 2
+        views[view] = above[0], (float(middle - tall / 2), float(middle + tall / 2))
+    return views
+
+
 def _clear_of_ground(trajectory: xarray.Dataset, robot: Robot) -> tuple[np.ndarray, float]:
     """(samples, bodies): whether all feet of a body are well above the ground; and how far (m)."""
-    contacts = robot.structure.contacts
-    feet, least = trajectory.p_WN.values[:, contacts], _CLEARANCE * _height(robot.structure)
+    structure = robot.structure
+    start, contacts = node_positions(structure, structure.initial_state), structure.contacts
+    feet, least = trajectory.p_WN.values[:, contacts], _CLEARANCE * float(np.ptp(start[:, Z]))
     clear = feet[..., Z] - ground_heights(feet[..., :2], robot.ground) > least
-    bodies = range(len(robot.structure.bodies))
-    of_body = robot.structure.carriers[contacts]
-    return np.stack([clear[:, of_body == body].all(axis=1) for body in bodies], axis=1), least
-
-
-def _height(structure: Structure) -> float:
-    """Height (m) of the robot at the start."""
-    return float(np.ptp(node_positions(structure, structure.initial_state)[:, Z]))
+    bodies, of_foot = range(len(structure.bodies)), structure.carriers[contacts]
+    return np.stack([clear[:, of_foot == body].all(axis=1) for body in bodies], axis=1), least
 
 
 def _profile(nodes: np.ndarray, sample: int, robot: Robot) -> np.ndarray:
