@@ -5,6 +5,7 @@ import math
 
 import pandas
 import pytest
+from helpers.drawn import panels
 from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 
 from tetra_drake.analysis.comparison import compare
@@ -118,7 +119,7 @@ def test_different_objectives_and_runs_given_twice_are_refused(run, refused):
 def test_the_figure_has_a_line_and_a_band_for_each_run(run):
     fitnesses = [float(number) for number in range(30)]
     paths = [run("a", trial(*fitnesses), trial(*fitnesses[::2])), run("b", trial(4.0, 5.0))]
-    left, right = search(compare(paths, reach=5.0 * INCH)).axes
+    left, right = panels(search(compare(paths, reach=5.0 * INCH)))
     first, second = (line.get_xydata().tolist() for line in left.lines)
     assert first[-1] == [30.0, 28.5]
     assert second[-1] == [2.0, 5.0]
@@ -126,7 +127,7 @@ def test_the_figure_has_a_line_and_a_band_for_each_run(run):
     # 5 in are fitness 10: evaluations 11 and 6.
     assert right.lines[0].get_xydata().tolist()[1:] == [[6.0, 50.0], [11.0, 100.0], [30.0, 100.0]]
     assert right.lines[1].get_ydata().tolist() == [0.0, 0.0]
-    assert len(search(compare(paths)).axes) == 1
+    assert len(panels(search(compare(paths)))) == 1
 
 
 def test_the_command_prints_and_writes(run, tmp_path, capsys):

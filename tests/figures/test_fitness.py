@@ -4,8 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from helpers.drawn import panels
 from helpers.synthetic_run import PER_DISTANCE, write_run
-from matplotlib.container import BarContainer, ErrorbarContainer
+from matplotlib.container import BarContainer
 
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.fitness import (
@@ -32,12 +33,12 @@ def with_means(*means):
 
 def lines(figure):
     """The points of the lines with a label of their own."""
-    points = {line.get_label(): line.get_xydata().tolist() for line in figure.axes[0].lines}
+    points = {line.get_label(): line.get_xydata().tolist() for line in panels(figure)[0].lines}
     return {label: xy for label, xy in points.items() if not label.startswith("_")}
 
 
 def bar_groups(figure):
-    return [c for c in figure.axes[0].containers if isinstance(c, BarContainer)]
+    return [c for c in panels(figure)[0].containers if isinstance(c, BarContainer)]
 
 
 def bars(figure):
@@ -52,7 +53,9 @@ def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of):
     best, worst = bars(figure)
     assert best == pytest.approx([4.0 / PER_DISTANCE, 3.0 / PER_DISTANCE])
     assert worst == pytest.approx([-6.0 / PER_DISTANCE, 2.0 / PER_DISTANCE])
-    assert figure.axes[0].get_xticks().tolist() == [0, 2]
+    assert panels(figure)[0].get_xticks().tolist() == [0, 2]
+    in_metres = bars(initial_distances(run, units="SI"))
+    assert in_metres[0] == pytest.approx([0.0254 * distance for distance in best])
 
 
 def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of):
@@ -66,47 +69,47 @@ def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of):
     assert forward == np.histogram(fitnesses[fitnesses >= 0.0], edges)[0].tolist()
     assert backward == np.histogram(fitnesses[fitnesses < 0.0], edges)[0].tolist()
     assert abs(min(edges, key=abs)) < 1e-12
-    assert f"{100 * (fitnesses < 0.0).mean():.0f} %" in figure.get_suptitle()
+    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert [int(label.split()[0]) for label in labels] == [sum(forward), sum(backward)]
     assert sum(map(sum, bars(initial_fitness(run, 0)))) == 1
 
 
-def test_fitness_lines_are_the_recorded_means_in_the_order_of_their_ends(run_of):
+def test_fitness_lines_are_the_recorded_means_over_evaluations(run_of):
     run = run_of(
         with_means(1.0, 2.0, 5.0),
-        with_means(3.0, 3.5),
+        [[(3.0, 0), (3.0, 1)], [(5.0, 0), (5.0, 1)]],  # two evaluations in an iteration
         with_means(None, 7.0, 8.0),
         with_means(None, None),
     )
-    expected = {
-        "trial 2": [[1, 7.0], [2, 8.0]],
-        "trial 0": [[0, 1.0], [1, 2.0], [2, 5.0]],
-        "trial 1": [[0, 3.0], [1, 3.5]],
+    assert lines(fitness_of_trials(run)) == {
+        "trial 0": [[1, 1.0], [2, 2.0], [3, 5.0]],
+        "trial 1": [[2, 3.0], [4, 5.0]],
+        "trial 2": [[2, 7.0], [3, 8.0]],
     }
-    figure = fitness_of_trials(run)
-    assert lines(figure) == expected
-    legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert legend == [*expected, "average"]
 
 
 def test_the_best_fitness_is_shown_where_the_optimiser_reports_no_mean(run_of):
     run = run_of([[(1.0, 0), (3.0, 1)], [(2.0, 0)], [(4.0, 0)]])
     run = dataclasses.replace(run, iterations=run.iterations.drop(columns="mean_fitness"))
-    assert lines(fitness_of_trials(run)) == {"trial 0": [[0, 3.0], [1, 3.0], [2, 4.0]]}
+    assert lines(fitness_of_trials(run)) == {"trial 0": [[2, 3.0], [3, 3.0], [4, 4.0]]}
+
+
+MEANS = [[1.0, 2.0], [3.0, 4.0, 5.0, 8.0], [4.0, 4.0, 4.0, 4.0], [6.0, 7.0, 9.0]]
 
 
 @pytest.mark.parametrize(
-    ("means", "unfinished", "average"),
-    [
-        ([[1.0, 2.0], [3.0, 4.0, 5.0, 8.0]], (), [2.0, 3.0, 3.5, 5.0]),
-        ([[1.0, 2.0], [3.0, 4.0, 5.0], [5.0, 6.0, 7.0, 9.0]], (1,), [3.0, 4.0, 14.0 / 3.0]),
-    ],
-    ids=["ended trials count with their last mean", "the average ends with an unfinished trial"],
+    ("unfinished", "medians"),
+    [((), [3.5, 4.0, 4.5, 6.0]), ((3,), [3.5, 4.0, 4.5])],
+    ids=["ended trials count with their last mean", "the median ends with an unfinished trial"],
 )
-def test_the_average_over_trials(run_of, means, unfinished, average):
-    run = run_of(*(with_means(*trial) for trial in means), unfinished=unfinished)
-    axes = fitness_of_trials(run).axes[0]
-    (errorbars,) = (c for c in axes.containers if isinstance(c, ErrorbarContainer))
-    line, _, (segments,) = errorbars
-    assert line.get_ydata().tolist() == pytest.approx(average)
-    deviation = np.ptp(segments.get_segments()[0][:, 1]) / 2
-    assert deviation == pytest.approx(np.std([mean[0] for mean in means], ddof=1))
+def test_the_median_over_trials_and_its_quartiles(run_of, unfinished, medians):
+    run = run_of(*(with_means(*trial) for trial in MEANS), unfinished=unfinished)
+    figure = fitness_of_trials(run)
+    assert [y for _, y in lines(figure)["median"]] == pytest.approx(medians)
+    [band] = figure.axes[0].collections
+    at_start = band.get_paths()[0].vertices
+    at_start = at_start[at_start[:, 0] == 1, 1]
+    quartiles = np.quantile([trial[0] for trial in MEANS], [0.25, 0.75])
+    assert [at_start.min(), at_start.max()] == pytest.approx(quartiles)
+    named = [text.get_text().split(":")[0] for text in figure.axes[0].texts]
+    assert sorted(named) == ["median", "trial 0", "trial 3"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.drawn import panels
 from helpers.synthetic_run import tiny_scenario, write_run
 from matplotlib.collections import QuadMesh
 
@@ -36,30 +37,30 @@ def draw(tmp_path):
     return draw
 
 
-def panels(figure):
+def cells(figure):
     """The values of the cells by rows, from the lowest, of each panel."""
-    meshes = [m for axes in figure.axes for m in axes.collections if isinstance(m, QuadMesh)]
+    meshes = [m for axes in panels(figure) for m in axes.collections if isinstance(m, QuadMesh)]
     return [mesh.get_array().filled(np.nan) for mesh in meshes if mesh.get_array().size == 6]
 
 
 def test_cells_have_the_fitness_of_their_gaits(draw):
     figure = draw({})
-    (fitness,) = panels(figure)
+    (fitness,) = cells(figure)
     np.testing.assert_array_equal(fitness, [[2.0, 4.0, np.nan], [np.nan, np.nan, 3.0]])
-    axes = figure.axes[0]
+    axes = panels(figure)[0]
     assert axes.get_xlim() == pytest.approx((0.0, 3.0))
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("speed (in/s)", "lifted")
     # The fittest is next to the corner of low lifted and high speed, too.
     numbers = {text.get_text(): text.get_position() for text in axes.texts}
     assert numbers["1"] == pytest.approx((1.5, 0.25))
-    assert "3 of 6" in figure.get_suptitle()
+    assert "3 of 6" in panels(figure)[0].get_title("left")
 
 
 def test_lucky_gaits_are_crosses_and_the_share_of_draws_is_beside(draw):
     figure = draw({0: 1.0, 1: 0.4, 2: 0.5})
-    fitness, kept = panels(figure)
+    fitness, kept = cells(figure)
     np.testing.assert_array_equal(fitness, [[2.0, np.nan, np.nan], [np.nan, np.nan, 3.0]])
     np.testing.assert_allclose(kept, [[100.0, 40.0, np.nan], [np.nan, np.nan, 50.0]])
-    (crosses,) = figure.axes[0].lines
+    (crosses,) = panels(figure)[0].lines
     np.testing.assert_allclose(crosses.get_xydata(), [[1.5, 0.25]])
-    assert "0 of 6" in draw({0: 0.0, 1: 0.0, 2: 0.0}).get_suptitle()
+    assert "0 of 6" in panels(draw({0: 0.0, 1: 0.0, 2: 0.0}))[0].get_title("left")

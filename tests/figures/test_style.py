@@ -30,3 +30,11 @@ def test_equal_data_give_equal_bytes_whatever_the_users_style(tmp_path):
     assert set(files) == {"line.svg", "line.png"}
     assert b"<svg" in files["line.svg"] and b"<dc:date>" not in files["line.svg"]
     assert files["line.png"].startswith(b"\x89PNG")
+
+
+def test_a_figure_can_be_a_pdf(tmp_path):
+    for folder in ("a", "b"):
+        save_figure(draw(1.0), tmp_path / folder, "line", kinds=["pdf"])
+    first, second = ((tmp_path / folder / "line.pdf").read_bytes() for folder in ("a", "b"))
+    assert first == second and first.startswith(b"%PDF")
+    assert len(list((tmp_path / "a").iterdir())) == 1

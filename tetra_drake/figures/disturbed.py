@@ -17,9 +17,21 @@ from tetra_drake.analysis.robustness import (
     chance,
     robustness_numbers,
 )
-from tetra_drake.figures.style import OKABE_ITO, REFERENCE, SHADE, common_style, save_findings
+from tetra_drake.figures.style import (
+    OKABE_ITO,
+    REFERENCE,
+    SHADE,
+    Units,
+    common_style,
+    figure_of,
+    name_panel,
+    page,
+    save_findings,
+    split,
+    units_named,
+    write_beside,
+)
 from tetra_drake.formatting import fixed
-from tetra_drake.scenario.units import INCH
 
 _DOTS: Any = {
     "color": OKABE_ITO["sky_blue"],
@@ -41,8 +53,9 @@ _BOX: Any = {
     "whiskerprops": _LINE,
     "capprops": _LINE,
 }
-_LOSS: Any = {"marker": "d", "linestyle": "", "color": OKABE_ITO["vermillion"]}
-_MEAN: Any = {"marker": "d", "linestyle": "", "color": OKABE_ITO["blue"]}
+_GREATEST: Any = {"color": "black", "linewidth": 1.0}
+
+_ROW = 0.22  # inches on paper
 
 
 def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
@@ -57,25 +70,26 @@ def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
 
 
 @common_style()
-def robustness(judgement: Judgement) -> Figure:
-    """Distance under fresh draws of the disturbances over undisturbed distance, by gait, and what
-    hurts most.
+def robustness(judgement: Judgement, *, axes: Axes | None = None, units: str = "in") -> Figure:
+    """Robustness of gaits. Above: distance in each disturbed draw over undisturbed distance, by
+    gait, those that keep most draws on top. Boxes are quartiles, whiskers 5 to 95 %. A gait keeps a
+    draw right of the dashed line; the share that it keeps is at the right.
 
-    Boxes are quartiles, their whiskers 5 to 95 % of the draws; the dashed line is where a gait
-    still keeps a draw. Gaits that keep most draws are on top. What lies in the grey may be chance.
-    """
+    Below, what hurts: the median change of distance by one change alone, with a line to the
+    greatest loss; and the size of the rank correlation of each change with distance if all act
+    together. A correlation in the grey may be chance."""
+    unit = units_named(units)
     gaits = by_gait(judgement).sort_values("kept", kind="stable")
     changes, count = by_change(judgement).iloc[::-1], judgement.draws["draw"].nunique()
-    figure = Figure(figsize=(10.0, 1.6 + 0.24 * max(len(gaits), len(changes), 6)))
-    left, middle, right = figure.subplots(1, 3, width_ratios=[5, 3, 3])
-    _draw_distances(left, judgement, gaits)
-    _draw_alone(middle, changes)
-    _draw_correlations(right, changes, chance(count))
-    figure.legend(loc="outside lower center", ncols=4)
-    gait = f"the median of {len(gaits)} gaits" if len(gaits) > 1 else "the gait"
-    kept = fixed(100.0 * gaits["kept"].median(), 0)
-    figure.suptitle(f"Robustness under {count} fresh draws\n{gait} keeps {kept} % of them")
-    return figure
+    heights = [_ROW * max(len(gaits) + 1, 4), _ROW * max(len(changes) + 1, 4)]
+    host = page(axes, height_in=sum(heights) + 2.0)
+    rows = split(host, heights=heights, gap_y=52.0, above=16.0, share_x=False)[:, 0]
+    _draw_distances(rows[0], judgement, gaits)
+    alone, together = split(rows[1], widths=[1.0, 1.0], share_x=False, share_y=True)[0]
+    _draw_alone(alone, changes, unit)
+    _draw_correlations(together, changes, chance(count))
+    host.set_title(f"Robustness under {count} draws of disturbances", loc="left")
+    return figure_of(host)
 
 
 def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -> None:
@@ -89,38 +103,41 @@ def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -
         axes.boxplot(shares, positions=[place], **_BOX)
     axes.axvline(1.0 - LOSS, **REFERENCE)
     axes.axvline(1.0, color="black", linewidth=0.8)
+    for place, kept in enumerate(gaits["kept"]):
+        write_beside(axes, place, f"{fixed(100.0 * kept, 0)} %")
     margin = max(0.7, 2.5 - len(gaits) / 2)  # else the box of a single gait fills the axes
     axes.set(
-        title=f"gait: draws that it keeps ({100.0 * (1.0 - LOSS):g} % or more)",
         xlabel="distance / undisturbed distance",
         yticks=range(len(gaits)),
-        yticklabels=[f"{g}: {fixed(100.0 * kept, 0)} %" for g, kept in gaits["kept"].items()],
+        yticklabels=gaits.index,
         ylim=(-margin, len(gaits) - 1 + margin),
         xmargin=0.02,
     )
+    name_panel(axes, "distance in each draw, by gait")
+    axes.set_title("draws kept", loc="right", fontsize="medium", pad=3.0)
     axes.grid(visible=False, axis="y")
 
 
-def _draw_alone(axes: Axes, changes: pandas.DataFrame) -> None:
-    places, worst = range(len(changes)), changes["worst"].clip(upper=0.0).abs() / INCH
-    axes.barh(places, changes["median"] / INCH, color=OKABE_ITO["orange"], label="median change")
-    axes.plot(worst, places, label="greatest loss", **_LOSS)
-    axes.set(title="one change alone", xlabel="change of distance (in)")
+def _draw_alone(axes: Axes, changes: pandas.DataFrame, unit: Units) -> None:
+    places, worst = range(len(changes)), changes["worst"].clip(upper=0.0).abs() / unit.length
+    axes.hlines(places, 0.0, worst, **_GREATEST)
+    axes.barh(places, changes["median"] / unit.length, height=0.6, color=OKABE_ITO["orange"])
+    axes.set_xlabel(f"change of distance ({unit.length_name})")
+    name_panel(axes, "one change alone")
     _finish(axes, list(changes.index))
 
 
 def _draw_correlations(axes: Axes, changes: pandas.DataFrame, noise: float) -> None:
-    places = range(len(changes))
-    axes.axvspan(-noise, noise, color=SHADE, zorder=0)
+    axes.axvspan(0.0, noise, color=SHADE, linewidth=0.0, zorder=0)
     sizes, sky_blue = changes["correlation_size"], OKABE_ITO["sky_blue"]
-    axes.barh(places, sizes, color=sky_blue, label="median size of correlation")
-    axes.plot(changes["correlation"], places, label="mean correlation", **_MEAN)
-    axes.axvline(0.0, color="black", linewidth=0.8)
-    axes.set(title="all changes together", xlabel="rank correlation")
-    _finish(axes, [""] * len(changes))
+    axes.barh(range(len(changes)), sizes, height=0.6, color=sky_blue)
+    axes.set_xlabel("size of rank correlation")
+    name_panel(axes, "all changes together")
+    _finish(axes, list(changes.index))
 
 
 def _finish(axes: Axes, labels: list[str]) -> None:
     axes.set_yticks(range(len(labels)), labels)
-    axes.set(ylim=(-0.7, len(labels) - 0.3), xmargin=0.05)
+    axes.set(xmargin=0.05, ylim=(-0.7, len(labels) - 0.3))
+    axes.set_xlim(left=0.0)
     axes.grid(visible=False, axis="y")

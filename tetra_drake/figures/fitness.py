@@ -6,16 +6,32 @@ import math
 from typing import Any
 
 import pandas
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.evolution.run import Run
-from tetra_drake.figures.style import OKABE_ITO, common_style, line_style, make_figure
+from tetra_drake.figures.style import (
+    OKABE_ITO,
+    common_style,
+    figure_of,
+    legend_below,
+    page,
+    split,
+    spread,
+    units_named,
+    write_beside,
+)
 from tetra_drake.formatting import fixed
+from tetra_drake.scenario.units import INCH
 
-_LEGEND_ROWS = 14  # trials per column of a legend beside the axes
-_TICKS = 20  # largest number of trial numbers below the axes, and of error bars
-_AVERAGE: Any = {"color": "0.45", "linewidth": 2.5, "elinewidth": 0.7, "capsize": 2.0}
+_TICKS = 20  # largest number of trial numbers below the axes
+_SEVERAL = 4  # trials from which on quartiles are drawn
+
+_TRIAL: Any = {"color": "0.6", "linewidth": 0.8, "linestyle": "-"}
+_MEDIAN: Any = {"color": OKABE_ITO["blue"], "linewidth": 2.0, "linestyle": "-"}
+_BAND: Any = {"color": OKABE_ITO["blue"], "alpha": 0.18, "linewidth": 0.0}
+_NAME_HEIGHT = 0.06  # of the name of a trial, as a share of the height of the axes
 
 
 def initial_extremes(run: Run) -> pandas.DataFrame:
@@ -29,41 +45,45 @@ def initial_extremes(run: Run) -> pandas.DataFrame:
 
 
 @common_style()
-def initial_distances(run: Run) -> Figure:
-    """Distances of the fittest and the least fit initial gait of each trial; no failed gaits."""
-    extremes, scenario, width = initial_extremes(run), run.scenario, 0.4
-    figure, [[axes]] = make_figure(width_in=7.0, height_in=3.6)
-    best, worst = extremes.index - width / 2, extremes.index + width / 2
-    blue, orange = OKABE_ITO["blue"], OKABE_ITO["orange"]
-    axes.bar(best, extremes["best"], width, color=blue, label="fittest of a trial")
-    axes.bar(worst, extremes["worst"], width, color=orange, label="least fit of a trial")
-    axes.axhline(0.0, color="black", linewidth=0.8)
+def initial_distances(run: Run, *, axes: Axes | None = None, units: str = "in") -> Figure:
+    """Distances of the fittest and the least fit gait of each trial's first iteration, without
+    those that failed."""
+    unit, width = units_named(units), 0.4
+    extremes = initial_extremes(run) * INCH / unit.length
+    host = page(axes, height_in=3.6)
+    looks = {
+        "fittest gait of a trial": {"color": OKABE_ITO["blue"]},
+        "least fit gait of a trial": {"color": OKABE_ITO["orange"]},
+    }
+    thick: Any = {"linewidth": 6.0, "linestyle": "-", "solid_capstyle": "butt"}
+    below = legend_below(host, {label: look | thick for label, look in looks.items()})
+    panel = split(host, below=below)[0, 0]
+    panel.bar(extremes.index - width / 2, extremes["best"], width, color=OKABE_ITO["blue"])
+    panel.bar(extremes.index + width / 2, extremes["worst"], width, color=OKABE_ITO["orange"])
+    panel.axhline(0.0, color="black", linewidth=0.8)
     margin = max(0.9, 2.0 - len(extremes) / 2)  # else the bars of a single trial fill the axes
-    axes.set(
+    duration = run.scenario.simulation.duration
+    panel.set(
         xlabel="trial",
-        ylabel=f"distance in {scenario.simulation.duration:g} s (in)",
+        ylabel=f"distance in {duration:g} s ({unit.length_name})",
         xlim=(extremes.index.min() - margin, extremes.index.max() + margin),
         xticks=extremes.index[:: math.ceil(len(extremes) / _TICKS)],
     )
-    axes.grid(visible=False, axis="x")
-    figure.legend(loc="outside lower center", ncols=2)
-    figure.suptitle(
-        "Best and worst initial gait of each trial\n"
-        f"best of all: {fixed(extremes['best'].max(), 1)} inches"
-    )
-    return figure
+    panel.grid(visible=False, axis="x")
+    host.set_title("Best and worst initial gait of each trial", loc="left")
+    return figure_of(host)
 
 
 @common_style()
-def initial_fitness(run: Run, trial: int) -> Figure:
-    """Histogram of the fitness of a trial's initial gaits; those that walk backward stand out."""
+def initial_fitness(run: Run, trial: int, *, axes: Axes | None = None) -> Figure:
+    """Histogram of the fitness of a trial's initial gaits; those that walk backward are hatched."""
     initial = run.initial().query("trial == @trial")
     walked = initial.dropna(subset="fitness")
     fitness, backward = walked["fitness"], walked["distance_in"] < 0.0
-    figure, [[axes]] = make_figure(width_in=7.0, height_in=3.6)
+    panel = page(axes, height_in=3.4)
     # Bin edges at round numbers, zero among them where the values pass it.
     locator = MaxNLocator(nbins=20, steps=[1, 2, 2.5, 5, 10])
-    axes.hist(
+    panel.hist(
         [fitness[~backward], fitness[backward]],
         bins=list(locator.tick_values(fitness.min(), fitness.max())),
         stacked=True,
@@ -73,56 +93,61 @@ def initial_fitness(run: Run, trial: int) -> Figure:
         edgecolor="white",
         linewidth=0.6,
     )
-    axes.set(xlabel="fitness", ylabel="gaits", xmargin=0.02)
-    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.grid(visible=False, axis="x")
-    axes.legend(loc="best")
-    title = f"Fitness of the initial population, trial {trial}\n"
-    title += f"{fixed(100.0 * float(backward.mean()), 0)} % walk backward"
+    panel.set(xlabel="fitness", ylabel="gaits", xmargin=0.02)
+    panel.yaxis.set_major_locator(MaxNLocator(integer=True))
+    panel.grid(visible=False, axis="x")
+    panel.legend(loc="best")
     failed = len(initial) - len(walked)
-    if failed:
-        title += f"; {failed} failed"
-    figure.suptitle(title)
-    return figure
+    title = f"Fitness of the initial gaits of trial {trial}"
+    panel.set_title(title + (f"; {failed} failed" if failed else ""), loc="left")
+    return figure_of(panel)
 
 
-def average_over_trials(run: Run, fitness: pandas.DataFrame) -> pandas.DataFrame:
-    """Mean and standard deviation over the trials, columns of `fitness`. Index: iteration.
+def quartiles_over_trials(run: Run, fitness: pandas.DataFrame) -> pandas.DataFrame:
+    """Quartiles over the trials, columns of `fitness`: low, median, high. Index: evaluations.
 
     A trial that has ended counts with its last value, as its population no longer changes; the
-    average ends where the first unfinished trial does.
+    quartiles end where the first unfinished trial does.
     """
     ended = run.iterations.dropna(subset="stop")["trial"]
     going_on = [fitness[t].last_valid_index() for t in fitness if t not in ended.values]
     table = fitness.ffill().loc[: min(going_on, default=fitness.index[-1])]
-    return pandas.DataFrame({"mean": table.mean(axis=1), "deviation": table.std(axis=1)})
+    shares = {"low": 0.25, "median": 0.5, "high": 0.75}
+    return pandas.DataFrame({name: table.quantile(q, axis=1) for name, q in shares.items()})
 
 
 @common_style()
-def fitness_of_trials(run: Run) -> Figure:
-    """Mean fitness of each trial's population over iterations (best fitness where the optimiser
-    reports no mean), and the average over trials with its standard deviation.
+def fitness_of_trials(run: Run, *, axes: Axes | None = None) -> Figure:
+    """Fitness over evaluations: the mean of each trial's population, or the best if the optimiser
+    reports no mean. Grey: trials. Blue: their median, and from the lower to the upper quartile.
 
-    The legend is sorted by the last values; trials that have ended count in the average with
-    theirs."""
+    A trial that has ended counts in the quartiles with its last value."""
     kind = "mean" if "mean_fitness" in run.iterations else "best"
-    table = run.iterations.pivot(index="iteration", columns="trial", values=f"{kind}_fitness")
+    table = run.iterations.pivot(index="evaluations", columns="trial", values=f"{kind}_fitness")
     table = table.dropna(axis="columns", how="all")
-    first, last = table.bfill().iloc[0], table.ffill().iloc[-1]
-    figure, [[axes]] = make_figure(width_in=7.0, height_in=4.0)
-    for trial in last.sort_values(ascending=False, kind="stable").index:
+    panel = page(axes, height_in=3.6)
+    for trial in table:
         series = table[trial].dropna()
         # The dot marks the end of a line, and makes a line of one point visible.
-        dot: Any = {"marker": "o", "markevery": [-1]}
-        axes.plot(series.index, series, label=f"trial {trial}", **line_style(trial), **dot)
-    if len(last) > 1:
-        average = average_over_trials(run, table)
-        every = math.ceil(len(average) / _TICKS)
-        mean, deviation = average["mean"], average["deviation"]
-        axes.errorbar(average.index, mean, deviation, label="average", errorevery=every, **_AVERAGE)
-    axes.set(xlabel="iteration", ylabel=f"{kind} fitness", xmargin=0.02)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    columns = math.ceil((len(last) + 1) / _LEGEND_ROWS)
-    figure.legend(loc="outside right center", ncols=columns, handlelength=3.2)
-    figure.suptitle(f"Fitness of each trial\nrises in {(last > first).sum()} of {len(last)}")
-    return figure
+        dot: Any = {"marker": "o", "markersize": 3.0, "markevery": [-1]}
+        panel.plot(series.index, series, label=f"trial {trial}", **_TRIAL, **dot)
+    ends = table.ffill().iloc[-1].sort_values().rename("trial {}".format)
+    if len(ends) >= _SEVERAL:
+        quartiles = quartiles_over_trials(run, table)
+        panel.plot(quartiles.index, quartiles["median"], label="median", **_MEDIAN)
+        panel.fill_between(quartiles.index, quartiles["low"], quartiles["high"], **_BAND)
+        ends = pandas.concat([ends.iloc[[0, -1]], quartiles.iloc[-1][["median"]]])
+    panel.set(xlabel="evaluations", ylabel=f"{kind} fitness", xmargin=0.02)
+    panel.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10], integer=True))
+    _name_lines(panel, ends)
+    panel.set_title(f"{kind.capitalize()} fitness of each trial", loc="left")
+    return figure_of(panel)
+
+
+def _name_lines(panel: Axes, last: pandas.Series) -> None:
+    """Names lines beside the axes at their last values."""
+    low, high = panel.get_ylim()
+    places = spread(last.to_numpy(), _NAME_HEIGHT * (high - low))
+    for (name, value), place in zip(last.items(), places, strict=True):
+        colour = _MEDIAN["color"] if name == "median" else "0.35"
+        write_beside(panel, place, f"{name}: {fixed(value, 1)}", color=colour)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,18 +11,33 @@ import xarray
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
-from tetra_drake.figures.style import OKABE_ITO, SHADE, add_grid, common_style, legend_below
+from tetra_drake.figures.gait_diagram import foot_name
+from tetra_drake.figures.style import (
+    OKABE_ITO,
+    SHADE,
+    common_style,
+    figure_of,
+    inches,
+    legend_below,
+    name_panel,
+    page,
+    shown_part,
+    split,
+    units_named,
+)
 from tetra_drake.formatting import fixed
 from tetra_drake.results.measures import intervals, off_ground, share_of_time
-from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.units import POUND_FORCE
+from tetra_drake.results.result import SimulationResult
+
+_SECONDS = 4.0  # shown unless a time is given
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
 _SECOND: Any = {"color": OKABE_ITO["vermillion"], "linestyle": (0, (4, 1.2))}
 _LANDING: Any = {"color": "black", "marker": "v", "markersize": 4.0, "linestyle": ""}
 
-_TOP = 0.94  # height of the marks of landings, as a share of a panel's height
+_TOP = 0.92  # height of the marks of landings, as a share of a panel's height
 _IMPACTS = 0.01  # share of the samples at either end that does not count for the scale of forces
 _MARGIN = 0.25  # free space above and below the others, as a share of their range
 _ROWS, _COLUMNS = 10, 4  # largest number of panels one below the other, and of columns
@@ -30,65 +45,81 @@ _MIRRORED = 0.01  # mean difference over mean force, below which two nodes are m
 
 
 @common_style()
-def signals_and_tensions(trajectory: xarray.Dataset) -> Figure:
-    """Actuation signals and the tension of a cable that each drives (lbf) over time (s).
+def signals_and_tensions(
+    result: SimulationResult,
+    *,
+    axes: Axes | None = None,
+    time: tuple[float, float] | None = None,
+    units: str = "in",
+) -> Figure:
+    """Actuation signals, and the tension of the cable that each drives, in the last 4 s.
 
-    One panel per oscillator, with the first of the cables that it drives.
-    """
-    forces = trajectory[["signal", "tension"]] / POUND_FORCE
+    The title of a panel is the name of the cable. If a signal drives several, the first is shown.
+    Start-up, when signals are 0, is shaded."""
+    unit, trajectory = units_named(units), shown_part(result.recorded, time or _last(result))
+    forces = trajectory[["signal", "tension"]] / unit.force
     oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
     driven = [signals.index(oscillator) for oscillator in oscillators]
     groups = len(driven) // len(np.unique(forces.cable_bodies[driven]))
-    figure, panels = _panels_over_time(oscillators, groups=groups)
-    for cable, (oscillator, panel) in zip(driven, panels.items(), strict=True):
+    start_up = result.scenario.cpg.start_up
+    looks: dict[str, Any] = {"cable tension": _FIRST, "signal": _SECOND}
+    others = []
+    if float(trajectory.time[0]) < start_up:
+        others.append(Patch(color=SHADE, label="start-up"))
+    cables = {str(i): forces.cable.values[cable] for i, cable in enumerate(driven)}
+    host, panels = _panels_over_time(axes, cables, looks, *others, groups=groups)
+    for cable, oscillator, panel in zip(driven, oscillators, panels.values(), strict=True):
+        panel.axhline(0.0, color="0.6", linewidth=0.6)
+        if others:
+            panel.axvspan(float(trajectory.time[0]), start_up, color=SHADE, linewidth=0.0)
         panel.plot(forces.time, forces.tension[:, cable], **_FIRST)
         panel.plot(forces.time, forces.signal.sel(oscillator=oscillator), **_SECOND)
-    legend_below(figure, {"cable tension": _FIRST, "signal": _SECOND})
-    swing = np.ptp(forces.signal.values, axis=0).max()
-    figure.suptitle(
-        f"Signals and tensions of actuated cables\nlargest signal: {fixed(swing)} lbf peak to peak"
-    )
-    return figure
+    host.set_title(f"Signals and tensions of actuated cables ({unit.force_name})", loc="left")
+    return figure_of(host)
 
 
 @common_style()
-def ground_forces(trajectory: xarray.Dataset, robot: Robot, *, seconds: float = 5.0) -> Figure:
-    """Normal force and friction along x (lbf) over the last seconds of time (s).
+def ground_forces(
+    result: SimulationResult,
+    *,
+    axes: Axes | None = None,
+    time: tuple[float, float] | None = None,
+    units: str = "in",
+) -> Figure:
+    """Normal force and friction along x in the last 4 s; on uneven ground, friction along the
+    forward tangent, which is x projected on the slope.
 
-    On uneven ground, friction along the forward tangent, which is x projected on the slope. One
-    panel per body that can touch, for the first of its nodes that does, and one for each other node
-    that touches and is not its mirror image. Shaded: intervals without normal force, with their
-    share of the time shown. Triangles: landings. An impact is shorter than the time between two
-    samples, so a sample may show or miss its peak. The scale is that of the forces between impacts:
-    peaks beyond it are cut off.
-    """
-    end = trajectory.sel(time=slice(trajectory.time[-1] - seconds, None))
-    forces = end[["normal_force", "friction_force"]] / POUND_FORCE
-    shown = _contacts_to_show(end)
-    along = "along x" if robot.ground.flat else "along the forward tangent"
-    _, per_body = np.unique(end.contact_body.sel(contact=shown), return_counts=True)
-    figure, panels = _panels_over_time(shown, groups=per_body.min())
-    for contact, panel in panels.items():
-        node, off = forces.sel(contact=contact), off_ground(end.sel(contact=contact))
-        lifted = intervals(off.time.values, off.values)
-        for start, stop in lifted:
+    One panel for each foot that stands, but one for two that bear the same. Grey: stance. The peaks
+    of impacts are cut off, as they are shorter than the time between samples."""
+    unit, end = units_named(units), shown_part(result.recorded, time or _last(result))
+    forces = end[["normal_force", "friction_force"]] / unit.force
+    along = "along x" if result.robot.ground.flat else "along the forward tangent"
+    looks = {"normal force": _FIRST, f"friction {along}": _SECOND, "landing": _LANDING}
+    feet = _feet_to_show(end)
+    _, per_body = np.unique(end.contact_body.sel(contact=list(feet)), return_counts=True)
+    stance = Patch(color=SHADE, label="stance")
+    host, panels = _panels_over_time(axes, feet, looks, stance, groups=per_body.min())
+    limits = _limits_between_impacts(forces)
+    for foot, panel in panels.items():
+        node, stands = forces.sel(contact=foot), ~off_ground(end.sel(contact=foot))
+        spans = intervals(stands.time.values, stands.values)
+        for start, stop in spans:
             panel.axvspan(start, stop, color=SHADE, linewidth=0.0)
         panel.plot(node.time, node.normal_force, **_FIRST)
         panel.plot(node.time, node.friction_force.sel(horizontal="x"), **_SECOND)
-        landings = [stop for _, stop in lifted if stop < off.time[-1]]
+        landings = [start for start, _ in spans if start > stands.time[0]]
         above = panel.get_xaxis_transform()
         panel.plot(landings, [_TOP] * len(landings), transform=above, **_LANDING)
-        share = fixed(100 * share_of_time(off), 0)
-        panel.set_title(f"lifted {share} %", loc="right")
-        panel.set_ylim(_limits_between_impacts(forces))
-    lines = {"normal force": _FIRST, f"friction force {along}": _SECOND, "landing": _LANDING}
-    legend_below(figure, lines, Patch(color=SHADE, label="no normal force"))
-    period = 1e3 * float(end.time[1] - end.time[0])
-    figure.suptitle(
-        "Forces of the ground on each body\n"
-        f"every {period:.3g} ms: peaks of impacts, which are shorter, are missed or cut off"
-    )
-    return figure
+        share = fixed(100.0 * share_of_time(stands), 0)
+        panel.set_title(f"stands {share} %", loc="right", fontsize="small", pad=3.0)
+        panel.set_ylim(limits)
+    host.set_title(f"Forces of the ground ({unit.force_name})", loc="left")
+    return figure_of(host)
+
+
+def _last(result: SimulationResult) -> tuple[float, float]:
+    end = float(result.recorded.time[-1])
+    return max(0.0, end - _SECONDS), end
 
 
 def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | None:
@@ -101,33 +132,48 @@ def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | Non
     return (low - margin, high + margin) if margin > 0.0 else None
 
 
-def _contacts_to_show(trajectory: xarray.Dataset) -> list[str]:
-    """Names of the nodes of each body that touch and bear something else than the first of them; of
-    its first contact node if none touches."""
-    shown: list[str] = []
+def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
+    """Nodes of each body that touch and bear something else than the first of them, and their
+    titles; the first node if none touches."""
+    feet: dict[str, str] = {}
     for body in dict.fromkeys(trajectory.contact_body.values):
         normal = trajectory.normal_force[:, (trajectory.contact_body == body).values]
         names, forces = normal.contact.values, normal.values.T
         touching = np.flatnonzero((forces > 0.0).any(axis=1))
-        first = touching[0] if touching.size else 0
-        shown.append(names[first])
-        for other in touching[1:]:
-            apart = np.abs(forces[other] - forces[first]).mean()
-            if apart > _MIRRORED * forces[first].mean():
-                shown.append(names[other])
-    return shown
+        for place, node in enumerate(touching):
+            first = touching[0]
+            apart = np.abs(forces[node] - forces[first]).mean()
+            if place and apart <= _MIRRORED * forces[first].mean():
+                feet[names[first]] += f" = {foot_name(names[node]).removeprefix(f'{body} ')}"
+            else:
+                feet[names[node]] = foot_name(names[node])
+    first_node = trajectory.contact.values[0]
+    return feet or {first_node: foot_name(first_node)}
 
 
-def _panels_over_time(names: Sequence[str], *, groups: int) -> tuple[Figure, dict[str, Axes]]:
-    """A figure with one panel of forces per name, in a column for each group if these are few."""
+def _panels_over_time(
+    axes: Axes | None, names: Mapping[str, str], looks: Mapping[str, Any], *others: Any, groups: int
+) -> tuple[Axes, dict[str, Axes]]:
+    """The axes for a figure, and a panel of forces per key with a name as its title, in a column
+    for each group if these are few."""
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)
-    width = 7.5 if columns == 1 else 9.0
-    row_height = np.clip(10.0 / rows, 0.75, 1.4)
-    figure = Figure(figsize=(width, 1.1 + rows * row_height))
-    panels = add_grid(figure, names, columns=columns)
-    for panel in list(panels.values())[columns * (rows - 1) :]:
+    row_height = float(np.clip(9.0 / rows, 0.7, 1.2))
+    host = page(axes, height_in=1.0 + rows * row_height)
+    below = legend_below(host, looks, *others)
+    size: Any = {"heights": [1.0] * rows, "widths": [1.0] * columns}
+    grid = split(host, **size, gap_x=24.0, gap_y=17.0, above=14.0, below=below, share_y=True)
+    for unused in grid.ravel()[len(names) :]:
+        unused.remove()
+    for panel in grid.ravel()[: len(names)][-columns:]:
         panel.set_xlabel("time (s)")
-    figure.supylabel("force (lbf)")
-    return figure, panels
+        panel.tick_params(labelbottom=True)
+        panel.xaxis.set_major_locator(MaxNLocator(nbins=9 // columns, steps=[1, 2, 5, 10]))
+    panels = dict(zip(names, grid.ravel(), strict=False))
+    size_of_name = 60 * inches(host)[0] / 6.0 / columns
+    for key, panel in panels.items():
+        name = names[key].replace("_", " ")
+        name_panel(panel, name if len(name) < size_of_name else f"{name[: int(size_of_name)]}…")
+        panel.set_xmargin(0.0)
+    return host, panels

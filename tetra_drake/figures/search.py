@@ -12,10 +12,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.analysis.comparison import Compared, comparison_numbers
-from tetra_drake.figures.style import common_style, line_style, make_figure, save_findings
-from tetra_drake.scenario.units import shown
+from tetra_drake.figures.style import (
+    common_style,
+    figure_of,
+    legend_below,
+    line_style,
+    name_panel,
+    page,
+    save_findings,
+    split,
+    units_named,
+)
 
-_LEGEND_WIDTH = 60  # largest number of letters in a row of the legend, per panel
 _FIRST = 10  # beginning of the axes of costs, in simulations
 
 
@@ -28,7 +36,7 @@ def save_comparison(compared: Compared, folder: Path) -> list[str]:
 
 
 @common_style()
-def search(compared: Compared) -> Figure:
+def search(compared: Compared, *, axes: Axes | None = None, units: str = "in") -> Figure:
     """Best fitness so far, median and interquartile band over the trials of each run, and the share
     of trials whose fittest gait so far walks the distance to be reached.
 
@@ -37,26 +45,29 @@ def search(compared: Compared) -> Figure:
     labels = []
     for label, count in compared.runs["trials"].items():
         labels.append(f"{label} (1 trial)" if count == 1 else f"{label} ({count} trials)")
-    longest = max(len(label) for label in labels)
-    across = min(len(labels), max(1, _LEGEND_WIDTH * columns // (longest + 10)))
-    height = 3.6 + 0.18 * math.ceil(len(labels) / across)
-    figure, [row] = make_figure(width_in=3.0 + 3.5 * columns, height_in=height, columns=columns)
+    styles = {label: line_style(place) for place, label in enumerate(labels)}
+    host = page(axes, height_in=3.4 + 0.1 * len(labels))
+    unit, below = units_named(units), legend_below(host, styles)
+    size: Any = {"widths": [1.0] * columns, "gap_x": 48.0}
+    row = split(host, **size, above=16.0, below=below)[0]
     ends = compared.curves.groupby("run", sort=False)["cost"].max()
     first = min(_FIRST, ends.min())
     for place, label in enumerate(compared.runs.index):
         style = {**line_style(place), "drawstyle": "steps-post", "marker": "o", "markevery": [-1]}
         _draw_best(row[0], compared, label, first, style)
         if compared.reach is not None:
-            _draw_reached(row[1], compared, compared.reach, label, ends[label], style)
-    for axes in row:
-        axes.set(xlabel="simulations", xscale="log", xlim=(first, 1.1 * ends.max()))
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
-    row[0].set(title="median and quartiles", ylabel="best fitness so far")
-    figure.legend(row[0].lines, labels, loc="outside lower center", ncols=across)
-    figure.suptitle("How well runs search, by simulations")
-    return figure
+            _draw_reached(row[1], compared, label, ends[label], style)
+            reached = f"{compared.reach / unit.length:.4g} {unit.length_name}"
+            name_panel(row[1], f"{reached} reached (% of trials)")
+    ticks = (1.0, 3.0) if ends.max() > 100 * first else (1.0, 2.0, 5.0)
+    for panel in row:
+        panel.set(xlabel="simulations", xscale="log", xlim=(first, 1.1 * ends.max()))
+        panel.xaxis.set_major_locator(LogLocator(subs=ticks))
+        panel.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
+        panel.xaxis.set_minor_formatter(NullFormatter())
+    name_panel(row[0], "best fitness so far: median and quartiles")
+    host.set_title("How well runs search", loc="left")
+    return figure_of(host)
 
 
 def _draw_best(axes: Axes, compared: Compared, label: str, first: int, style: Any) -> None:
@@ -67,11 +78,9 @@ def _draw_best(axes: Axes, compared: Compared, label: str, first: int, style: An
     axes.fill_between(curve["cost"], curve["low"], curve["high"], **band)
 
 
-def _draw_reached(
-    axes: Axes, compared: Compared, reach: float, label: str, end: int, style: Any
-) -> None:
+def _draw_reached(axes: Axes, compared: Compared, label: str, end: int, style: Any) -> None:
     trials = compared.trials[compared.trials["run"] == label]
     there = np.sort(trials["reached"][trials["reached"] <= end])
     shares = 100.0 * np.arange(len(there) + 1) / len(trials)
     axes.plot([0.0, *there, end], [*shares, shares[-1]], **style)
-    axes.set(title=f"{shown(reach, 'm')} reached", ylabel="trials (%)", ylim=(-3.0, 103.0))
+    axes.set_ylim(-3.0, 103.0)

@@ -16,6 +16,7 @@ from tetra_drake.analysis.elites import elites
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures import fitness, forces, motion
+from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.style import save_figure
 from tetra_drake.results.result import SimulationResult
@@ -85,16 +86,16 @@ def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:
 
     Raises InputError if the folder cannot be written to.
     """
-    trajectory, robot = result.recorded, result.robot
     pictures: list[tuple[Any, ...]] = [
-        (motion.time_lapse, trajectory, robot.structure),
-        (motion.path_of_the_centre, trajectory, robot.structure),
-        (motion.relative_distances, trajectory),
-        (motion.one_step, trajectory, robot),
+        (gait_diagram, result),
+        (motion.time_lapse, result),
+        (motion.path_of_the_centre, result),
+        (motion.relative_distances, result),
+        (motion.one_step, result),
     ]
-    if robot.structure.signals:
-        pictures.append((forces.signals_and_tensions, trajectory))
-    pictures.append((forces.ground_forces, trajectory, robot))
+    if result.robot.structure.signals:
+        pictures.append((forces.signals_and_tensions, result))
+    pictures.append((forces.ground_forces, result))
     return _save(folder, *pictures)
 
 
@@ -109,9 +110,7 @@ def draw_run(study: Study, folder: Path) -> dict[str, str]:
         pictures.append((fitness.initial_fitness, run, study.trial))
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
-    walks = [(gait.label, gait.result.recorded) for gait in (study.initial, study.best)]
-    structure = study.best.result.robot.structure
-    pictures.append((motion.before_and_after, walks, structure))
+    pictures.append((motion.before_and_after, study.initial.result, study.best.result))
     captions = _save(folder, *pictures)
     return captions | draw_trajectory(study.best.result, folder)
 
