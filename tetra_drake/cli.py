@@ -50,8 +50,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has closed it, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
-    except KeyboardInterrupt:
-        print("tetra-drake: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print("\ntetra-drake: interrupted", *interrupt.args, file=sys.stderr)
         return INTERRUPTED
     return 0
 
@@ -218,8 +218,7 @@ def _evolve(options: Options) -> None:
             )
     except KeyboardInterrupt:
         resume = f"tetra-drake evolve --out {options.out} --resume"
-        print(f"\nnothing is lost; continue with: {resume}", file=sys.stderr)
-        raise
+        raise KeyboardInterrupt(f"(nothing is lost; continue with: {resume})") from None
     print(run_text(run))
 
 

@@ -180,8 +180,8 @@ def test_differences_are_keys_and_readable_values(scenario):
     changed = scenario.with_changes(changes | {"robot.offsets": [["1 mm", 0, 0]] * 5})
     assert differences(changed, scenario) == [
         ("robot.cables.slack", "true"),
-        ("robot.offsets", f"[{', '.join(['[0.001 m, 0 m, 0 m]'] * 5)}]"),
-        ("friction.stiction_damping", "52.5381 N*s/m"),
+        ("robot.offsets", f"[{', '.join(['[1 mm, 0 in, 0 in]'] * 5)}]"),
+        ("friction.stiction_damping", "0.3 lbf*s/in"),
         ("cpg.signals", "live"),
         ("optimizer.stop_rise", "0.3"),
     ]

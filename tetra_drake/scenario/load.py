@@ -11,6 +11,7 @@ from tetra_drake.files import read_text
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import TAG, Tree, flattened, tree_of
 from tetra_drake.scenario.structure_files import structure_file
+from tetra_drake.scenario.units import plainest
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 MOST_BYTES = 2**20
@@ -40,14 +41,15 @@ def dump_scenario(scenario: Scenario) -> str:
 
 
 def differences(scenario: Scenario, base: Scenario) -> list[tuple[str, str]]:
-    """(key, value as text) of what a scenario has other than `base`, the name aside."""
+    """(key, value as text) of what a scenario has other than `base`, the name aside. Quantities are
+    in the units in which they are round."""
     ours, theirs = _texts(scenario), _texts(base)
     return [(key, text) for key, text in ours.items() if theirs.get(key) != text and key != "name"]
 
 
 def _texts(scenario: Scenario) -> dict[str, str]:
     """The values of a scenario as texts, by their keys."""
-    tree = tree_of(scenario, show="{:.6g} {}".format, sparse=False)
+    tree = tree_of(scenario, show=plainest, sparse=False)
     texts = {}
     for key, value in flattened(tree).items():
         text = f"{value:.6g}" if isinstance(value, float) else json.dumps(value)
