@@ -1,7 +1,8 @@
 """The common look of figures, and how they are written.
 
-A figure function is decorated with `@common_style()`, starts with make_figure() and returns the
-figure; save_figure() writes it. Neither a display nor pyplot is needed.
+A figure function is decorated with `@common_style()`. It draws on page(), which are the caller's
+axes or those of a new figure; split() divides them into panels. It returns the figure, which
+save_figure() writes. Neither a display nor pyplot is needed.
 """
 
 from __future__ import annotations
@@ -11,19 +12,26 @@ import json
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import matplotlib.style
 import numpy as np
 import pandas
+import xarray
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
+from matplotlib.transforms import Bbox
 
+from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file, write_whole
+from tetra_drake.formatting import listed
+from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 OKABE_ITO = {
     "black": "#000000",
@@ -43,11 +51,53 @@ LINE_COLOURS = tuple(colour for name, colour in OKABE_ITO.items() if name != "ye
 DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 """Line styles that tell series apart in a grey print; with the colours, 28 series differ."""
 
+WIDTH_IN = 7.0
+"""Width of figures on paper, in inches."""
+
 SHADE = "0.9"
 """Grey behind marked intervals of time."""
 
 REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 """Line style of values to compare with."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units in which figures show lengths and forces."""
+
+    length: float
+    """Size in m."""
+    length_name: str
+    digits: int
+    """Decimals of a length that matter."""
+    force: float
+    """Size in N."""
+    force_name: str
+
+
+_UNITS = {"in": Units(INCH, "in", 2, POUND_FORCE, "lbf"), "SI": Units(1.0, "m", 3, 1.0, "N")}
+
+
+def units_named(name: str) -> Units:
+    """The units "in" (and lbf) or "SI"; raises InputError for another name."""
+    if name not in _UNITS:
+        raise InputError(
+            "figure", "units", f"found '{name}', expected one of {listed(list(_UNITS))}"
+        )
+    return _UNITS[name]
+
+
+def shown_part(trajectory: xarray.Dataset, time: tuple[float, float] | None) -> xarray.Dataset:
+    """The part of a trajectory from a start to an end (s), or all of it; raises InputError if it
+    holds no two samples."""
+    if time is None:
+        return trajectory
+    part = trajectory.sel(time=slice(*time))
+    if part.sizes["time"] < 2:
+        end = float(trajectory.time[-1])
+        problem = f"found {time[0]:g} to {time[1]:g} s, expected a range within 0 to {end:g} s"
+        raise InputError("figure", "time", problem)
+    return part
 
 
 def line_style(index: int) -> dict[str, Any]:
@@ -63,6 +113,117 @@ def common_style() -> Iterator[None]:
     cycle = cycler(color=LINE_COLOURS * len(DASHES), linestyle=DASHES * len(LINE_COLOURS))
     with matplotlib.style.context(["default", sheet, {"axes.prop_cycle": cycle}]):
         yield
+
+
+def page(axes: Axes | None, *, height_in: float) -> Axes:
+    """The axes to draw on: the caller's, or those of a new figure, `height_in` inches high."""
+    if axes is not None:
+        return axes
+    made = Figure(figsize=(WIDTH_IN, height_in)).add_subplot()
+    _keep_style(made)
+    return made
+
+
+def figure_of(axes: Axes) -> Figure:
+    """The whole figure to which axes belong."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
+def _keep_style(axes: Axes) -> None:
+    """Gives ticks, which are made when the figure is drawn, the style of now."""
+    grid_color, grid_linewidth = rcParams["grid.color"], rcParams["grid.linewidth"]
+    axes.tick_params(grid_color=grid_color, grid_linewidth=grid_linewidth)
+    axes.tick_params(axis="x", labelsize=rcParams["xtick.labelsize"])
+    axes.tick_params(axis="y", labelsize=rcParams["ytick.labelsize"])
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Place of a panel in its host: shares of the room that gaps between panels and the margins of
+    the host leave. Matplotlib asks for it whenever it draws, so gaps keep their size on paper."""
+
+    host: Axes
+    left: float
+    bottom: float
+    width: float
+    height: float
+    column: int
+    row: int
+    """From below."""
+    gaps: tuple[float, float]
+    """Points between columns and between rows."""
+    room: tuple[float, float]
+    """Points that gaps and margins take across and up."""
+    below: float
+    """Points below the panels."""
+
+    def __call__(self, axes: object, renderer: object) -> Bbox:
+        """The place within the figure."""
+        figure = self.host.get_figure(root=False)
+        assert figure is not None
+        point, whole = figure.dpi / 72.0, self.host.bbox
+        width = max(whole.width - point * self.room[0], 1.0)
+        height = max(whole.height - point * self.room[1], 1.0)
+        place = Bbox.from_bounds(
+            whole.x0 + self.left * width + point * self.column * self.gaps[0],
+            whole.y0 + self.bottom * height + point * (self.below + self.row * self.gaps[1]),
+            self.width * width,
+            self.height * height,
+        )
+        return place.transformed(figure.transSubfigure.inverted())
+
+
+def split(
+    host: Axes,
+    *,
+    heights: Sequence[float] = (1.0,),
+    widths: Sequence[float] = (1.0,),
+    gap_x: float = 12.0,
+    gap_y: float = 12.0,
+    above: float = 0.0,
+    below: float = 0.0,
+    share_x: bool = True,
+    share_y: bool = False,
+) -> np.ndarray:
+    """Panels (rows, columns) in place of axes, whose title stays, with relative heights and widths.
+
+    `gap_x` and `gap_y` are points between panels; `above` and `below` are points of the axes' place
+    that stay free. All panels share an x axis, or a y axis, if they shall.
+    """
+    host.set_axis_off()
+    rows, columns = len(heights), len(widths)
+    room = (gap_x * (columns - 1), gap_y * (rows - 1) + above + below)
+    panels = np.empty((rows, columns), dtype=object)
+    first = None
+    for row, column in np.ndindex(rows, columns):
+        place = _Place(
+            host,
+            left=sum(widths[:column]) / sum(widths),
+            bottom=sum(heights[row + 1 :]) / sum(heights),
+            width=widths[column] / sum(widths),
+            height=heights[row] / sum(heights),
+            column=column,
+            row=rows - 1 - row,
+            gaps=(gap_x, gap_y),
+            room=room,
+            below=below,
+        )
+        panel = host.inset_axes(
+            (0.0, 0.0, 1.0, 1.0),
+            sharex=first if share_x else None,
+            sharey=first if share_y else None,
+        )
+        panel.set_axes_locator(place)
+        _keep_style(panel)
+        first = first or panel
+        if share_x and row < rows - 1:
+            panel.tick_params(labelbottom=False)
+        if share_y and column > 0:
+            panel.tick_params(labelleft=False)
+        panels[row, column] = panel
+    return panels
 
 
 def make_figure(
@@ -84,6 +245,14 @@ def add_grid(figure: Figure | SubFigure, names: Sequence[str], *, columns: int) 
     for name, panel in zip(names, panels, strict=False):
         panel.set_title(textwrap.fill(name.replace("_", " "), 110 // columns), loc="left")
     return dict(zip(names, panels, strict=False))
+
+
+def own_words(names: Sequence[str]) -> list[str]:
+    """Names without the words that all of them have but the first, such as "T1-T2 left" of "T1-T2
+    outer bottom_left"."""
+    words = [name.replace("_", " ").split() for name in names]
+    common = set(words[0][1:]).intersection(*words) if len(names) > 1 else set()
+    return [" ".join(word for word in of if word not in common) for of in words]
 
 
 def legend_below(figure: Figure, lines: Mapping[str, Any], *others: Artist) -> None:

@@ -16,6 +16,7 @@ from tetra_drake.analysis.elites import elites
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures import fitness, forces, motion
+from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.figures.style import save_figure
 from tetra_drake.results.result import SimulationResult
@@ -87,6 +88,7 @@ def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:
     """
     trajectory, robot = result.recorded, result.robot
     pictures: list[tuple[Any, ...]] = [
+        (gait_diagram, result),
         (motion.time_lapse, trajectory, robot.structure),
         (motion.path_of_the_centre, trajectory, robot.structure),
         (motion.relative_distances, trajectory),

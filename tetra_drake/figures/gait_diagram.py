@@ -1,0 +1,214 @@
+"""The gait diagram: which feet stand when, with the signals and the speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray
+from matplotlib import rcParams
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from tetra_drake.figures.style import (
+    OKABE_ITO,
+    REFERENCE,
+    Units,
+    common_style,
+    figure_of,
+    own_words,
+    page,
+    shown_part,
+    split,
+    units_named,
+)
+from tetra_drake.formatting import fixed
+from tetra_drake.results import measures
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.structure import Structure
+
+_CYCLES = 3
+_LAST_SHARE = 0.25  # share of the time that is shown where no signal oscillates
+
+_FEW_FEET = 14  # largest number of feet of which each is named
+_NAME_HEIGHT = 0.13  # inches on paper
+_SIGNAL_HEIGHT, _FOOT_HEIGHT = 0.2, 0.16  # inches on paper
+_MOST_HEIGHT, _LEAST_HEIGHT = 3.2, 0.7  # of all signals, and of all feet
+_SPEED_HEIGHT, _MARGINS = 0.9, 1.1
+
+_BETWEEN_BODIES = 0.5  # gap between the feet of two bodies, in heights of a row
+_BAR = 0.78  # height of a stance bar, in heights of a row
+_EDGE = 0.2  # free height above and below all bars
+_SWING = 0.48  # largest height of a signal, in distances between signals
+
+_LINE: Any = {"color": OKABE_ITO["vermillion"], "linewidth": 1.0, "linestyle": "-"}
+_SPEED: Any = {"color": "black", "linewidth": 1.1, "linestyle": "-"}
+_CYCLE: Any = {"color": "0.6", "linewidth": 0.7, "linestyle": (0, (1, 2))}
+_STANCE = {"left": OKABE_ITO["blue"], "right": OKABE_ITO["sky_blue"]}
+_OTHER_FOOT = "0.35"
+
+
+@common_style()
+def gait_diagram(
+    result: SimulationResult,
+    *,
+    axes: Axes | None = None,
+    time: tuple[float, float] | None = None,
+    units: str = "in",
+) -> Figure:
+    """Gait diagram of the last three cycles: actuation signals, stance of each foot, and forward
+    speed of the centre of mass.
+
+    A bar shows when a foot bears load; the lead is on top. The duty factor is the share of the time
+    in which a foot stands. Dotted lines mark cycles. If no signal has two periods in the second
+    half, the last quarter is shown."""
+    structure, unit = result.robot.structure, units_named(units)
+    cycle = measures.last_step(result.recorded)
+    trajectory = shown_part(result.recorded, time or _last_cycles(result.recorded, cycle))
+    stands = _stance(trajectory, structure)
+    rows = _rows_of_feet(stands)
+    heights = [
+        float(np.clip(_SIGNAL_HEIGHT * structure.signals, _LEAST_HEIGHT, _MOST_HEIGHT)),
+        float(np.clip(_FOOT_HEIGHT * max(rows.values(), default=0.0), _LEAST_HEIGHT, _MOST_HEIGHT)),
+        _SPEED_HEIGHT,
+    ]
+    if not structure.signals:
+        del heights[0]
+    host = page(axes, height_in=sum(heights) + _MARGINS)
+    panels = split(host, heights=heights, gap_y=18.0, above=15.0)[:, 0]
+    # A caller's axes may be small.
+    scale = min(1.0, float(host.bbox.height) / figure_of(host).dpi / sum(heights))
+    if structure.signals:
+        _draw_signals(panels[0], trajectory, unit, names=int(scale * heights[0] / _NAME_HEIGHT))
+    each = len(rows) <= _FEW_FEET and scale * _FOOT_HEIGHT > 0.8 * _NAME_HEIGHT
+    _draw_stance(panels[-2], stands, rows, each=each)
+    _draw_speed(panels[-1], trajectory, structure, unit)
+    _mark_cycles(panels, trajectory.time.values, cycle)
+    title = "Gait diagram"
+    if cycle is not None:
+        title += f", cycle of {fixed(cycle[1] - cycle[0])} s"
+    host.set_title(title, loc="left")
+    return figure_of(host)
+
+
+def _last_cycles(
+    trajectory: xarray.Dataset, cycle: tuple[float, float] | None
+) -> tuple[float, float]:
+    """Start and end (s) of the last cycles, or of the last part where no signal oscillates."""
+    if cycle is None:
+        start, end = (float(trajectory.time[i]) for i in (0, -1))
+        return end - _LAST_SHARE * (end - start), end
+    start, end = cycle
+    return max(float(trajectory.time[0]), end - _CYCLES * (end - start)), end
+
+
+def _stance(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
+    """(time, contact): whether a foot bears load. Feet are the bottom nodes of a row, and all nodes
+    that touch the ground."""
+    stands = ~measures.off_ground(trajectory)
+    are_feet = np.isin(structure.contacts, structure.markers)
+    return stands[:, stands.any("time").values | are_feet]
+
+
+def _rows_of_feet(stands: xarray.DataArray) -> dict[str, float]:
+    """Height of each foot in the diagram, in rows: the rear, or the first body, is below, and a
+    left foot above the right one."""
+    rows: dict[str, float] = {}
+    row = 0.5
+    bodies = stands.contact_body.values
+    for body in dict.fromkeys(bodies):
+        for foot in stands.contact.values[bodies == body][::-1]:
+            rows[foot] = row
+            row += 1.0
+        row += _BETWEEN_BODIES
+    return rows
+
+
+def foot_name(node: str) -> str:
+    """Name of a contact node as a foot, such as "T1 left"."""
+    return node.replace("bottom_", "").replace("_", " ")
+
+
+def _draw_signals(panel: Axes, trajectory: xarray.Dataset, unit: Units, *, names: int) -> None:
+    """Signals one above the other, the last on top as the lead is, and so many of their names."""
+    signals, oscillators = trajectory.signal / unit.force, trajectory.oscillator.values
+    largest = float(np.abs(signals.values).max())
+    scale = _SWING / largest if largest else 0.0
+    for place, name in enumerate(oscillators):
+        panel.axhline(place, color="0.8", linewidth=0.5)
+        panel.plot(signals.time, place + scale * signals.sel(oscillator=name), **_LINE)
+    every = 1 + (len(oscillators) - 1) // max(names, 1)
+    panel.set_yticks(range(0, len(oscillators), every), own_words(oscillators)[::every])
+    panel.set_ylim(-0.6, len(oscillators) - 0.4)
+    panel.grid(visible=False, axis="y")
+    _name(panel, f"actuation signals, up to {fixed(largest)} {unit.force_name}")
+
+
+def _name(panel: Axes, name: str) -> None:
+    panel.set_title(name, loc="left", fontsize=rcParams["axes.labelsize"])
+
+
+def _draw_stance(
+    panel: Axes, stands: xarray.DataArray, rows: Mapping[str, float], *, each: bool
+) -> None:
+    """Stance bars; names and duty factors of each foot, or names of bodies alone."""
+    times = stands.time.values
+    by_body: dict[str, list[float]] = {}
+    for foot, row in rows.items():
+        stance = stands.sel(contact=foot)
+        by_body.setdefault(str(stance.contact_body.values), []).append(row)
+        spans = [(start, end - start) for start, end in measures.intervals(times, stance.values)]
+        side = foot.rpartition("_")[2]
+        colour = _STANCE.get(side, _OTHER_FOOT)
+        panel.broken_barh(spans, (row - _BAR / 2, _BAR), facecolors=colour)
+        if each:
+            _write_beside(panel, row, f"{fixed(100.0 * measures.share_of_time(stance), 0)} %")
+    if each:
+        panel.set_yticks(list(rows.values()), [foot_name(foot) for foot in rows])
+        panel.set_title("duty factor", loc="right", fontsize=rcParams["ytick.labelsize"])
+        _name(panel, "stance")
+    else:
+        panel.set_yticks([float(np.mean(of)) for of in by_body.values()], list(by_body))
+        has_sides = any(foot.endswith("_left") for foot in rows)
+        _name(panel, "stance, left foot above right one" if has_sides else "stance")
+    panel.tick_params(axis="y", length=0)
+    panel.set_ylim(-_EDGE, max(rows.values(), default=0.5) + 0.5 + _EDGE)
+    panel.grid(visible=False, axis="y")
+
+
+def _write_beside(panel: Axes, height: float, text: str) -> None:
+    size, transform = rcParams["ytick.labelsize"], panel.get_yaxis_transform()
+    panel.text(1.01, height, text, transform=transform, va="center", fontsize=size)
+
+
+def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, unit: Units) -> None:
+    velocity = np.einsum("tna,n->ta", trajectory.v_WN.values, structure.node_shares)
+    speed, name = velocity[:, 0], "speed along x"
+    if structure.is_row:
+        heading = measures.path_of_centre(trajectory, structure).heading
+        speed = velocity[:, 0] * np.cos(heading) + velocity[:, 1] * np.sin(heading)
+        name = "forward speed"
+    speed = speed / unit.length
+    mean = float(np.trapezoid(speed, trajectory.time) / np.ptp(trajectory.time.values))
+    panel.axhline(0.0, color="0.8", linewidth=0.5)
+    panel.axhline(mean, **REFERENCE)
+    panel.plot(trajectory.time, speed, **_SPEED)
+    _write_beside(panel, mean, f"mean\n{fixed(mean, unit.digits)}")
+    panel.set(xlabel="time (s)", xlim=trajectory.time.values[[0, -1]])
+    _name(panel, f"{name} ({unit.length_name}/s)")
+
+
+def _mark_cycles(
+    panels: Iterable[Axes], times: np.ndarray, cycle: tuple[float, float] | None
+) -> None:
+    """Lines where cycles begin."""
+    if cycle is None:
+        return
+    start, end = cycle
+    period = end - start
+    first, last = np.ceil((times[0] - end) / period), np.floor((times[-1] - end) / period)
+    for panel in panels:
+        panel.grid(visible=False, axis="x")
+        for count in np.arange(first, last + 1.0):
+            panel.axvline(end + count * period, **_CYCLE)
