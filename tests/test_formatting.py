@@ -41,4 +41,4 @@ def test_a_range_without_width_or_ends_is_not_shown():
     assert percents(1.0, 0.91, 1.0) == "100 % (91 to 100)"
     assert percents(1.0, 1.0, 1.0) == "100 %"
     assert ranged(2.0, 1.0, 3.0) == "2.00 (1.00 to 3.00)"
-    assert ranged(2.0, math.nan, math.nan) == "2.00"
+    assert ranged(2.0, math.nan, math.nan) == ranged(2.0, 2.0, 2.0) == "2.00"

@@ -46,8 +46,8 @@ def listed(items: Sequence[object]) -> str:
 
 
 def ranged(value: float, low: float, high: float) -> str:
-    """A number with a range that belongs to it, unless that is not known."""
-    if math.isnan(low):
+    """A number with a range that belongs to it, unless that is unknown or has no width."""
+    if math.isnan(low) or low == high:
         return rounded(value)
     return f"{rounded(value)} ({rounded(low)} to {rounded(high)})"
 

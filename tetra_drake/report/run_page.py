@@ -41,7 +41,8 @@ _OF_EVOLUTION = (
 )
 """Figures by the part of the report that shows them; others show motion and forces."""
 
-_LONGEST_SETTING = 80  # largest number of letters of a setting that is shown
+_LONGEST_SETTING = 60  # largest number of letters of a setting that is shown
+_NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
 
 def write_figures(source: Path, out: Path | None = None) -> list[Path]:
@@ -116,9 +117,8 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         gait_file, page = _map_files(names, gait, study)
         map_files |= dict.fromkeys(names, gait_file)
         map_pages[names[0]] = page
-    again, changed = {}, {}
+    changed = {}
     for shown_gait in (study.best, study.initial):
-        again[shown_gait.label] = shown_gait.distance_in
         change = abs(shown_gait.distance_in - shown_gait.recorded["distance_in"])
         if change > 1e-6:
             changed[shown_gait.label] = change
@@ -130,7 +130,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         title=f"{scenario.name}: {headline(scenario, study.best.recorded)}",
         evaluations=f"{sum(status.evaluations for status in run.statuses):,}",
         ground=ground_text(scenario),
-        again=again,
+        best=study.best,
         changed=changed,
         versions=versions(),
         differences=_settings(scenario),
@@ -161,11 +161,11 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
 
 
 def _settings(scenario: Scenario) -> list[tuple[str, str]]:
-    """Settings other than the thesis's; no coordinates of nodes, nor other long lists."""
+    """Settings other than the thesis's; no long lists, nor what the report says elsewhere."""
     return [
         (key, value)
         for key, value in differences(scenario, load_scenario("thesis"))
-        if not key.startswith("robot.nodes.") and len(value) <= _LONGEST_SETTING
+        if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
     ]
 
 
@@ -214,14 +214,15 @@ def _weight_matrices(gait: Gait) -> list[WeightMatrix]:
     return matrices
 
 
-def _pictures(captions: Mapping[str, str], folder: Path) -> dict[str, list[tuple[str, str]]]:
-    """Pictures with their captions, by the part of the report that shows them."""
-    parts: dict[str, list[tuple[str, str]]] = {"gait": [], "evolution": [], "forces": []}
+def _pictures(captions: Mapping[str, str], folder: Path) -> dict[str, list[tuple[str, str, str]]]:
+    """Pictures with their files and captions, by the part of the report that shows them."""
+    parts: dict[str, list[tuple[str, str, str]]] = {"gait": [], "evolution": [], "forces": []}
     for name, caption in captions.items():
         part = "gait" if name in _OF_THE_GAIT else "forces"
         if name in _OF_EVOLUTION:
             part = "evolution"
-        parts[part].append((_embedded(folder / f"{name}.svg"), caption))
+        file = f"{name}.svg"
+        parts[part].append((_embedded(folder / file), f"{FIGURES}/{file}", caption))
     return parts
 
 
