@@ -119,7 +119,7 @@ def analyse(
     `executor` is for all but the draws of disturbances.
     """
     run = load_run(directory)
-    scenario = run.manifest.scenario
+    scenario = run.scenario
     run.fittest()  # InputError if there is none
     best = best_gaits(run)
     gaits = {row["trial"]: run.gait(row["trial"], row["evaluation"]) for row in best}

@@ -50,8 +50,8 @@ def thin(source: Path, out: Path) -> None:
     run = load_run(source)
     manifest = json.loads((source / MANIFEST).read_text(encoding="utf-8")) | {"thinned": True}
     whole = {(int(trial), int(index)) for trial, index in _that_matter(run)}
-    metrics = _that_choose(run.manifest.scenario)
-    for trial in range(run.manifest.scenario.evolution.trials):
+    metrics = _that_choose(run.scenario)
+    for trial in range(run.scenario.evolution.trials):
         old, new = trial_folder(source, trial), trial_folder(out, trial)
         entries = read_entries(old / EVALUATIONS)
         thinned = [e if (trial, e["index"]) in whole else _thinned(e, metrics) for e in entries]

@@ -15,6 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
+from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.optimizers import quality_diversity
 from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.scenario.load import load_scenario
@@ -111,8 +112,8 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
 def test_a_robot_of_another_length_is_evolved_and_drawn(tiny, tmp_path):
     scenario = tiny.with_changes({"robot.tetrahedra": 2, "simulation.duration": "2.0 s"})
     run = tetra_drake.evolve(scenario, tmp_path / "run", workers=1, reevaluate=False)
-    trial, index = run.fittest()
-    assert len(run.vector(trial, index)) == 2  # no weights
+    best = run.fittest()
+    assert len(run.vector(best["trial"], best["index"])) == 2  # no weights
     assert run.statuses[0].failures == 0
     assert len(list((run.directory / "figures").glob("*.svg"))) >= 9
     replay = commands(read_page(run.directory / "replay.html"), "set_object")
@@ -153,6 +154,24 @@ def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
         with pytest.raises(InputError, match=problem):
             tetra_drake.evolve(scenario, tmp_path / "run", objective=objective)
     assert not (tmp_path / "run").exists()
+
+
+def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
+    def evolve(seed, **options):
+        options |= {"reevaluate": False, "report": False}
+        return tetra_drake.evolve(tiny, tmp_path / "run", seed=seed, overwrite=True, **options)
+
+    first, second = evolve(1), evolve(2)
+    assert (second.manifest.seed, len(second.evaluations)) == (2, len(first.evaluations))
+    with refused("evolve", "overwrite", "resume"):
+        evolve(3, resume=True)
+    with RunRecord.resume(tmp_path / "run"), refused(tmp_path / "run", "", "at work"):
+        evolve(3)
+    assert tetra_drake.load_run(tmp_path / "run").manifest.seed == 2
+    (tmp_path / "run" / "manifest.json").unlink()
+    with refused(tmp_path / "run", "", "holds no manifest.json"):
+        evolve(3)
+    assert (tmp_path / "run" / "trial_00").is_dir()
 
 
 def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(

@@ -1,10 +1,30 @@
-"""A Drake model of a walking tensegrity robot driven by a Matsuoka central pattern generator.
+"""A Drake model of walking tensegrity robots driven by a Matsuoka central pattern generator.
 
-    import tetra_drake as td
+    >>> import tetra_drake as td
+    >>> scenario = td.load_scenario("quick").with_changes({"robot.tetrahedra": 3})
+    >>> run = td.evolve(scenario, "runs/mine", overwrite=True)
+    >>> result = td.simulate(scenario, run.best_gait(), record=True)
+    >>> print(result)
+    >>> result.recorded.tension.sel(cable_bodies="T1-T2").max().item()
+    >>> result.show()  # in a notebook
+    >>> metrics = td.sweep(scenario, run.gaits(), {"robot.cables.outer_stiffness": ["30 N/m"]})
 
-    scenario = td.load_scenario("thesis")
-    result = td.simulate(scenario, td.load_gait("gait.json", scenario), record=True)
-    run = td.evolve(scenario, "runs/mine", seed=1)
+What there is, and what it offers:
+
+    load_scenario       with_changes({key: value}), to_yaml()
+    load_gait, seeded_gait
+    simulate            metrics, recorded (the trajectory, for xarray), show(), save_replay(file)
+    simulate_many       the same for many gaits, on all cores
+    sweep               metrics of gaits with other values of the scenario, for xarray
+    load_result         what the command `tetra-drake simulate` wrote
+    evolve, load_run    best_gait(), gaits(), scenario; evaluations, iterations (for pandas)
+    load_command        a file of commands for actuators, for simulate(scenario, command=...)
+    figures             from tetra_drake.figures.gait_diagram import gait_diagram, and then
+                        gait_diagram(result, axes=ax); other modules in tetra_drake.figures likewise
+
+print() shows the most important of a scenario, gait, run, result or result.metrics. Numbers are SI,
+unless the name says otherwise, as in result.metrics.distance_in. Input that cannot be used raises
+an InputError, a ValueError whose message is one line.
 
 Each name is imported when it is first used, so `import tetra_drake` loads neither Drake nor numba.
 """
@@ -15,6 +35,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tetra_drake.analysis.sweep import sweep as sweep
     from tetra_drake.engines.simulate import simulate as simulate
     from tetra_drake.engines.simulate import simulate_many as simulate_many
     from tetra_drake.evolution.run import load_run as load_run
@@ -22,6 +43,7 @@ if TYPE_CHECKING:
     from tetra_drake.prototype.command_file import load_command as load_command
     from tetra_drake.report.result_folder import load_result as load_result
     from tetra_drake.robot.gait import load_gait as load_gait
+    from tetra_drake.robot.gait import seeded_gait as seeded_gait
     from tetra_drake.scenario.load import load_scenario as load_scenario
 
 __version__ = "0.2.0"
@@ -33,8 +55,10 @@ _HOMES = {
     "load_result": "tetra_drake.report.result_folder",
     "load_run": "tetra_drake.evolution.run",
     "load_scenario": "tetra_drake.scenario.load",
+    "seeded_gait": "tetra_drake.robot.gait",
     "simulate": "tetra_drake.engines.simulate",
     "simulate_many": "tetra_drake.engines.simulate",
+    "sweep": "tetra_drake.analysis.sweep",
 }
 
 __all__ = ["__version__", *_HOMES]

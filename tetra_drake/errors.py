@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import functools
 import re
+from typing import Any
 
 _QUOTED, _LONGEST, _LONGEST_PATH = 200, 600, 4096
 """Characters of anything quoted, of a problem and of a source, at most."""
@@ -43,11 +44,20 @@ class SimulationFailure(RuntimeError):
 
     wall_time = 0.0
     """Wall time of the simulation in s, if the engine says it."""
+    scenario: Any = None
+    gait: Any = None
+    """Scenario and gait that were simulated, of a failure among the outcomes of many."""
+    name = ""
+    """Name of this gait."""
 
     def __init__(self, *, time: float, reason: str) -> None:
         self.time = time
         self.reason = reason
         super().__init__(f"simulation failed at t = {time:.4f} s: {reason}")
+
+    def __repr__(self) -> str:
+        gait = f"{self.name} on scenario {self.scenario.name}: " if self.name else ""
+        return f"<{type(self).__name__} {gait}{self}>"
 
     def __reduce__(self) -> tuple[object, ...]:
         # Keyword-only arguments defeat the default; failures must cross process borders.

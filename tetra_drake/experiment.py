@@ -28,7 +28,7 @@ from tetra_drake.evolution.trials import Trial, check_fitness, open_trials, run_
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import MakeOptimizer
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.load import given_scenario
 from tetra_drake.scenario.schema import Scenario
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ def evolve(
     seed: int | None = None,
     workers: int | None = None,
     resume: bool = False,
+    overwrite: bool = False,
     optimizer: MakeOptimizer | None = None,
     objective: Objective | None = None,
     executor: MakeExecutor | None = None,
@@ -51,10 +52,15 @@ def evolve(
 ) -> Run:
     """Evolves gaits on a scenario and records the run in the new directory `out`.
 
+        >>> scenario = td.load_scenario("quick")
+        >>> run = td.evolve(scenario, "runs/mine", seed=1, overwrite=True)
+        >>> result = td.simulate(scenario, run.best_gait())
+
     seed: 0 by default. The record depends on scenario, method and seed only.
     workers: one per core by default; a Dask cluster's are as many as it has.
     resume: goes on with the run in `out`; then `scenario` may be None, and what is given must be
         what the run began with: a recorded gait is evaluated again and must get its fitness again.
+    overwrite: replaces the run in `out`, with all that its directory holds.
     optimizer: optimizer(space, scenario.evolution, generator) makes the optimiser of a trial
         (see optimizers.base); by default the scenario's.
     objective: objective(result) -> float, to be maximised; by default the scenario's fitness.
@@ -72,8 +78,10 @@ def evolve(
     check_guard()
     out, progress = Path(out), progress or Progress()
     workers = getattr(executor, "workers", None) or workers or available_cores()
-    given = load_scenario(scenario) if isinstance(scenario, (str, Path)) else scenario
+    given = None if scenario is None else given_scenario(scenario)
     scenario = read_manifest(out).scenario if resume else given
+    if resume and overwrite:
+        raise InputError("evolve", "overwrite", "excludes resume")
     if scenario is None:
         raise InputError("scenario", "", "is needed to begin a run")
     check_scenario(scenario)  # before there is a directory
@@ -85,6 +93,8 @@ def evolve(
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
         check_sendable(GaitEvaluation(scenario, objective), where)
+        if overwrite:
+            RunRecord.remove(out)
         record = RunRecord.create(out, scenario=scenario, seed=seed or 0, method=method)
     with record, progress:
         progress.say(_introduction(out, record.manifest, workers, report=report))

@@ -86,9 +86,14 @@ def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(
     run = load_run(write_run(tmp_path / "run", trials))
     assert run.best(3)[["trial", "index"]].to_numpy().tolist() == [[0, 0], [0, 3], [1, 1], [1, 0]]
     assert run.best()["fitness"].tolist() == [5.0, 6.0]
-    assert run.fittest() == (1, 1)
+    assert run.fittest().equals(run.evaluations.query("trial == 1 and index == 1").iloc[0])
+    assert run.initial_best(1).equals(run.evaluations.query("trial == 1 and index == 0").iloc[0])
     assert run.best_gait() == run.gait(1, 1) != run.gait(0, 0)
-    assert run.best_gait().name == "tiny, seed 7, trial 1, evaluation 1"
+    assert run.gaits() == [run.gait(0, 0), run.gait(1, 1)]
+    names = [gait.name for gait in run.gaits(3)]
+    numbers = [(0, 0), (0, 3), (1, 1), (1, 0)]
+    assert names == [f"tiny, seed 7, trial {i}, evaluation {k}" for i, k in numbers]
+    assert run.scenario == run.manifest.scenario
     assert run.initial()["index"].tolist() == [0, 1, 2, 3, 0]
 
 

@@ -23,7 +23,7 @@ def run(tmp_path):
 
 def test_the_gaits_of_a_run_come_with_its_scenario(run):
     recorded, source = load_run(run), load_source(run)
-    assert source.scenario == recorded.manifest.scenario
+    assert source.scenario == recorded.scenario
     assert source.best == recorded.gait(1, 0)
     assert source.gaits == {"trial 0": recorded.gait(0, 0), "trial 1": recorded.gait(1, 0)}
 

@@ -251,7 +251,7 @@ def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
 
 
 def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(walk):
-    every = walk.reindex(contact=walk.node.values, fill_value=0)
+    every = walk.drop_vars("contact_body").reindex(contact=walk.node.values, fill_value=0)
     every = every.assign_coords(contact_body=("contact", walk.node_body.values))
     every.normal_force.loc[{"contact": "T2 tip"}][-10:] = LOAD
     every.normal_force.loc[{"contact": "T3 tip"}][:10] = LOAD  # before the time shown

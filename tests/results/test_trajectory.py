@@ -9,10 +9,11 @@ from helpers import prism
 from helpers.made_up_walk import make_walk
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.results.trajectory import sample_times, save_dataset
+from tetra_drake.results.trajectory import sample_times, save_dataset, with_indexes
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.nesting import NODES
 
 
 @pytest.fixture(scope="module", params=["drake", "compiled"])
@@ -75,12 +76,15 @@ def test_cables_say_where_they_are_and_what_drives_them(trajectory: xarray.Datas
     driven = trajectory.cable[trajectory.cable_signal == "T2-T3"].values.tolist()
     assert driven == ["T2-T3 outer bottom_left", "T2-T3 outer bottom_right"]
     assert (trajectory.cable_signal == "").sum() == 16
+    assert trajectory.tension.sel(cable_signal="T2-T3").cable.values.tolist() == driven
+    assert trajectory.sel(cable_bodies="T2-T3").sizes["cable"] == 6
     inner = trajectory.sel(cable="T1-T2 inner top")
     assert (inner.cable_bodies.item(), inner.cable_group.item()) == ("T1-T2", "inner")
 
 
 def test_nodes_say_of_which_bodies_they_are(trajectory: xarray.Dataset) -> None:
     assert trajectory.node_body.sel(node="T4 tip") == "T4"
+    assert set(trajectory.p_WN.sel(node_body="T1").node.values) == {f"T1 {name}" for name in NODES}
     assert trajectory.contact_body.sel(contact="T5 tip") == "T5"
     assert trajectory.body.values.tolist() == ["T1", "T2", "T3", "T4", "T5"]
 
@@ -116,4 +120,4 @@ def test_what_is_saved_is_what_is_read(tmp_path: Path) -> None:
     walk = make_walk(bodies=2, duration=0.1)
     save_dataset(walk, tmp_path / "t.nc")
     with xarray.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as loaded:
-        xarray.testing.assert_identical(loaded.load(), walk)
+        xarray.testing.assert_identical(with_indexes(loaded.load()), walk)

@@ -229,9 +229,16 @@ def test_random_gaits_are_uniform_within_the_bounds(scenario):
 def test_a_printed_gait_has_weights_in_the_row_of_the_inhibited_oscillator(tmp_path, scenario):
     numbered = dict(zip(NAMES, range(1, 25), strict=True))
     gait = load_gait(write(tmp_path, gait_file(weights=numbered, name="any")), scenario)
-    head, *tables = str(gait).split("\n\n")
-    assert head.startswith("any") and f"{gait.tau_a:.4g} s" in head
-    extensors, flexors = ([line.split() for line in table.splitlines()] for table in tables)
-    assert extensors[1:3] == [["onto", "1", "2", "3", "4"], ["1", "-", "1.00", "2.00", "3.00"]]
-    assert flexors[2] == ["1", "-", "4.00", "5.00", "6.00"]
-    assert flexors[5] == ["4", "22.00", "23.00", "24.00", "-"]
+    head, _, *table = [line.split() for line in str(gait).splitlines()]
+    assert head[0] == "any:" and f"{gait.tau_a:.4g}" in head
+    assert table[:2] == [
+        ["onto", "1", "2", "3", "4"],
+        ["1", "-", "1.00/4.00", "2.00/5.00", "3.00/6.00"],
+    ]
+    assert table[4] == ["4", "19.00/22.00", "20.00/23.00", "21.00/24.00", "-"]
+
+
+def test_a_printed_gait_of_many_oscillators_is_short(scenario):
+    long = scenario.with_changes({"robot.tetrahedra": 12})
+    lines = str(seeded_gait(long)).splitlines()
+    assert len(lines) == 2 and lines[1].startswith("220 weights from 1.0")

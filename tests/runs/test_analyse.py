@@ -48,7 +48,7 @@ def test_the_best_gait_of_each_trial_is_analysed(folder):
 
 def test_they_are_simulated_on_other_engines_and_under_other_laws(folder):
     run, again = load_run(folder), analyse.load_analysis(folder).resimulations
-    scenario = run.manifest.scenario
+    scenario = run.scenario
     settings = analyse.settings_of(scenario)
     assert list(again["setting"]) == [name for name in settings for _ in range(2)]
     engines = {name: changed.engine_name for name, changed in settings.items()}

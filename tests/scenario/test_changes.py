@@ -81,4 +81,20 @@ def test_a_metric_joins_the_objective_where_a_mapping_replaces_it(scenario):
     assert joined == scenario.objective | {"lead": 2.0}
     replaced = scenario.with_changes({"objective": {"lead": "2 /m"}})
     assert replaced.objective == {"lead": 2.0}
-    assert "objective:\n  lead: 2 /m\n" in str(replaced), "as it was written"
+    assert "objective:\n  lead: 2 /m\n" in replaced.to_yaml(), "as it was written"
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "advice"),
+    [
+        ({"duration": "5 s"}, "duration", "'simulation.duration'"),
+        ({"outer_stiffness": "5 N/m"}, "outer_stiffness", "'robot.cables.outer_stiffness'"),
+        ({"robot": {"slack": True}}, "robot.slack", "'cables.slack'"),
+        ({"robot.cables.damping": 1}, "robot.cables.damping", "without a unit"),
+    ],
+)
+def test_a_key_without_its_section_is_refused_with_the_whole_key(
+    scenario, refused, changes, key, advice
+):
+    with refused("scenario thesis", key, advice):
+        scenario.with_changes(changes)

@@ -11,7 +11,6 @@ from record import EXPERIMENTS
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import (
-    differences,
     dump_scenario,
     load_scenario,
     shipped_scenarios,
@@ -178,9 +177,9 @@ def test_differences_are_keys_and_readable_values(scenario):
     changes = {"robot.cables.slack": True, "cpg.signals": "live", "optimizer.stop_rise": 0.1 + 0.2}
     changes |= {"name": "other", "friction.stiction_damping": "0.3 lbf*s/in"}
     changed = scenario.with_changes(changes | {"robot.offsets": [["1 mm", 0, 0]] * 5})
-    assert differences(changed, scenario) == [
+    assert changed.differences(scenario) == [
         ("robot.cables.slack", "true"),
-        ("robot.offsets", f"[{', '.join(['[1 mm, 0 in, 0 in]'] * 5)}]"),
+        ("robot.offsets", f"[{', '.join(['[1 mm, 0, 0]'] * 5)}]"),
         ("friction.stiction_damping", "0.3 lbf*s/in"),
         ("cpg.signals", "live"),
         ("optimizer.stop_rise", "0.3"),
@@ -288,3 +287,25 @@ def test_a_base_that_is_no_scenario_is_not_shown(tmp_path, content):
         load_scenario(file)
     assert caught.value.source == str(tmp_path / "any")
     assert "secret" not in caught.value.problem
+
+
+# Printing
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_a_printed_scenario_fits_a_screen(name):
+    lines = str(load_scenario(name)).splitlines()
+    assert len(lines) <= 16 and max(map(len, lines)) <= 100
+    assert lines[0].startswith(f"scenario {name}: ")
+
+
+def test_a_printed_scenario_tells_what_differs_from_the_thesis(tmp_path):
+    loaded = load_scenario("quick").with_changes({"robot.strut_length": "7 in"})
+    assert [line.split() for line in str(loaded).splitlines()[1:]] == [
+        ["robot", "strut_length", "7", "in,", "spacing", "balanced"],
+        ["simulation", "duration", "8", "s,", "steady_from", "2", "s"],
+        ["evolution", "trials", "1,", "evaluations", "28"],
+        ["optimizer", "population", "12,", "weight_mutation", "0.5"],
+    ]
+    recorded = load_scenario(write(tmp_path, dump_scenario(loaded)))
+    assert "strut_length 7 in, spacing 3.43348 in" in str(recorded), "round numbers"

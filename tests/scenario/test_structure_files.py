@@ -7,7 +7,7 @@ import pytest
 from pytest import approx
 
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
-from tetra_drake.scenario.load import differences, dump_scenario, load_scenario
+from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.robot_kinds import Structure
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.structure_files import read_structure, shipped_structures
@@ -56,7 +56,7 @@ def test_a_scenario_holds_what_its_file_holds(folder: Path) -> None:
     assert scenario.robot.size == approx(0.1)
     assert scenario.robot.slack
     written = folder / "elsewhere.yaml"
-    for text in (dump_scenario(scenario), str(scenario)):
+    for text in (dump_scenario(scenario), scenario.to_yaml()):
         written.write_text(text)
         assert load_scenario(written) == scenario
 
@@ -103,7 +103,7 @@ def test_python_names_and_changes_structures_as_a_file_does(folder: Path) -> Non
     changed = scenario.with_changes({"robot.cables.side.stiffness": "250 N/m"})
     assert changed.robot.cables["side"].stiffness == 250.0
     assert changed.with_changes({"robot.cables.side.stiffness": "200 N/m"}) == scenario
-    assert differences(changed, scenario) == [("robot.cables.side.stiffness", "250 N/m")]
+    assert changed.differences(scenario) == [("robot.cables.side.stiffness", "250 N/m")]
     actuated = scenario.with_changes({"robot.actuated": {"all": ["side a c"]}})
     assert list(actuated.robot.actuated) == ["all"]
     added = scenario.with_changes({"robot.actuated.rise": ["rise a e"]})

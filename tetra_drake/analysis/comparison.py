@@ -18,7 +18,6 @@ from tetra_drake.analysis.statistics import interquartile_mean, interval, json_r
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import FITNESS
 from tetra_drake.evolution.run import Run, load_run
-from tetra_drake.scenario.load import differences
 
 if TYPE_CHECKING:
     import pandas
@@ -77,7 +76,7 @@ def compare(directories: Sequence[str | Path], *, reach: float | None = None) ->
         curves.append(_curve(progress).assign(run=label))
         run = runs[label]
         summaries[label] = {
-            "draws": run.manifest.scenario.draws,
+            "draws": run.scenario.draws,
             **_summary(rows),
             "wall_time": run.evaluations["wall_time_s"].mean(),
         }
@@ -102,7 +101,7 @@ def _progress(run: Run) -> pandas.DataFrame:
     table = run.evaluations[["trial", "fitness", "distance"]].copy()
     trial = table["trial"]
     table["ended"] = trial.map({status.number: bool(status.stop) for status in run.statuses})
-    table["cost"] = run.manifest.scenario.draws * (table.groupby("trial").cumcount() + 1)
+    table["cost"] = run.scenario.draws * (table.groupby("trial").cumcount() + 1)
     table["fitness"] = table["fitness"].fillna(-math.inf).groupby(trial).cummax()
     is_new = table["fitness"] != table["fitness"].groupby(trial).shift()
     table["distance"] = table["distance"].where(is_new).groupby(trial).ffill()
@@ -190,7 +189,7 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
             raise InputError(run.directory, "objective", f"{problem} about each other")
         changed = [
             f"{key} {value}"
-            for key, value in differences(run.manifest.scenario, base.manifest.scenario)
+            for key, value in run.scenario.differences(base.scenario)
             if key.split(".")[0] not in _SEARCH
         ]
         if changed:
@@ -199,7 +198,7 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
 
 
 def _objective(run: Run) -> tuple[str, Mapping[str, float]]:
-    name, terms = run.manifest.method.objective, run.manifest.scenario.objective
+    name, terms = run.manifest.method.objective, run.scenario.objective
     return name, terms if name == FITNESS else {}
 
 

@@ -42,7 +42,7 @@ def elites(run: Run) -> pandas.DataFrame:
     """
     import pandas
 
-    table, kind = run.whole, run.manifest.scenario.optimizer
+    table, kind = run.whole, run.scenario.optimizer
     judged = pandas.DataFrame(read_entries(run.directory / ELITES), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > FLOOR].dropna(subset=list(kind.measures))
@@ -72,7 +72,7 @@ def judge_elites(
         return
     repair_torn_line(directory / ELITES)
     run = load_run(directory)
-    scenario, gaits_of_map = run.manifest.scenario, elites(run)
+    scenario, gaits_of_map = run.scenario, elites(run)
     missing = gaits_of_map[gaits_of_map["kept"].isna()]
     if missing.empty:
         return
@@ -96,7 +96,7 @@ def robust(gaits: pandas.DataFrame) -> pandas.DataFrame:
 
 def chosen(run: Run) -> dict[str, pandas.Series]:
     """Fittest of the robust elites and those nearest to the corners of the map, by name."""
-    gaits, kind = robust(elites(run)), run.manifest.scenario.optimizer
+    gaits, kind = robust(elites(run)), run.scenario.optimizer
     if not isinstance(kind, QualityDiversity) or gaits.empty:
         return {}
     return {"fittest of the map": gaits.iloc[0]} | _corners(gaits, kind)

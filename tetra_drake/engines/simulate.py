@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tetra_drake.engines.interface import Outcome, Viewer, check_can_be_watched, engine_of
-from tetra_drake.errors import InputError
+from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, commanded_robot
-from tetra_drake.robot.gait import Gait, seeded_gait
+from tetra_drake.robot.gait import Gait, given_gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, constant_steering
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.load import given_scenario
 from tetra_drake.scenario.schema import Scenario
 
 
 def simulate(
     scenario: Scenario | str | Path,
-    gait: Gait | None = None,
+    gait: Gait | str | Path | None = None,
     *,
     command: Command | None = None,
     record: bool = False,
@@ -29,8 +29,12 @@ def simulate(
     """Simulates the scenario's robot walking by a gait, or following a command, for the scenario's
     duration, on the engine that the scenario names.
 
-    `scenario` may be the name of a shipped one or a file. Either a gait or a command is given; of
-    a command see robot.command and prototype.command_file. `steering`, the turn from -1 to 1, or a
+        >>> scenario = td.load_scenario("quick")
+        >>> result = td.simulate(scenario, td.seeded_gait(scenario, 80), record=True)
+        >>> inches, tension = result.metrics.distance_in, result.recorded.tension
+
+    `scenario` may be the name of a shipped one or a file, `gait` a gait file. Either a gait or a
+    command is given; of a command see load_command(). `steering`, the turn from -1 to 1, or a
     function of the time in s that gives it, acts in place of the gait's turn.
 
     Pure: the same scenario and gait give the same numbers, bit for bit, wall time aside,
@@ -39,8 +43,7 @@ def simulate(
     Raises Diverged or StepBudgetExceeded, which say when and why, and InputError if the gait or
     the steering does not fit the scenario, or if its engine cannot be watched.
     """
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
+    scenario = given_scenario(scenario)
     if steering is not None and not callable(steering):
         steering = constant_steering(steering)
     if viewer is not None:
@@ -54,19 +57,26 @@ def simulate(
         return dataclasses.replace(result, scenario=scenario)  # the one with a network
     if gait is None:
         raise InputError("simulate", "gait", "is needed, or a command")
-    robot = Robot.of(scenario)
+    robot, gait = Robot.of(scenario), given_gait(gait, scenario)
     return engine.simulate(robot, gait, record=record, viewer=viewer, steering=steering)
 
 
 def simulate_many(
     scenario: Scenario | str | Path | Sequence[Scenario],
-    gaits: Sequence[Gait],
+    gaits: Sequence[Gait | str | Path],
     *,
     record: bool = False,
     workers: int | None = None,
 ) -> list[Outcome]:
     """Simulates many gaits, on one scenario or each on its own, as simulate() does; the results
     in the order of the gaits, for one that fails its Diverged or StepBudgetExceeded.
+
+        >>> scenario = td.load_scenario("quick")
+        >>> outcomes = td.simulate_many(scenario, [td.seeded_gait(scenario, i) for i in range(3)])
+        >>> [outcome.name for outcome in outcomes]
+        ['random gait 0', 'random gait 1', 'random gait 2']
+
+    Results and failures know their scenario and gait.
 
     On the compiled engine, `workers` threads (one per core by default) simulate several gaits side
     by side in the registers of each core: the same numbers, bit for bit, several times as fast.
@@ -78,20 +88,26 @@ def simulate_many(
 
     Raises InputError if there is not one scenario or as many as gaits, or if a gait does not fit.
     """
-    if isinstance(scenario, (str, Path)):
-        scenario = load_scenario(scenario)
-    scenarios = [scenario] * len(gaits) if isinstance(scenario, Scenario) else list(scenario)
+    if isinstance(scenario, (str, Path, Scenario)):
+        scenarios = [given_scenario(scenario)] * len(gaits)
+    else:
+        scenarios = list(scenario)
     if len(scenarios) != len(gaits):
         problem = f"found {len(scenarios)}, expected one, or one for each of {len(gaits)} gaits"
         raise InputError("simulate_many", "scenario", problem)
     threads = available_cores() if workers is None else workers
     if threads < 1:
         raise InputError("simulate_many", "workers", f"found {workers}, expected at least 1")
-    walks = list(zip(scenarios, gaits, strict=True))
+    walks = [(each, given_gait(gait, each)) for each, gait in zip(scenarios, gaits, strict=True)]
     engines = {engine_of(scenario) for scenario in scenarios}
     if len(engines) == 1:
-        return engines.pop().simulate_many(walks, record=record, threads=threads)
-    return [engine_of(walk[0]).outcome(*walk, record=record) for walk in walks]
+        outcomes = engines.pop().simulate_many(walks, record=record, threads=threads)
+    else:
+        outcomes = [engine_of(walk[0]).outcome(*walk, record=record) for walk in walks]
+    for (walked, gait), outcome in zip(walks, outcomes, strict=True):
+        if isinstance(outcome, SimulationFailure):
+            outcome.scenario, outcome.gait, outcome.name = walked, gait, gait.name
+    return outcomes
 
 
 def check_scenario(scenario: Scenario) -> None:

@@ -39,7 +39,7 @@ def reevaluate(
     Raises InputError if the run has another objective.
     """
     run = load_run(directory)
-    manifest, scenario = run.manifest, run.manifest.scenario
+    manifest, scenario = run.manifest, run.scenario
     recorded, given = manifest.method.objective, Method.of(scenario, objective=objective).objective
     if given != recorded:
         problem = f"the run was made with {recorded}, not {given}"

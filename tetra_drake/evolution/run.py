@@ -20,6 +20,7 @@ from tetra_drake.evolution.entries import (
 )
 from tetra_drake.evolution.manifest import Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
+from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
@@ -38,7 +39,8 @@ _INDICES = {"placed", "best_evaluation"}
 
 @dataclass(frozen=True)
 class Run:
-    """A recorded run, finished or not; metrics in SI, times in s."""
+    """A recorded run, finished or not; metrics in SI, times in s. A gait's row is one of
+    `evaluations`."""
 
     directory: Path
     manifest: Manifest
@@ -59,6 +61,28 @@ class Run:
     """Gaits evaluated once more on the Drake diagram: columns as in evaluations, without
     `placed`; empty if there are none."""
 
+    def __str__(self) -> str:
+        method, trials = self.manifest.method, self.statuses
+        ended = sum(bool(trial.stop) for trial in trials)
+        failures = sum(trial.failures for trial in trials)
+        lines = [
+            f"run {self.directory}: scenario {self.scenario.name}, seed {self.manifest.seed}",
+            f"optimiser {method.optimizer}, objective {method.objective}; {len(self.evaluations)} "
+            f"evaluations ({failures} failed), {ended} of {len(trials)} trials ended",
+        ]
+        if not self.best().empty:
+            best = self.fittest()
+            lines.append(f"best gait: {gait_label(best)}, {headline(self.scenario, best)}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<Run {self.directory}>"
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario on which the run's gaits were evolved."""
+        return self.manifest.scenario
+
     @cached_property
     def whole(self) -> pandas.DataFrame:
         """The evaluations with their genomes: all of them, unless the run is thinned."""
@@ -67,40 +91,40 @@ class Run:
     @cached_property
     def statuses(self) -> list[TrialStatus]:
         """The state of each trial."""
-        return [self._status(trial) for trial in range(self.manifest.scenario.evolution.trials)]
+        return [self._status(trial) for trial in range(self.scenario.evolution.trials)]
 
     def best(self, count: int = 1) -> pandas.DataFrame:
         """The fittest different gaits of each trial: rows of `evaluations`.
 
         Trial after trial, within a trial the best first. So the first row is the best of trial 0,
-        not of the run: that is best_gait().
+        not of the run: that is fittest().
         """
         ranked = self.whole.dropna(subset="fitness").sort_values(
             ["trial", "fitness", "index"], ascending=[True, False, True]
         )
         return ranked.drop_duplicates(["trial", *self._columns]).groupby("trial").head(count)
 
-    def fittest(self) -> tuple[int, int]:
-        """Trial and index of the run's fittest gait; InputError while no gait has a fitness."""
+    def fittest(self) -> pandas.Series:
+        """The row of the run's fittest gait; InputError while no gait has a fitness."""
         best = self.best()
         if best.empty:
             raise InputError(self.directory, "", "no gait of this run has a fitness yet")
-        row = best.loc[best["fitness"].idxmax()]
-        return int(row["trial"]), int(row["index"])
+        return best.loc[best["fitness"].idxmax()]
+
+    def initial_best(self, trial: int) -> pandas.Series:
+        """The row of the fittest gait of a trial's first iteration in which not all failed."""
+        rows = self.evaluations.query("trial == @trial").dropna(subset="fitness")
+        first = rows[rows["iteration"] == rows["iteration"].min()]
+        return first.loc[first["fitness"].idxmax()]
 
     def best_gait(self) -> Gait:
         """The run's fittest gait, of all trials; InputError while no gait has a fitness."""
-        return self.gait(*self.fittest())
+        return self._gait_of(self.fittest())
 
-    def initial_best(self, trial: int) -> int:
-        """Index of the fittest gait of a trial's first iteration in which not all failed."""
-        rows = self.evaluations.query("trial == @trial").dropna(subset="fitness")
-        first = rows[rows["iteration"] == rows["iteration"].min()].set_index("index")
-        return int(first["fitness"].idxmax())
-
-    def evaluation(self, trial: int, index: int) -> pandas.Series:
-        """A row of `evaluations`."""
-        return self.evaluations.query("trial == @trial and index == @index").iloc[0]
+    def gaits(self, count: int = 1) -> list[Gait]:
+        """The fittest `count` different gaits of each trial, in the order of best(). Their names
+        say trial and evaluation."""
+        return [self._gait_of(row) for _, row in self.best(count).iterrows()]
 
     def initial(self) -> pandas.DataFrame:
         """The evaluations of iteration 0."""
@@ -127,15 +151,18 @@ class Run:
         """The gait of an evaluation."""
         return self.manifest.gait(self.vector(trial, index), trial=trial, index=index)
 
+    def _gait_of(self, row: pandas.Series) -> Gait:
+        return self.gait(row["trial"], row["index"])
+
     @property
     def _columns(self) -> list[str]:
-        return _parameters(self.manifest.scenario)
+        return _parameters(self.scenario)
 
     def _status(self, trial: int) -> TrialStatus:
         rows = self.evaluations[self.evaluations["trial"] == trial]
         status = TrialStatus(
             trial,
-            self.manifest.scenario.evolution.evaluations,
+            self.scenario.evolution.evaluations,
             evaluations=len(rows),
             failures=int(rows["failure"].notna().sum()),
             wall_time=float(rows["wall_time_s"].sum()),
@@ -154,8 +181,9 @@ def gait_label(row: pandas.Series) -> str:
 def load_run(path: str | Path) -> Run:
     """Loads a run directory, finished or not, as pandas tables.
 
-        run = load_run("runs/demo")
-        run.iterations.pivot(index="iteration", columns="trial", values="mean_fitness").plot()
+        >>> run = td.load_run("runs/demo")
+        >>> result = td.simulate(run.scenario, run.best_gait())
+        >>> lines = run.iterations.pivot(index="iteration", columns="trial", values="best_fitness")
 
     Raises InputError if `path` holds no run or the record is damaged.
     """

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,7 +42,6 @@ from tetra_drake.files import check_folder, make_folder
 from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Gait, Vector, save_gait
-from tetra_drake.scenario.load import differences
 from tetra_drake.scenario.schema import Scenario
 
 LOCK = ".lock"
@@ -90,12 +90,23 @@ class RunRecord:
         if seed not in (None, manifest.seed):
             raise InputError(directory, "seed", f"the run has seed {manifest.seed}, not {seed}")
         if scenario is not None:
-            for key, value in differences(manifest.scenario, scenario):
+            for key, value in manifest.scenario.differences(scenario):
                 problem = f"the run has {value}; it is resumed with its own scenario"
                 raise InputError(directory, key, problem)
         if method is not None:
             manifest.method.check_same(method, directory)
         return cls(directory, manifest, _lock(directory))
+
+    @staticmethod
+    def remove(directory: Path) -> None:
+        """Removes a run with all that its directory holds, if there is such a directory.
+
+        Raises InputError if it holds no run, or if a process is at work on it.
+        """
+        if directory.exists():
+            read_manifest(directory)
+            with _lock(directory):
+                shutil.rmtree(directory)
 
     def __enter__(self) -> RunRecord:
         return self

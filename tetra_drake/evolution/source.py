@@ -42,8 +42,8 @@ def load_source(
         chosen = read_manifest(folder).scenario
     if source.is_dir():
         run = load_run(source)
-        best, of_trials = run.best_gait(), run.best()[["trial", "index"]].to_numpy()
-        gaits = {f"trial {trial}": run.gait(trial, index) for trial, index in of_trials}
+        best, trials = run.best_gait(), run.best()["trial"]
+        gaits = {f"trial {trial}": gait for trial, gait in zip(trials, run.gaits(), strict=True)}
     else:
         best = load_gait(source, chosen)
         gaits = {source.stem: best}

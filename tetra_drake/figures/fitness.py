@@ -31,7 +31,7 @@ def initial_extremes(run: Run) -> pandas.DataFrame:
 @common_style()
 def initial_distances(run: Run) -> Figure:
     """Distances of the fittest and the least fit initial gait of each trial; no failed gaits."""
-    extremes, scenario, width = initial_extremes(run), run.manifest.scenario, 0.4
+    extremes, scenario, width = initial_extremes(run), run.scenario, 0.4
     figure, [[axes]] = make_figure(width_in=7.0, height_in=3.6)
     best, worst = extremes.index - width / 2, extremes.index + width / 2
     blue, orange = OKABE_ITO["blue"], OKABE_ITO["orange"]

@@ -33,7 +33,7 @@ def map_of_gaits(run: Run) -> Figure:
     the share of the draws that they keep; those that keep less than half of them are crosses.
 
     Numbers are the fittest gait and those nearest to the corners."""
-    kind = cast(QualityDiversity, run.manifest.scenario.optimizer)
+    kind = cast(QualityDiversity, run.scenario.optimizer)
     gaits = elites(run)
     kept = robust(gaits)
     judged = bool(gaits["kept"].notna().any())

@@ -52,6 +52,10 @@ def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) ->
 def load_command(path: str | Path, scenario: Scenario) -> Command:
     """Reads the file of a command for a scenario's robot; columns may stand in any order.
 
+        >>> scenario = td.load_scenario("quick")
+        >>> command = td.load_command("lab/command.csv", scenario)
+        >>> result = td.simulate(scenario, command=command)
+
     Raises InputError, naming file and place, for whatever is wrong in the file or does not fit.
     """
     robot, text = Robot.of(scenario), read_text(path, "command file")

@@ -68,17 +68,17 @@ def study_run(run: Run) -> Study:
     Raises InputError if no gait of the run has a fitness, and SimulationFailure if other versions
     than the run's make such a gait fail.
     """
-    trial, fittest = run.fittest()
-    first = run.initial_best(trial)
-    best = simulate_again(run, trial, fittest)
-    initial = best if first == fittest else simulate_again(run, trial, first)
+    fittest = run.fittest()
+    first = run.initial_best(fittest["trial"])
+    best = simulate_again(run, fittest)
+    initial = best if first["index"] == fittest["index"] else simulate_again(run, first)
     return Study(run, best=best, initial=initial)
 
 
-def simulate_again(run: Run, trial: int, index: int) -> RecordedGait:
-    """A gait of a run, simulated again. Raises SimulationFailure."""
-    result = simulate(run.manifest.scenario, run.gait(trial, index), record=True)
-    return RecordedGait(run.evaluation(trial, index), result)
+def simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
+    """A gait of a run, one of `Run.evaluations`, simulated again. Raises SimulationFailure."""
+    gait = run.gait(recorded["trial"], recorded["index"])
+    return RecordedGait(recorded, simulate(run.scenario, gait, record=True))
 
 
 def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:

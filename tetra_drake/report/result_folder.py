@@ -20,7 +20,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import check_folder, read_text, write_whole
 from tetra_drake.results.path import CentrePath
 from tetra_drake.results.result import IntegratorWork, SimulationResult, save_result
-from tetra_drake.results.trajectory import DIMENSIONS, labels
+from tetra_drake.results.trajectory import DIMENSIONS, labels, with_indexes
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
@@ -59,6 +59,9 @@ def save_result_folder(folder: Path, result: SimulationResult) -> None:
 
 def load_result(folder: str | Path) -> SimulationResult:
     """Reads the folder of a simulation back, with its scenario, gait and trajectory.
+
+        >>> result = td.load_result("out")
+        >>> signals = result.recorded.signal.sel(oscillator="T1-T2")
 
     Raises InputError, naming the file, if one is missing, damaged, or not of this scenario.
     """
@@ -153,4 +156,4 @@ def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
     times = trajectory["time"].values
     if len(times) < 2 or not (np.diff(times) > 0.0).all():
         raise InputError(path, "time", "has fewer than two samples, or does not ascend")
-    return trajectory
+    return with_indexes(trajectory)

@@ -23,7 +23,7 @@ from tetra_drake.report.summary import ground_text, metrics_table, results, tria
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.actuation import KINDS, Actuation
 from tetra_drake.robot.gait import Gait, save_gait
-from tetra_drake.scenario.load import differences, load_scenario
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metric_units import METRICS, inverse
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import shown
@@ -94,7 +94,7 @@ def _write_map(study: Study, directory: Path) -> None:
         gait_file, page = _map_files(names, row, study)
         save_gait(run.gait(trial, index), directory / gait_file, run.manifest.scenario)
         if page != Path(REPLAY):
-            simulate_again(run, trial, index).result.save_replay(directory / page)
+            simulate_again(run, row).result.save_replay(directory / page)
 
 
 def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[Path, Path]:
@@ -107,7 +107,7 @@ def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[
 def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) -> str:
     """The report as HTML, with the pictures in `folder`, whose captions are given by name."""
     run, manifest = study.run, study.run.manifest
-    scenario = manifest.scenario
+    scenario = run.scenario
     best_gait = trial_folder(Path(), study.trial) / BEST_GAIT
     named = {"initially": study.initial.recorded, "best": study.best.recorded}
     gaits, on_map = distinct_gaits(named), distinct_gaits(chosen(run))
@@ -164,7 +164,7 @@ def _settings(scenario: Scenario) -> list[tuple[str, str]]:
     """Settings other than the thesis's; no long lists, nor what the report says elsewhere."""
     return [
         (key, value)
-        for key, value in differences(scenario, load_scenario("thesis"))
+        for key, value in scenario.differences(load_scenario("thesis"))
         if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
     ]
 

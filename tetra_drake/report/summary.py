@@ -101,10 +101,9 @@ def run_text(run: Run) -> str:
     if len(run.statuses) > 1:
         texts.append(trials_table(run).text())
     if not run.best().empty:
-        trial, best = run.fittest()
-        first = run.initial_best(trial)
-        gaits = {"initially": run.evaluation(trial, first), "best": run.evaluation(trial, best)}
-        texts.append(metrics_table(gaits, run.manifest.scenario).text())
+        best = run.fittest()
+        gaits = {"initially": run.initial_best(best["trial"]), "best": best}
+        texts.append(metrics_table(gaits, run.scenario).text())
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
         texts.append(f"to watch the best gait:  {replay}\nfigures and numbers:     {report}")
@@ -126,9 +125,8 @@ def results(run: Run) -> list[tuple[str, str]]:
         effort.append(("time per evaluation", _time(wall_time / evaluations)))
     if best.empty:
         return effort
-    trial, index = run.fittest()
-    fittest = run.evaluation(trial, index)
-    initial = run.evaluation(trial, run.initial_best(trial))
+    fittest = run.fittest()
+    initial = run.initial_best(fittest["trial"])
     name = _about(run)
     title, unit = name.replace("_", " "), METRICS[name]
     rows = [
@@ -166,16 +164,15 @@ def trials_table(run: Run) -> Table:
 
 def _course(run: Run, best: pandas.Series, in_drake: pandas.DataFrame) -> list[float]:
     """What trials_table() shows of the best gait of a trial, in SI."""
-    name, trial = _about(run), int(best["trial"])
-    initial = run.evaluation(trial, run.initial_best(trial))
-    key = (trial, int(best["index"]))
+    name, key = _about(run), (best["trial"], best["index"])
+    initial = run.initial_best(best["trial"])
     again = in_drake.loc[key, name] if key in in_drake.index else math.nan
     return [initial[name], best[name], float(again)]
 
 
 def _about(run: Run) -> str:
     """Metric that the run's objective is about."""
-    return headline_metric(run.manifest.scenario.objective, run.evaluation(*run.fittest()))
+    return headline_metric(run.scenario.objective, run.fittest())
 
 
 def _three(value: float, unit: str) -> str:

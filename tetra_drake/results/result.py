@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import html
 import json
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -68,6 +70,17 @@ class SimulationResult:
     trajectory: xarray.Dataset | None = field(default=None, repr=False)
     """See results.trajectory.make_dataset; None unless asked for."""
 
+    def __str__(self) -> str:
+        kept = "not recorded" if self.trajectory is None else "recorded"
+        return (
+            f"{self.title}\n"
+            f"scenario {self.scenario.name}, engine {self.engine}, trajectory {kept}, "
+            f"fitness {self.fitness:.4g}\n{self.metrics}"
+        )
+
+    def __repr__(self) -> str:
+        return f"<SimulationResult {self.title}>"
+
     @functools.cached_property
     def robot(self) -> Robot:
         """The scenario's robot."""
@@ -86,6 +99,13 @@ class SimulationResult:
         """The gait's name and what it did."""
         return f"{self.name}: {headline(self.scenario, vars(self.metrics))}"
 
+    def show(self, *, height: int = 480) -> ReplayFrame:
+        """The replay, to be the last value of a notebook's cell; `height` is in pixels."""
+        with tempfile.TemporaryDirectory() as folder:
+            page = Path(folder, "replay.html")
+            self.save_replay(page)
+            return ReplayFrame(page.read_text(encoding="utf-8"), height)
+
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
         """Writes the page that plays the motion; see visualization.replay.save_replay."""
         from tetra_drake.visualization.replay import save_replay
@@ -93,6 +113,18 @@ class SimulationResult:
         save_replay(
             path, robot=self.robot, trajectory=self.recorded, title=self.title, viewer=viewer
         )
+
+
+@dataclass(frozen=True)
+class ReplayFrame:
+    """A replay page in a notebook, which shows it by IPython's protocol of rich display."""
+
+    page: str
+    height: int
+
+    def _repr_html_(self) -> str:
+        style = f"width: 100%; height: {self.height}px; border: 0"
+        return f'<iframe srcdoc="{html.escape(self.page)}" style="{style}"></iframe>'
 
 
 def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:

@@ -83,7 +83,8 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     variable has a `units` attribute. Coordinates along `node` and `contact`, the nodes that the
     ground can touch: node_body and contact_body; along `cable`: cable_bodies, the two that it joins
     ("T1-T2"), cable_group and cable_signal, the oscillator that drives the cable ("" if none);
-    along `oscillator`: oscillator_side (1 left, -1 right, else 0).
+    along `oscillator`: oscillator_side (1 left, -1 right, else 0). All of them select, as in
+    tension.sel(cable_bodies="T2-T3").
     """
     import xarray
 
@@ -107,13 +108,21 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
         "in_contact": (modes[..., 0], "1", "1 on the ground"),
         "friction_mode": (modes[..., 1:], "1", slip),
     }
-    return xarray.Dataset(
+    dataset = xarray.Dataset(
         {
             name: (DIMENSIONS[name], values, {"units": unit, "long_name": meaning})
             for name, (values, unit, meaning) in variables.items()
         },
         coords={"time": ("time", motion.times, {"units": "s"}), **labels(structure)},
     )
+    return with_indexes(dataset)
+
+
+def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
+    """The dataset with an index of each coordinate, which files do not keep."""
+    for name in dataset.coords.keys() - dataset.xindexes.keys():
+        dataset = dataset.set_xindex(str(name))
+    return dataset
 
 
 def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:

@@ -31,6 +31,10 @@ TAU_B_PER_TAU_A = 2.0
 """The thesis keeps tau_B = 2 tau_A, so that the output resembles a sine wave."""
 
 
+_MOST_COLUMNS = 8
+"""Oscillators of which a printed gait shows the weights: a line then has 100 characters."""
+
+
 class Gains(Section):
     """Strength of each pathway of physics.feedback, in units of the input u0."""
 
@@ -58,25 +62,30 @@ class Gait:
     """Names such as "3->1 extensor": from oscillator 3 onto oscillator 1. Empty if unknown."""
 
     def __str__(self) -> str:
-        """A table of the parameters; the weights as a matrix for each kind of neuron."""
+        """A few lines; the weights as a matrix, for as many oscillators as fit on a line."""
         lines = [f"{self.name}: tau_A {self.tau_a:.4g} s, tau_B {self.tau_b:.4g} s"]
         if self.turn:
             lines.append(f"turn {self.turn:.4g}")
         lines += [f"gain of {name} {gain:.4g}" for name, gain in self.gains if gain]
-        if not self.weight_names:
-            weights = [f"{weight:.4g}" for weight in self.weights]
-            return "\n".join([*lines, f"weights {' '.join(weights) or 'none'}"])
-        texts = {n: f"{w:.2f}" for n, w in zip(self.weight_names, self.weights, strict=True)}
-        count = max(int(name.split("->")[0]) for name in texts)
+        texts = dict(zip(self.weight_names, [f"{x:.2f}" for x in self.weights], strict=False))
+        count = max((int(name.split("->")[0]) for name in texts), default=0)
+        if not 0 < count <= _MOST_COLUMNS:
+            least, most = min(self.weights, default=0.0), max(self.weights, default=0.0)
+            lines.append(f"{len(self.weights)} weights from {least:.2f} to {most:.2f}")
+            return "\n".join(lines)
         oscillators = [str(i + 1) for i in range(count)]
-        for kind in KINDS:
-            rows = []
-            for onto in oscillators:
-                row = [texts.get(f"{source}->{onto} {kind}", "-") for source in oscillators]
-                rows.append([onto, *row])
-            lines += ["", f"weights of the {kind}s, a column for each oscillator they come from"]
-            lines.append(Table(["onto", *oscillators], rows).text())
-        return "\n".join(lines)
+        rows = []
+        for onto in oscillators:
+            cells = [onto]
+            for source in oscillators:
+                pair = [texts.get(f"{source}->{onto} {kind}", "-") for kind in KINDS]
+                cells.append("-" if pair == ["-", "-"] else "/".join(pair))
+            rows.append(cells)
+        lines.append(f"weights ({'/'.join(KINDS)}), a column for each oscillator they come from")
+        return "\n".join([*lines, Table(["onto", *oscillators], rows).text()])
+
+    def __repr__(self) -> str:
+        return f"<Gait {self.name}>"
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """The content of a gait file; `scenario` is one that the gait fits, and was made for unless
@@ -189,7 +198,11 @@ WALKING_SEED = 80
 
 
 def seeded_gait(scenario: Scenario, seed: int = WALKING_SEED) -> Gait:
-    """The random gait of a seed, drawn uniformly from the scenario's bounds (Table 5)."""
+    """The random gait of a seed, drawn uniformly from the scenario's bounds (Table 5).
+
+    >>> td.seeded_gait(td.load_scenario("thesis"), 80)
+    <Gait random gait 80>
+    """
     space = ParameterSpace.of(scenario)
     return space.gait(space.random(np.random.default_rng(seed)), name=f"random gait {seed}")
 
@@ -220,6 +233,8 @@ class GaitFile(Section):
 def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     """Reads a gait file, or the gait under `key` of a JSON file, for the scenario's robot.
 
+        >>> gait = td.load_gait("gait.json", td.load_scenario("quick"))
+
     Raises InputError, naming file and key, for whatever is wrong in the file or does not fit.
     """
     file = _read_file(path, key)
@@ -240,6 +255,11 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     )
     check_gait(gait, scenario, actuation, source=path, key=key)
     return gait
+
+
+def given_gait(gait: Gait | str | Path, scenario: Scenario) -> Gait:
+    """A gait, read from its file if that is given."""
+    return gait if isinstance(gait, Gait) else load_gait(gait, scenario)
 
 
 def _read_file(path: str | Path, key: str) -> GaitFile:

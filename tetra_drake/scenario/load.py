@@ -1,17 +1,15 @@
-"""Scenario files: read with their bases, written, and compared."""
+"""Scenario files: read with their bases, and written."""
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import TAG, Tree, flattened, tree_of
+from tetra_drake.scenario.sections import Tree, tree_of
 from tetra_drake.scenario.structure_files import structure_file
-from tetra_drake.scenario.units import plainest
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 MOST_BYTES = 2**20
@@ -26,6 +24,9 @@ def shipped_scenarios() -> list[str]:
 def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     """Loads a shipped scenario by its name, or a scenario file by its path.
 
+        >>> scenario = td.load_scenario("thesis").with_changes({"robot.spacing": "3 in"})
+        >>> print(scenario)
+
     Raises InputError, naming file and key, for whatever is wrong in the file, or in the structure
     or height file that it names.
     """
@@ -35,26 +36,14 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     return scenario
 
 
+def given_scenario(scenario: Scenario | str | Path) -> Scenario:
+    """A scenario, loaded if its name or file is given."""
+    return scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+
+
 def dump_scenario(scenario: Scenario) -> str:
     """The scenario as a complete scenario file: SI units, loads back to the same numbers."""
     return dump_yaml(tree_of(scenario))
-
-
-def differences(scenario: Scenario, base: Scenario) -> list[tuple[str, str]]:
-    """(key, value as text) of what a scenario has other than `base`, the name aside. Quantities are
-    in the units in which they are round."""
-    ours, theirs = _texts(scenario), _texts(base)
-    return [(key, text) for key, text in ours.items() if theirs.get(key) != text and key != "name"]
-
-
-def _texts(scenario: Scenario) -> dict[str, str]:
-    """The values of a scenario as texts, by their keys."""
-    tree = tree_of(scenario, show=plainest, sparse=False)
-    texts = {}
-    for key, value in flattened(tree).items():
-        text = f"{value:.6g}" if isinstance(value, float) else json.dumps(value)
-        texts[key.removesuffix(f".{TAG}")] = text.replace('"', "")
-    return texts
 
 
 def _file(name: str, folder: Path) -> Path:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import Any
 
 from tetra_drake.files import json_number
-from tetra_drake.scenario.units import INCH
+from tetra_drake.formatting import Table
+from tetra_drake.scenario.units import INCH, customary
 
 STRAIGHT = 0.01
 """Curvature (1/m) below which a path counts as straight: over the thesis's fifteen inches, it bends
@@ -16,6 +18,10 @@ by a fifth of a millimetre."""
 
 LEAST_WAY = 1e-3
 """m: a robot that goes less far counts as gone so far in its cost of transport."""
+
+
+_NOTHING = 1e-9
+"""What is printed as 0, in SI: rounding of sums."""
 
 
 def _metric(unit: str, *, least: bool = False, most: bool = False, of_a_row: bool = False) -> Any:
@@ -92,6 +98,22 @@ class Metrics:
     """Share of time in which a limit binds, mean of all winches or tension motors."""
     lifted_shares: tuple[float, ...] = ()
     """The share of `lifted` of each body, from T1 on."""
+
+    def __str__(self) -> str:
+        """A table of the metrics that the robot has, in SI and in the units that people read."""
+        cells = []
+        for name, unit in METRICS.items():
+            value = getattr(self, name)
+            if not math.isnan(value):
+                size, read = customary(unit)
+                number = value if abs(value) > _NOTHING else 0.0
+                other = f"{number / size:.4g} {read}" if read != unit else ""
+                cells.append([name, f"{number:.4g} {unit}".rstrip(), other])
+        half = (len(cells) + 1) // 2
+        pairs = itertools.zip_longest(cells[:half], cells[half:], fillvalue=["", "", ""])
+        headings = ["metric", "SI", "in, lbf, deg"]
+        rows = [left + right for left, right in pairs]
+        return Table(headings + headings, rows, text_columns=range(6)).text()
 
     @property
     def distance_in(self) -> float:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
+import json
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
 
 from pydantic import PrivateAttr, model_validator
 
 from tetra_drake.errors import InputError
+from tetra_drake.files import read_text
 from tetra_drake.scenario.actuator_kinds import Actuation, Force
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
@@ -38,12 +42,16 @@ from tetra_drake.scenario.settings import (
 )
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
-from tetra_drake.scenario.yaml_text import dump_yaml
+from tetra_drake.scenario.units import plainest, rounded
+from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
 
 MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
 """Upper limits of the values of all signals in one simulation: some 3 GB."""
+
+_WIDTH = 100
+"""Characters of a line of a printed scenario."""
 
 MOST_SAMPLES = 2_000_000
 """Upper limit of the recorded poses of all bodies in one simulation: some 2 GB."""
@@ -79,7 +87,42 @@ class Scenario(Section):
     """The scenario as its files have it, with the units of who wrote them."""
 
     def __str__(self) -> str:
+        """A few lines: what is simulated, and by section what differs from the thesis."""
+        lines = [
+            f"scenario {self.name}: {self.robot.body_count} bodies, {self.oscillators} oscillators,"
+            f" {self.simulation.duration:g} s, engine {self.engine_name}; evolution"
+            f" {self.evolution.trials} x {self.evolution.evaluations} gaits"
+        ]
+        sections: dict[str, list[str]] = {}
+        for key, text in self.differences(_thesis()):
+            section, _, name = key.partition(".")
+            sections.setdefault(section, []).append(f"{name} {text}".strip())
+        for section, texts in sections.items():
+            line = f"  {section:<13} {', '.join(texts)}"
+            if len(line) > _WIDTH:
+                line = f"{line[: _WIDTH - 5].rpartition(', ')[0]}, ..."
+            lines.append(line)
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<Scenario {self.name}>"
+
+    def to_yaml(self) -> str:
+        """All settings as a scenario file, in the units in which they were written."""
         return dump_yaml(self.tree)
+
+    def differences(self, base: Scenario) -> list[tuple[str, str]]:
+        """(key, value) of what differs from `base`, the name aside, in the units in which it was
+        written; of a record, which is written in SI, in those in which the number is round."""
+        ours, theirs, written = _values(self), _values(base), flattened(self.tree)
+        in_si = flattened(tree_of(self, sparse=False))
+        found = []
+        for key, value in ours.items():
+            if key != "name" and _text(value) != _text(theirs.get(key)):
+                given = written.get(key, in_si[key])
+                text = _text(value if given == in_si[key] else given)
+                found.append((key.removesuffix(f".{TAG}"), text))
+        return found
 
     def __eq__(self, other: object) -> bool:
         # Units in which a number was written do not matter.
@@ -241,6 +284,23 @@ class Scenario(Section):
                 except InputError as error:
                     problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
                     refuse(place, problem)
+
+
+@functools.cache
+def _thesis() -> Scenario:
+    """The scenario that others are compared with in print."""
+    file = Path(__file__).parent / "thesis.yaml"
+    return Scenario.from_tree(parse_yaml(read_text(file, "scenario file"), file), file)
+
+
+def _values(scenario: Scenario) -> dict[str, Any]:
+    """The values of a scenario by their keys; quantities as plain texts."""
+    return flattened(tree_of(scenario, show=plainest, sparse=False))
+
+
+def _text(value: Any) -> str:
+    """A value of a tree as text."""
+    return rounded(json.dumps(value)).replace('"', "")
 
 
 def _with_number(value: Any, names: Sequence[str], number: float) -> Any:

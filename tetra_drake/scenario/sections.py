@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, NoReturn, Self
 
 import pydantic
@@ -111,12 +111,7 @@ class Section(BaseModel):
     @classmethod
     def _advice(cls, name: str) -> str:
         """Advice on an unknown key: a key of a section, or a similar one."""
-        keys = []
-        for key, field in keys_of(cls).items():
-            for kind in _union(field.annotation):
-                if isinstance(kind, type) and issubclass(kind, Section) and name in keys_of(kind):
-                    keys.append(f"'{key}.{name}'")
-                    break
+        keys = [f"'{key}'" for key in dict.fromkeys(_keys_named(name, cls))]
         return f"did you mean {' or '.join(keys)}?" if keys else hint(name, keys_of(cls))
 
     @classmethod
@@ -133,6 +128,16 @@ class Section(BaseModel):
 def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
     """The fields of a section by the keys that stand for them in files."""
     return {field.alias or name: field for name, field in section.model_fields.items()}
+
+
+def _keys_named(name: str, section: type[Section]) -> Iterator[str]:
+    """Dotted keys within a section whose last part is a name."""
+    for key, field in keys_of(section).items():
+        for kind in _union(field.annotation):
+            if isinstance(kind, type) and issubclass(kind, Section):
+                if name in keys_of(kind):
+                    yield f"{key}.{name}"
+                yield from (f"{key}.{inner}" for inner in _keys_named(name, kind))
 
 
 class Kinds:

@@ -48,6 +48,11 @@ def quantity_to_si(text: str, unit: str) -> float:
         raise ValueError(f"found '{text}', whose unit is unknown; {example}") from error
 
 
+def rounded(text: str) -> str:
+    """A text whose numbers with many decimals are rounded to six digits."""
+    return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
+
+
 def customary(unit: str) -> tuple[float, str]:
     """The unit in which people read numbers of an SI unit, such as "lbf/in" for "N/m": its size in
     SI, and its name. Units with others than lengths, forces, angles and times stay as they are."""

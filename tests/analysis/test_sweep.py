@@ -1,0 +1,82 @@
+"""Gaits on a grid of scenarios: labelled axes, and the numbers of single simulations."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tetra_drake.analysis.sweep import sweep
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.robot.gait import save_gait, seeded_gait
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.metric_units import METRICS
+from tetra_drake.scenario.schema import Scenario
+
+STIFFNESS = "robot.cables.outer_stiffness"
+
+
+@pytest.fixture(scope="module")
+def short() -> Scenario:
+    times = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.1 s"}
+    return load_scenario("thesis").with_changes({"engine": "!Compiled"} | times)
+
+
+def test_each_key_is_a_labelled_axis_of_the_numbers_of_single_simulations(short: Scenario) -> None:
+    gaits = [seeded_gait(short, seed) for seed in (1, 2)]
+    changes = {STIFFNESS: ["30 N/m", "0.2 lbf/in"], "friction": ["!ResetIntegrator", "!Coulomb"]}
+    found = sweep(short, gaits, changes, workers=1)
+    assert dict(found.sizes) == {"outer_stiffness": 2, "friction": 2, "gait": 2}
+    assert found.outer_stiffness.values.tolist() == pytest.approx([30.0, 35.0253670])
+    assert found.outer_stiffness.units == "N/m"
+    assert found.gait.values.tolist() == ["random gait 1", "random gait 2"]
+    one = found.sel(outer_stiffness=30.0, friction="!Coulomb", gait="random gait 2")
+    alone = simulate(short.with_changes({STIFFNESS: "30 N/m", "friction": "!Coulomb"}), gaits[1])
+    assert alone.scenario.robot.spacing != short.robot.spacing, "balanced anew"
+    assert (one.distance, one.fitness) == (alone.metrics.distance, alone.fitness)
+    assert {name: array.units for name, array in found.items()} == {
+        "fitness": "1", **{name: unit or "1" for name, unit in METRICS.items()}
+    }  # fmt: skip
+
+
+def test_the_path_of_one_gait_is_enough_and_a_failure_is_nan(
+    short: Scenario, tmp_path: Path
+) -> None:
+    save_gait(seeded_gait(short), tmp_path / "gait.json", short)
+    found = sweep(short, tmp_path / "gait.json", {"simulation.max_evaluations": [10, 100_000]})
+    assert found.distance.dims == ("max_evaluations", "gait")
+    assert [math.isnan(x) for x in found.distance.values[:, 0]] == [True, False]
+
+
+def test_axes_have_whole_keys_where_the_last_part_says_too_little(short: Scenario) -> None:
+    changes: dict[str, list[Any]] = {
+        "robot.cables.damping": ["8 N*s/m"],
+        "ground.damping": ["5000 N*s/m^2"],
+        "require.speed": ["1 mm/s"],
+        "friction": [Coulomb()],
+        "robot.tetrahedra": [5],
+    }
+    found = sweep(short, seeded_gait(short), changes)
+    others = ["robot.cables.damping", "ground.damping", "require.speed", "friction", "tetrahedra"]
+    assert [*found.dims] == [*others, "gait"]
+    assert found["require.speed"].item() == 1e-3
+    assert "static=0.5" in found.friction.item()
+
+
+@pytest.mark.parametrize(
+    ("changes", "source", "key", "problem"),
+    [
+        ({"simulation.durtion": ["1 s"]}, "scenario thesis", "simulation.durtion", "'duration'"),
+        ({STIFFNESS: [40.0]}, "scenario thesis", STIFFNESS, "without a unit"),
+        ({STIFFNESS: []}, "sweep", STIFFNESS, "[]"),
+        ({STIFFNESS: "40 N/m"}, "sweep", STIFFNESS, "a list"),
+    ],
+)
+def test_what_cannot_be_swept_is_refused(short, changes, source, key, problem, refused) -> None:
+    with refused(source, key, problem):
+        sweep(short, seeded_gait(short), changes)
+    with refused("sweep", "gaits", "none"):
+        sweep(short, [], {})

@@ -1,0 +1,117 @@
+"""The public functions: the examples in their docstrings run, and what they give prints well."""
+
+from __future__ import annotations
+
+import doctest
+import functools
+import html
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import tetra_drake as td
+from tetra_drake.prototype.export import export
+from tetra_drake.report.result_folder import save_result_folder
+from tetra_drake.robot.gait import save_gait
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+
+SHORT = {
+    "engine": "!Compiled",
+    "simulation.duration": "0.5 s",
+    "simulation.steady_from": "0.1 s",
+    "evolution.evaluations": 6,
+    "evolution.trials": 1,
+    "optimizer.population": 4,
+    "optimizer.tournament": 2,
+}
+
+
+@functools.wraps(load_scenario)
+def load_short(name: str) -> Scenario:
+    return load_scenario(name).with_changes(SHORT)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with the files that the examples read, where scenarios are short."""
+    folder, before = tmp_path_factory.mktemp("api"), Path.cwd()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(td, "load_scenario", load_short, raising=False)
+        patch.setattr("tetra_drake.experiment._reevaluate", lambda *_: None)
+        patch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
+        os.chdir(folder)
+        scenario = load_short("quick")
+        gait = td.evolve(scenario, "runs/demo").best_gait()
+        save_gait(gait, "gait.json", scenario)
+        save_result_folder(Path("out"), td.simulate(scenario, gait, record=True))
+        export(scenario, gait, rate=100.0, out=Path("lab"))
+        yield folder
+        os.chdir(before)
+
+
+class WhereStated(doctest.OutputChecker):
+    """Compares what an example prints only with what the docstring states."""
+
+    def check_output(self, want: str, got: str, optionflags: int) -> bool:
+        return not want or super().check_output(want, got, optionflags)
+
+
+@pytest.mark.parametrize("name", ["", *td.__all__[1:]])
+def test_the_example_of_each_public_name_runs(name: str) -> None:
+    subject = getattr(td, name) if name else td
+    (test,) = [
+        found
+        for found in doctest.DocTestFinder(recurse=False).find(subject, name, globs={"td": td})
+        if found.name == name
+    ]
+    assert test.examples
+    reports: list[str] = []
+    runner = doctest.DocTestRunner(WhereStated(), verbose=False)
+    failures, _ = runner.run(test, out=reports.append)
+    assert not failures, "".join(reports)
+
+
+def test_what_is_printed_fits_a_screen_and_is_rounded() -> None:
+    run = td.load_run("runs/demo")
+    result = td.load_result("out")
+    for subject in (run.scenario, run, run.best_gait(), result, result.metrics):
+        lines = str(subject).splitlines()
+        assert len(lines) <= 20 and max(map(len, lines)) <= 100
+        assert not re.search(r"\d\.\d{9}", str(subject))
+    assert "runs/demo" in str(run) and "scenario quick" in str(run) and "6 evaluations" in str(run)
+    assert f"{result.metrics.distance:.4g} m" in str(result.metrics)
+    assert f"{result.metrics.distance_in:.4g} in" in str(result)
+    assert "actuator_limited" not in str(result.metrics), "it has no motors"
+    assert len(repr([run, result, run.scenario, *run.gaits()])) < 400
+
+
+def test_a_result_shows_its_replay_in_a_notebook(folder: Path) -> None:
+    result = td.load_result("out")
+    result.save_replay(folder / "alone.html")
+    shown = result.show(height=321)._repr_html_()
+    (page,) = re.findall(
+        r'^<iframe srcdoc="([^"]*)" style="[^"]*height: 321px[^"]*"></iframe>$', shown
+    )
+    assert html.unescape(page) == (folder / "alone.html").read_text()
+
+
+def test_a_gait_may_be_the_path_of_its_file() -> None:
+    scenario = td.load_scenario("quick")
+    gait = td.load_gait("gait.json", scenario)
+    results = [td.simulate(scenario, "gait.json"), *td.simulate_many(scenario, [Path("gait.json")])]
+    for result in results:
+        assert (result.gait, result.metrics) == (gait, td.simulate(scenario, gait).metrics)
+
+
+def test_a_failure_among_many_says_of_which_gait_and_scenario() -> None:
+    scenario = td.load_scenario("quick")
+    failing = scenario.with_changes({"simulation.max_evaluations": 10, "name": "failing"})
+    gaits = [td.seeded_gait(scenario, seed) for seed in (1, 2)]
+    walked, failed = td.simulate_many([scenario, failing], gaits)
+    assert (walked.name, walked.scenario) == ("random gait 1", scenario)
+    assert (failed.name, failed.gait, failed.scenario) == ("random gait 2", gaits[1], failing)
+    assert "random gait 2 on scenario failing" in repr(failed)
