@@ -308,4 +308,4 @@ def test_a_printed_scenario_tells_what_differs_from_the_thesis(tmp_path):
         ["optimizer", "population", "12,", "weight_mutation", "0.5"],
     ]
     recorded = load_scenario(write(tmp_path, dump_scenario(loaded)))
-    assert "strut_length 7 in, spacing 3.43348 in" in str(recorded), "round numbers"
+    assert "strut_length 7 in, spacing 3.43349 in" in str(recorded), "round numbers"
