@@ -26,19 +26,19 @@ _TITLES = {"worst_distance_in": "distance in the worst draw (in)", "kept": "robu
 
 _NOTES = {
     "steady_distance": "without the start",
-    "twist": "rear feet, one ahead of the other",
-    "lead": "front tip ahead of the rear foot",
+    "twist": "one rear foot ahead of the other",
+    "lead": "front tip ahead of rear foot",
     "lateral_drift": "sideways",
-    "heading_change": "positive: to the left",
-    "path_curvature": "1 / radius, positive: to the left",
+    "heading_change": "left positive",
+    "path_curvature": "1 / radius, left positive",
     "cost_of_transport": "work / (weight x distance)",
     "signal_rate": "how fast signals change",
-    "lifted": "time off the ground, mean of bodies",
-    "clearance": "smallest distance of struts' axes",
+    "lifted": "time off the ground",
+    "clearance": "smallest gap of struts' axes",
     "tension": "smallest of any cable",
-    "travelling_index": "signals: 0 standing wave, 1 travelling",
+    "travelling_index": "0: standing wave, 1: travelling",
     "actuator_limited": "time at a limit of an actuator",
-    "kept": "draws that cost a tenth of the distance at most",
+    "kept": "draws that cost at most a tenth",
 }
 """What a number is, where its name does not say it."""
 
