@@ -13,7 +13,7 @@ import xarray
 
 import tetra_drake
 from tetra_drake.cli import main
-from tetra_drake.formatting import fixed
+from tetra_drake.formatting import rounded
 from tetra_drake.robot.gait import Gait, load_gait, save_gait, seeded_gait
 from tetra_drake.scenario.load import load_scenario
 
@@ -158,13 +158,13 @@ def gait_3() -> Gait:
     return seeded_gait(load_scenario(), 3)
 
 
-def test_simulate_writes_its_files_and_prints_the_distance_and_the_page(simulated, result):
+def test_simulate_writes_its_files_and_prints_the_fitness_and_the_page(simulated, result):
     folder, printed = simulated
     names = ["replay.html", "result.json", "scenario.yaml", "trajectory.nc"]
     assert sorted(os.listdir(folder)) == names
     lines = printed.splitlines()
-    distance = next(line.split() for line in lines if line.split()[0] == "distance")
-    assert distance[1:] == ["(in)", fixed(result["distance_in"], 3)]
+    fitness = next(line.split() for line in lines if line.startswith("fitness "))
+    assert fitness[1] == rounded(result["fitness"])
     assert lines[-1].endswith(str(folder / "replay.html"))
 
 

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from tetra_drake.formatting import Table, duration, fixed, listed, percents, signed
+from tetra_drake.formatting import Table, duration, fixed, listed, percents, ranged, rounded, signed
 
 
 @pytest.mark.parametrize(
@@ -11,6 +11,11 @@ from tetra_drake.formatting import Table, duration, fixed, listed, percents, sig
         (fixed, 1.234, "1.23"),
         (fixed, -0.004, "0.00"),
         (fixed, math.nan, "-"),
+        (rounded, 1050.4, "1050"),
+        (rounded, 9.996, "10.0"),
+        (rounded, -0.05119, "-0.0512"),
+        (rounded, 0.0, "0"),
+        (rounded, math.nan, "-"),
         (signed, 1.234, "+1.23"),
         (signed, -0.004, "0.00"),
         (duration, 59.6, "0:01:00"),
@@ -32,6 +37,8 @@ def test_a_table_aligns_numbers_to_the_right():
     assert Table(["in", "note"], [["1", "b"]], text_columns=(1,)).text() == "in  note\n 1  b"
 
 
-def test_a_range_without_width_is_not_shown():
+def test_a_range_without_width_or_ends_is_not_shown():
     assert percents(1.0, 0.91, 1.0) == "100 % (91 to 100)"
     assert percents(1.0, 1.0, 1.0) == "100 %"
+    assert ranged(2.0, 1.0, 3.0) == "2.00 (1.00 to 3.00)"
+    assert ranged(2.0, math.nan, math.nan) == ranged(2.0, 2.0, 2.0) == "2.00"

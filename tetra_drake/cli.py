@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130  # exit statuses
 
-_OF_GAIT = "that of the run in whose folder the gait is, else thesis"
+_OF_GAIT = "the scenario of the gait's run; thesis for a gait in no run"
 """The default scenario of commands that take a gait."""
 
 Options = argparse.Namespace
@@ -50,8 +50,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has closed it, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
-    except KeyboardInterrupt:
-        print("tetra-drake: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print("\ntetra-drake: interrupted", *interrupt.args, file=sys.stderr)
         return INTERRUPTED
     return 0
 
@@ -88,20 +88,20 @@ def make_parser() -> Command:
 def _simulate_options(command: Command) -> None:
     _add_scenario(command, default=_OF_GAIT)
     gaits = _add_gait(command, "--gait")
-    what = "instead, a file of commands for the actuators (CSV), as `export` writes"
+    what = "a file of actuator commands (CSV) instead, as `export` writes"
     gaits.add_argument("--command", metavar="FILE", dest="command_file", type=Path, help=what)
     _add_engine(command)
     _add_path(command, "--out", "DIR", "the folder to write to (default: out)", default=Path("out"))
-    what = "show the robot in a browser while the Drake diagram simulates it, at most in real time"
+    what = "show the robot in a browser while Drake simulates it, in real time at most"
     command.add_argument("--meshcat", action="store_true", help=what)
 
 
 def _simulate(options: Options) -> None:
     """Simulate one gait.
 
-    Simulates one gait, or a robot that follows a file of commands, prints how far and how straight
-    it walked, and writes result.json (the numbers), trajectory.nc (motion and forces over time, for
-    xarray), replay.html (open it in a browser) and scenario.yaml (the scenario in full).
+    Simulates one gait, or a robot that follows a file of commands, and prints its metrics. Writes
+    result.json (the numbers), trajectory.nc (motion and forces over time, for xarray), replay.html
+    (open it in a browser) and scenario.yaml (all settings).
     """
     from tetra_drake.engines.interface import check_can_be_watched
     from tetra_drake.engines.simulate import prepare, simulate
@@ -162,38 +162,38 @@ def _export(options: Options) -> None:
 
 
 def _evolve_options(command: Command) -> None:
-    _add_scenario(command, default="quick, which takes minutes; with --resume, the run's")
-    _add_path(command, "--out", "DIR", "the run directory, as runs/NAME", required=True)
+    _add_scenario(command, default="quick, which takes minutes; with --resume, that of the run")
+    _add_path(command, "--out", "DIR", "the run directory, such as runs/NAME", required=True)
     _add_engine(command)
-    _add_count(command, "--trials", "number of independent trials, instead of the scenario's")
+    _add_count(command, "--trials", "number of independent trials (default: the scenario's)")
     _add_count(
         command,
         "--evaluations",
-        "greatest number of evaluations per trial, instead of the scenario's",
+        "most evaluations of a trial (default: the scenario's)",
     )
     command.add_argument("--seed", metavar="N", type=_integer(0), help="random seed (default: 0)")
     _add_workers(command)
     cluster = (
-        "evaluate on all of a Dask cluster, by its scheduler's address, such as tcp://node1:8786; "
-        "without an address, on one of --workers processes on this machine"
+        "evaluate on a Dask cluster, given by its scheduler's address, such as tcp://node1:8786; "
+        "without an address, on a new one of --workers processes on this machine"
     )
     command.add_argument("--dask", metavar="ADDRESS", nargs="?", const="", help=cluster)
     resume = "continue an interrupted run; needs only --out"
     command.add_argument("--resume", action="store_true", help=resume)
     again = (
-        "leave out what is simulated after the search: the best gaits on the Drake diagram if the "
-        "engine is another, those of a map on disturbed robots"
+        "skip the simulations after the search, which check the best gaits in Drake if the engine "
+        "is another one, and the gaits of a map on disturbed robots"
     )
     command.add_argument("--no-reevaluate", dest="reevaluate", action="store_false", help=again)
 
 
 def _evolve(options: Options) -> None:
-    """Evolve gaits that walk far.
+    """Evolve gaits.
 
-    Evolves gaits by the scenario's optimiser, by default the thesis's evolutionary algorithm, and
-    records every evaluation in a run directory. Ctrl-C ends it; the same command with --resume
-    continues it. The result depends on scenario and seed only. At the end it writes
-    report.html, replay.html, figures/ and, of a map, elites/ (gait files) into the run directory.
+    Searches gaits with the scenario's optimiser, by default the thesis's evolutionary algorithm,
+    and records every evaluation in a run directory. Ctrl-C stops it; --resume continues it. The
+    result depends on scenario and seed only. At the end it writes report.html, replay.html,
+    figures/ and, for a map, elites/ (gait files) into the run directory.
     """
     from tetra_drake.evolution.progress import Display
     from tetra_drake.experiment import evolve
@@ -218,8 +218,7 @@ def _evolve(options: Options) -> None:
             )
     except KeyboardInterrupt:
         resume = f"tetra-drake evolve --out {options.out} --resume"
-        print(f"\nnothing is lost; continue with: {resume}", file=sys.stderr)
-        raise
+        raise KeyboardInterrupt(f"(nothing is lost; continue with: {resume})") from None
     print(run_text(run))
 
 
@@ -240,7 +239,7 @@ def _scenario_to_evolve(options: Options) -> Scenario | None:
 def _replay_options(command: Command) -> None:
     source = "a folder written by `simulate`, a gait file, or a folder written by `evolve`"
     _add_path(command, "source", "RESULT_DIR|GAIT|RUN_DIR", source)
-    _add_scenario(command, default="the run's, else thesis; for gait files only")
+    _add_scenario(command, default="that of its run, or thesis; for gait files only")
     _add_path(command, "--out", "FILE", "the HTML file to write", required=True)
 
 
@@ -280,19 +279,19 @@ def _robustness_options(command: Command) -> None:
     _add_path(command, "source", "GAIT|RUN", "a gait file, or a folder written by `evolve`")
     _add_scenario(command, default=_OF_GAIT)
     _add_count(command, "--draws", "number of draws (default: 200)", default=200)
-    seed = "of the draws (default: 0)"
+    seed = "random seed of the draws (default: 0)"
     command.add_argument("--seed", metavar="N", type=_integer(0), default=0, help=seed)
     _add_workers(command)
     _add_path(command, "--out", "DIR", "write tables (CSV, JSON) and the figure into this folder")
 
 
 def _robustness(options: Options) -> None:
-    """Judge gaits on disturbances that no evolution has seen.
+    """Test gaits under disturbances that were not used in evolution.
 
     Simulates a gait, or the best gait of each trial of a run, on the compiled engine: undisturbed,
-    under fresh draws of the scenario's disturbances (of 5 percent, if it has none), and under each
-    change alone. Prints how far it walks, how many draws it keeps (it loses at most a tenth of its
-    undisturbed distance), and what hurts most.
+    in new draws of the scenario's disturbances (5 percent if it has none), and with each
+    disturbance alone. Prints how far it walks, in how many draws it is robust (loses at most a
+    tenth of its undisturbed distance), and which disturbance hurts most.
     """
     from tetra_drake.analysis.robustness import judge
     from tetra_drake.evolution.source import load_source
@@ -318,7 +317,7 @@ def _robustness(options: Options) -> None:
 def _compare_options(command: Command) -> None:
     runs = "folders written by `evolve`, finished or not, all with the same objective"
     _add_path(command, "runs", "RUN", runs, nargs="+")
-    reach = "a distance to be reached, as '14.34 in'"
+    reach = "also count simulations until a trial walks this distance, such as '14.34 in'"
     command.add_argument("--reach", metavar="LENGTH", type=_quantity("m"), help=reach)
     _add_path(command, "--out", "DIR", "write tables (CSV, JSON) and the figure into this folder")
 
@@ -326,10 +325,10 @@ def _compare_options(command: Command) -> None:
 def _compare(options: Options) -> None:
     """Compare how well runs search.
 
-    Compares runs by the best fitness of their trials so far, at the same number of simulations,
-    of which an evaluation has one in each draw of disturbances: trials, interquartile means with
-    bootstrap intervals, simulations until the fittest gait walks a distance, and time. Writes
-    trials.csv, curves.csv, summary.json and the figure search, if asked for.
+    Compares the best fitness of each trial at the same number of simulations. An evaluation is
+    one simulation, or one for each draw of disturbances. Prints interquartile means with bootstrap
+    intervals, simulations until a trial reaches a distance, and time. With --out it writes
+    trials.csv, curves.csv, summary.json and the figure search.
     """
     from tetra_drake.analysis.comparison import compare
     from tetra_drake.report.analysis_text import comparison_text
@@ -422,9 +421,9 @@ def _add_workers(command: Command) -> None:
 def _add_gait(command: Command, name: str, **more: Any) -> argparse._MutuallyExclusiveGroup:
     """Adds the ways to choose a gait, and returns their group."""
     group = command.add_mutually_exclusive_group()
-    what = "a gait file (JSON), or a folder written by `evolve`, whose best gait it is"
+    what = "a gait file (JSON), or a folder written by `evolve` for its best gait"
     group.add_argument(name, metavar="FILE|RUN", type=Path, help=what, **more)
-    seed = "instead, a random gait of this seed (default: one that walks)"
+    seed = "a random gait of this seed instead (default: one that walks)"
     group.add_argument("--seed", metavar="N", type=_integer(0), help=seed)
     return group
 

@@ -22,6 +22,14 @@ def signed(value: float, digits: int = 2) -> str:
     return f"+{text}" if math.isfinite(value) and float(text) > 0.0 else text
 
 
+def rounded(value: float, digits: int = 3) -> str:
+    """A number with this many significant digits, never as 1e3; "-" where it is not finite."""
+    if value == 0.0 or not math.isfinite(value):
+        return fixed(value, 0)
+    magnitude = int(f"{value:.{digits - 1}e}".partition("e")[2])
+    return fixed(value, max(0, digits - 1 - magnitude))
+
+
 def duration(seconds: float) -> str:
     """A time as h:mm:ss; "-" where it is not finite."""
     if not math.isfinite(seconds):
@@ -38,8 +46,10 @@ def listed(items: Sequence[object]) -> str:
 
 
 def ranged(value: float, low: float, high: float) -> str:
-    """A number with a range that belongs to it."""
-    return f"{fixed(value)} ({fixed(low)} to {fixed(high)})"
+    """A number with a range that belongs to it, unless that is unknown or has no width."""
+    if math.isnan(low) or low == high:
+        return rounded(value)
+    return f"{rounded(value)} ({rounded(low)} to {rounded(high)})"
 
 
 def percents(share: float, low: float, high: float) -> str:
@@ -77,12 +87,12 @@ class Table:
 def render(template: str, **values: object) -> str:
     """A page from a Jinja template of the package, as "report/report.html.jinja".
 
-    Values are escaped; fixed() and duration() are filters.
+    Values are escaped; rounded() and duration() are filters.
     """
     from jinja2 import Environment, StrictUndefined
 
     source = (resources.files("tetra_drake") / template).read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined)
-    environment.filters.update(fixed=fixed, duration=duration)
+    environment.filters.update(rounded=rounded, duration=duration)
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":")}  # compact, not sorted
     return environment.from_string(source).render(values)

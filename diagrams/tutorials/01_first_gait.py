@@ -3,9 +3,8 @@
 # %% A scenario has every number of the robot and its world; a gait is what its oscillators do.
 from pathlib import Path
 
-from tetra_drake.figures.gait_diagram import gait_diagram
-
 import tetra_drake as td
+from tetra_drake.figures.gait_diagram import gait_diagram
 
 scenario = td.load_scenario("coulomb")  # the thesis's robot, on feet that hold
 gait = td.seeded_gait(scenario, seed=80)  # a random one

@@ -3,9 +3,8 @@
 # %% The file beside this script lists nodes, struts, cables, and which cables oscillators drive.
 from pathlib import Path
 
-from tetra_drake.figures.gait_diagram import gait_diagram
-
 import tetra_drake as td
+from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.report.structure_page import structure_text
 
 here = Path(__file__).parent

@@ -12,7 +12,6 @@ from thinning import last_population
 from tetra_drake.evolution.executors import process_executor
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.report.summary import run_text
 
 
 def lines(path):
@@ -114,7 +113,6 @@ def test_another_optimiser_reports_its_own_numbers(tmp_path):
     farthest = run.evaluations.groupby("trial")["distance"].max()
     assert run.iterations.groupby("trial")["farthest"].last().tolist() == farthest.tolist()
     assert set(run.iterations["note"]) == {"wide"}
-    assert "mean fitness" not in run_text(run)
 
 
 def test_the_last_batch_is_cut_to_the_evaluations_that_are_left(tmp_path):

@@ -7,11 +7,8 @@ from tetra_drake.report.run_page import write_figures
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
-ONE_GAIT = (
-    "gait_diagram time_lapse path_of_the_centre relative_distances one_step signals_and_tensions "
-    "ground_forces"
-)
-OF_ONE_GAIT = set(ONE_GAIT.split())
+OF_ONE_GAIT = {"gait_diagram", "time_lapse", "path_of_the_centre", "relative_distances"}
+OF_ONE_GAIT |= {"one_step", "signals_and_tensions", "ground_forces"}
 OF_A_RUN = OF_ONE_GAIT | {"fitness_of_trials", "initial_distances", "initial_fitness"}
 OF_A_RUN |= {"before_and_after"}
 

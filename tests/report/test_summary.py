@@ -2,10 +2,13 @@
 
 import dataclasses
 import math
+import re
 
 import pytest
+from helpers.synthetic_run import tiny_scenario, write_run
 
-from tetra_drake.report.summary import ground_text, result_text
+from tetra_drake.evolution.run import load_run
+from tetra_drake.report.summary import ground_text, result_text, results
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.terrain_kinds import HeightField, Rough
@@ -14,22 +17,28 @@ from tetra_drake.scenario.units import INCH
 
 def numbers(text):
     """By metric, the numbers in a text; metrics in their order."""
-    lines = text[text.index("metric ") :].splitlines()
-    return {name.strip(): value for name, _, value in (line.rpartition("  ") for line in lines)}
+    cells = [re.split(r" {2,}", line) for line in text.splitlines()]
+    return {name: value for name, value, *_ in (line for line in cells if len(line) > 1)}
 
 
 def test_the_metrics_are_printed_in_the_units_of_people_the_objectives_first(tiny, result):
     metrics = dataclasses.replace(result.metrics, distance=2.0 * INCH, heading_change=math.pi)
     result = dataclasses.replace(result, metrics=metrics, fitness=1.5)
     shown = numbers(result_text(result))
-    expected = {"distance (in)": "2.000", "fitness": "1.500", "heading change (deg)": "180.000"}
+    expected = {"distance (in)": "2.00", "fitness": "1.50", "heading change (deg)": "180"}
     assert shown | expected == shown
-    assert list(shown)[1] == "distance (in)"
+    assert next(iter(shown)) == "distance (in)"
     turning = tiny.with_changes({"objective": {"heading_change": "1 /rad"}})
-    assert (
-        list(numbers(result_text(dataclasses.replace(result, scenario=turning))))[1]
-        == "heading change (deg)"
-    )
+    shown = numbers(result_text(dataclasses.replace(result, scenario=turning)))
+    assert next(iter(shown)) == "heading change (deg)"
+
+
+def test_metrics_that_are_zero_or_missing_have_no_row(result):
+    nothing = dict.fromkeys(("twist", "lifted"), 0.0) | {"tension": math.nan, "clearance": 1e-9}
+    metrics = dataclasses.replace(result.metrics, **nothing)
+    shown = numbers(result_text(dataclasses.replace(result, metrics=metrics)))
+    assert "speed (in/s)" in shown
+    assert not shown.keys() & {"twist (in)", "lifted (%)", "tension (lbf)", "clearance (in)"}
 
 
 def test_requirements_that_are_not_met_are_named(tiny, result):
@@ -50,8 +59,38 @@ def test_requirements_that_are_not_met_are_named(tiny, result):
         ("thesis", {"terrain": HeightField(file="/far/away/a.npy", cell=0.0254)}, {"a.npy"}),
     ],
 )
-def test_the_ground_is_named_unless_it_is_the_thesiss(scenario, changes, words):
+def test_the_ground_is_named_with_its_terrain_and_friction(scenario, changes, words):
     text = ground_text(load_scenario(scenario).with_changes(changes))
-    assert bool(text) == bool(words)
     assert all(word in text for word in words)
     assert "/far" not in text and "\n" not in text
+
+
+def test_a_run_is_summed_up_by_the_metric_of_its_objective(tmp_path):
+    # By trials, in inches: from 2 to 3, from 5 to 6, from 1 to 4; the fittest walks 6 in.
+    trials = [
+        [[(4.0, 0)], [(6.0, 0)]],
+        [[(10.0, 0)], [(12.0, 0), (None, 1)]],
+        [[(2.0, 0)], [(8.0, 0)]],
+    ]
+    walked = dict(results(load_run(write_run(tmp_path / "far", trials))))
+    assert walked["distance"].startswith("6.00 in, trial 1, evaluation 1")
+    assert walked["best initial gait"].startswith("5.00 in, trial 1, evaluation 0")
+    assert re.findall(r"[\d.]+ in", walked["best of each trial"]) == [
+        "4.00 in",
+        "3.50 in",
+        "5.00 in",
+    ]
+    assert walked["evaluations"].startswith("7,") and "1" in walked["evaluations"]
+    assert walked["time per evaluation"] == "500 ms"
+
+    turning = tiny_scenario().with_changes({"objective": {"heading_change": "1 /rad"}})
+    angles = {fitness: {"heading_change": math.radians(fitness)} for fitness in (4.0, 6.0)}
+    run = write_run(tmp_path / "turn", trials[:1], scenario=turning, metrics=angles)
+    turned = dict(results(load_run(run)))
+    assert turned["heading change"].startswith("6.00 deg")
+    assert "distance" not in turned and "best of each trial" not in turned
+
+
+def test_a_run_without_a_fitness_is_summed_up_by_its_effort(tmp_path):
+    run = load_run(write_run(tmp_path / "run", [[[(None, 0)]]]))
+    assert [name for name, _ in results(run)] == ["evaluations", "time per evaluation"]

@@ -308,7 +308,7 @@ def test_a_printed_scenario_tells_what_differs_from_the_thesis(tmp_path):
         ["optimizer", "population", "12,", "weight_mutation", "0.5"],
     ]
     recorded = load_scenario(write(tmp_path, dump_scenario(loaded)))
-    assert "strut_length 0.1778 m, spacing 0.0872105 m" in str(recorded), "rounded"
+    assert "strut_length 7 in, spacing 3.43349 in" in str(recorded), "round numbers"
 
 
 def test_a_kind_is_changed_with_its_settings_as_in_a_file(scenario, refused):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tetra_drake.scenario.units import INCH, POUND_FORCE, customary, quantity_to_si, shown
+from tetra_drake.scenario.units import INCH, POUND_FORCE, customary, plainest, quantity_to_si, shown
 
 # Exact by definition: the international inch, the avoirdupois pound (0.45359237 kg) and
 # standard gravity (9.80665 m/s^2), whose product is the pound-force.
@@ -40,6 +40,7 @@ def test_an_si_number_written_with_its_unit_reads_back_to_the_last_bit(value):
         ("m", "in"),
         ("N", "lbf"),
         ("N*s/m", "lbf*s/in"),
+        ("N*s/m^2", "lbf*s/in^2"),
         ("1/rad", "/deg"),
         ("J", "J"),
     ],
@@ -49,6 +50,26 @@ def test_people_read_inches_pounds_force_and_degrees_of_the_same_size(unit, read
     assert name == read
     assert size == pytest.approx(quantity_to_si(f"1 {name}", unit), rel=1e-14)
     assert shown(2.5 * size, unit) == f"2.5 {read}"
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("6 in", "m"),
+        ("240 mm/s", "m/s"),
+        ("20 ms", "s"),
+        ("0.5 s", "s"),
+        ("27 lbf*s/in^2", "N*s/m^2"),
+        ("1000 N/m", "N/m"),
+        ("9.80665 m/s^2", "m/s^2"),
+        ("5 deg", "rad"),
+        ("1 /rad", "1/rad"),
+        ("0.125", ""),
+    ],
+)
+def test_a_setting_is_shown_in_the_unit_in_which_it_is_a_round_number(text, unit):
+    number = quantity_to_si(text, unit) if unit else float(text)
+    assert plainest(number, unit) == text
 
 
 REFUSED = [

@@ -193,9 +193,7 @@ def _differences(runs: Mapping[str, Run]) -> list[str]:
             if key.split(".")[0] not in _SEARCH
         ]
         if changed:
-            notes.append(
-                f"{label} has not only its search other than {first}: {', '.join(changed)}"
-            )
+            notes.append(f"{label} differs from {first} not only in search: {', '.join(changed)}")
     return notes
 
 

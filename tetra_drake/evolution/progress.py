@@ -10,12 +10,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, TextIO
 
 from tetra_drake.evolution.trials import TrialStatus
-from tetra_drake.formatting import duration, fixed
+from tetra_drake.formatting import duration, rounded
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
 _LINE_PERIOD = 10.0  # s, between plain lines
+_FIRST_ESTIMATE = 5  # number of tasks done before the time left is estimated
 
 
 class Progress:
@@ -42,8 +43,8 @@ class Progress:
 
 
 class Display(Progress):
-    """Prints to a stream: one bar per stage on a terminal; elsewhere lines, when a stage begins
-    and ends and every ten seconds. Both show one time left for all trials."""
+    """Progress on a stream: on a terminal one bar per stage; elsewhere a line when a stage begins
+    and ends, and every ten seconds. Both show the time left for all trials together."""
 
     def __init__(self, stream: TextIO) -> None:
         from rich import progress
@@ -54,7 +55,6 @@ class Display(Progress):
             progress.TextColumn("{task.description}"),
             progress.BarColumn(bar_width=20),
             progress.MofNCompleteColumn(),
-            progress.TimeRemainingColumn(),
             progress.TextColumn("{task.fields[text]}"),
             console=Console(file=stream),
             refresh_per_second=4,
@@ -94,15 +94,16 @@ class Display(Progress):
         """Moves the stage's bar, or prints a line where one is due."""
         begins = title not in self._tasks
         if begins:
-            self._tasks[title] = self._bars.add_task(title, completed=done, total=total, text=text)
-        task = self._tasks[title]
-        self._bars.update(task, completed=done, total=total, text=text)
+            self._tasks[title] = self._bars.add_task(title, completed=done, total=total, text="")
+        task = self._bars.tasks[self._tasks[title]]
+        self._bars.update(task.id, completed=done, total=total)
+        parts = [text] if text else []
+        if task.time_remaining and done >= _FIRST_ESTIMATE:
+            parts.append(f"{duration(task.time_remaining)} left")
+        self._bars.update(task.id, text=", ".join(parts))
         if not self._plain:
             return
-        parts = [f"{title}: {done} of {total}", text]
-        if seconds := self._bars.tasks[task].time_remaining:
-            parts.append(f"{duration(seconds)} left")
-        line = ", ".join(part for part in parts if part)
+        line = ", ".join([f"{title}: {done} of {total}", *parts])
         now = time.monotonic()
         due = begins or done == total or now - self._printed >= _LINE_PERIOD
         if due and line != self._line:
@@ -111,16 +112,16 @@ class Display(Progress):
 
 
 def overview(statuses: Sequence[TrialStatus]) -> str:
-    """Fitness and distance of the fittest gait, trials that have ended, failures."""
+    """Distance and fitness of the fittest gait, finished trials, failures."""
     fittest = max(statuses, key=lambda status: status.best_fitness)
     ended = sum(status.stop is not None for status in statuses)
     failures = sum(status.failures for status in statuses)
     parts = []
     if fittest.iteration >= 0:
-        parts.append(f"best fitness {fixed(fittest.best_fitness)}")
-        parts.append(f"fittest gait's distance {fixed(fittest.best_distance_in)} in")
+        distance, fitness = rounded(fittest.best_distance_in), rounded(fittest.best_fitness)
+        parts.append(f"best gait {distance} in (fitness {fitness})")
     if len(statuses) > 1:
-        parts.append(f"{ended} of {len(statuses)} trials ended")
+        parts.append(f"{ended} of {len(statuses)} trials finished")
     if failures:
         parts.append(f"{failures} failed")
     return ", ".join(parts)

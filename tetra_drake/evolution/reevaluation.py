@@ -5,7 +5,6 @@ trial_00/reevaluations.jsonl    lines as in evaluations.jsonl, with the engine t
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 from tetra_drake.errors import InputError
@@ -21,7 +20,7 @@ BEST_GAITS = 5
 """Number of best gaits per trial that are evaluated once more; among disturbances fewer, but one,
 so that there are about as many simulations."""
 
-_TITLE = "best gaits on the Drake diagram"
+_TITLE = "checking the best gaits in Drake"
 
 
 def reevaluate(
@@ -67,14 +66,3 @@ def reevaluate(
         append_lines(trial_folder(run.directory, trial) / REEVALUATIONS, [entry])
         progress.stage(_TITLE, finished, len(missing))
     return load_run(run.directory)
-
-
-def best_distances(run: Run) -> list[tuple[int, float, float]]:
-    """Distances (in) of the fittest gait of each trial: recorded, and on the diagram; NaN
-    where there is none."""
-    key = ["trial", "index"]
-    on_diagram = run.reevaluations.set_index(key)["distance_in"].to_dict()
-    distances = []
-    for (trial, index), distance in run.best().set_index(key)["distance_in"].items():
-        distances.append((int(trial), float(distance), on_diagram.get((trial, index), math.nan)))
-    return distances

@@ -28,8 +28,8 @@ from tetra_drake.scenario.units import INCH
 
 _SHOW_PERIOD = 1.0  # s
 
-LEAST_BASE = 1.0
-"""in: a gain in percent of a shorter distance says nothing."""
+ALL_DONE = "all evaluations done"
+"""Why a trial ends whose optimiser does not stop earlier."""
 
 
 @dataclass
@@ -48,40 +48,17 @@ class TrialStatus:
     """Total of the evaluations, in s."""
     best_fitness: float = -math.inf
     best_distance_in: float = math.nan
-    mean_fitness: float = math.nan
-    """Mean fitness of the population; NaN if the optimiser reports none."""
-    initial_best_distance_in: float = math.nan
-    initial_mean_fitness: float = math.nan
     stop: str | None = None
     """Why the trial ended; None while it goes on."""
-
-    @property
-    def gain_in(self) -> float:
-        """Rise of the best distance, in inches."""
-        return self.best_distance_in - self.initial_best_distance_in
-
-    @property
-    def gain_percent(self) -> float:
-        """The gain in % of the best initial distance; NaN where that is too short to compare with,
-        below LEAST_BASE."""
-        initial = self.initial_best_distance_in
-        return 100.0 * self.gain_in / initial if initial >= LEAST_BASE else math.nan
 
     def complete(self, line: Mapping[str, Any], *, best_distance_in: float) -> None:
         """Takes over a line of iterations.jsonl, and the distance of its best evaluation."""
         self.iteration = line["iteration"]
         self.stop = line["stop"] if isinstance(line["stop"], str) else None
-        self.best_fitness = _number(line["best_fitness"], missing=-math.inf)
+        best = line["best_fitness"]
+        # NaN stands for null in a table.
+        self.best_fitness = -math.inf if best is None or math.isnan(best) else best
         self.best_distance_in = best_distance_in
-        self.mean_fitness = _number(line.get("mean_fitness"), missing=math.nan)
-        if self.iteration == 0:
-            self.initial_mean_fitness = self.mean_fitness
-            self.initial_best_distance_in = best_distance_in
-
-
-def _number(value: float | None, *, missing: float) -> float:
-    """A number of a line, or of a table, in which NaN stands for null."""
-    return missing if value is None or math.isnan(value) else value
 
 
 @dataclass(frozen=True)
@@ -188,7 +165,7 @@ class Trial:
             "evaluations": status.evaluations,
             "best_fitness": best.evaluation.fitness if best else None,
             "best_evaluation": best.index if best else None,
-            "stop": "all evaluations done" if all_done else outcome.stop,
+            "stop": ALL_DONE if all_done else outcome.stop,
             **outcome.report,
         }
         self._record.complete(entries, line)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tetra_drake.analysis.comparison import Compared
 from tetra_drake.analysis.robustness import LOSS, Judgement, by_change, by_gait, chance
-from tetra_drake.formatting import Table, fixed, percents, ranged, signed
+from tetra_drake.formatting import Table, fixed, percents, ranged, rounded, signed
 from tetra_drake.scenario.units import INCH, shown
 
 if TYPE_CHECKING:
@@ -22,13 +22,13 @@ def robustness_text(judgement: Judgement) -> str:
     require = bool(judgement.scenario.require)
     misses = " and misses no requirement" if require else ""
     texts = [
-        f"Distance in inches under {count} draws of the disturbances. A gait keeps a draw in which "
-        f"it loses at\nmost {100.0 * LOSS:g} % of its undisturbed distance{misses}.\n"
+        f"Distances in inches in {count} draws of disturbances: undisturbed, percentiles, mean.\n"
+        f"Robust: share of draws in which a gait loses at most {100.0 * LOSS:g} %{misses}.\n"
         "In brackets: 95 % confidence intervals.",
         _gaits_table(gaits, with_missed=require).text(),
-        "What hurts most: change of the distance by one change alone, in inches; Spearman's rank\n"
-        "correlation of factor and distance over the draws of a gait, mean and median size.\n"
-        f"Chance alone gives up to {chance(count):.2f}.",
+        "What hurts most: change of the distance in inches by one disturbance alone.\n"
+        "Correlation: Spearman's, of factor and distance over the draws of a gait; mean, and\n"
+        f"median of its absolute value. Chance alone gives up to {chance(count):.2f}.",
         _changes_table(by_change(judgement)).text(),
     ]
     return "\n\n".join(texts)
@@ -42,46 +42,40 @@ def _gaits_table(gaits: pandas.DataFrame, *, with_missed: bool) -> Table:
         name = str(gait)
         if len(name) >= _LONGEST_NAME:
             name = f"{name[: _LONGEST_NAME - 1]}…"
-        cells = [name, *(fixed(row[length] / INCH) for length in lengths)]
+        cells = [name, *(rounded(row[length] / INCH) for length in lengths)]
         inches = row / INCH
         cells.append(ranged(inches["mean"], inches["mean_low"], inches["mean_high"]))
         cells.append(percents(row["kept"], row["kept_low"], row["kept_high"]))
         cells += [f"{row[count]:.0f}" for count in counts]
         rows.append(cells)
-    return Table(["gait", *lengths, "mean", "keeps", *counts], rows)
+    return Table(["gait", *lengths, "mean", "robust", *counts], rows)
 
 
 def _changes_table(changes: pandas.DataFrame) -> Table:
-    rows = [
-        [
-            str(what),
-            fixed(row["median"] / INCH),
-            signed(row["worst"] / INCH),
-            f"{row['failed']:.0f}",
-            signed(row["correlation"]),
-            fixed(row["correlation_size"]),
-        ]
-        for what, row in changes.iterrows()
-    ]
-    return Table(["changed", "median change", "worst", "failed", "correlation", "size"], rows)
+    rows = []
+    for what, row in changes.iterrows():
+        correlation, size = signed(row["correlation"]), fixed(row["correlation_size"])
+        if math.isnan(row["correlation"]):
+            correlation, size = "", ""
+        median, worst = fixed(row["median"] / INCH), signed(row["worst"] / INCH)
+        rows.append([str(what), median, worst, f"{row['failed']:.0f}", correlation, size])
+    headings = ["disturbance", "median change", "worst", "failed", "correlation", "|correlation|"]
+    return Table(headings, rows)
 
 
 def comparison_text(compared: Compared) -> str:
     """Tables of the fitness and the distances that runs reach, side by side."""
-    distances = (
-        "Distance of the fittest gait of each trial in inches, likewise; seconds per evaluation"
-    )
+    distances = "Distance in inches of the best gait of each trial, also as interquartile mean."
     if compared.reach is not None:
         distances += (
-            f";\nsimulations until the fittest so far walks {shown(compared.reach, 'm')}, "
-            "median over the trials, in brackets\nquartiles; trials in which it does"
+            f"\nSimulations until a trial's best gait walks {shown(compared.reach, 'm')}: "
+            "median (quartiles) over trials."
         )
     texts = [
-        f"Fitness of the best of each trial after {compared.common} simulations, where the "
-        "shortest run ends, and\nin the end: interquartile mean over trials, in brackets its 95 % "
-        "confidence interval.",
+        f"Best fitness of each trial after {compared.common} simulations, where the shortest run "
+        "ends, and at its end:\ninterquartile mean over trials (95 % confidence interval).",
         _fitness_table(compared).text(),
-        f"{distances}.",
+        distances,
         _distance_table(compared).text(),
     ]
     texts += [f"note: {note}" for note in compared.notes]
@@ -95,19 +89,19 @@ def _fitness_table(compared: Compared) -> Table:
         cells.append(ranged(row["at_common_mean"], row["at_common_low"], row["at_common_high"]))
         cells.append(ranged(row["fitness_mean"], row["fitness_low"], row["fitness_high"]))
         rows.append(cells)
-    headings = ["run", "trials", "simulations", f"after {compared.common}", "in the end"]
+    headings = ["run", "trials", "simulations", f"after {compared.common}", "at the end"]
     return Table(headings, rows)
 
 
 def _distance_table(compared: Compared) -> Table:
-    headings = ["run", "distance", "seconds"]
+    headings = ["run", "distance", "s per evaluation"]
     if compared.reach is not None:
-        headings += [f"to {shown(compared.reach, 'm')}", "trials"]
+        headings += [f"simulations to {shown(compared.reach, 'm')}", "trials that reach it"]
     rows = []
     for label, row in compared.runs.iterrows():
         inches = row / INCH
         mean = ranged(inches["distance_mean"], inches["distance_low"], inches["distance_high"])
-        cells = [str(label), mean, fixed(row["wall_time"], 3)]
+        cells = [str(label), mean, rounded(row["wall_time"], 2)]
         if compared.reach is not None:
             low, high = _cost(row["reached_low"]), _cost(row["reached_high"])
             cells.append(f"{_cost(row['reached'])} ({low} to {high})")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
@@ -14,19 +15,34 @@ from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
 from tetra_drake.evolution.manifest import MANIFEST, SCENARIO
 from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.files import check_folder, write_whole
-from tetra_drake.formatting import Table, fixed, render
+from tetra_drake.formatting import Table, listed, render, rounded
 from tetra_drake.machine import versions
 from tetra_drake.report.book import Study, draw_run, draw_trajectory, simulate_again, study_run
 from tetra_drake.report.result_folder import RESULT, load_result
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
-from tetra_drake.robot.gait import ParameterSpace, save_gait
-from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.robot.actuation import KINDS, Actuation
+from tetra_drake.robot.gait import Gait, save_gait
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metric_units import METRICS, inverse
+from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import shown
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"
 ELITES, ELITES_CSV = "elites", "elites.csv"
+
+_OF_THE_GAIT = ("gait_diagram", "time_lapse")
+_OF_EVOLUTION = (
+    "fitness_of_trials",
+    "before_and_after",
+    "initial_distances",
+    "initial_fitness",
+    "map_of_gaits",
+)
+"""Figures by the part of the report that shows them; others show motion and forces."""
+
+_LONGEST_SETTING = 60  # largest number of letters of a setting that is shown
+_NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
 
 def write_figures(source: Path, out: Path | None = None) -> list[Path]:
@@ -76,7 +92,7 @@ def _write_map(study: Study, directory: Path) -> None:
     for names, row in on_map:
         trial, index = row["trial"], row["index"]
         gait_file, page = _map_files(names, row, study)
-        save_gait(run.gait(trial, index), directory / gait_file, run.manifest.scenario)
+        save_gait(run.gait(trial, index), directory / gait_file, run.scenario)
         if page != Path(REPLAY):
             simulate_again(run, row).result.save_replay(directory / page)
 
@@ -91,8 +107,9 @@ def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[
 def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) -> str:
     """The report as HTML, with the pictures in `folder`, whose captions are given by name."""
     run, manifest = study.run, study.run.manifest
+    scenario = run.scenario
     best_gait = trial_folder(Path(), study.trial) / BEST_GAIT
-    named = {"fittest initial": study.initial.recorded, "fittest": study.best.recorded}
+    named = {"initially": study.initial.recorded, "best": study.best.recorded}
     gaits, on_map = distinct_gaits(named), distinct_gaits(chosen(run))
     map_files: dict[str, Path] = {}
     map_pages: dict[str, Path] = {}
@@ -100,39 +117,39 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         gait_file, page = _map_files(names, gait, study)
         map_files |= dict.fromkeys(names, gait_file)
         map_pages[names[0]] = page
-    space = ParameterSpace.of(manifest.scenario)
-    values = [fixed(value, 4) for value in run.vector(study.trial, study.best.recorded["index"])]
-    again, changed = {}, {}
-    for gait in (study.best, study.initial):
-        again[gait.label] = gait.distance_in
-        change = abs(gait.distance_in - gait.recorded["distance_in"])
+    changed = {}
+    for shown_gait in (study.best, study.initial):
+        change = abs(shown_gait.distance_in - shown_gait.recorded["distance_in"])
         if change > 1e-6:
-            changed[gait.label] = change
+            changed[shown_gait.label] = change
+    gait = run.gait(study.trial, study.best.recorded["index"])
     return render(
         "report/report.html.jinja",
         run=run,
         manifest=manifest,
-        ground=ground_text(manifest.scenario),
+        title=f"{scenario.name}: {headline(scenario, study.best.recorded)}",
+        evaluations=f"{sum(status.evaluations for status in run.statuses):,}",
+        ground=ground_text(scenario),
         best=study.best,
-        walked=headline(manifest.scenario, study.best.recorded),
-        again=again,
         changed=changed,
         versions=versions(),
-        differences=manifest.scenario.differences(load_scenario("thesis")),
+        differences=_settings(scenario),
         results=results(run),
         trials=trials_table(run),
-        objective=_terms(manifest.scenario.objective, inverse),
-        require=_terms(manifest.scenario.require, str),
+        objective=_terms(scenario.objective, inverse),
+        require=_terms(scenario.require, str),
         gaits=gaits,
         label=gait_label,
-        links={"fittest": best_gait},
-        metrics=_metrics(gaits),
+        links={"best": best_gait},
+        metrics=_metrics(gaits, scenario),
         map=on_map,
         map_links=map_files,
         map_pages=map_pages,
-        map_metrics=_metrics(on_map) if on_map else None,
-        parameters=Table(["", "value"], list(zip(space.names, values, strict=True))),
-        pictures=[(_embedded(folder / f"{name}.svg"), captions[name]) for name in captions],
+        map_metrics=_metrics(on_map, scenario) if on_map else None,
+        parameters=_parameters(gait),
+        weights=_weight_matrices(gait),
+        oscillators=Actuation.of(scenario).names,
+        pictures=_pictures(captions, folder),
         gait=best_gait,
         files={
             "scenario": SCENARIO,
@@ -140,8 +157,16 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
             "figures": FIGURES,
             "elites": Path(ELITES) / ELITES_CSV,
         },
-        settings=dump_scenario(manifest.scenario),
     )
+
+
+def _settings(scenario: Scenario) -> list[tuple[str, str]]:
+    """Settings other than the thesis's; no long lists, nor what the report says elsewhere."""
+    return [
+        (key, value)
+        for key, value in scenario.differences(load_scenario("thesis"))
+        if not key.startswith(_NOT_SHOWN) and len(value) <= _LONGEST_SETTING
+    ]
 
 
 def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str]) -> str:
@@ -150,8 +175,55 @@ def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str]) -> str:
     return ", ".join(terms)
 
 
-def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]]) -> Table:
-    return metrics_table({names[0]: gait for names, gait in gaits})
+def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]], scenario: Scenario) -> Table:
+    return metrics_table({names[0]: gait for names, gait in gaits}, scenario)
+
+
+def _parameters(gait: Gait) -> str:
+    """The parameters of a gait beside its weights, in a line."""
+    texts = [f"Time constants τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s"]
+    if gait.turn:
+        texts.append(f"turn {rounded(gait.turn)}")
+    texts += [f"feedback gain of {name} {rounded(gain)}" for name, gain in gait.gains if gain]
+    return listed(texts)
+
+
+@dataclass(frozen=True)
+class WeightMatrix:
+    """The weights between the neurons of one kind, for a heat map."""
+
+    kind: str
+    rows: list[list[float | None]]
+    """A row for each oscillator, with a weight from each; None where there is no inhibition."""
+
+    @property
+    def largest(self) -> float:
+        """The largest weight; 1 if all are zero."""
+        return max((weight for row in self.rows for weight in row if weight), default=1.0)
+
+
+def _weight_matrices(gait: Gait) -> list[WeightMatrix]:
+    """The weights of a gait: extensors, flexors. Empty for a single oscillator."""
+    weights = dict(zip(gait.weight_names, gait.weights, strict=True))
+    count = max((int(name.partition("->")[0]) for name in weights), default=0)
+    numbers = range(1, count + 1)
+    matrices = []
+    for kind in KINDS if count else ():
+        rows = [[weights.get(f"{j}->{i} {kind}") for j in numbers] for i in numbers]
+        matrices.append(WeightMatrix(kind, rows))
+    return matrices
+
+
+def _pictures(captions: Mapping[str, str], folder: Path) -> dict[str, list[tuple[str, str, str]]]:
+    """Pictures with their files and captions, by the part of the report that shows them."""
+    parts: dict[str, list[tuple[str, str, str]]] = {"gait": [], "evolution": [], "forces": []}
+    for name, caption in captions.items():
+        part = "gait" if name in _OF_THE_GAIT else "forces"
+        if name in _OF_EVOLUTION:
+            part = "evolution"
+        file = f"{name}.svg"
+        parts[part].append((_embedded(folder / file), f"{FIGURES}/{file}", caption))
+    return parts
 
 
 def _embedded(picture: Path) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tetra_drake.analysis.rest import RestStudy
-from tetra_drake.formatting import Table, fixed
+from tetra_drake.formatting import Table, fixed, rounded
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.robot import Robot
@@ -44,7 +45,7 @@ def structure_text(study: RestStudy) -> str:
     count = f"{len(structure.bodies)} bodies, {len(structure.node_names)} nodes"
     lines = [
         f"{robot.scenario.name}: {count}, {len(structure.cables)} cables, "
-        f"{structure.signals} oscillators, {1e3 * structure.mass.sum():.4g} g",
+        f"{structure.signals} oscillators, {rounded(1e3 * structure.mass.sum(), 4)} g",
         f"Without weight: self-stress states {len(statics.self_stresses)}, "
         f"infinitesimal mechanisms {statics.mechanisms}.",
         f"Lowest natural frequencies on the ground, undamped: {lowest or 'none'} Hz.",
@@ -58,24 +59,25 @@ def structure_text(study: RestStudy) -> str:
 def _bodies_table(study: RestStudy) -> Table:
     rows, bodies = [], study.nodes.groupby("body", sort=False)
     for (body, nodes), mass in zip(bodies, study.robot.structure.mass, strict=True):
-        heights = _range(nodes["z"] / INCH)
-        load = fixed(nodes["load"].sum() / POUND_FORCE, 4)
-        rows.append([str(body), f"{1e3 * mass:.4g}", heights, load])
-    return Table(["body", "mass (g)", "heights of nodes (in)", "on the ground (lbf)"], rows)
+        heights = _range(nodes["z"] / INCH, fixed)
+        load = rounded(nodes["load"].sum() / POUND_FORCE)
+        rows.append([str(body), rounded(1e3 * mass, 4), heights, load])
+    return Table(["body", "mass (g)", "heights of nodes (in)", "load on the ground (lbf)"], rows)
 
 
 def _cables_table(study: RestStudy) -> Table:
     rows = []
     for group, cables in study.cables.groupby("group", sort=False):
-        free = fixed(cables["free_length"].mean() / INCH)
+        free = rounded(cables["free_length"].mean() / INCH)
         lengths, tensions = cables["length"] / INCH, cables["tension"] / POUND_FORCE
-        rows.append([str(group), str(len(cables)), free, _range(lengths), _range(tensions, 3)])
+        rows.append([str(group), str(len(cables)), free, _range(lengths), _range(tensions)])
     headings = ["cables", "number", "free length (in)", "length (in)", "tension (lbf)"]
     return Table(headings, rows)
 
 
-def _range(values: pandas.Series, digits: int = 2) -> str:
-    return f"{fixed(values.min(), digits)} to {fixed(values.max(), digits)}"
+def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> str:
+    low, high = write(values.min()), write(values.max())
+    return low if low == high else f"{low} to {high}"
 
 
 def save_structure_page(study: RestStudy, path: Path) -> None:

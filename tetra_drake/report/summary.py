@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from tetra_drake.evolution.reevaluation import best_distances
 from tetra_drake.evolution.run import Run, gait_label
-from tetra_drake.evolution.trials import TrialStatus
-from tetra_drake.formatting import Table, fixed, signed
-from tetra_drake.optimizers.steady_state import CHILDREN
+from tetra_drake.evolution.trials import ALL_DONE
+from tetra_drake.formatting import Table, fixed, rounded
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.scenario.metric_units import METRICS
@@ -22,141 +18,169 @@ from tetra_drake.scenario.units import customary
 if TYPE_CHECKING:
     import pandas
 
+_SHARES = ("lifted", "actuator_limited", "kept")
+"""Numbers that are shown in percent."""
 
-def metrics_table(gaits: Mapping[str, Mapping[str, Any] | pandas.Series]) -> Table:
-    """Fitness and metrics of gaits, a column for each, given as rows of `Run.evaluations`; metrics
-    that none of them has are left out."""
-    columns = list(gaits.values())
-    cells = {"fitness": [fixed(gait["fitness"], 3) for gait in columns]}
-    for name, unit in METRICS.items():
-        size, read = customary(unit)
-        title = name.replace("_", " ")
-        heading = f"{title} ({read})" if read else title
-        cells[heading] = [fixed(gait[name] / size, 3) for gait in columns]
-        if name == "distance":
-            worst = [gait.get("worst_distance_in", math.nan) for gait in columns]
-            cells["distance, worst draw (in)"] = [fixed(inches, 3) for inches in worst]
-    kept = [gait.get("kept", math.nan) for gait in columns]
-    cells["draws kept, disturbed (%)"] = [fixed(100.0 * share, 0) for share in kept]
-    bodies = [name for name in dict(columns[0]) if name.startswith("lifted_T")]
-    cells["lifted, body by body (%)"] = [
-        " ".join(fixed(100.0 * gait[name], 0) for name in bodies) for gait in columns
-    ]
-    rows = [[heading, *values] for heading, values in cells.items()]
-    with_numbers = [row for row in rows if any(value.strip("- ") for value in row[1:])]
-    return Table(["", *gaits], with_numbers)
+_TITLES = {"worst_distance_in": "distance in the worst draw (in)", "kept": "robust (%)"}
+"""Titles of numbers that are no metrics."""
+
+_NOTES = {
+    "steady_distance": "without the start",
+    "twist": "one rear foot ahead of the other",
+    "lead": "front tip ahead of rear foot",
+    "lateral_drift": "sideways",
+    "heading_change": "left positive",
+    "path_curvature": "1 / radius, left positive",
+    "cost_of_transport": "work / (weight x distance)",
+    "signal_rate": "how fast signals change",
+    "lifted": "time off the ground",
+    "clearance": "smallest gap of struts' axes",
+    "tension": "smallest of any cable",
+    "travelling_index": "0: standing wave, 1: travelling",
+    "actuator_limited": "time at a limit of an actuator",
+    "kept": "draws that cost at most a tenth",
+}
+"""What a number is, where its name does not say it."""
+
+_NOTHING = 5e-4
+"""A table has no row for numbers that are all smaller, in the units in which it shows them."""
+
+
+def metrics_table(
+    gaits: Mapping[str, Mapping[str, Any] | pandas.Series], scenario: Scenario
+) -> Table:
+    """Fitness and metrics of gaits, a column for each, given as rows of `Run.evaluations`; the
+    metric that the objective is about stands first. Numbers that are zero for all are left out."""
+    *_, last = gaits.values()
+    first = headline_metric(scenario.objective, last)
+    names = dict.fromkeys([first, "fitness", "worst_distance_in", *METRICS, "kept"])
+    rows = []
+    for name in names:
+        size, title = _size_and_title(name)
+        values = [gait.get(name, math.nan) / size for gait in gaits.values()]
+        if any(math.isfinite(value) and abs(value) >= _NOTHING for value in values):
+            digits = [fixed(x, 0) if name in _SHARES else rounded(x) for x in values]
+            rows.append([title, *digits, _NOTES.get(name, "")])
+    return Table(["", *gaits, ""], rows, text_columns=(0, len(gaits) + 1))
+
+
+def _size_and_title(name: str) -> tuple[float, str]:
+    """Unit in which a number is shown, and its name with this unit."""
+    title = name.replace("_", " ")
+    if name in _SHARES:
+        return 0.01, _TITLES.get(name, f"{title} (%)")
+    size, unit = customary(METRICS.get(name, ""))
+    return size, _TITLES.get(name, f"{title} ({unit})" if unit else title)
 
 
 def result_text(result: SimulationResult) -> str:
-    """The metrics of a simulation, what it missed, and what it took."""
+    """The metrics of a simulation, what it missed, and how long it took."""
     scenario, metrics = result.scenario, result.metrics
-    lines = [f"{result.name}: {result.duration:g} s on scenario {scenario.name}"]
-    if ground := ground_text(scenario):
-        lines.append(f"ground: {ground}")
-    table = metrics_table({"": {"fitness": result.fitness} | vars(metrics)})
-    first = headline_metric(scenario.objective, vars(metrics)).replace("_", " ")
-    rows = sorted(table.rows, key=lambda row: not row[0].startswith(first))
-    lines.append(Table(["metric", "value"], rows).text())
+    lines = [result.title, f"scenario {scenario.name}, {ground_text(scenario)}"]
+    lines.append(metrics_table({"": {"fitness": result.fitness} | vars(metrics)}, scenario).text())
+    if metrics.tension < 0.0:
+        lines.append("A cable had to push: this gait cannot be built.")
     unmet = unmet_requirements(metrics, scenario.require)
     lines += [f"{text} (requirement not met)" for text in unmet]
-    seconds, speed = fixed(result.wall_time, 1), fixed(result.duration / result.wall_time, 1)
-    work = result.integrator
-    lines.append(
-        f"simulated in {seconds} s, {speed} times real time: {work.scheme}, "
-        f"{scenario.engine.precision}, {work.steps} steps, "
-        f"{work.derivative_evaluations} derivative evaluations"
-    )
+    time, factor = _time(result.wall_time), rounded(result.duration / result.wall_time)
+    lines.append(f"simulated in {time} ({factor} x real time), engine {result.engine}")
     return "\n".join(lines)
 
 
-THESIS_GROUND = "flat, the thesis's friction"
-
-
 def ground_text(scenario: Scenario) -> str:
-    """Terrain and friction in a line; empty for the thesis's flat ground and friction.
+    """Terrain and friction in a line.
 
     For example, "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)".
     """
-    friction = scenario.engine.friction_text(scenario.friction)
-    ground = f"{scenario.terrain.text}, {friction}"
-    return "" if ground == THESIS_GROUND else ground
+    return f"{scenario.terrain.text}, {scenario.engine.friction_text(scenario.friction)}"
 
 
 def run_text(run: Run) -> str:
     """The lines printed at the end of a run."""
-    texts = [
-        "Trials from the first to the last iteration; distances are those of the fittest gaits.",
-        trials_table(run).text(),
-        Table(["", "this run"], results(run)).text(),
-    ]
+    texts = [Table(["", ""], results(run), text_columns=(0, 1)).text().strip("\n")]
+    if len(run.statuses) > 1:
+        texts.append(trials_table(run).text())
     if not run.best().empty:
         best = run.fittest()
-        gaits = {"initial": run.initial_best(best["trial"]), "fittest": best}
-        label = gait_label(best)
-        texts.append(f"The fittest gait, {label}, beside its trial's fittest initial one:")
-        texts.append(metrics_table(gaits).text())
+        gaits = {"initially": run.initial_best(best["trial"]), "best": best}
+        texts.append(metrics_table(gaits, run.scenario).text())
     replay, report = run.directory / "replay.html", run.directory / "report.html"
     if replay.exists() and report.exists():
-        texts.append(f"open {replay} in a browser to see the best gait walk, {report} for more")
+        texts.append(f"to watch the best gait:  {replay}\nfigures and numbers:     {report}")
     return "\n\n".join(texts)
-
-
-def trials_table(run: Run) -> Table:
-    """The trials of a run from the first to the last iteration, and their best gaits on the Drake
-    diagram if they were evaluated there, too."""
-    trials = run.statuses
-    columns = {
-        "trial": [f"{trial.number}" for trial in trials],
-        "best distance (in)": [
-            _rise(trial.initial_best_distance_in, trial.best_distance_in) for trial in trials
-        ],
-    }
-    if not run.reevaluations.empty:
-        distances = {trial: distance for trial, _, distance in best_distances(run)}
-        on_diagram = [distances.get(trial.number, math.nan) for trial in trials]
-        columns["on the diagram (in)"] = [fixed(distance) for distance in on_diagram]
-    if any(math.isfinite(trial.mean_fitness) for trial in trials):
-        rises = [_rise(trial.initial_mean_fitness, trial.mean_fitness) for trial in trials]
-        columns["mean fitness"] = rises
-    columns["iterations"] = [f"{max(trial.iteration, 0)}" for trial in trials]
-    columns["evaluations"] = [f"{trial.evaluations}" for trial in trials]
-    columns["failed"] = [f"{trial.failures}" for trial in trials]
-    columns["state"] = [trial.stop or "not ended" for trial in trials]
-    return Table(list(columns), list(zip(*columns.values(), strict=True)))
-
-
-def _rise(before: float, after: float) -> str:
-    return f"{fixed(before)} → {fixed(after)}"
 
 
 def results(run: Run) -> list[tuple[str, str]]:
     """The results of a run by their names, with units.
 
-    Distances are those of the fittest gaits; the best gait is the fittest of all. Improvements are
-    in inches, and in percent where the initial distances are long enough to compare with.
+    They are of the metric that the run's objective is about. The best gait is the fittest.
     """
-    statuses = run.statuses
-    best = max(statuses, key=lambda status: status.best_fitness)
-    initial = [status.initial_best_distance_in for status in statuses]
+    statuses, best = run.statuses, run.best()
     evaluations = sum(status.evaluations for status in statuses)
+    failures = sum(status.failures for status in statuses)
     wall_time = sum(status.wall_time for status in statuses)
-    iteration_time = CHILDREN * wall_time / max(evaluations, 1)
-    return [
-        ("best initial gait", f"{fixed(_finite(initial).max())} in"),
-        ("best evolved gait", f"{fixed(best.best_distance_in)} in"),
-        ("improvement, mean of trials", _improvement(statuses)),
-        ("improvement, best gait's trial", _improvement([best])),
-        ("time per two evaluations", f"{fixed(iteration_time)} s"),
+    count = f"{evaluations}, of which {failures} failed" if failures else f"{evaluations}"
+    effort = [("evaluations", count)]
+    if evaluations:
+        effort.append(("time per evaluation", _time(wall_time / evaluations)))
+    if best.empty:
+        return effort
+    fittest = run.fittest()
+    initial = run.initial_best(fittest["trial"])
+    name = _about(run)
+    title, unit = name.replace("_", " "), METRICS[name]
+    rows = [
+        (title, f"{_three(fittest[name], unit)}, {gait_label(fittest)}"),
+        ("best initial gait", f"{_three(initial[name], unit)}, {gait_label(initial)}"),
     ]
+    if len(best) > 1:
+        median = _three(best[name].median(), unit)
+        low, high = (_three(best[name].quantile(share), unit) for share in (0.25, 0.75))
+        rows.append(("best of each trial", f"median {median}, quartiles {low} and {high}"))
+    return rows + effort
 
 
-def _improvement(statuses: Sequence[TrialStatus]) -> str:
-    """Mean gain of trials in inches, and in percent if all trials have one."""
-    gain = f"{signed(_finite([status.gain_in for status in statuses]).mean())} in"
-    percent = float(np.mean([status.gain_percent for status in statuses]))
-    return f"{gain} ({fixed(percent, 0)} %)" if math.isfinite(percent) else gain
+def trials_table(run: Run) -> Table:
+    """The trials of a run: the metric that its objective is about, of the best gait initially and
+    in the end, and in Drake if that gait was evaluated there, too; evaluations and state."""
+    size, title = _size_and_title(_about(run))
+    best = {row["trial"]: row for _, row in run.best().iterrows()}
+    in_drake = run.reevaluations.set_index(["trial", "index"])
+    columns = ["trial", f"initial {title}", "best", "in Drake", "evaluations", "failed", "end"]
+    rows = []
+    for status in run.statuses:
+        values = [math.nan] * 3
+        if status.number in best:
+            values = _course(run, best[status.number], in_drake)
+        cells = [rounded(value / size) for value in values]
+        counts = [f"{status.evaluations}", f"{status.failures or ''}"]
+        end = "not finished" if status.stop is None else status.stop.replace(ALL_DONE, "")
+        rows.append([f"{status.number}", *cells, *counts, end])
+    shown = [place for place, cells in enumerate(zip(*rows, strict=True)) if {*cells} - {"-", ""}]
+    rows = [[row[place] for place in shown] for row in rows]
+    names = [columns[place] for place in shown]
+    return Table(names, rows, text_columns=(0, names.index("end") if "end" in names else 0))
 
 
-def _finite(values: Sequence[float]) -> np.ndarray:
-    """The finite ones of the values; NaN alone if there is none."""
-    return np.array([value for value in values if math.isfinite(value)] or [math.nan])
+def _course(run: Run, best: pandas.Series, in_drake: pandas.DataFrame) -> list[float]:
+    """What trials_table() shows of the best gait of a trial, in SI."""
+    name, key = _about(run), (best["trial"], best["index"])
+    initial = run.initial_best(best["trial"])
+    again = in_drake.loc[key, name] if key in in_drake.index else math.nan
+    return [initial[name], best[name], float(again)]
+
+
+def _about(run: Run) -> str:
+    """Metric that the run's objective is about."""
+    return headline_metric(run.scenario.objective, run.fittest())
+
+
+def _three(value: float, unit: str) -> str:
+    """A number of an SI unit with three digits, in the unit in which people read it."""
+    size, name = customary(unit)
+    return f"{rounded(value / size)} {name}".rstrip()
+
+
+def _time(seconds: float) -> str:
+    """A wall time, as "35 ms"."""
+    return f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{rounded(seconds)} s"

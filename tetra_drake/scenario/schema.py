@@ -42,7 +42,7 @@ from tetra_drake.scenario.settings import (
 )
 from tetra_drake.scenario.structure_files import with_structure
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
-from tetra_drake.scenario.units import rounded
+from tetra_drake.scenario.units import plainest, rounded
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
@@ -113,11 +113,16 @@ class Scenario(Section):
 
     def differences(self, base: Scenario) -> list[tuple[str, str]]:
         """(key, value) of what differs from `base`, the name aside, in the units in which it was
-        written."""
-        full = [tree_of(each, show="{:.6g} {}".format, sparse=False) for each in (self, base)]
-        ours, theirs, written = (_texts(tree) for tree in (*full, self.tree))
-        changed = [key for key in ours if ours[key] != theirs.get(key, "null") and key != "name"]
-        return [(key.removesuffix(f".{TAG}"), written.get(key, ours[key])) for key in changed]
+        written; of a record, which is written in SI, in those in which the number is round."""
+        ours, theirs, written = _values(self), _values(base), flattened(self.tree)
+        in_si = flattened(tree_of(self, sparse=False))
+        found = []
+        for key, value in ours.items():
+            if key != "name" and _text(value) != _text(theirs.get(key)):
+                given = written.get(key, in_si[key])
+                text = _text(value if given == in_si[key] else given)
+                found.append((key.removesuffix(f".{TAG}"), text))
+        return found
 
     def __eq__(self, other: object) -> bool:
         # Units in which a number was written do not matter.
@@ -288,10 +293,14 @@ def _thesis() -> Scenario:
     return Scenario.from_tree(parse_yaml(read_text(file, "scenario file"), file), file)
 
 
-def _texts(tree: Tree) -> dict[str, str]:
-    """The values of a tree as texts, by their keys."""
-    values = flattened(tree).items()
-    return {key: rounded(json.dumps(value)).replace('"', "") for key, value in values}
+def _values(scenario: Scenario) -> dict[str, Any]:
+    """The values of a scenario by their keys; quantities as plain texts."""
+    return flattened(tree_of(scenario, show=plainest, sparse=False))
+
+
+def _text(value: Any) -> str:
+    """A value of a tree as text."""
+    return rounded(json.dumps(value)).replace('"', "")
 
 
 def _with_number(value: Any, names: Sequence[str], number: float) -> Any:

@@ -12,6 +12,15 @@ POUND_FORCE = 4.4482216152605  # N, exact
 _READ = {"m": (INCH, "in"), "N": (POUND_FORCE, "lbf"), "rad": (math.pi / 180.0, "deg")}
 """Size in SI and name of what people read instead of an SI unit."""
 
+_SMALL = {
+    "m": [(1e-3, "mm"), (1e-2, "cm")],
+    "m/s": [(1e-3, "mm/s")],
+    "s": [(1e-3, "ms")],
+    "kg": [(1e-3, "g")],
+    "kg/m^3": [(1e3, "g/cm^3")],
+}
+"""Other units of which settings may be round numbers: size in SI, name."""
+
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
 _FACTORS = rf"{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*"
@@ -48,11 +57,13 @@ def customary(unit: str) -> tuple[float, str]:
     """The unit in which people read numbers of an SI unit, such as "lbf/in" for "N/m": its size in
     SI, and its name. Units with others than lengths, forces, angles and times stay as they are."""
     above, _, below = unit.partition("/")
-    factors, divisors = above.split("*"), below.split("*")
-    if not {*factors, *divisors} <= {*_READ, "s", "1", ""}:
-        return 1.0, unit
-    size = math.prod(_READ.get(name, (1.0, ""))[0] for name in factors)
-    size /= math.prod(_READ.get(name, (1.0, ""))[0] for name in divisors)
+    size = 1.0
+    for factors, sign in ((above, 1), (below, -1)):
+        for factor in factors.split("*"):
+            name, _, power = factor.partition("^")
+            if name not in {*_READ, "s", "1", ""}:
+                return 1.0, unit
+            size *= _READ.get(name, (1.0, ""))[0] ** (sign * int(power or 1))
     name = re.sub(r"[A-Za-z]+", lambda word: _READ.get(word[0], (1.0, word[0]))[1], unit)
     return size, name.removeprefix("1")
 
@@ -61,3 +72,14 @@ def shown(number: float, unit: str) -> str:
     """A number of an SI unit as people read it, such as "25 lbf/in"."""
     size, name = customary(unit)
     return f"{number / size:.4g} {name}".rstrip()
+
+
+def plainest(number: float, unit: str) -> str:
+    """A number of an SI unit in the unit that needs the fewest digits, such as "6 in", "20 ms"."""
+    candidates = [customary(unit), *_SMALL.get(unit, []), (1.0, unit.removeprefix("1"))]
+
+    def digits(candidate: tuple[float, str]) -> int:
+        return sum(letter.isdecimal() for letter in f"{number / candidate[0]:.9g}")
+
+    size, name = min(candidates, key=digits)
+    return f"{number / size:.6g} {name}".rstrip()
