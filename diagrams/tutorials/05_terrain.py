@@ -26,8 +26,8 @@ results = td.simulate_many(scenarios, [run.best_gait()] * len(scenarios), record
 figure = Figure(figsize=(7.0, 4.0), layout="constrained")
 axes = figure.subplots()
 for result in results:
-    inches = distance_walked(result.recorded, result.robot.structure) / 0.0254
-    axes.plot(result.recorded.time, inches, label=result.scenario.name)
+    inches = distance_walked(result.trajectory, result.robot.structure) / 0.0254
+    axes.plot(result.trajectory.time, inches, label=result.scenario.name)
 axes.set(xlabel="time (s)", ylabel="distance (in)")
 axes.legend()
 figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)

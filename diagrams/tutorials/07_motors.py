@@ -31,7 +31,7 @@ print(f"played from the file: {played.metrics.distance_in:.1f} in")
 figure = Figure(figsize=(7.0, 3.0), layout="constrained")
 axes = figure.subplots()
 for name, result in {"forces": needs, "motors": driven}.items():
-    tension = result.recorded.tension.sel(cable="T1-T2 outer bottom_left", time=slice(10.0, 13.0))
+    tension = result.trajectory.tension.sel(cable="T1-T2 outer bottom_left", time=slice(10.0, 13.0))
     axes.plot(tension.time, tension, label=name)
 axes.set(xlabel="time (s)", ylabel="tension (N)")
 axes.legend()
