@@ -140,12 +140,18 @@ def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
     return f"{name.replace('_', ' ')} {shown(metrics[name], METRICS[name])}, {walk}"
 
 
+_GROUNDS = {"Rough": "on rough ground", "Steps": "over steps", "Obstacles": "over obstacles"}
+"""How one says where the robot walks, by kind of terrain."""
+
+
 def _ground(scenario: Scenario) -> str:
-    """Ground that is not flat, as " on rough ground"."""
+    """Where the robot walks unless the ground is level, as " on rough ground"."""
     slope = scenario.terrain.plane_slope
     if slope is None:
-        return f" on {type(scenario.terrain).__name__.lower()} ground"
-    return f" {'up' if slope > 0.0 else 'down'} {abs(math.degrees(slope)):.3g} degrees" if slope else ""
+        return f" {_GROUNDS.get(type(scenario.terrain).__name__, 'on uneven ground')}"
+    if slope == 0.0:
+        return ""
+    return f" {'up' if slope > 0.0 else 'down'} {abs(math.degrees(slope)):.3g} degrees"
 
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:

@@ -12,7 +12,7 @@ window.addEventListener("load", () => {
   const {LineBasicMaterial, Mesh, MeshPhongMaterial, Quaternion, Raycaster, Vector3} = MeshCat.THREE;
   const {bodies, cables, colours, contacts, nodes, progress, strut, times} = recording;
   const INCH = 0.0254, UP = new Vector3(0, 0, 1);
-  const WIDTH_FILLED = 0.74, HEIGHT_FILLED = 0.6;  // shares of the picture
+  const WIDTH_FILLED = 0.7, HEIGHT_FILLED = 0.58;  // shares of the picture
   const AFAR = 30;  // robots
   const SMOOTHING = 0.6;  // s before and after a time over which the camera's target is averaged
   const duration = times.at(-1) - times[0];
@@ -267,8 +267,10 @@ window.addEventListener("load", () => {
   function follow(on) {
     element("follow").checked = on;
     followed = null;
-    if (on) standing = null;
-    show_frame();
+    if (!on) return;
+    standing = null;
+    aim(middle());
+    frame_picture();
   }
   element("time").max = duration;
   element("time").addEventListener("input", (event) => show(Number(event.target.value)));
@@ -327,13 +329,13 @@ window.addEventListener("load", () => {
     dress(false);
     labels.splice(0).forEach(({span}) => span.remove());
     element("labels").hidden = false;
-    camera({times: moments, from: [0.1, -1, 0.3]});
+    camera({times: moments, from: [0.35, -1, 0.4]});
     moments.forEach((moment, i) => {
       show(moment);
       const above = mean(places), last = i == moments.length - 1;
       above.z = Math.max(...places.map((point) => point.z)) + 12 * strut;
       label(`${moment} s`, () => above, "name");
-      if (!last) add_ghost(0.75 - 0.25 * i / moments.length);
+      if (!last) add_ghost(0.65 - 0.2 * i / moments.length);
     });
     const start = paths[0].geometry.attributes.position;
     const from = new Vector3().fromBufferAttribute(start, 0);
@@ -347,8 +349,7 @@ window.addEventListener("load", () => {
   }
   function dress(on) {
     for (const id of ["heading", "legend", "bar", "labels"]) element(id).hidden = !on;
-    document.documentElement.style.setProperty("--bar", on ? "" : "0px");
-    if (on) document.documentElement.style.removeProperty("--bar");
+    document.documentElement.style.setProperty("--bar", on ? null : "0px");
     viewer.set_3d_pane_size();
     frame_picture();
   }

@@ -48,7 +48,7 @@ RESOLUTION = 2.0**-16
 then take 0.1 MB, and Meshcat's script 0.9 MB."""
 
 MOST_NAMES = 12
-"""Largest number of bodies whose names are shown."""
+"""Largest number of bodies whose names are shown, unless they are those of two nodes."""
 
 _COMMAND = re.compile(r'fetch\(("data:application/octet-binary;base64,[^"]*")\)(\s*\.then\(.*\))+;')
 """How Meshcat's page adds a part of the scene: at some time. The film needs them all at once."""
@@ -108,7 +108,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "times": frames["time"].values.round(5).tolist(),
         "resolution": RESOLUTION,
         "bodies": bodies,
-        "named": len(bodies) <= MOST_NAMES,
+        "named": len(bodies) <= MOST_NAMES and not any(" " in name for name in bodies),
         "nodes": [
             {"path": _parts(path), "body": int(body), "place": place.round(6).tolist()}
             for path, body, place in zip(paths, structure.carriers, structure.p_BN, strict=True)

@@ -31,7 +31,7 @@ COLOURS = {
     "force": "#111111",
     "trace": "#5b6570",
     "floor": "#f3f4f5",
-    "low": "#cdb894",
+    "low": "#d6c6a6",
     "high": "#f7f4ec",
     "inch": "#d5d8dc",
     "inch_on_relief": "#bfb6a2",
@@ -44,7 +44,7 @@ a node on the ground has the colour `stance`."""
 SLENDERNESS = 60.0
 """Longest strut over the least drawn radius of struts: thinner ones could hardly be seen."""
 
-THICKEST, THINNEST = 1.0, 0.15
+THICKEST, THINNEST = 0.7, 0.15
 """Drawn radius of the cable with the highest tension, and the least one, in radii of a strut."""
 
 MARGIN, UNEVEN_MARGIN = 4.5, 1.5
