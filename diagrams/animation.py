@@ -3,7 +3,7 @@
     tetra-drake replay RUN|GAIT --out replay.html
     python diagrams/animation.py replay.html walking.gif walking.png
 
-A GIF shows 10 s at twice their speed, with a camera that follows. A PNG shows the robot
+A GIF shows 6 s at twice their speed, with a camera that follows. A PNG shows the robot
 at four equally spaced times, with the distance walked. Needs Chromium or Chrome, and the Python
 package playwright (`pip install -e '.[test]'`).
 """
@@ -32,17 +32,17 @@ if TYPE_CHECKING:
 LIMITS = {".gif": 500_000, ".png": 90_000}
 """Sizes of files in bytes, for which pictures become as narrow as they must."""
 
-GROUND_COLOURS = {".gif": 16, ".png": 100}
+GROUND_COLOURS = {".gif": 8, ".png": 100}
 """Number of colours that a picture has beside the robot's."""
 
-ASPECTS = {".gif": 16 / 9, ".png": 2.2}
+ASPECTS = {".gif": 16 / 9, ".png": 2.8}
 """Width over height of a picture."""
 
 WIDTHS = {".gif": range(560, 239, -40), ".png": range(800, 239, -80)}
 """Pixels."""
 
 SUPERSAMPLING = 2
-START, END, STEP = 2.0, 12.0, 0.2  # s of the motion: of the frames, between frames
+START, END, STEP = 4.0, 10.0, 0.2  # s of the motion: of the frames, between frames
 FRAME_TIME = 100  # ms: twice as fast as the robot walks
 INSTANTS = 4  # of a still
 

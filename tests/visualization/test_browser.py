@@ -197,7 +197,7 @@ def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
 
 
 def test_a_still_has_ghosts_and_neither_heading_nor_bar(browser, replay):
-    with opened(browser, replay.as_uri()) as page:
+    with opened(browser, replay.as_uri(), size=(300, 200)) as page:
         animation.wait_until_loaded(page)
         robots = "viewer.scene.children.filter(child => child.name == 'robot').length"
         assert page.evaluate(robots) == 1
