@@ -50,6 +50,9 @@ then take 0.1 MB, and Meshcat's script 0.9 MB."""
 MOST_NAMES = 12
 """Largest number of bodies whose names are shown, unless they are those of two nodes."""
 
+LONG_ARROW = 0.8
+"""Length of the arrow of a great force, over the robot's height at the start."""
+
 _COMMAND = re.compile(r'fetch\(("data:application/octet-binary;base64,[^"]*")\)(\s*\.then\(.*\))+;')
 """How Meshcat's page adds a part of the scene: at some time. The film needs them all at once."""
 
@@ -101,7 +104,9 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     tension, force = frames["tension"].values, ground_forces(robot, frames)
     greatest = np.percentile(tension, _USUAL)
     per_newton = radius_per_newton(structure, greatest)
-    inch_of_arrow = round_force(float(np.percentile(np.linalg.norm(force, axis=-1), _USUAL)) / 4.0)
+    usual_force = float(np.percentile(np.linalg.norm(force, axis=-1), _USUAL))
+    inches = LONG_ARROW * float(np.ptp(frames["p_WN"].values[0, :, 2])) / INCH
+    inch_of_arrow = round_force(usual_force / max(inches, 1.0))
     poses = np.concatenate([frames["p_WB"].values, frames["q_WB"].values], axis=-1)
     ends = structure.cables[["node_a", "node_b"]].tolist()
     return {
