@@ -3,9 +3,9 @@
     tetra-drake replay RUN|GAIT --out replay.html
     python diagrams/animation.py replay.html walking.gif walking.png
 
-A GIF shows the first 15 s at twice their speed; a PNG the end of the motion, with the paths of the
-bottom nodes. Needs Chromium or Chrome, and the Python package playwright
-(`pip install -e '.[test]'`).
+A GIF shows 6 s at twice their speed, with a camera that follows. A PNG shows the robot
+at four equally spaced times, with the distance walked. Needs Chromium or Chrome, and the Python
+package playwright (`pip install -e '.[test]'`).
 """
 
 from __future__ import annotations
@@ -20,24 +20,31 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PIL import Image, ImageChops
+from PIL import Image
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file
-from tetra_drake.visualization.scene import ASPECT, COLOURS, PASSIVE_COLOURS
+from tetra_drake.visualization.scene import COLOURS
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-LIMITS = {".gif": 500_000, ".png": 60_000}
+LIMITS = {".gif": 500_000, ".png": 90_000}
 """Sizes of files in bytes, for which pictures become as narrow as they must."""
 
-GROUND_COLOURS = {".gif": 8, ".png": 64}
+GROUND_COLOURS = {".gif": 8, ".png": 100}
 """Number of colours that a picture has beside the robot's."""
 
-WIDTHS, SUPERSAMPLING = range(720, 239, -80), 2  # pixels
-START, END, STEP = 1.0, 15.0, 0.2  # s of the motion: of the frames, between frames
+ASPECTS = {".gif": 16 / 9, ".png": 2.8}
+"""Width over height of a picture."""
+
+WIDTHS = {".gif": range(560, 239, -40), ".png": range(800, 239, -80)}
+"""Pixels."""
+
+SUPERSAMPLING = 2
+START, END, STEP = 4.0, 10.0, 0.2  # s of the motion: of the frames, between frames
 FRAME_TIME = 100  # ms: twice as fast as the robot walks
+INSTANTS = 4  # of a still
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 _SOFTWARE_WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
@@ -66,53 +73,53 @@ def launch_browser() -> Iterator[Browser]:
 
 
 def wait_until_loaded(page: Page) -> None:
-    """Waits until a replay page has read all it holds."""
-    page.wait_for_load_state("networkidle")
-    page.wait_for_function("viewer.animator.duration > 0")
+    """Waits until a replay page can play."""
+    page.wait_for_function("window.film")
 
 
-def show_instant(page: Page, time: float) -> None:
-    """Stops a replay page at a time (s) of the motion."""
+def do(page: Page, call: str, *arguments: object) -> None:
+    """Calls one of the page's functions (see film.js), such as "show", and waits until the result
+    is drawn."""
     page.evaluate(
-        """async time => {
-            viewer.animator.pause();
-            viewer.animator.seek(time);
-            viewer.animator.display_progress(time);
+        """async ([call, given]) => {
+            film[call](...given);
             const frame = () => new Promise(requestAnimationFrame);
             await frame();
             await frame();
         }""",
-        time,
+        [call, list(arguments)],
     )
 
 
-def shots(page: Page, times: Iterable[float], *, traces: bool) -> list[Image.Image]:
-    """Pictures of a replay page at times (s) of the motion: the robot and its floor on white, with
-    or without the traces."""
-    page.add_style_tag(content="#heading, .dg { display: none !important }")
-    for name, shown in {"Background": False, "forces": False, "traces": traces}.items():
-        page.evaluate(
-            "([name, shown]) => viewer.set_property([name], 'visible', shown)", [name, shown]
-        )
+def shot(page: Page) -> Image.Image:
+    """What the page shows."""
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
+def shots(page: Page, times: Iterable[float]) -> list[Image.Image]:
+    """Pictures of the robot at times (s) of the motion."""
+    do(page, "dress", False)
+    page.evaluate("viewer.set_property(['floor', 'inch'], 'visible', false)")  # they flicker
     images = []
     for time in times:
-        show_instant(page, time)
-        images.append(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+        do(page, "show", time)
+        images.append(shot(page))
     return images
 
 
+def still(page: Page, times: Sequence[float]) -> Image.Image:
+    """Picture of the robot at all these times (s) of the motion."""
+    do(page, "still", list(times))
+    return shot(page)
+
+
 def save(images: Sequence[Image.Image], path: Path) -> None:
-    """Writes images on white as a picture or an endless animation, without the margins that all
-    have, as wide as LIMITS allow."""
-    white = Image.new("RGB", images[0].size, "white")
-    boxes = np.array([ImageChops.difference(image, white).getbbox() for image in images])
-    low, high = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-    cut = [image.crop((*low.tolist(), *high.tolist())) for image in images]
+    """Writes images as a picture or an endless animation, as wide as LIMITS allow."""
     palette = _palette(images[0], GROUND_COLOURS[path.suffix])
     with whole_file(path) as temporary:
-        for width in WIDTHS:
-            size = width, round(width * cut[0].height / cut[0].width)
-            small = [image.resize(size, Image.Resampling.LANCZOS) for image in cut]
+        for width in WIDTHS[path.suffix]:
+            size = width, round(width * images[0].height / images[0].width)
+            small = [image.resize(size, Image.Resampling.LANCZOS) for image in images]
             first, *others = (
                 image.quantize(palette=palette, dither=Image.Dither.NONE) for image in small
             )
@@ -126,32 +133,31 @@ def save(images: Sequence[Image.Image], path: Path) -> None:
 
 
 def _palette(image: Image.Image, count: int) -> Image.Image:
-    """The colours of the robot, those half faded into the floor, and `count` of an image."""
-    rgb = {name: np.array(list(bytes.fromhex(code[1:]))) for name, code in COLOURS.items()}
-    drawn = [rgb[name] for name in ("odd", "even", "actuated", *PASSIVE_COLOURS, "trace")]
-    faded = [(colour + rgb["floor"]) // 2 for colour in drawn]
+    """The colours of the robot in light and shade, and `count` of an image."""
+    names = ("rear", "lead", "node", "stance", "actuated", "passive")
+    robot = np.array([list(bytes.fromhex(COLOURS[name][1:])) for name in names])
     others = image.quantize(count).getpalette() or []
     palette = Image.new("P", (1, 1))
-    palette.putpalette(np.concatenate([[255, 255, 255], *drawn, *faded, others]).tolist())
+    palette.putpalette(np.concatenate([*(robot * 0.7), *robot, others]).astype(int).tolist())
     return palette
 
 
-def make_pictures(browser: Browser, replay: Path, files: Sequence[Path]) -> None:
-    """Writes pictures of a replay page, of kinds in LIMITS."""
+def make_picture(browser: Browser, replay: Path, file: Path) -> None:
+    """Writes a picture of a replay page, of a kind in LIMITS."""
+    width = WIDTHS[file.suffix][0]
+    height = round(width / ASPECTS[file.suffix])
     page = browser.new_page(
-        viewport={"width": WIDTHS[0], "height": round(WIDTHS[0] / ASPECT)},
-        device_scale_factor=SUPERSAMPLING,
+        viewport={"width": width, "height": height}, device_scale_factor=SUPERSAMPLING
     )
     with contextlib.closing(page):
         page.goto(replay.resolve().as_uri())
         wait_until_loaded(page)
-        duration = page.evaluate("viewer.animator.duration")
-        for file in files:
-            if file.suffix == ".gif":
-                times = np.arange(START, min(duration, END), STEP).tolist()
-                save(shots(page, times, traces=False), file)
-            else:
-                save(shots(page, [duration], traces=True), file)
+        duration = page.evaluate("film.duration")
+        if file.suffix == ".gif":
+            save(shots(page, np.arange(START, min(duration, END), STEP).tolist()), file)
+        else:
+            times = np.linspace(0.0, duration, INSTANTS).round(2).tolist()
+            save([still(page, times)], file)
 
 
 def main() -> None:
@@ -164,7 +170,8 @@ def main() -> None:
         if file.suffix not in LIMITS:
             parser.error(f"{file}: expected a file that ends in {' or '.join(LIMITS)}")
     with launch_browser() as browser:
-        make_pictures(browser, options.replay, options.files)
+        for file in options.files:
+            make_picture(browser, options.replay, file)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario import schema
 from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.terrain_kinds import Incline, Rough
 
 INCH = 0.0254
 
@@ -148,15 +149,28 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
 @pytest.mark.parametrize(
     ("objective", "text"),
     [
-        ({"speed": 1.0, "heading_change": 9.0}, "2.00 inches in 15 s"),
-        ({"heading_change": 1.0}, "heading change 180 deg after 15 s"),
-        ({"cost_of_transport": -1.0, "twist": -1.0}, "cost of transport 4 after 15 s"),
+        ({"speed": 1.0, "heading_change": 9.0}, "walks 2.0 in in 15 s"),
+        ({"heading_change": 1.0}, "turns 180 degrees in 15 s"),
+        ({"cost_of_transport": -1.0, "twist": -1.0}, "cost of transport 4, walks 2.0 in in 15 s"),
     ],
 )
 def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text):
     metrics = dict.fromkeys(METRICS, 0.0) | {"distance": 2.0 * INCH, "twist": 0.5 * INCH}
     metrics |= {"heading_change": math.pi, "cost_of_transport": 4.0, "speed": 0.1}
     assert headline(scenario.with_sections(objective=objective), metrics) == text
+
+
+@pytest.mark.parametrize(
+    ("terrain", "text"),
+    [
+        (Incline(slope=math.radians(10.0)), "walks 2.0 in backward up 10 degrees in 15 s"),
+        (Incline(slope=math.radians(-5.0)), "walks 2.0 in backward down 5 degrees in 15 s"),
+        (Rough(amplitude=0.01, wavelength=0.1), "walks 2.0 in backward on rough ground in 15 s"),
+    ],
+)
+def test_the_headline_says_where_the_robot_walks(scenario, terrain, text):
+    metrics = dict.fromkeys(METRICS, 0.0) | {"distance": -2.0 * INCH}
+    assert headline(scenario.with_changes({"terrain": terrain}), metrics) == text
 
 
 @pytest.mark.parametrize(

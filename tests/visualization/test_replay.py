@@ -8,27 +8,29 @@ import re
 import numpy as np
 import pytest
 from helpers import prism
-from helpers.meshcat_page import commands, read_page
-from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RotationMatrix
+from helpers.made_up_walk import LOAD, make_row, make_walk
+from helpers.meshcat_page import read_page
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.nesting import CABLES
+from tetra_drake.scenario.terrain_kinds import Incline
+from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.visualization.replay import (
     RESOLUTION,
     frame_samples,
-    legend_of,
+    ground_forces,
     pack_page,
+    round_force,
     save_replay,
 )
-from tetra_drake.visualization.scene import ARROW_LENGTH, CABLE_RADIUS, HIDDEN
+from tetra_drake.visualization.scene import THICKEST, THINNEST, cable_paths, drawn_radii
 
 ROUNDING = 0.51 * RESOLUTION
 
-TITLE = '<script>bad()</script> & \\1 "gait": 4.36 in'
+NAME, DEED = '<script>bad()</script> & \\1 "gait"', "walks 4.4 in"
+TITLE = f"{NAME}: {DEED}"
 
 
 def recorded(scenario):
@@ -61,31 +63,22 @@ def page(scenario, trajectory, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def tracks(page):
-    """Key frames of the page."""
-    return film_tracks(page)
+def film(page):
+    return film_of(page)
 
 
-def film_tracks(page):
-    """By path and property: times (frames,) in s and values (frames, ...) of the key frames."""
-    (packed,) = re.findall(r"const film = (.*);\n", page)
+@pytest.fixture(scope="module")
+def structure(scenario):
+    return Robot.of(scenario).structure
+
+
+def film_of(page):
+    """What the page plays, with motions (frames, numbers) in SI units."""
+    (packed,) = re.findall(r"const recording = (.*);\n", page)
     film = json.loads(packed)
-    times = np.array(film["ticks"]) / film["per_second"]
-    tracks = {
-        path: {
-            name: (times, film["resolution"] * np.cumsum(rows, axis=1).T)
-            for name, rows in properties.items()
-        }
-        for path, properties in film["motions"].items()
-    }
-    shown = np.array([False, True, True])
-    for path, tick in film["traces"].items():
-        tracks[path] = {"visible": (np.array([0.0, tick / film["per_second"], times[-1]]), shown)}
-    return tracks
-
-
-def rotation(xyzw):
-    return RotationMatrix(Quaternion(np.roll(xyzw, 1))).matrix()
+    for name in ("poses", "radii", "touches", "arrows", "traces"):
+        film[name] = film["resolution"] * np.cumsum(film[name], axis=1).T
+    return film
 
 
 @pytest.mark.parametrize(
@@ -99,91 +92,94 @@ def test_frames_are_evenly_spread_over_the_samples(samples, period, frames):
     assert frames == 1 or 1 <= steps.min() <= steps.max() <= steps.min() + 1
 
 
-def test_bodies_move_as_recorded(frames, tracks):
-    for i, body in enumerate(frames["body"].values):
-        times, positions = tracks[f"/robot/{body}"]["position"]
-        np.testing.assert_allclose(times, frames["time"], rtol=0, atol=1e-5)
-        np.testing.assert_allclose(positions, frames["p_WB"][:, i], rtol=0, atol=ROUNDING)
-        turned = np.roll(tracks[f"/robot/{body}"]["quaternion"][1], 1, axis=1)  # from x y z w
-        np.testing.assert_allclose(turned, frames["q_WB"][:, i], rtol=0, atol=ROUNDING)
+def test_bodies_move_as_recorded(frames, film):
+    np.testing.assert_allclose(film["times"], frames["time"], rtol=0, atol=1e-5)
+    assert film["bodies"] == frames["body"].values.tolist()
+    poses = film["poses"].reshape(len(frames["time"]), -1, 7)
+    np.testing.assert_allclose(poses[..., :3], frames["p_WB"], rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(poses[..., 3:], frames["q_WB"], rtol=0, atol=ROUNDING)
 
 
-def test_traces_show_only_what_has_been_walked(frames, page, tracks):
-    (path,) = (path for path in tracks if path.startswith("/traces/"))
-    times, shown = tracks[path]["visible"]
-    assert shown.tolist()[:2] == [False, True]  # five frames; the recording lasts 0.2 s
-    assert shown[1:].all()
-    end = frames["time"].values[-1]
-    np.testing.assert_allclose(times, np.where(shown, end, 0.0), rtol=0, atol=1e-5)
-    start, end = trace_of(page)
-    bottom = frames["p_WN"][:, frames.node.str.contains("bottom").values].values
-    np.testing.assert_allclose(start, bottom[:-1].reshape(-1, 3), rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(end, bottom[1:].reshape(-1, 3), rtol=0, atol=ROUNDING)
+def test_nodes_sit_on_their_bodies(structure, film):
+    names = [node["path"][-1].removeprefix("node ") for node in film["nodes"]]
+    assert names == list(structure.node_names)
+    assert [node["body"] for node in film["nodes"]] == structure.carriers.tolist()
+    places = [node["place"] for node in film["nodes"]]
+    np.testing.assert_allclose(places, structure.p_BN, rtol=0, atol=1e-6)
 
 
-def trace_of(page):
-    """Starts and ends (2, lines, 3) of the lines of the one trace."""
-    (trace,) = (one for one in commands(page, "/traces/") if one["type"] == "set_object")
-    (geometry,) = trace["object"]["geometries"]
-    points = np.array(geometry["data"]["attributes"]["position"]["array"])
-    return points.reshape(-1, 2, 3).swapaxes(0, 1)
+def test_cables_join_their_nodes_and_swell_with_tension(structure, frames, film):
+    assert ["/" + "/".join(cable["path"]) for cable in film["cables"]] == cable_paths(structure)
+    ends = structure.cables[["node_a", "node_b"]].tolist()
+    assert [tuple(cable["nodes"]) for cable in film["cables"]] == ends
+    tension, strut = frames["tension"].values, drawn_radii(structure)[0].min()
+    assert THINNEST * strut <= film["radii"].min() + ROUNDING
+    free = (film["radii"] > 1.1 * THINNEST * strut) & (film["radii"] < 1.2 * THICKEST * strut)
+    ratios = (film["radii"] / tension)[free]
+    full = THICKEST * strut / np.percentile(tension, 99)
+    np.testing.assert_allclose(ratios, full, rtol=0.02)
 
 
-def test_a_structure_that_is_no_row_leaves_the_path_of_its_centre(tmp_path):
+def test_arrows_are_the_forces_of_the_ground(scenario, frames, film):
+    robot, (number, _) = Robot.of(scenario), film["legend"]["force"].split()
+    forces = ground_forces(robot, frames)
+    assert (forces[..., 2] == frames["normal_force"].values).all() and forces[..., 2].max() > 0.0
+    expected = forces * INCH / (float(number) * POUND_FORCE)
+    arrows = film["arrows"].reshape(expected.shape)
+    np.testing.assert_allclose(arrows, expected, rtol=0, atol=ROUNDING)
+    np.testing.assert_array_equal(film["touches"] > 0.0, frames["in_contact"].values > 0)
+
+
+@pytest.mark.parametrize(
+    ("pounds", "rounded"), [(0.0301, 0.05), (0.05, 0.05), (0.9, 1.0), (17.0, 20.0)]
+)
+def test_an_inch_of_an_arrow_is_a_round_force(pounds, rounded):
+    assert round_force(pounds * POUND_FORCE) == pytest.approx(rounded * POUND_FORCE)
+
+
+def test_forces_on_a_slope_are_turned_with_it():
+    slope = 0.2
+    inclined = make_row(changes={"terrain": Incline(slope=slope)})
+    walk = make_walk().isel(time=[0, 50])
+    turned = ground_forces(inclined, walk)[0, 0] / LOAD
+    ahead, up = [np.cos(slope), 0.0, np.sin(slope)], [-np.sin(slope), 0.0, np.cos(slope)]
+    np.testing.assert_allclose(turned, np.array(up) - 0.5 * np.array(ahead), rtol=0, atol=1e-12)
+
+
+def test_progress_is_the_distance_or_the_turn(scenario, trajectory, tmp_path, film):
+    walked = trajectory["p_WN"].values[:, 0, 0]
+    assert (film["progress"]["what"], film["progress"]["unit"]) == ("walked", " in")
+    assert film["progress"]["values"][-1] == pytest.approx(
+        (walked[-1] - walked[0]) / INCH, abs=0.06
+    )
+    turning = scenario.with_sections(objective={"heading_change": 1.0})
+    quarter = trajectory.copy(deep=True)
+    quarter["q_WB"].values[:] = [1.0, 0.0, 0.0, 0.0]
+    quarter["q_WB"].values[len(quarter.time) // 2 :] = np.sqrt([0.5, 0.0, 0.0, 0.5])
+    save_replay(tmp_path / "turn.html", robot=Robot.of(turning), trajectory=quarter, title="a: b")
+    progress = film_of(read_page(tmp_path / "turn.html"))["progress"]
+    assert (progress["what"], progress["unit"], progress["values"][-1]) == ("turned", "°", 90.0)
+
+
+def test_rear_feet_or_the_centre_leave_a_path(structure, frames, film, tmp_path):
+    feet = frames["p_WN"].values[:, structure.markers[:2]].reshape(len(frames["time"]), -1)
+    np.testing.assert_allclose(film["traces"], feet, rtol=0, atol=ROUNDING)
     robot = prism.make_prism()
     motion = prism.slide_prism(robot, duration=0.2)
     save_replay(tmp_path / "prism.html", robot=robot, trajectory=motion, title="a prism")
     page = read_page(tmp_path / "prism.html")
-    assert "path of the centre" in page and "passive top cable" in page
-    start, end = trace_of(page)
-    np.testing.assert_allclose(start[0], [0.0, 0.0, 0.08], rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(end[-1], [0.2 * prism.SPEED, 0.0, 0.08], rtol=0, atol=ROUNDING)
-    positions = film_tracks(page)["/robot/n2 n3"]["position"][1]
-    np.testing.assert_allclose(positions[0], robot.structure.p_WB[2], rtol=0, atol=ROUNDING)
-
-
-def test_cables_reach_from_node_to_node_and_swell_with_tension(structure, frames, tracks):
-    p_WN = frames["p_WN"].values
-    expected = set()
-    for c, (name, cable) in enumerate(zip(structure.cable_names, structure.cables, strict=True)):
-        kind = "actuated" if cable["signal"] >= 0 else f"passive {name.split()[1]}"
-        expected.add(f"/cables/{kind}/{name}")
-        track = tracks[f"/cables/{kind}/{name}"]
-        middle, xyzw, scale = (track[key][1] for key in ("position", "quaternion", "scale"))
-        half = np.array([rotation(q)[:, 2] for q in xyzw]) * scale[:, 2:] / 2
-        np.testing.assert_allclose(
-            middle - half, p_WN[:, cable["node_a"]], rtol=0, atol=2 * ROUNDING
-        )
-        np.testing.assert_allclose(
-            middle + half, p_WN[:, cable["node_b"]], rtol=0, atol=2 * ROUNDING
-        )
-        radius = CABLE_RADIUS * frames["tension"].values[:, c]
-        sides = np.column_stack([radius, radius])
-        np.testing.assert_allclose(scale[:, :2], sides, rtol=0, atol=ROUNDING)
-    assert {path for path in tracks if path.startswith("/cables/")} == expected
-
-
-def test_arrows_stand_on_their_nodes_and_are_as_long_as_the_force(frames, tracks):
-    for contact in frames["contact"].values:
-        p_WN = frames["p_WN"].sel(node=contact).values
-        normal = frames["normal_force"].sel(contact=contact).values
-        friction = frames["friction_force"].sel(contact=contact).values
-        sizes = {"normal": normal, "friction": np.linalg.norm(friction, axis=1)}
-        for kind, size in sizes.items():
-            track = tracks[f"/forces/{kind}/{contact}"]
-            np.testing.assert_allclose(track["position"][1], p_WN, rtol=0, atol=ROUNDING)
-            length = ARROW_LENGTH * size.clip(min=HIDDEN)
-            scale = track["scale"][1]
-            np.testing.assert_allclose(scale[:, 2], length, rtol=0, atol=ROUNDING)
-            assert scale.min() > 0.0, "a scale of 0 makes matrices singular"
-    assert (frames["normal_force"].values > 0.0).any()
+    sliding = film_of(page)
+    assert "path of the centre" in page and not sliding["named"]  # bodies named after two nodes
+    ends = [[0.0, 0.0, 0.08], [0.2 * prism.SPEED, 0.0, 0.08]]
+    np.testing.assert_allclose(sliding["traces"][[0, -1]], ends, rtol=0, atol=ROUNDING)
 
 
 def test_the_title_is_text_and_not_markup(page, trajectory):
     packed = pack_page(page, title=TITLE)
-    for tag, source in (("title", page), ("h1", page), ("title", packed)):
-        (title,) = re.findall(rf"<{tag}>(.*?)</{tag}>", source)
-        assert html.unescape(title) == TITLE
+    expected = (("title", page, TITLE), ("title", packed, TITLE), ("h1", page, DEED))
+    for tag, source, text in (*expected, ("p", page.partition("<h1>")[2], NAME)):
+        title = re.search(rf"<{tag}>(.*?)</{tag}>", source)[1]
+        assert html.unescape(title) == text
         assert "<" not in title
     assert "bad()</script>" not in page + packed
 
@@ -214,11 +210,3 @@ def test_pages_share_a_viewer_of_which_there_is_one_version(
             save(tmp_path / "other.html", viewer=wrong)
     assert other.read_text(encoding="utf-8") == script[:-1]
     assert not (tmp_path / "other.html").exists()
-
-
-def test_the_legend_names_kinds_of_cables_that_the_robot_has(scenario, structure, page):
-    legend = legend_of(structure)
-    assert [colour for colour, _ in legend[:3]] == ["actuated", "passive_1", "passive_2"]
-    assert all(meaning in page for _, meaning in legend)
-    driven = scenario.with_changes({"robot.actuation": [[cable] for cable in CABLES]})
-    assert legend_of(Robot.of(driven).structure) == [legend[0], *legend[3:]]

@@ -1,13 +1,12 @@
-"""The robot as a Meshcat scene: arrows, floor and camera."""
+"""The robot as a Meshcat scene: bodies, cables and floor."""
 
 import numpy as np
 import pytest
 from helpers import prism
-from helpers.made_up_walk import make_walk
+from helpers.made_up_walk import make_row, make_walk
 from helpers.meshcat_page import commands
-from pydrake.common.eigen_geometry import Quaternion
+from matplotlib.colors import hex2color
 from pydrake.geometry import MeshcatParams
-from pydrake.math import RotationMatrix
 
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.robot import Robot
@@ -16,15 +15,14 @@ from tetra_drake.scenario.terrain_kinds import Incline, Rough, Steps
 from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.replay import quiet_meshcat
 from tetra_drake.visualization.scene import (
+    COLOURS,
     MOST_POINTS,
-    UNEVEN_MARGIN,
     add_robot,
-    aligning_quaternions,
-    cable_colours,
-    floor_corners,
+    cable_paths,
+    drawn_radii,
     floor_points,
+    place_robot,
     set_surroundings,
-    tracks,
 )
 
 UNEVEN = {
@@ -38,22 +36,13 @@ def robot_on(terrain):
     return Robot.of(load_scenario("coulomb").with_changes({"terrain": terrain}))
 
 
-def test_aligning_quaternions_turn_z_into_the_direction():
-    directions = np.random.default_rng(3).normal(size=(50, 3))
-    directions[:3] = [(0.0, 0.0, 2.0), (0.0, 0.0, -3.0), (0.0, 1e-12, -1.0)]
-    for q, direction in zip(aligning_quaternions(directions), directions, strict=True):
-        z = RotationMatrix(Quaternion(q)).matrix()[:, 2]
-        np.testing.assert_allclose(z, direction / np.linalg.norm(direction), rtol=0, atol=1e-9)
-    np.testing.assert_array_equal(aligning_quaternions(np.zeros(3)[np.newaxis]), [[1, 0, 0, 0]])
-
-
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
 def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
     robot = robot_on(terrain)
-    ground, radius = robot.ground, robot.structure.node_radius[0]
+    ground, radius = robot.ground, drawn_radii(robot.structure)[1].min()
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     points = make_walk().p_WN.values
-    set_surroundings(meshcat, robot, points)
+    set_surroundings(meshcat, robot, points, seen=points[0])
     page = meshcat.StaticHtml()
     objects = {c["path"]: c["object"] for c in commands(page, "/floor/") if "object" in c}
     assert "/floor/slab" not in objects
@@ -67,14 +56,9 @@ def test_the_drawn_floor_is_the_ground_a_node_radius_lower(terrain):
         above = p_WV[:, 2] - ground_heights(p_WV[:, :2], ground) + radius
         walls = p_WV[:, 2] < p_WV[:, 2].min() + 1e-6 if path == "/floor/relief" else False
         assert np.abs(above[~walls] if path == "/floor/relief" else above - 3e-4).max() < 1.1e-4
-    low, high = floor_corners(points, UNEVEN_MARGIN) * INCH
     for p_WV in vertices.values():
-        np.testing.assert_allclose([p_WV[:, :2].min(axis=0), p_WV[:, :2].max(axis=0)], [low, high])
-    moved = {c["path"]: c["matrix"] for c in commands(page, "set_transform")}
-    arrow = np.reshape(moved["/floor/forward"], (4, 4))  # its columns, one after the other
-    ends = np.array([arrow[3, :3], arrow[3, :3] + arrow[2, :3]])
-    clear = ends[:, 2] - ground_heights(ends[:, :2], ground) + radius
-    assert clear.min() > -0.05 * INCH and clear.max() < 0.3 * INCH
+        assert (p_WV[:, :2].min(axis=0) < points.min(axis=(0, 1))[:2] - 6.0 * INCH).all()
+        assert (p_WV[:, :2].max(axis=0) > points.max(axis=(0, 1))[:2] + 6.0 * INCH).all()
 
 
 @pytest.mark.parametrize("terrain", UNEVEN.values(), ids=UNEVEN)
@@ -105,33 +89,32 @@ def test_bodies_of_any_structure_have_their_struts_and_nodes():
         along = (ends[1] - ends[0]) / shapes[path]["height"]
         np.testing.assert_allclose(moved[path][:3, 2], along, rtol=0, atol=1e-12)
         np.testing.assert_allclose(moved[path][:3, 3], ends.mean(axis=0), rtol=0, atol=1e-12)
-    for name, radius, p_BN in zip(prism.NODES, prism.RADII, structure.p_BN, strict=True):
+    radii = drawn_radii(structure)[1]
+    assert (radii >= prism.RADII).all()
+    for name, radius, p_BN in zip(prism.NODES, radii, structure.p_BN, strict=True):
         (path,) = (path for path in shapes if path.endswith(f"/node {name}"))
         assert shapes[path]["radius"] == radius
         np.testing.assert_allclose(moved[path][:3, 3], p_BN, rtol=0, atol=1e-12)
-    colours = cable_colours(structure)
-    assert {path.split("/")[2] for path in shapes if path.startswith("/cables/")} == set(colours)
-    assert colours == {
-        "actuated": "actuated",
-        "passive bottom": "passive_1",
-        "passive top": "passive_2",
+    cables = {path.split("/")[2] for path in shapes if path.startswith("/cables/")}
+    assert cables == {"actuated", "passive"}
+
+
+def test_a_sample_places_bodies_and_cables_and_colours_feet():
+    walk = make_walk().isel(time=[50])  # T1 is lifted, T2 stands
+    robot, meshcat = make_row(), quiet_meshcat(MeshcatParams(host="localhost", port=0))
+    add_robot(meshcat, robot.structure)
+    place_robot(meshcat, robot.structure, walk, per_newton=1e-4)
+    page = meshcat.StaticHtml()
+    moved = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in commands(page, "set_transform")}
+    np.testing.assert_array_equal(moved["/robot/T3"][:3, 3], walk.p_WB.values[0, 2])
+    for path, cable in zip(cable_paths(robot.structure), robot.structure.cables, strict=True):
+        start, end = walk.p_WN.values[0, [cable["node_a"], cable["node_b"]]]
+        matrix = moved[path]
+        np.testing.assert_allclose(matrix[:3, 3] - matrix[:3, 2] / 2, start, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(matrix[:3, 3] + matrix[:3, 2] / 2, end, rtol=0, atol=1e-12)
+    colours = {
+        c["path"]: c["value"] for c in commands(page, "set_property") if c["property"] == "color"
     }
-
-
-def test_force_arrows_stand_on_the_slope():
-    slope = 0.2
-    frames = make_walk().isel(time=[0, 50])
-    inclined, flat = robot_on(Incline(slope=slope)), robot_on(load_scenario().terrain)
-    sloping = {track.path: track for track in tracks(inclined, frames)}
-    level = {track.path: track for track in tracks(flat, frames)}
-    for kind, expected in (
-        ("normal", [-np.sin(slope), 0.0, np.cos(slope)]),
-        ("friction", [-np.cos(slope), 0.0, -np.sin(slope)]),  # backward in the walk
-    ):
-        path = f"/forces/{kind}/T1 bottom_left"
-        assert frames.in_contact.values[0, 0] == 1
-        (quaternion, _), scales = sloping[path].quaternions, sloping[path].scales
-        z = RotationMatrix(Quaternion(quaternion)).matrix()[:, 2]
-        np.testing.assert_allclose(z, expected, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(scales, level[path].scales, rtol=1e-12)
-    assert level["/forces/normal/T1 bottom_left"].quaternions is None
+    lifted, stands = (colours[f"/robot/{body}/node {body} bottom_left"] for body in ("T1", "T2"))
+    assert lifted != stands
+    assert stands[:3] == pytest.approx(hex2color(COLOURS["stance"]))

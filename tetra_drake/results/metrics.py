@@ -112,21 +112,46 @@ _WALKED = ("distance", "steady_distance", "speed")
 """Metrics of which an objective that looks for far walks has one."""
 
 
+def looks_for_distance(objective: Mapping[str, float]) -> bool:
+    """True for an objective that rewards far walks."""
+    return any(objective.get(name, 0.0) > 0.0 for name in _WALKED)
+
+
 def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]) -> str:
     """The metric that says most about a gait: the distance if the objective looks for it, else the
     one with the largest part in the fitness."""
-    if any(objective.get(name, 0.0) > 0.0 for name in _WALKED):
+    if looks_for_distance(objective):
         return "distance"
     parts = {name: abs(weight * metrics[name]) for name, weight in objective.items()}
     return max(parts, key=lambda name: -1.0 if math.isnan(parts[name]) else parts[name])
 
 
 def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
-    """The metric that says most about a gait, as "14.34 inches in 15 s"."""
-    name, seconds = headline_metric(scenario.objective, metrics), scenario.simulation.duration
+    """What a gait does, by its scenario's objective, as "walks 14.3 in in 15 s"."""
+    seconds = f"in {scenario.simulation.duration:g} s"
+    inches = metrics["distance"] / INCH
+    backward = " backward" if inches < 0.0 else ""
+    walk = f"walks {fixed(abs(inches), 1)} in{backward}{_ground(scenario)} {seconds}"
+    name = headline_metric(scenario.objective, metrics)
     if name == "distance":
-        return f"{fixed(metrics[name] / INCH)} inches in {seconds:g} s"
-    return f"{name.replace('_', ' ')} {shown(metrics[name], METRICS[name])} after {seconds:g} s"
+        return walk
+    if name == "heading_change":
+        return f"turns {fixed(abs(math.degrees(metrics[name])), 0)} degrees {seconds}"
+    return f"{name.replace('_', ' ')} {shown(metrics[name], METRICS[name])}, {walk}"
+
+
+_GROUNDS = {"Rough": "on rough ground", "Steps": "over steps", "Obstacles": "over obstacles"}
+"""How one says where the robot walks, by kind of terrain."""
+
+
+def _ground(scenario: Scenario) -> str:
+    """Where the robot walks unless the ground is level, as " on rough ground"."""
+    slope = scenario.terrain.plane_slope
+    if slope is None:
+        return f" {_GROUNDS.get(type(scenario.terrain).__name__, 'on uneven ground')}"
+    if slope == 0.0:
+        return ""
+    return f" {'up' if slope > 0.0 else 'down'} {abs(math.degrees(slope)):.3g} degrees"
 
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:

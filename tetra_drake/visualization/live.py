@@ -14,7 +14,12 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.replay import quiet_meshcat
-from tetra_drake.visualization.scene import add_robot, set_surroundings, tracks
+from tetra_drake.visualization.scene import (
+    add_robot,
+    place_robot,
+    radius_per_newton,
+    set_surroundings,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -42,8 +47,14 @@ class LiveView:
         structure = self._robot.structure
         p_WN = node_positions(structure, structure.initial_state)
         room = np.array([ROOM, 0.0, 0.0])
+        # The tensions to come are unknown: those at the start are drawn at half of full size.
+        cables = structure.cables
+        lengths = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
+        stretch = lengths - cables["free_length"]
+        self._per_newton = radius_per_newton(structure, 2.0 * (cables["stiffness"] * stretch).max())
         add_robot(meshcat, structure)
-        set_surroundings(meshcat, self._robot, np.stack([p_WN - room, p_WN + room]))
+        around = np.stack([p_WN - room, p_WN + room])
+        set_surroundings(meshcat, self._robot, around, seen=around)
 
     def wants(self, time: float) -> bool:
         """True if the frame before is over at this time (s)."""
@@ -54,8 +65,7 @@ class LiveView:
         now = float(frame["time"].values[0])
         if self._started is not None:
             time.sleep(max(0.0, self._started + now - time.monotonic()))
-        for track in tracks(self._robot, frame):
-            self._meshcat.SetTransform(track.path, track.matrix(0))
+        place_robot(self._meshcat, self._robot.structure, frame, per_newton=self._per_newton)
         if self._started is None:
             while self._meshcat.GetNumActiveConnections() == 0:
                 time.sleep(_PATIENCE)

@@ -6,9 +6,10 @@ import base64
 import gzip
 import html
 import logging
+import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -19,32 +20,44 @@ from pydrake.geometry import Meshcat, MeshcatParams
 from tetra_drake.errors import InputError
 from tetra_drake.files import write_whole
 from tetra_drake.formatting import render
+from tetra_drake.results.metrics import looks_for_distance
+from tetra_drake.results.path import follow
+from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import Structure, followed_nodes
+from tetra_drake.robot.structure import followed_nodes
+from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.visualization.scene import (
-    ASPECT,
     COLOURS,
-    Track,
     add_robot,
-    cable_colours,
-    rgba,
+    cable_paths,
+    cable_radii,
+    drawn_radii,
+    node_paths,
+    radius_per_newton,
     set_surroundings,
-    tracks,
 )
 
 if TYPE_CHECKING:
     import xarray
 
 FRAMES_PER_SECOND = 25.0
-"""Key frames per second of motion, at most."""
+"""Recorded frames per second of motion, at most."""
 
 RESOLUTION = 2.0**-16
 """Step to which pages round positions and sizes (m) and quaternions; 15 s of the thesis's robot
-then take 0.2 MB, and Meshcat's script 1 MB."""
+then take 0.1 MB, and Meshcat's script 0.9 MB."""
 
-_TRACE_FRAMES = 5  # key frames per piece of the traces, which becomes visible when it ends
-_TICKS_PER_SECOND = 100_000  # resolution of time: Meshcat counts in integers
-_REPETITIONS = 1_000_000  # number of times that the motion is played before it stops
+MOST_NAMES = 12
+"""Largest number of bodies whose names are shown, unless they are those of two nodes."""
+
+LONG_ARROW = 0.8
+"""Length of the arrow of a great force, over the robot's height at the start."""
+
+_COMMAND = re.compile(r'fetch\(("data:application/octet-binary;base64,[^"]*")\)(\s*\.then\(.*\))+;')
+"""How Meshcat's page adds a part of the scene: at some time. The film needs them all at once."""
+
+_USUAL = 99.0
+"""Percentile of tensions and forces that is drawn at full size: impacts are far greater."""
 
 
 def save_replay(
@@ -57,88 +70,117 @@ def save_replay(
 ) -> None:
     """Writes the page that replays a robot's trajectory.
 
-    Every key frame is a sample of the trajectory; browsers interpolate between key frames. With
-    `viewer`, the page reads Meshcat's script, which is most of it, from that file, so that pages
-    can share it; it is written if it does not exist.
+    The title is the gait's name, a colon, and what the robot does. Every frame is a sample of the
+    trajectory; the page interpolates between frames. With `viewer`, the page reads Meshcat's
+    script, which is most of it, from that file, so that pages can share it; it is written if it
+    does not exist.
 
     Raises InputError if `path` or `viewer` cannot be written, or `viewer` holds anything else.
     """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
-    film = _add_film(meshcat, robot, trajectory)
-    legend = legend_of(robot.structure)
+    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
+    p_WN = trajectory["p_WN"].values
+    add_robot(meshcat, robot.structure)
+    set_surroundings(meshcat, robot, p_WN, seen=p_WN[0])
     page = meshcat.StaticHtml()
     if viewer is not None:
         address = quote(Path(os.path.relpath(viewer, Path(path).parent)).as_posix())
         page, script = _without_viewer(page, address=address)
         _write_once(Path(viewer), script)
-    write_whole(path, pack_page(_with_overlay(page, title, legend, film), title=title))
+    page = _with_overlay(page, title, film_of(robot, frames))
+    write_whole(path, pack_page(page, title=title))
 
 
-def legend_of(structure: Structure) -> list[tuple[str, str]]:
-    """Names in COLOURS, and what has these colours."""
-    cables = [(colour, f"{kind} cable") for kind, colour in cable_colours(structure).items()]
-    return [
-        *cables,
-        ("normal", "normal force"),
-        ("friction", "friction force"),
-        ("trace", f"path of the {structure.followed}"),
-        ("forward", "arrow on the floor: forward (+x)"),
-    ]
+def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
+    """What film.js plays: objects of the scene, and how they move over samples of a trajectory.
 
-
-def _add_film(meshcat: Meshcat, robot: Robot, trajectory: xarray.Dataset) -> dict[str, Any]:
-    """Adds robot, surroundings and traces in the first frame; returns the film.
-
-    It is what overlay.html.jinja plays, small when compressed: motions are steps from frame to
-    frame, the first one from 0, in RESOLUTION, in a row for each component.
+    Motions are small when compressed: steps in RESOLUTION from frame to frame, the first one from
+    0, in a row for each number.
     """
-    add_robot(meshcat, robot.structure)
-    set_surroundings(meshcat, robot, trajectory["p_WN"].values)
-    frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
-    times = frames["time"].values
-    ticks = np.rint((times - times[0]) * _TICKS_PER_SECOND).astype(int).tolist()
-    moving = list(tracks(robot, frames))
-    for track in moving:
-        meshcat.SetTransform(track.path, track.matrix(0))
-    followed = _rounded(followed_nodes(frames["p_WN"].values, robot.structure)) * RESOLUTION
+    structure = robot.structure
+    bodies, contacts = structure.bodies, structure.contacts
+    paths = node_paths(structure)
+    size = drawn_radii(structure)[0].min()
+    tension, force = frames["tension"].values, ground_forces(robot, frames)
+    greatest = np.percentile(tension, _USUAL)
+    per_newton = radius_per_newton(structure, greatest)
+    usual_force = float(np.percentile(np.linalg.norm(force, axis=-1), _USUAL))
+    inches = LONG_ARROW * float(np.ptp(frames["p_WN"].values[0, :, 2])) / INCH
+    inch_of_arrow = round_force(usual_force / max(inches, 1.0))
+    poses = np.concatenate([frames["p_WB"].values, frames["q_WB"].values], axis=-1)
+    ends = structure.cables[["node_a", "node_b"]].tolist()
     return {
-        "per_second": _TICKS_PER_SECOND,
+        "times": frames["time"].values.round(5).tolist(),
         "resolution": RESOLUTION,
-        "repetitions": _REPETITIONS,
-        "ticks": ticks,
-        "motions": {track.path: _steps(track) for track in moving},
-        "traces": _add_traces(meshcat, followed, ticks),
+        "bodies": bodies,
+        "named": len(bodies) <= MOST_NAMES and not any(" " in name for name in bodies),
+        "nodes": [
+            {"path": _parts(path), "body": int(body), "place": place.round(6).tolist()}
+            for path, body, place in zip(paths, structure.carriers, structure.p_BN, strict=True)
+        ],
+        "cables": [
+            {"path": _parts(path), "nodes": nodes}
+            for path, nodes in zip(cable_paths(structure), ends, strict=True)
+        ],
+        "contacts": contacts.tolist(),
+        "colours": COLOURS,
+        "strut": float(size),
+        "poses": _steps(poses),
+        "radii": _steps(cable_radii(structure, frames, per_newton)),
+        "touches": _steps(frames["in_contact"].values * RESOLUTION),
+        "arrows": _steps(force * INCH / inch_of_arrow),
+        "traces": _steps(followed_nodes(frames["p_WN"].values, structure)[:, :2]),
+        "progress": _progress(robot, frames),
+        "legend": {
+            "tension": f"{greatest / POUND_FORCE:.2g} lbf",
+            "force": f"{inch_of_arrow / POUND_FORCE:.2g} lbf",
+            "trace": "rear feet" if structure.is_row else "centre",
+        },
     }
 
 
-def _add_traces(meshcat: Meshcat, paths: np.ndarray, ticks: list[int]) -> dict[str, int]:
-    """Adds paths (frames, paths, 3) in m in pieces; returns the tick at which a piece is walked."""
-    steps = np.stack([paths[:-1], paths[1:]]).reshape(2, len(paths) - 1, -1, 3)
-    traces = {}
-    for first in range(0, len(paths) - 1, _TRACE_FRAMES):
-        last = min(first + _TRACE_FRAMES, len(paths) - 1)
-        start, end = steps[:, first:last].reshape(2, -1, 3).swapaxes(1, 2)
-        path = f"/traces/{ticks[last] / _TICKS_PER_SECOND:g} s"
-        meshcat.SetLineSegments(path, start, end, rgba=rgba("trace"))
-        traces[path] = ticks[last]
-    return traces
+def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
+    """Forces (frames, contacts, 3) of the ground on the robot in World, in N."""
+    forces = np.concatenate(
+        [frames["friction_force"].values, frames["normal_force"].values[..., np.newaxis]], axis=-1
+    )
+    if robot.ground.flat:
+        return forces
+    p_WN = frames["p_WN"].values[:, robot.structure.contacts]
+    axes = ground_axes(p_WN.reshape(-1, 3), robot.ground).reshape(*p_WN.shape, 3)
+    turned: np.ndarray = np.einsum("fci,fcij->fcj", forces, axes)
+    return turned
 
 
-def _rounded(values: np.ndarray) -> np.ndarray:
-    """Whole multiples of RESOLUTION."""
-    return np.rint(values / RESOLUTION).astype(int)
+def round_force(force: float) -> float:
+    """The next larger 1, 2 or 5 times a power of ten in lbf, in N."""
+    pounds = max(force / POUND_FORCE, 1e-6)
+    power = 10.0 ** math.floor(math.log10(pounds))
+    return next(n for n in (1.0, 2.0, 5.0, 10.0) if n * power >= pounds) * power * POUND_FORCE
 
 
-def _steps(track: Track) -> dict[str, list[list[int]]]:
-    """Steps in RESOLUTION of the object's properties, a row for each component."""
-    values = {"position": track.positions, "scale": track.scales}
-    if track.quaternions is not None:
-        values["quaternion"] = np.roll(track.quaternions, -1, axis=1)  # x y z w
-    return {
-        name: np.diff(_rounded(rows.T), prepend=0).tolist()
-        for name, rows in values.items()
-        if rows is not None
-    }
+def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
+    """What the robot has reached in each frame: its distance, or its turn where that counts."""
+    structure, objective = robot.structure, robot.scenario.objective
+    if structure.is_row and "heading_change" in objective and not looks_for_distance(objective):
+        poses = np.concatenate([frames["q_WB"].values, frames["p_WB"].values], axis=-1)
+        heading = np.rad2deg(follow(frames["time"].values, poses, structure).heading)
+        values, what, unit, digits = heading - heading[0], "turned", "°", 0
+    else:
+        x = followed_nodes(frames["p_WN"].values, structure)[:, 0, 0] / INCH
+        values, what, unit, digits = x - x[0], "walked", " in", 1
+    return {"what": what, "unit": unit, "digits": digits, "values": values.round(digits).tolist()}
+
+
+def _parts(path: str) -> list[str]:
+    return path.strip("/").split("/")
+
+
+def _steps(values: np.ndarray) -> list[list[int]]:
+    """Steps in RESOLUTION of values (frames, ...), a row for each number of a frame."""
+    rows = np.rint(values.reshape(len(values), -1).T / RESOLUTION).astype(int)
+    steps: list[list[int]] = np.diff(rows, prepend=0).tolist()
+    return steps
 
 
 def frame_samples(times: np.ndarray) -> np.ndarray:
@@ -168,18 +210,17 @@ def pack_page(page: str, *, title: str) -> str:
     return render("visualization/packed_page.html.jinja", title=title, packed=packed)
 
 
-def _with_overlay(
-    page: str, title: str, legend: Sequence[tuple[str, str]], film: Mapping[str, Any]
-) -> str:
-    """Meshcat's page that plays a film, with a title, and over the scene a heading, a legend and a
-    clock."""
+def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
+    """Meshcat's page that plays a film, with heading and legend over the scene and a bar below."""
+    name, _, deed = title.rpartition(": ")
     overlay = render(
         "visualization/overlay.html.jinja",
-        title=title,
-        legend=[(COLOURS[name], meaning) for name, meaning in legend],
-        aspect=ASPECT,
+        name=name,
+        deed=deed,
         film=film,
+        script=render("visualization/film.js"),
     )
+    page = _COMMAND.sub(r"handle(\1);", page)
     # Functions, as backslashes in a replacement text would mean something.
     named = f"<title>{html.escape(title)}</title>"
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
