@@ -5,7 +5,7 @@
     >>> run = td.evolve(scenario, "runs/mine", overwrite=True)
     >>> result = td.simulate(scenario, run.best_gait(), record=True)
     >>> print(result)
-    >>> result.recorded.tension.sel(cable_bodies="T1-T2").max().item()
+    >>> result.trajectory.tension.sel(cable_bodies="T1-T2").max().item()
     >>> result.show()  # in a notebook
     >>> metrics = td.sweep(scenario, run.gaits(), {"robot.cables.outer_stiffness": ["30 N/m"]})
 

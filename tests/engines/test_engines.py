@@ -49,7 +49,7 @@ def test_recording_changes_nothing(scenario, engine, settings):
     assert recorded.integrator == plain.integrator
     for name, column in vars(plain.path).items():
         np.testing.assert_array_equal(getattr(recorded.path, name), column)
-    assert plain.trajectory is None and recorded.trajectory is not None
+    assert plain.recorded is None and recorded.recorded is not None
     x1 = recorded.trajectory.p_WN.sel(node="T1 bottom_left", axis="x")
     assert float(x1[-1] - x1[0]) / INCH == recorded.metrics.distance_in
 

@@ -37,7 +37,6 @@ def short(scenario: Scenario) -> Scenario:
 def trajectory_of(scenario: Scenario) -> xarray.Dataset:
     """Of the seeded gait."""
     result = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True)
-    assert result.trajectory is not None
     return result.trajectory
 
 

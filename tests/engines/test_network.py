@@ -38,7 +38,6 @@ def walk(
     kind = f"!{engine.capitalize()}" if isinstance(engine, str) else engine
     on_engine = scenario.with_changes({"engine": kind})
     result = simulate(scenario=on_engine, gait=gait, record=True, steering=steering)
-    assert result.trajectory is not None
     return result.trajectory
 
 

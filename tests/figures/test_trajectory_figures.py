@@ -374,14 +374,14 @@ def test_figures_of_any_structure_are_drawn_on_a_page(draw, carried):
 def test_bars_are_named_where_they_end(carried):
     panel = time_lapse_panels(time_lapse(carried))[0]
     assert [text.get_text() for text in panel.texts] == ["n0 n4", "n1 n5", "n2 n3"]
-    upper = carried.recorded.p_WN.sel(node=["n4", "n1", "n3"])[0, :, :2] / INCH
+    upper = carried.trajectory.p_WN.sel(node=["n4", "n1", "n3"])[0, :, :2] / INCH
     apart = np.array([text.xy for text in panel.texts]) - upper.values
     np.testing.assert_allclose(apart[:, 1], 0.0, atol=1e-9)
     assert np.abs(apart[:, 0]).max() < 1.0  # moved into the panel
 
 
 def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
-    way = prism.SPEED * carried.recorded.time / INCH
+    way = prism.SPEED * carried.trajectory.time / INCH
     [panel] = panels(before_and_after(carried, carried))
     np.testing.assert_allclose(panel.lines[0].get_ydata(), way, atol=1e-9)
     [panel] = paths_of(one_step(carried))
@@ -392,14 +392,14 @@ def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
 
 def test_bars_are_drawn_from_node_to_node(carried):
     lines, _ = struts(time_lapse_panels(time_lapse(carried, instants=2))[0])
-    p_WN = carried.recorded.p_WN.values[0, :, :2] / INCH
+    p_WN = carried.trajectory.p_WN.values[0, :, :2] / INCH
     np.testing.assert_allclose(lines, p_WN.reshape(3, 2, 2), atol=1e-12)
 
 
 def test_ground_forces_of_bars_are_those_of_nodes_below(carried):
     shown = [panel.get_title("left") for panel in panels(ground_forces(carried))]
     assert shown == ["n0", "n1", "n2"]
-    rolled = carried.recorded.copy(deep=True)
+    rolled = carried.trajectory.copy(deep=True)
     rolled.normal_force.loc[{"contact": ["n0", "n2"]}] = 0.0
     rolled.normal_force.loc[{"contact": "n4"}] = 0.2
     figure = ground_forces(result_of(carried.robot, rolled))

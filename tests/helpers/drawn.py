@@ -26,7 +26,7 @@ def result_of(
         integrator=unknown,
         engine="none",
         path=unknown,
-        trajectory=trajectory,
+        recorded=trajectory,
     )
     vars(result)["robot"] = robot  # which may be of no scenario
     return result

@@ -24,7 +24,6 @@ def trajectory(request: pytest.FixtureRequest, data: Path) -> xarray.Dataset:
     )
     gait = load_gait(data / "gait_g.json", scenario)
     result = simulate(scenario=scenario, gait=gait, record=True)
-    assert result.trajectory is not None
     return result.trajectory
 
 

@@ -31,7 +31,7 @@ def simulate(
 
         >>> scenario = td.load_scenario("quick")
         >>> result = td.simulate(scenario, td.seeded_gait(scenario, 80), record=True)
-        >>> inches, tension = result.metrics.distance_in, result.recorded.tension
+        >>> inches, tension = result.metrics.distance_in, result.trajectory.tension
 
     `scenario` may be the name of a shipped one or a file, `gait` a gait file. Either a gait or a
     command is given; of a command see load_command(). `steering`, the turn from -1 to 1, or a

@@ -56,7 +56,7 @@ def signals_and_tensions(
 
     The title of a panel is the name of the cable. If a signal drives several, the first is shown.
     Start-up, when signals are 0, is shaded."""
-    unit, trajectory = units_named(units), shown_part(result.recorded, time or _last(result))
+    unit, trajectory = units_named(units), shown_part(result.trajectory, time or _last(result))
     forces = trajectory[["signal", "tension"]] / unit.force
     oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
     driven = [signals.index(oscillator) for oscillator in oscillators]
@@ -91,7 +91,7 @@ def ground_forces(
 
     One panel for each foot that stands, but one for two that bear the same. Grey: stance. The peaks
     of impacts are cut off, as they are shorter than the time between samples."""
-    unit, end = units_named(units), shown_part(result.recorded, time or _last(result))
+    unit, end = units_named(units), shown_part(result.trajectory, time or _last(result))
     forces = end[["normal_force", "friction_force"]] / unit.force
     along = "along x" if result.robot.ground.flat else "along the forward tangent"
     looks = {"normal force": _FIRST, f"friction {along}": _SECOND, "landing": _LANDING}
@@ -118,7 +118,7 @@ def ground_forces(
 
 
 def _last(result: SimulationResult) -> tuple[float, float]:
-    end = float(result.recorded.time[-1])
+    end = float(result.trajectory.time[-1])
     return max(0.0, end - _SECONDS), end
 
 

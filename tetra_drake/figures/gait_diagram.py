@@ -67,8 +67,8 @@ def gait_diagram(
     in which a foot stands. Dotted lines mark cycles. If no signal has two periods in the second
     half, the last quarter is shown."""
     structure, unit = result.robot.structure, units_named(units)
-    cycle = measures.last_step(result.recorded)
-    trajectory = shown_part(result.recorded, time or _last_cycles(result.recorded, cycle))
+    cycle = measures.last_step(result.trajectory)
+    trajectory = shown_part(result.trajectory, time or _last_cycles(result.trajectory, cycle))
     stands = _stance(trajectory, structure)
     rows = _rows_of_feet(stands)
     heights = [

@@ -94,7 +94,7 @@ def relative_distances(
     """Distances along x from the first body to each other, between centres of mass, over time.
 
     Grey lines: the distances at the start."""
-    unit, trajectory = units_named(units), shown_part(result.recorded, time)
+    unit, trajectory = units_named(units), shown_part(result.trajectory, time)
     distances = measures.relative_distances(trajectory) / unit.length
     first, *names = distances.body.values
     panel = page(axes, height_in=1.5 + min(0.6 * len(names), 5.0))
@@ -130,7 +130,7 @@ def before_and_after(
     panel = split(host, below=legend_below(host, looks))[0, 0]
     ends = []
     for result, style in zip((initial, best), (_BEFORE, _AFTER), strict=True):
-        part = shown_part(result.recorded, time)
+        part = shown_part(result.trajectory, time)
         walked = _distance_walked(result, unit).sel(time=part.time)
         panel.plot(walked.time, walked, **style)
         ends.append(float(walked[-1]))
@@ -156,7 +156,7 @@ def time_lapse(
     """The robot from above at some instants, to scale, with the distance walked. Forward is to the
     right. The line is the path of its centre so far, with a dot at each full second."""
     structure, unit = result.robot.structure, units_named(units)
-    trajectory = shown_part(result.recorded, time)
+    trajectory = shown_part(result.trajectory, time)
     first, last = (float(trajectory.time[i]) for i in (0, -1))
     samples = _nearest(trajectory, np.linspace(first, last, instants))
     nodes, walked = trajectory.p_WN.values / unit.length, _distance_walked(result, unit)
@@ -199,7 +199,7 @@ def path_of_the_centre(
     """The path of the robot's centre: from above and to scale, with arrows where a row heads; or,
     if it is straight, its height along x."""
     structure, unit = result.robot.structure, units_named(units)
-    trajectory = shown_part(result.recorded, time)
+    trajectory = shown_part(result.trajectory, time)
     path = measures.path_of_centre(trajectory, structure)
     points = path.centre / unit.length
     if np.ptp(points[:, Y]) < _STRAIGHT * np.ptp(points[:, X]):
@@ -261,12 +261,12 @@ def one_step(
     the last quarter is shown."""
     robot, unit = result.robot, units_named(units)
     structure = robot.structure
-    ends = time or measures.last_step(result.recorded)
+    ends = time or measures.last_step(result.trajectory)
     title = "One step"
     if ends is None:
-        end = float(result.recorded.time[-1])
+        end = float(result.trajectory.time[-1])
         ends, title = (0.75 * end, end), "The last quarter"
-    step = shown_part(result.recorded, ends)
+    step = shown_part(result.trajectory, ends)
     nodes, (lifted, least) = step.p_WN.values / unit.length, _clear_of_ground(step, robot)
     samples = _nearest(step, np.linspace(*ends, instants))
     profiles = [_profile(step.p_WN.values, sample, robot) / unit.length for sample in samples]
@@ -387,7 +387,7 @@ def _draw_paths(
 
 def _distance_walked(result: SimulationResult, unit: Units) -> xarray.DataArray:
     """(time,): distance walked since the start of the simulation."""
-    trajectory = result.recorded
+    trajectory = result.trajectory
     walked = measures.distance_walked(trajectory, result.robot.structure) / unit.length
     return xarray.DataArray(walked, dims="time", coords={"time": trajectory.time})
 

@@ -44,7 +44,6 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
     finely = scenario.simulation.model_copy(update={"sample_period": 1.0 / (rate * refinement)})
     recorded = scenario.with_sections(simulation=finely)
     result = simulate(scenario=recorded, gait=gait, record=True)
-    assert result.trajectory is not None
     robot, motion = Robot.of(scenario), result.trajectory.isel(time=slice(None, None, refinement))
     loads = actuator_loads(robot, result.trajectory)
     command = Command(gait.name, 1.0 / rate, loads.commands[::refinement])

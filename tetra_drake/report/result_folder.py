@@ -47,7 +47,7 @@ def save_result_folder(folder: Path, result: SimulationResult) -> None:
     not, or if the folder cannot be written to."""
     from tetra_drake.results.trajectory import save_dataset
 
-    trajectory = result.recorded
+    trajectory = result.trajectory
     # Written last and removed first: where there is a result.json, the other files belong to it.
     if (folder / RESULT).is_file():
         (folder / RESULT).unlink()
@@ -61,7 +61,7 @@ def load_result(folder: str | Path) -> SimulationResult:
     """Reads the folder of a simulation back, with its scenario, gait and trajectory.
 
         >>> result = td.load_result("out")
-        >>> signals = result.recorded.signal.sel(oscillator="T1-T2")
+        >>> signals = result.trajectory.signal.sel(oscillator="T1-T2")
 
     Raises InputError, naming the file, if one is missing, damaged, or not of this scenario.
     """
@@ -85,7 +85,7 @@ def load_result(folder: str | Path) -> SimulationResult:
         integrator=IntegratorWork(**file.integrator),
         engine=file.engine,
         path=file.path.columns(),
-        trajectory=trajectory,
+        recorded=trajectory,
     )
 
 

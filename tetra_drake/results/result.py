@@ -67,11 +67,11 @@ class SimulationResult:
     """Name of the scenario's engine."""
     path: CentrePath = field(repr=False, compare=False)
     """Path of the robot's centre from start to end, in steps of results.path.PERIOD."""
-    trajectory: xarray.Dataset | None = field(default=None, repr=False)
+    recorded: xarray.Dataset | None = field(default=None, repr=False)
     """See results.trajectory.make_dataset; None unless asked for."""
 
     def __str__(self) -> str:
-        kept = "not recorded" if self.trajectory is None else "recorded"
+        kept = "not recorded" if self.recorded is None else "recorded"
         return (
             f"{self.title}\n"
             f"scenario {self.scenario.name}, engine {self.engine}, trajectory {kept}, "
@@ -87,12 +87,12 @@ class SimulationResult:
         return Robot.of(self.scenario)
 
     @property
-    def recorded(self) -> xarray.Dataset:
+    def trajectory(self) -> xarray.Dataset:
         """The trajectory; raises InputError if the simulation recorded none."""
-        if self.trajectory is None:
+        if self.recorded is None:
             problem = "was not recorded; simulate with record=True"
             raise InputError(f"result of {self.name}", "trajectory", problem)
-        return self.trajectory
+        return self.recorded
 
     @property
     def title(self) -> str:
@@ -111,7 +111,7 @@ class SimulationResult:
         from tetra_drake.visualization.replay import save_replay
 
         save_replay(
-            path, robot=self.robot, trajectory=self.recorded, title=self.title, viewer=viewer
+            path, robot=self.robot, trajectory=self.trajectory, title=self.title, viewer=viewer
         )
 
 
@@ -181,7 +181,7 @@ def make_result(
         integrator=work,
         engine=robot.scenario.engine_name,
         path=path,
-        trajectory=trajectory,
+        recorded=trajectory,
     )
 
 

@@ -147,7 +147,7 @@ def test_many_gaits_have_the_results_of_single_ones(short, workers):
 
 def without_cost(result: SimulationResult | SimulationFailure) -> SimulationResult:
     assert isinstance(result, SimulationResult)
-    return dataclasses.replace(result, wall_time=0.0, trajectory=None)
+    return dataclasses.replace(result, wall_time=0.0, recorded=None)
 
 
 def test_every_gait_may_have_a_scenario_of_its_own(short):
