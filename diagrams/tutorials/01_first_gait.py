@@ -12,7 +12,7 @@ result = td.simulate(scenario, gait, record=True)
 print(result.metrics)
 
 # %% A page for any browser. In a notebook, result.show() shows it.
-result.save_replay("first_gait.html")
+result.save_replay("out/first_gait.html")
 
 # %% The trajectory is an xarray dataset in SI units, with names along its axes.
 outer = result.trajectory.tension.sel(cable_group="outer", time=slice(5.0, None))

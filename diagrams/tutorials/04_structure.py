@@ -5,27 +5,25 @@ from pathlib import Path
 
 import tetra_drake as td
 from tetra_drake.figures.gait_diagram import gait_diagram
-from tetra_drake.report.structure_page import structure_text
 
-here = Path(__file__).parent
-print(structure_text(here / "four_struts.yaml"))
-
-# %% A scenario with this robot, read from a file as the shipped ones are.
-file = Path("out/four_struts.yaml")
-file.parent.mkdir(exist_ok=True)
-file.write_text(
-    f"""
-base: prism
-name: four-struts
-robot: !Structure {{file: {here / "four_struts.yaml"}}}
-evolution: {{evaluations: 300}}
-optimizer: !CmaEs {{}}
-""",
-    encoding="utf-8",
+# %% A scenario with this robot. In a file: robot: !Structure {file: four_struts.yaml}
+structure = Path(__file__).parent / "four_struts.yaml"
+scenario = td.load_scenario("prism").with_changes(
+    {
+        "name": "four-struts",
+        "robot": f"!Structure {{file: {structure}}}",
+        "optimizer": "!CmaEs",
+        "evolution.evaluations": 400,
+    }
 )
-scenario = td.load_scenario(file)
+print(scenario)
 
-# %% It hops: each side cable pulls its strut's foot along.
+# %% At rest: does every cable pull?
+still = scenario.with_changes({"cpg.gain": "0 lbf"})
+rest = td.simulate(still, td.seeded_gait(still))
+print(f"least tension of a cable: {rest.metrics.tension:.2f} N")
+
+# %% A gait for its four oscillators, one for each side cable.
 run = td.evolve(scenario, "out/four_struts", overwrite=True, reevaluate=False, report=False)
 result = td.simulate(scenario, run.best_gait(), record=True)
 print(result.metrics)

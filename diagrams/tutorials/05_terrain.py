@@ -20,7 +20,7 @@ grounds = {
     "rough": {"terrain": "!Rough {amplitude: 0.25 in, wavelength: 6 in}"},
 }
 scenarios = [flat.with_changes({"name": name, **changes}) for name, changes in grounds.items()]
-results = td.simulate_many(scenarios, [run.best_gait()] * len(scenarios), record=True)
+results = [td.simulate(scenario, run.best_gait(), record=True) for scenario in scenarios]
 
 # %% How far it walks on each, over time.
 figure = Figure(figsize=(7.0, 4.0), layout="constrained")

@@ -24,9 +24,8 @@ print(gaits["with feedback"][1])
 figure = Figure(figsize=(7.0, 4.0), layout="constrained")
 axes = figure.subplots()
 for name, (scenario, gait) in gaits.items():
-    unseen = [scenario.with_changes({"terrain.seed": seed}) for seed in range(1, 21)]
-    walks = td.simulate_many(unseen, [gait] * len(unseen))
-    inches = np.sort([walk.metrics.distance_in for walk in walks])
+    walks = td.sweep(scenario, gait, {"terrain.seed": list(range(1, 21))})
+    inches = np.sort(walks.distance.squeeze() / 0.0254)
     axes.plot(np.arange(1, 21), inches, "o-", label=f"{name}: mean {inches.mean():.1f} in")
 axes.set(xlabel="terrain, sorted by distance", ylabel="distance in 15 s (in)", xticks=[1, 10, 20])
 axes.legend()

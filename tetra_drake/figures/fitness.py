@@ -123,7 +123,8 @@ def fitness_of_trials(run: Run, *, axes: Axes | None = None) -> Figure:
 
     A trial that has ended counts in the quartiles with its last value."""
     kind = "mean" if "mean_fitness" in run.iterations else "best"
-    table = run.iterations.pivot(index="evaluations", columns="trial", values=f"{kind}_fitness")
+    whole = _whole_iterations(run)
+    table = whole.pivot(index="evaluations", columns="trial", values=f"{kind}_fitness")
     table = table.dropna(axis="columns", how="all")
     panel = page(axes, height_in=3.6)
     for trial in table:
@@ -142,6 +143,16 @@ def fitness_of_trials(run: Run, *, axes: Axes | None = None) -> Figure:
     _name_lines(panel, ends)
     panel.set_title(f"{kind.capitalize()} fitness of each trial", loc="left")
     return figure_of(panel)
+
+
+def _whole_iterations(run: Run) -> pandas.DataFrame:
+    """The iterations but those that the budget of evaluations has cut short, whose mean is of few
+    gaits."""
+    rows = run.iterations
+    sizes = rows.groupby("trial")["evaluations"].diff()
+    is_last = ~rows.duplicated("trial", keep="last")
+    before = sizes.groupby(rows["trial"]).shift()
+    return rows[~(is_last & (sizes < before))]
 
 
 def _name_lines(panel: Axes, last: pandas.Series) -> None:

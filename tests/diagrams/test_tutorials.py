@@ -1,0 +1,31 @@
+"""The tutorials: each runs as it stands, is short, and has its picture beside it."""
+
+import runpy
+import shutil
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+CHECKOUT = Path(__file__).parents[2]
+TUTORIALS = CHECKOUT / "diagrams" / "tutorials"
+NAMES = sorted(file.stem for file in TUTORIALS.glob("*.py"))
+LONGEST = 40  # lines
+
+
+def test_there_are_ten_each_short_and_with_its_picture():
+    assert [int(name[:2]) for name in NAMES] == list(range(1, 11))
+    for name in NAMES:
+        assert len((TUTORIALS / f"{name}.py").read_text("utf-8").splitlines()) <= LONGEST, name
+        assert (TUTORIALS / f"{name}.png").is_file()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_tutorial_runs_and_draws_its_picture(name, tmp_path, monkeypatch):
+    folder = tmp_path / "diagrams" / "tutorials"
+    shutil.copytree(TUTORIALS, folder, ignore=shutil.ignore_patterns("*.png"))
+    (tmp_path / "runs").symlink_to(CHECKOUT / "runs")
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(folder / f"{name}.py"), run_name="__main__")
+    with Image.open(folder / f"{name}.png") as drawn, Image.open(TUTORIALS / f"{name}.png") as kept:
+        assert drawn.size == kept.size
