@@ -29,11 +29,14 @@ from tetra_drake.visualization.scene import COLOURS
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-LIMITS = {".gif": 500_000, ".png": 90_000}
+LIMITS = {".gif": 750_000, ".png": 90_000}
 """Sizes of files in bytes, for which pictures become as narrow as they must."""
 
 GROUND_COLOURS = {".gif": 8, ".png": 100}
 """Number of colours that a picture has beside the robot's."""
+
+GREYS = 8
+"""Number of greys of a picture."""
 
 ASPECTS = {".gif": 16 / 9, ".png": 2.8}
 """Width over height of a picture."""
@@ -133,12 +136,15 @@ def save(images: Sequence[Image.Image], path: Path) -> None:
 
 
 def _palette(image: Image.Image, count: int) -> Image.Image:
-    """The colours of the robot in light and shade, and `count` of an image."""
+    """The colours of the robot in light and shade, greys for shadows and grid, and `count` of an
+    image."""
     names = ("rear", "lead", "node", "stance", "actuated", "passive")
     robot = np.array([list(bytes.fromhex(COLOURS[name][1:])) for name in names])
+    greys = np.repeat(np.linspace(120, 225, GREYS), 3)
     others = image.quantize(count).getpalette() or []
     palette = Image.new("P", (1, 1))
-    palette.putpalette(np.concatenate([*(robot * 0.7), *robot, others]).astype(int).tolist())
+    colours = np.concatenate([*(robot * 0.7), *robot, greys, others])
+    palette.putpalette(colours.astype(int).tolist())
     return palette
 
 

@@ -27,9 +27,11 @@ from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Display
 from tetra_drake.experiment import evolve
+from tetra_drake.figures.gait_diagram import gait_diagram
+from tetra_drake.figures.style import save_figure
 from tetra_drake.formatting import duration, listed
 from tetra_drake.machine import available_cores
-from tetra_drake.report.replay_page import write_replay
+from tetra_drake.report.replay_page import load_or_simulate
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, OptimizerKind, QualityDiversity
@@ -38,6 +40,8 @@ from tetra_drake.scenario.schema import Scenario
 HERE = Path(__file__).parent
 SCRATCH = Path("out/runs")
 VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
+DIAGRAM = "gait"
+"""Name of the picture of the gait diagram, without its suffix."""
 
 
 @dataclass(frozen=True)
@@ -132,11 +136,19 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     for old in {*shown.glob("*")} - {shown / "README.md", *shown.glob("*.png")}:
         shutil.rmtree(old) if old.is_dir() else old.unlink()
     thin(made, shown)
-    write_replay(shown, shown / REPLAY, viewer=out / VIEWER)
-    films = [shown / FILM] if experiment.film else []
-    take_pictures(shown / REPLAY, *films, shown / PICTURE)
+    show(shown, viewer=out / VIEWER, film=experiment.film)
     shutil.copy(analysis, copy)
     print(f"{name}: {duration(time.monotonic() - begin)}", flush=True)
+
+
+def show(directory: Path, *, viewer: Path, film: bool) -> None:
+    """Draws a run's best gait: the page, the picture, the gait diagram and, if asked for, the
+    film."""
+    result = load_or_simulate(directory)
+    result.save_replay(directory / REPLAY, viewer=viewer)
+    films = [directory / FILM] if film else []
+    take_pictures(directory / REPLAY, *films, directory / PICTURE)
+    save_figure(gait_diagram(result), directory, DIAGRAM, kinds=["svg"])
 
 
 def take_pictures(page: Path, *pictures: Path) -> None:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from analyse import MUJOCO, SHOWN, TIGHT, Analysis, load_analysis
-from record import EXPERIMENTS, PICTURE
+from record import DIAGRAM, EXPERIMENTS, PICTURE
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
@@ -53,13 +53,14 @@ def gallery_table(runs: Runs) -> str:
     rows = []
     for name, run in runs.items():
         best = run.best_trial
-        picture = f'<img src="{name}/{PICTURE}" width="240" alt="{name}">'
+        picture = f'<img src="{name}/{PICTURE}" width="300" alt="{name}">'
+        diagram = f'<img src="{name}/{DIAGRAM}.svg" width="300" alt="gait diagram of {name}">'
         title = f"[`{name}`]({name}/{README}): {EXPERIMENTS[name].title}"
         distances = [fixed(run.undisturbed(best)), fixed(run.again(best, TIGHT))]
         kept = f"{100.0 * run.gaits.loc[best, 'kept']:.0f} %"
-        rows.append([picture, f"{title}<br>[page]({name}/{REPLAY})", *distances, kept])
-    headings = ["", "experiment", "distance, in", "on the Drake diagram, in", "keeps"]
-    return Table(headings, rows, text_columns=(0, 1)).markdown()
+        rows.append([picture, diagram, f"{title}<br>[page]({name}/{REPLAY})", *distances, kept])
+    headings = ["", "", "experiment", "distance, in", "on the Drake diagram, in", "keeps"]
+    return Table(headings, rows, text_columns=(0, 1, 2)).markdown()
 
 
 def trials_table(run: Analysis) -> str:

@@ -84,7 +84,7 @@ def test_the_python_runs(work: Path, shortened: None, monkeypatch: pytest.Monkey
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
     (snippet,) = snippets("python")
     exec(compile(snippet, "README.md", "exec"), {})
-    assert len(td.load_run("runs/python").evaluations) == 20
+    assert len(td.load_run("runs/python").evaluations) == 60
 
 
 def test_the_steering_runs_as_a_function_and_by_the_port(work: Path, shortened: None) -> None:

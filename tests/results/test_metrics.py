@@ -16,7 +16,7 @@ from tetra_drake.results.metrics import (
     headline,
     unmet_requirements,
 )
-from tetra_drake.results.path import CentrePath
+from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario import schema

@@ -35,9 +35,9 @@ from tetra_drake.figures.style import (
 )
 from tetra_drake.formatting import fixed, signed
 from tetra_drake.results import measures
-from tetra_drake.results.path import CentrePath
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.ground import ground_heights
+from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
 from tetra_drake.scenario.units import INCH

@@ -18,10 +18,10 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import check_folder, read_text, write_whole
-from tetra_drake.results.path import CentrePath
 from tetra_drake.results.result import IntegratorWork, SimulationResult, save_result
 from tetra_drake.results.trajectory import DIMENSIONS, labels, with_indexes
 from tetra_drake.robot.gait import load_gait
+from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario

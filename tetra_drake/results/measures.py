@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.results.path import CentrePath, follow
+from tetra_drake.robot.path import CentrePath, follow
 from tetra_drake.robot.structure import Structure, followed_nodes
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from tetra_drake.formatting import fixed
 from tetra_drake.physics.actuator import DIRECT
 from tetra_drake.physics.tally import Tally
 from tetra_drake.results.measures import travelling_index
-from tetra_drake.results.path import CentrePath, curvature
+from tetra_drake.robot.path import CentrePath, curvature
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
-from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, MOST, Metrics
+from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, MOST, Metrics, looks_for_distance
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
 
@@ -106,15 +106,6 @@ def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:
         unit = INCH if METRICS[name] == "m" else 1.0
         total += (weight * unit) * (getattr(metrics, name) / unit)
     return total
-
-
-_WALKED = ("distance", "steady_distance", "speed")
-"""Metrics of which an objective that looks for far walks has one."""
-
-
-def looks_for_distance(objective: Mapping[str, float]) -> bool:
-    """True for an objective that rewards far walks."""
-    return any(objective.get(name, 0.0) > 0.0 for name in _WALKED)
 
 
 def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]) -> str:

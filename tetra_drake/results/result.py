@@ -18,9 +18,9 @@ from tetra_drake.files import json_number, write_whole
 from tetra_drake.machine import versions
 from tetra_drake.physics.tally import Tally
 from tetra_drake.results.metrics import compute_fitness, compute_metrics, headline
-from tetra_drake.results.path import PERIOD, CentrePath, follow
 from tetra_drake.results.trajectory import Motion, make_dataset, sample_times
 from tetra_drake.robot.gait import Gait
+from tetra_drake.robot.path import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.metric_units import METRICS, Metrics
@@ -66,7 +66,7 @@ class SimulationResult:
     engine: str
     """Name of the scenario's engine."""
     path: CentrePath = field(repr=False, compare=False)
-    """Path of the robot's centre from start to end, in steps of results.path.PERIOD."""
+    """Path of the robot's centre from start to end, in steps of robot.path.PERIOD."""
     recorded: xarray.Dataset | None = field(default=None, repr=False)
     """See results.trajectory.make_dataset; None unless asked for."""
 

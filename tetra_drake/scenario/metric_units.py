@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -54,10 +55,10 @@ class Metrics:
     """Sideways way, abs(y₁)."""
     heading_change: float = _metric("rad", of_a_row=True)
     """Angle by which the robot has turned to the left at the end. Whole turns count. See
-    results.path."""
+    robot.path."""
     path_curvature: float = _metric("1/m")
     """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive to
-    the left of the direction in which the centre moves, be that backward. See results.path."""
+    the left of the direction in which the centre moves, be that backward. See robot.path."""
     actuator_work: float = _metric("J")
     """Integral of max(0, -S dl/dt) in the steady stretch, for driven cables with signal S and
     length l: the work of actuators that cannot take any back."""
@@ -147,3 +148,12 @@ def inverse(unit: str) -> str:
     if not unit or above == "1":
         return below
     return f"{below or 1}/{above}"
+
+
+_WALKED = ("distance", "steady_distance", "speed")
+"""Metrics of which an objective that looks for far walks has one."""
+
+
+def looks_for_distance(objective: Mapping[str, float]) -> bool:
+    """True for an objective that rewards far walks."""
+    return any(objective.get(name, 0.0) > 0.0 for name in _WALKED)
