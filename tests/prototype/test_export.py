@@ -155,5 +155,5 @@ def test_the_commands_write_and_play(short, tmp_path, monkeypatch, capsys):
     assert "No motor is given" in capsys.readouterr().out
     play = "simulate --command lab/command.csv --scenario lab/scenario.yaml --out out"
     assert main(play.split()) == 0
-    assert capsys.readouterr().out.startswith("command.csv: 15 s on scenario coulomb\n")
+    assert capsys.readouterr().out.startswith("command.csv: walks")
     assert (tmp_path / "out/replay.html").exists()

@@ -167,7 +167,7 @@ def test_the_best_gait_is_shown_with_its_parameters_and_as_recorded(study, page)
         assert cells[title] == f"{weight:.2f}"
     assert f"{gait.tau_a:.3f} s" in " ".join(page.texts["p"])
     # As recorded; simulated again, this gait moves elsewhere, which a note says.
-    assert "2.00 inches" in page.texts["h1"][0]
+    assert "walks 2.0 in" in page.texts["h1"][0]
     best, initial = "trial 1, evaluation 4", "trial 1, evaluation 0"
     assert (study.best.label, study.initial.label) == (best, initial)
     assert any(f"2 in ({best})" in text for text in page.texts["p"])

@@ -48,7 +48,7 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     assert run.evaluations.groupby("trial").size().tolist() == [8, 8]
     assert run.reevaluations["engine"].unique() == ["drake"]
     made = {"manifest.json", "scenario.yaml", "trial_00", "trial_01"}
-    shown = {"replay.html", "walking.png", "walking.gif", "analysis.json"}
+    shown = {"replay.html", "walking.png", "walking.gif", "gait.svg", "analysis.json"}
     assert {file.name for file in (out / "tiny").iterdir()} == kept | made | shown
     assert 'src="../meshcat.js"' in read_page(out / "tiny/replay.html")
     assert (out / record.VIEWER).is_file()
