@@ -19,11 +19,6 @@ class EngineSettings(Section):
     packages: ClassVar[tuple[str, ...]] = ()
     """Packages that only this engine needs."""
 
-    @property
-    def precision(self) -> str:
-        """Precision of the engine, as "accuracy 0.005"."""
-        raise NotImplementedError
-
     def friction_text(self, friction: FrictionKind) -> str:
         """The friction that the engine simulates, in words."""
         return friction.text
@@ -44,10 +39,6 @@ class Drake(EngineSettings):
     look_ahead: float = quantity("s", default=2e-5, ge=0)
     """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none."""
 
-    @property
-    def precision(self) -> str:
-        return f"accuracy {self.accuracy:g}"
-
 
 class Compiled(EngineSettings):
     """The compiled engine: a Rosenbrock method in machine code, many gaits side by side."""
@@ -62,10 +53,6 @@ class Compiled(EngineSettings):
         m/s of tolerance, within limits."""
         return min(LONGEST_LOOK_AHEAD, max(2.0 * SHORTEST_STEP, 0.2 * self.tolerance))
 
-    @property
-    def precision(self) -> str:
-        return f"tolerance {self.tolerance:g} m/s"
-
 
 class Mujoco(EngineSettings):
     """MuJoCo with its own contact, on planes."""
@@ -73,10 +60,6 @@ class Mujoco(EngineSettings):
     step: float = quantity("s", default=0.125e-3, ge=1e-7, le=1)
 
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)
-
-    @property
-    def precision(self) -> str:
-        return f"step {1e3 * self.step:g} ms"
 
     def friction_text(self, friction: FrictionKind) -> str:
         return friction.cone_text

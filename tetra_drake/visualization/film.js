@@ -277,7 +277,7 @@ window.addEventListener("load", () => {
   element("play").addEventListener("click", () => set_playing(!playing));
   element("follow").addEventListener("change", (event) => follow(event.target.checked));
   element("forces").addEventListener("change", () => { place(time); viewer.set_dirty(); });
-  element("legend").open = window.innerWidth > 700;
+  element("legend").open = window.innerWidth > 900;
   window.addEventListener("keydown", (event) => {
     if (event.code == "Space" && event.target == document.body) set_playing(!playing);
   });
