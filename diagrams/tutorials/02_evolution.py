@@ -11,7 +11,7 @@ scenario = td.load_scenario("coulomb").with_changes(
         "name": "tutorial",
         "optimizer": "!CmaEs",
         "evolution.trials": 4,
-        "evolution.evaluations": 250,
+        "evolution.evaluations": 160,
         "simulation.duration": "8 s",
     }
 )

@@ -12,7 +12,7 @@ scenario = td.load_scenario("coulomb").with_changes(
     {
         "optimizer": "!CmaEs",
         "evolution.trials": 1,
-        "evolution.evaluations": 300,
+        "evolution.evaluations": 250,
         "simulation.duration": "8 s",
     }
 )

@@ -12,7 +12,7 @@ changes = {
     "require": {"clearance": "0.125 in", "tension": "0 lbf"},  # else feedback may shake the robot
     "optimizer": "!CmaEs",
     "evolution.trials": 1,
-    "evolution.evaluations": 300,
+    "evolution.evaluations": 200,
 }
 with_feedback = td.load_scenario("feedback").with_changes(changes)
 without = with_feedback.with_changes({"cpg.feedback": []})

@@ -16,7 +16,7 @@ def main() -> None:
         {
             "optimizer": "!CmaEs",
             "evolution.trials": 2,
-            "evolution.evaluations": 60,
+            "evolution.evaluations": 53,
             "simulation.duration": "5 s",
         }
     )
