@@ -330,20 +330,20 @@ window.addEventListener("load", () => {
     labels.splice(0).forEach(({span}) => span.remove());
     element("labels").hidden = false;
     camera({times: moments, from: [0.35, -1, 0.4]});
+    const walked = progress.what == "walked";  // else the instants lie one above the other
     moments.forEach((moment, i) => {
       show(moment);
       const above = mean(places), last = i == moments.length - 1;
       above.z = Math.max(...places.map((point) => point.z)) + 12 * strut;
-      label(`${moment} s`, () => above, "name");
+      if (walked) label(`${moment} s`, () => above, "name");
       if (!last) add_ghost(0.65 - 0.2 * i / moments.length);
     });
     const start = paths[0].geometry.attributes.position;
     const from = new Vector3().fromBufferAttribute(start, 0);
-    const way = now(traces[0]) - from.x;
+    const way = new Vector3(now(traces[0]) - from.x, 0, now(traces[2]) - from.z);
     from.y = Math.min(...places.map((point) => point.y)) - 24 * strut;
-    const mark = arrow(colours.trace, 0.04);
-    point_arrow(mark, from, new Vector3(way, 0, 0));
-    const half = from.clone().setX(from.x + way / 2).setY(from.y - 16 * strut);
+    if (walked) point_arrow(arrow(colours.trace, 0.04), from, way);
+    const half = from.clone().addScaledVector(way, 0.5).setY(from.y - 16 * strut);
     label(shown(now(progress.values)), () => half, "name");
     show_labels();
   }
