@@ -183,11 +183,11 @@ def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, u
         heading = measures.path_of_centre(trajectory, structure).heading
         speed = velocity[:, 0] * np.cos(heading) + velocity[:, 1] * np.sin(heading)
         name = "forward speed"
-    speed = speed / unit.length
-    mean = float(np.trapezoid(speed, trajectory.time) / np.ptp(trajectory.time.values))
+    over_time = xarray.DataArray(speed / unit.length, {"time": trajectory.time})
+    mean = float(over_time.integrate("time") / np.ptp(trajectory.time.values))
     panel.axhline(0.0, color="0.8", linewidth=0.5)
     panel.axhline(mean, **REFERENCE)
-    panel.plot(trajectory.time, speed, **_SPEED)
+    panel.plot(over_time.time, over_time, **_SPEED)
     write_beside(panel, mean, f"mean\n{fixed(mean, unit.digits)}")
     panel.set(xlabel="time (s)", xlim=trajectory.time.values[[0, -1]])
     name_panel(panel, f"{name} ({unit.length_name}/s)")
