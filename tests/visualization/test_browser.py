@@ -168,14 +168,17 @@ def test_the_camera_follows_and_keeps_the_robot_large(page, trajectory):
 def test_a_camera_that_stands_lets_the_robot_walk_on(page, trajectory):
     animation.do(page, "show", 0.0)
     page.locator("#follow").uncheck()
-    before = page.evaluate("viewer.camera.position.toArray()")
+    before = np.array(page.evaluate("viewer.camera.position.toArray()"))
     animation.do(page, "show", 5.0)
-    assert page.evaluate("viewer.camera.position.toArray()") == before
+    # The orbit controls turn the position into angles and back, which rounds it.
+    stands = page.evaluate("viewer.camera.position.toArray()")
+    np.testing.assert_allclose(stands, before, atol=1e-9)
     animation.do(page, "camera", {"times": [0.0, 5.0]})
     for time in (0.0, 5.0):
         assert extents(page, trajectory["p_WN"].sel(time=time).values).max() < 0.8
     page.locator("#follow").check()
-    assert page.evaluate("viewer.camera.position.toArray()") != before
+    follows = page.evaluate("viewer.camera.position.toArray()")
+    assert np.linalg.norm(follows - before) > 0.1
 
 
 def text(page, output):
