@@ -25,6 +25,7 @@ def short():
         "simulation.steady_from": "0.5 s",
     }
     changes |= {"cpg.start_up": "0.2 s", "simulation.sample_period": "1e-3 s", "cpg.gain": "3 lbf"}
+    changes |= {"friction.stiffness": "0 N/m"}  # as in MuJoCo
     return load_scenario("coulomb").with_changes(changes | {"engine": "!Compiled"})
 
 

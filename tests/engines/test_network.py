@@ -77,6 +77,8 @@ def test_two_alike_oscillators_per_junction_walk_as_the_thesis_s_one(scenario, e
 def test_mirrored_gaits_and_opposite_turns_give_mirrored_walks(engine, signals):
     every = list(PATHWAYS) if signals == "live" else []
     changes = {"cpg__signals": signals, "cpg__feedback": every}
+    # A bristle's reset falls into one step or the next by rounding.
+    changes["friction__stiffness"] = "0 N/m"
     scenario = shortly(load_scenario("undulation"), 1.0, **changes)
     gait = dataclasses.replace(seeded_gait(scenario, 3), turn=0.4)
     one, other = walk(scenario, gait, engine), walk(scenario, image(gait, scenario), engine)

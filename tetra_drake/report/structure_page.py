@@ -33,7 +33,7 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     """The robot of a structure file, or a file of NTRT with a `unit` of length, on flat ground with
     Coulomb friction, for MuJoCo. Raises InputError that names file and key."""
     structure, name = read_structure(name_or_file, unit=unit), Path(name_or_file).stem
-    surroundings = load_scenario(_SURROUNDINGS)
+    surroundings = load_scenario(_SURROUNDINGS).with_changes({"friction.stiffness": "0 N/m"})
     return Robot.of(surroundings.with_sections(name=name, robot=structure, engine=Mujoco()))
 
 

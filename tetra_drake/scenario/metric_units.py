@@ -89,8 +89,8 @@ class Metrics:
     """Mean speed, winding or paying out."""
     peak_actuator_power: float = _metric("W", most=True)
     """Greatest product of an actuator's tension and winding speed."""
-    mean_actuator_power: float = _metric("W")
-    """Mean positive power of an actuator."""
+    mean_actuator_power: float = _metric("W", most=True)
+    """Mean positive power of an actuator: the effort of a gait."""
     actuator_limited: float = _metric("", most=True)
     """Share of time in which a limit binds, mean of all winches or tension motors."""
     lifted_shares: tuple[float, ...] = ()
