@@ -20,21 +20,23 @@ from typing import Any
 import pandas
 
 from tetra_drake.analysis.robustness import PERCENT, judge, robustness_numbers
-from tetra_drake.engines.simulate import check_scenario
+from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.executors import evaluate_all, process_executor
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.machine import available_cores, versions
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat
+from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.scenario.units import INCH
 
-SCHEMA = 4
+SCHEMA = 5
 ANALYSIS = "analysis.json"
 
 TIGHT, MUJOCO = "runge_kutta3, witness", "MuJoCo"
@@ -43,6 +45,9 @@ functions; MuJoCo's ground, with a coefficient of 0.5 in place of the reset inte
 LAWS = {"reset integrator": "thesis", "Coulomb": "coulomb"}
 """Settings on flat ground: the compiled engine with the friction of another shipped scenario."""
 
+UNSEEN = range(1001, 1021)
+"""Seeds of random ground on which no gait was evolved."""
+
 SHOWN = ("cost_of_transport", "tension", "clearance")
 """The metrics of the best gaits that pages show."""
 
@@ -50,6 +55,7 @@ _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_hig
 _COLUMNS = {
     "best_gaits": ("trial", "evaluation", "evaluations", "fitness", *SHOWN),
     "resimulations": ("trial", "setting", "distance_in"),
+    "unseen": ("trial", "seed", "distance_in"),
     "gaits": ("gait", "undisturbed", "5 %", "50 %", "95 %", *_MEAN, *_KEPT, "failed"),
     "changes": ("what", "median", "worst", "failed", "correlation", "correlation_size"),
 }
@@ -68,6 +74,9 @@ class Analysis:
     resimulations: pandas.DataFrame
     """Fittest gaits on other engines and under other laws of friction: trial, setting, distance_in
     (NaN where it failed)."""
+    unseen: pandas.DataFrame
+    """Fittest gaits on random ground of UNSEEN seeds, if the scenario has such ground: trial, seed,
+    distance_in (NaN where it failed)."""
     gaits: pandas.DataFrame
     """Fittest gaits on the compiled engine under draws of the default disturbances, in m; see
     robustness.by_gait(). Index: trial."""
@@ -95,7 +104,11 @@ def load_analysis(directory: Path) -> Analysis:
     try:
         raw: Any = json.loads(path.read_text(encoding="utf-8"))
         rows = raw | raw["robustness"]
-        frames = {key: pandas.DataFrame(rows[key])[list(_COLUMNS[key])] for key in _COLUMNS}
+        frames = {}
+        for key, names in _COLUMNS.items():
+            # Without rows there are no columns either.
+            frames[key] = pandas.DataFrame(rows[key], columns=None if rows[key] else list(names))
+            frames[key] = frames[key][list(names)]
         for frame in frames.values():
             numbers = frame.columns.intersection(_NUMBERS)
             frame[numbers] = frame[numbers].astype(float)
@@ -103,6 +116,7 @@ def load_analysis(directory: Path) -> Analysis:
             raw["versions"],
             best_gaits=frames["best_gaits"].set_index("trial"),
             resimulations=frames["resimulations"],
+            unseen=frames["unseen"],
             gaits=frames["gaits"].set_index("gait"),
             changes=frames["changes"],
         )
@@ -128,6 +142,7 @@ def analyse(
         "versions": versions(),
         "best_gaits": best,
         "resimulations": resimulate(scenario, gaits, workers, executor),
+        "unseen": on_unseen_ground(scenario, gaits, workers),
         "robustness": robustness_numbers(judge(scenario, gaits, percent=PERCENT, workers=workers)),
     }
     text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
@@ -167,10 +182,32 @@ def resimulate(
     return rows
 
 
+def on_unseen_ground(
+    scenario: Scenario, gaits: Mapping[int, Gait], workers: int
+) -> list[dict[str, Any]]:
+    """The gaits on random ground of UNSEEN seeds, as in Analysis; none on other ground."""
+    if not isinstance(scenario.terrain, Rough):
+        return []
+    walks = [(trial, seed) for trial in gaits for seed in UNSEEN]
+    scenarios = {seed: scenario.with_changes({"terrain.seed": seed}) for seed in UNSEEN}
+    outcomes = simulate_many(
+        [scenarios[seed] for _, seed in walks],
+        [gaits[trial] for trial, _ in walks],
+        workers=workers,
+    )
+    rows = []
+    for (trial, seed), outcome in zip(walks, outcomes, strict=True):
+        walked = outcome.metrics.distance_in if isinstance(outcome, SimulationResult) else None
+        rows.append({"trial": trial, "seed": seed, "distance_in": walked})
+    return rows
+
+
 def settings_of(scenario: Scenario) -> dict[str, Scenario]:
     """The scenario with each setting, by names; without those that cannot simulate it."""
     tight = Drake(scheme="runge_kutta3", accuracy=1e-3, max_step=0.002, mode_changes="witness")
     changes: dict[str, dict[str, Any]] = {TIGHT: {"engine": tight}, MUJOCO: {"engine": "!Mujoco"}}
+    if isinstance(scenario.friction, Coulomb):
+        changes[MUJOCO]["friction.stiffness"] = "0 N/m"  # MuJoCo has no bristles
     if isinstance(scenario.terrain, Flat):
         for law, shipped in LAWS.items():
             other = load_scenario(shipped)

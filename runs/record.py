@@ -5,17 +5,20 @@
 Each experiment is evolved and analysed in a folder of out/runs, thinned into a folder here, and its
 best gait shown on a page and, by Chromium, in a picture there; those that README.md shows are
 filmed, too. Interrupted, it goes on; what is done is skipped. All pages share the viewer
-meshcat.js, of one version of Drake.
+meshcat.js, of one version of Drake. times.json says how long each took.
 """
 
 from __future__ import annotations
 
+import contextlib
 import filecmp
+import json
+import os
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,11 +29,14 @@ from thinning import thin
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Display
+from tetra_drake.evolution.run import load_run
 from tetra_drake.experiment import evolve
 from tetra_drake.figures.gait_diagram import gait_diagram
 from tetra_drake.figures.style import save_figure
+from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration, listed
 from tetra_drake.machine import available_cores
+from tetra_drake.prototype.export import export
 from tetra_drake.report.replay_page import load_or_simulate
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
@@ -42,6 +48,9 @@ SCRATCH = Path("out/runs")
 VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
+TIMES, EXPORTED = "times.json", "lab"
+RATE = 100.0
+"""Hz: samples of exported commands."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +64,8 @@ class Experiment:
     """Changes by keys of the scenario, beside its name."""
     film: bool = False
     """True if its best gait is filmed, for README.md."""
+    exported: bool = False
+    """True if its best gait is exported for a prototype, into the folder EXPORTED."""
 
     def scenario(self, name: str) -> Scenario:
         """Scenario of the run of this name."""
@@ -65,6 +76,12 @@ _COMPILED = {"engine": "!Compiled"}
 _SOUND = {"require": {"clearance": "0.125 in", "tension": 0.0}}
 """Struts do not touch, and cables need not push."""
 
+_WELL_APART = {"require": {"clearance": "0.25 in", "tension": 0.0}}
+"""Struts stay two diameters apart, and cables need not push."""
+
+_EFFORT = {"require": {"clearance": "0.125 in", "tension": 0.0, "mean_actuator_power": "80 mW"}}
+"""As _SOUND, and no gait has more than this effort."""
+
 
 def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, Any]:
     """Changes of an experiment on the compiled engine."""
@@ -72,7 +89,11 @@ def _by(optimizer: OptimizerKind, trials: int, evaluations: int) -> dict[str, An
     return {**_COMPILED, "optimizer": optimizer, **sizes}
 
 
-_SHORT = _by(CmaEs(), 3, 2000)
+_SHORT, _SETTLED = _by(CmaEs(), 3, 2000), _by(CmaEs(), 10, 2000)
+_STRUCTURE = _by(CmaEs(), 3, 1500) | {
+    "simulation.duration": "15 s",
+    "simulation.steady_from": "3 s",
+}
 
 EXPERIMENTS = {
     "thesis": Experiment("the thesis's experiment, ten trials", "thesis", _COMPILED),
@@ -88,14 +109,21 @@ EXPERIMENTS = {
     "coulomb": Experiment("the same under friction that grows with the load", "coulomb", _COMPILED),
     "incline": Experiment("up an incline of 5°", "incline", _SHORT),
     "steps": Experiment("up four steps of 0.25 in", "steps", _SHORT),
-    "rough": Experiment("over rough ground", "rough", _SHORT),
+    "rough": Experiment(
+        "over rough ground, ten trials", "rough", _SETTLED | _WELL_APART | {"cpg.signals": "live"}
+    ),
     "rough-feedback": Experiment(
-        "over rough ground, with feedback to the oscillators", "feedback", _SHORT | _SOUND
+        "the same with feedback to the oscillators", "feedback", _SETTLED | _WELL_APART
     ),
     "undulation": Experiment(
-        "an oscillator for each bottom cable, so that the robot can undulate",
+        "an oscillator for each bottom cable, so that the robot can undulate, ten trials",
         "undulation",
-        _SHORT | _SOUND,
+        _SETTLED | _EFFORT,
+    ),
+    "undulation-four": Experiment(
+        "the same with an oscillator for each pair of cables",
+        "undulation",
+        _SETTLED | _EFFORT | {"robot.actuation": [["outer bottom_left", "outer bottom_right"]]},
     ),
     "turning": Experiment("turning on the spot, in 30 s", "turning", _SHORT | _SOUND, film=True),
     "robust": Experiment("far on eight disturbed robots", "robust", _by(CmaEs(), 3, 1000)),
@@ -115,6 +143,14 @@ EXPERIMENTS = {
     "map": Experiment(
         "gaits that differ, the fittest of each kind", "thesis", _by(QualityDiversity(), 1, 30000)
     ),
+    "prism": Experiment("a prism of three struts", "prism", _STRUCTURE),
+    "six-bar": Experiment("a six-bar tensegrity", "six_bar", _STRUCTURE),
+    "mast": Experiment("a mast of prisms, lying", "mast", _STRUCTURE),
+    "pair": Experiment("two prisms side by side", "pair", _STRUCTURE),
+    "winch": Experiment("stiff cables on winches", "winch", _by(CmaEs(), 3, 1500), exported=True),
+    "motors": Experiment(
+        "the thesis's robot carries motors", "motors", _by(CmaEs(), 3, 1500), exported=True
+    ),
 }
 """Experiments by the names of their folders, in the order of the gallery."""
 
@@ -128,17 +164,43 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
     analysis, copy = made / ANALYSIS, shown / ANALYSIS
     if analysis.exists() and copy.exists() and filecmp.cmp(analysis, copy, shallow=False):
         return
-    begin, resume = time.monotonic(), (made / MANIFEST).exists()
-    progress = Display(sys.stdout)
-    evolve(experiment.scenario(name), made, resume=resume, report=False, progress=progress)
+    with timed(name, "evolution", out):
+        resume, progress = (made / MANIFEST).exists(), Display(sys.stdout)
+        evolve(experiment.scenario(name), made, resume=resume, report=False, progress=progress)
     if not analysis.exists():
-        analyse(made, workers=available_cores())
+        with timed(name, "analysis", out):
+            analyse(made, workers=available_cores())
+    with timed(name, "pages", out):
+        make_folder(made, shown)
+        show(shown, viewer=out / VIEWER, film=experiment.film)
+        if experiment.exported:
+            run = load_run(made)
+            export(run.scenario, run.best_gait(), rate=RATE, out=shown / EXPORTED)
+    shutil.copy(analysis, copy)
+
+
+def make_folder(made: Path, shown: Path) -> None:
+    """Thins a run into the folder `shown`, of which only the page and the pictures stay."""
     for old in {*shown.glob("*")} - {shown / "README.md", *shown.glob("*.png")}:
         shutil.rmtree(old) if old.is_dir() else old.unlink()
     thin(made, shown)
-    show(shown, viewer=out / VIEWER, film=experiment.film)
-    shutil.copy(analysis, copy)
-    print(f"{name}: {duration(time.monotonic() - begin)}", flush=True)
+
+
+@contextlib.contextmanager
+def timed(name: str, stage: str, out: Path) -> Iterator[None]:
+    """Adds what happens inside to TIMES in `out`, even if it is interrupted: wall time, and that of
+    all cores (s)."""
+    begin, work = time.monotonic(), sum(os.times()[:4])
+    try:
+        yield
+    finally:
+        file = out / TIMES
+        times = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        spent = times.setdefault(name, {}).setdefault(stage, {"wall_s": 0.0, "cores_s": 0.0})
+        spent["wall_s"] = round(spent["wall_s"] + time.monotonic() - begin, 1)
+        spent["cores_s"] = round(spent["cores_s"] + sum(os.times()[:4]) - work, 1)
+        write_whole(file, json.dumps(times, indent=1) + "\n")
+        print(f"{name}, {stage}: {duration(spent['wall_s'])}", flush=True)
 
 
 def show(directory: Path, *, viewer: Path, film: bool) -> None:
