@@ -27,6 +27,7 @@ from tetra_drake.evolution.executors import evaluate_all, process_executor
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.machine import available_cores, versions
+from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.engine_kinds import Drake
@@ -55,7 +56,7 @@ _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_hig
 _COLUMNS = {
     "best_gaits": ("trial", "evaluation", "evaluations", "fitness", *SHOWN),
     "resimulations": ("trial", "setting", "distance_in"),
-    "unseen": ("trial", "seed", "distance_in"),
+    "unseen": ("trial", "seed", "distance_in", "met"),
     "gaits": ("gait", "undisturbed", "5 %", "50 %", "95 %", *_MEAN, *_KEPT, "failed"),
     "changes": ("what", "median", "worst", "failed", "correlation", "correlation_size"),
 }
@@ -76,7 +77,7 @@ class Analysis:
     (NaN where it failed)."""
     unseen: pandas.DataFrame
     """Fittest gaits on random ground of UNSEEN seeds, if the scenario has such ground: trial, seed,
-    distance_in (NaN where it failed)."""
+    distance_in (NaN where it failed), met (are the scenario's requirements met there?)."""
     gaits: pandas.DataFrame
     """Fittest gaits on the compiled engine under draws of the default disturbances, in m; see
     robustness.by_gait(). Index: trial."""
@@ -197,8 +198,11 @@ def on_unseen_ground(
     )
     rows = []
     for (trial, seed), outcome in zip(walks, outcomes, strict=True):
-        walked = outcome.metrics.distance_in if isinstance(outcome, SimulationResult) else None
-        rows.append({"trial": trial, "seed": seed, "distance_in": walked})
+        distance, met = None, False
+        if isinstance(outcome, SimulationResult):
+            distance = outcome.metrics.distance_in
+            met = not unmet_requirements(outcome.metrics, scenario.require)
+        rows.append({"trial": trial, "seed": seed, "distance_in": distance, "met": met})
     return rows
 
 

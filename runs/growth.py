@@ -34,8 +34,8 @@ GROWTH, APART, KEPT = "growth", "engines apart, in", "kept, %"
 def growth(run: Run, gait: Gait) -> float:
     """Median over the ways of the largest displacement of a node at the end, over that at the
     start."""
-    scenario = run.manifest.scenario
-    bodies = scenario.bodies
+    scenario = run.scenario
+    bodies = scenario.robot.body_count
     generator = np.random.default_rng(0)
     directions = generator.normal(size=(WAYS, bodies, 3))
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
@@ -44,7 +44,7 @@ def growth(run: Run, gait: Gait) -> float:
     scenarios = [scenario, *(scenario.with_numbers(change) for change in changes)]
     outcomes = simulate_many(scenarios, [gait] * len(scenarios), record=True)
     ends = [
-        outcome.recorded.p_WN.values[-1]
+        outcome.trajectory.p_WN.values[-1]
         for outcome in outcomes
         if isinstance(outcome, SimulationResult)
     ]

@@ -2,9 +2,8 @@
 
     python runs/settle.py runs/rough runs/rough-feedback
 
-Prints the mean over the trials' best gaits of their distances (in), where they were evolved, on
-unseen ground and on disturbed robots, and the difference of the means with its 95 % interval, by
-bootstrap over the trials.
+Prints the means over the trials' best gaits of what analysis.json says of them, and the difference
+of the means with its 95 % interval, by bootstrap over the trials.
 """
 
 from __future__ import annotations
@@ -21,16 +20,20 @@ from tetra_drake.formatting import Table, fixed, listed, ranged
 from tetra_drake.scenario.units import INCH
 
 
-def distances(analysis: Analysis) -> dict[str, np.ndarray]:
-    """Distances (in) of the trials' best gaits, (trials,) each, by where they walk."""
-    by_place = {
-        "where it was evolved": analysis.gaits["undisturbed"].to_numpy() / INCH,
-        "on 200 disturbed robots": analysis.gaits["mean"].to_numpy() / INCH,
+def numbers(analysis: Analysis) -> dict[str, np.ndarray]:
+    """Numbers of the trials' best gaits, (trials,) each, by what they are."""
+    gaits = analysis.gaits
+    by_name = {
+        "distance where it was evolved, in": gaits["undisturbed"].to_numpy() / INCH,
+        "mean distance on disturbed robots, in": gaits["mean"].to_numpy() / INCH,
+        "share of disturbed robots that keep the gait, %": 100.0 * gaits["kept"].to_numpy(),
     }
     if len(analysis.unseen):
-        unseen = analysis.unseen.groupby("trial")["distance_in"].mean()
-        by_place["on 20 unseen grounds"] = unseen.to_numpy()
-    return by_place
+        walks = analysis.unseen.groupby("trial")[["distance_in", "met"]].mean()
+        by_name["mean distance on unseen ground, in"] = walks["distance_in"].to_numpy()
+        met = 100.0 * walks["met"].to_numpy()
+        by_name["share of unseen grounds where requirements are met, %"] = met
+    return by_name
 
 
 def difference_of_means(one: np.ndarray, other: np.ndarray) -> tuple[float, float, float]:
@@ -46,12 +49,12 @@ def difference_of_means(one: np.ndarray, other: np.ndarray) -> tuple[float, floa
 
 def settled(first: Path, second: Path) -> Table:
     """The comparison of two runs."""
-    one, other = (distances(load_analysis(run)) for run in (first, second))
+    one, other = (numbers(load_analysis(run)) for run in (first, second))
     rows = []
-    for place in [place for place in one if place in other]:
-        means = [fixed(values[place].mean()) for values in (one, other)]
-        rows.append([place, *means, ranged(*difference_of_means(one[place], other[place]))])
-    return Table(["mean distance, in", first.name, second.name, "difference"], rows)
+    for name in [name for name in one if name in other]:
+        means = [fixed(values[name].mean()) for values in (one, other)]
+        rows.append([name, *means, ranged(*difference_of_means(one[name], other[name]))])
+    return Table(["mean of the trials", first.name, second.name, "difference"], rows)
 
 
 def main(runs: list[str]) -> None:
