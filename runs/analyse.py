@@ -19,7 +19,8 @@ from typing import Any
 
 import pandas
 
-from tetra_drake.analysis.robustness import PERCENT, judge, robustness_numbers
+from tetra_drake.analysis.robustness import PERCENT, by_gait, judge
+from tetra_drake.analysis.statistics import json_rows
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
@@ -57,10 +58,9 @@ _COLUMNS = {
     "best_gaits": ("trial", "evaluation", "evaluations", "fitness", *SHOWN),
     "resimulations": ("trial", "setting", "distance_in"),
     "unseen": ("trial", "seed", "distance_in", "met"),
-    "gaits": ("gait", "undisturbed", "5 %", "50 %", "95 %", *_MEAN, *_KEPT, "failed"),
-    "changes": ("what", "median", "worst", "failed", "correlation", "correlation_size"),
+    "disturbed": ("gait", "undisturbed", *_MEAN, *_KEPT, "failed", "missed"),
 }
-_NUMBERS = [*SHOWN, "distance_in", "correlation", "correlation_size"]
+_NUMBERS = [*SHOWN, "distance_in"]
 """Columns that may be null in all rows."""
 
 
@@ -78,11 +78,9 @@ class Analysis:
     unseen: pandas.DataFrame
     """Fittest gaits on random ground of UNSEEN seeds, if the scenario has such ground: trial, seed,
     distance_in (NaN where it failed), met (are the scenario's requirements met there?)."""
-    gaits: pandas.DataFrame
+    disturbed: pandas.DataFrame
     """Fittest gaits on the compiled engine under draws of the default disturbances, in m; see
     robustness.by_gait(). Index: trial."""
-    changes: pandas.DataFrame
-    """Effects of single changes, in m; see robustness.by_change()."""
 
     @property
     def best_trial(self) -> int:
@@ -96,7 +94,7 @@ class Analysis:
 
     def undisturbed(self, trial: int) -> float:
         """Distance (in) of a trial's fittest gait on the compiled engine."""
-        return float(self.gaits.loc[trial, "undisturbed"]) / INCH
+        return float(self.disturbed.loc[trial, "undisturbed"]) / INCH
 
 
 def load_analysis(directory: Path) -> Analysis:
@@ -104,11 +102,10 @@ def load_analysis(directory: Path) -> Analysis:
     path = directory / ANALYSIS
     try:
         raw: Any = json.loads(path.read_text(encoding="utf-8"))
-        rows = raw | raw["robustness"]
         frames = {}
         for key, names in _COLUMNS.items():
             # Without rows there are no columns either.
-            frames[key] = pandas.DataFrame(rows[key], columns=None if rows[key] else list(names))
+            frames[key] = pandas.DataFrame(raw[key], columns=None if raw[key] else list(names))
             frames[key] = frames[key][list(names)]
         for frame in frames.values():
             numbers = frame.columns.intersection(_NUMBERS)
@@ -118,8 +115,7 @@ def load_analysis(directory: Path) -> Analysis:
             best_gaits=frames["best_gaits"].set_index("trial"),
             resimulations=frames["resimulations"],
             unseen=frames["unseen"],
-            gaits=frames["gaits"].set_index("gait"),
-            changes=frames["changes"],
+            disturbed=frames["disturbed"].set_index("gait"),
         )
     except (OSError, ValueError, KeyError, TypeError) as error:
         problem = f"cannot be read ({error}); run `python runs/analyse.py {directory}`"
@@ -138,13 +134,14 @@ def analyse(
     run.fittest()  # InputError if there is none
     best = best_gaits(run)
     gaits = {row["trial"]: run.gait(row["trial"], row["evaluation"]) for row in best}
+    judgement = judge(scenario, gaits, percent=PERCENT, alone=False, workers=workers)
     content = {
         "schema": SCHEMA,
         "versions": versions(),
         "best_gaits": best,
         "resimulations": resimulate(scenario, gaits, workers, executor),
         "unseen": on_unseen_ground(scenario, gaits, workers),
-        "robustness": robustness_numbers(judge(scenario, gaits, percent=PERCENT, workers=workers)),
+        "disturbed": json_rows(by_gait(judgement)),
     }
     text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
     write_whole(directory / ANALYSIS, text + "\n")

@@ -60,7 +60,7 @@ def growth_table(directory: Path) -> pandas.DataFrame:
     for trial, evaluation in analysis.best_gaits["evaluation"].items():
         apart = abs(analysis.undisturbed(trial) - analysis.again(trial, TIGHT))
         grown = growth(run, run.gait(trial, int(evaluation)))
-        kept = 100.0 * analysis.gaits.loc[trial, "kept"]
+        kept = 100.0 * analysis.disturbed.loc[trial, "kept"]
         rows.append({"trial": trial, GROWTH: grown, APART: apart, KEPT: kept})
     return pandas.DataFrame(rows).set_index("trial")
 

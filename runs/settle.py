@@ -22,11 +22,11 @@ from tetra_drake.scenario.units import INCH
 
 def numbers(analysis: Analysis) -> dict[str, np.ndarray]:
     """Numbers of the trials' best gaits, (trials,) each, by what they are."""
-    gaits = analysis.gaits
+    disturbed = analysis.disturbed
     by_name = {
-        "distance where it was evolved, in": gaits["undisturbed"].to_numpy() / INCH,
-        "mean distance on disturbed robots, in": gaits["mean"].to_numpy() / INCH,
-        "share of disturbed robots that keep the gait, %": 100.0 * gaits["kept"].to_numpy(),
+        "distance where it was evolved, in": disturbed["undisturbed"].to_numpy() / INCH,
+        "mean distance on disturbed robots, in": disturbed["mean"].to_numpy() / INCH,
+        "share of disturbed robots that keep the gait, %": 100.0 * disturbed["kept"].to_numpy(),
     }
     if len(analysis.unseen):
         walks = analysis.unseen.groupby("trial")[["distance_in", "met"]].mean()

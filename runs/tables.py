@@ -10,7 +10,6 @@ Each table stands in a Markdown file between two lines:
 
 from __future__ import annotations
 
-import math
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +21,7 @@ from record import DIAGRAM, EXPERIMENTS, PICTURE
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import read_text, write_whole
-from tetra_drake.formatting import Table, fixed, listed, percents, signed
+from tetra_drake.formatting import Table, fixed, listed, percents
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.units import INCH, customary
@@ -57,7 +56,7 @@ def gallery_table(runs: Runs) -> str:
         diagram = f'<img src="{name}/{DIAGRAM}.svg" width="300" alt="gait diagram of {name}">'
         title = f"[`{name}`]({name}/{README}): {EXPERIMENTS[name].title}"
         distances = [fixed(run.undisturbed(best)), fixed(run.again(best, TIGHT))]
-        kept = f"{100.0 * run.gaits.loc[best, 'kept']:.0f} %"
+        kept = f"{100.0 * run.disturbed.loc[best, 'kept']:.0f} %"
         rows.append([picture, diagram, f"{title}<br>[page]({name}/{REPLAY})", *distances, kept])
     headings = ["", "", "experiment", "distance, in", "on the Drake diagram, in", "keeps"]
     return Table(headings, rows, text_columns=(0, 1, 2)).markdown()
@@ -72,7 +71,7 @@ def trials_table(run: Analysis) -> str:
         compiled, tight = run.undisturbed(trial), run.again(trial, TIGHT)
         if not abs(compiled - tight) <= APART:
             apart.append(trial)
-        judged = run.gaits.loc[trial]
+        judged = run.disturbed.loc[trial]
         distances = [compiled, tight, run.again(trial, MUJOCO), judged["mean"] / INCH]
         kept = percents(*judged[["kept", "kept_low", "kept_high"]])
         metrics = [gait[name] / size for name, (size, _) in units.items()]
@@ -90,34 +89,21 @@ def trials_table(run: Analysis) -> str:
     return f"{table}\n\nThe engines differ by more than {APART} in in {trials} {listed(apart)}."
 
 
-def changes_table(run: Analysis) -> str:
-    """Effects of single changes on the best gaits."""
-    rows = []
-    for _, row in run.changes.iterrows():
-        failed = f", {row['failed']:.0f} failed" if row["failed"] else ""
-        alone = f"{fixed(row['median'] / INCH)} ({signed(row['worst'] / INCH)}{failed})"
-        correlation = "-"
-        if math.isfinite(row["correlation"]):
-            correlation = f"{signed(row['correlation'])} ({fixed(row['correlation_size'])})"
-        rows.append([row["what"], alone, correlation])
-    headings = ["changed by 5 %", "alone: median change (worst), in"]
-    return Table([*headings, "rank correlation: mean (median size)"], rows).markdown()
-
-
 def pages(runs: Runs) -> list[Path]:
     """All pages with tables."""
     return [HERE / README, *(HERE / name / README for name in runs)]
 
 
 def made_again(page: Path, runs: Runs) -> str:
-    """The text of a page with its tables made again: the gallery, or the tables of the run in whose
+    """The text of a page with its table made again: the gallery, or the trials of the run in whose
     folder the page is. Raises InputError if it cannot be read."""
 
     def make_table(name: str) -> str:
-        if name == "gallery":
-            return gallery_table(runs)
-        tables = {"trials": trials_table, "changes": changes_table}
-        return tables[name](runs[page.parent.name])
+        tables = {
+            "gallery": lambda: gallery_table(runs),
+            "trials": lambda: trials_table(runs[page.parent.name]),
+        }
+        return tables[name]()
 
     return filled(read_text(page, "page"), make_table)
 

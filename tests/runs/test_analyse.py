@@ -9,7 +9,6 @@ from helpers.synthetic_run import tiny_scenario, write_run
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import load_run
-from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 
 TRIALS = [[[(1.0, 0), (2.0, 1)], [(5.0, 0)]], [[(None, 0)]], [[(3.0, 0), (2.5, 1)]]]
@@ -55,7 +54,7 @@ def test_they_are_simulated_on_other_engines_and_under_other_laws(folder):
     assert engines == {analyse.TIGHT: "drake", analyse.MUJOCO: "mujoco"} | dict.fromkeys(
         analyse.LAWS, "compiled"
     )
-    assert settings["Coulomb"].friction == Coulomb()
+    assert settings["Coulomb"].friction == load_scenario("coulomb").friction
     by_setting = again.groupby("setting")["distance_in"].apply(list)
     assert by_setting["reset integrator"] == distances(run, scenario)
     assert by_setting[analyse.TIGHT] == distances(run, settings[analyse.TIGHT])
