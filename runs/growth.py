@@ -4,7 +4,7 @@
 
 Displaces each body of the robot by 1 nm at the start, in ten random ways per best gait, and draws
 how much the differences have grown at the end, beside the disagreement of the compiled engine with
-the diagram and the share of disturbed robots that keep the gait. Writes growth.svg to the run's
+the diagram and the share of disturbed robots that keep the gait. Writes growth.png to the run's
 folder, and prints the table and the rank correlations.
 """
 
@@ -83,7 +83,7 @@ def main(directories: list[str]) -> None:
     """Draws the figure of each run."""
     for directory in map(Path, directories):
         table = growth_table(directory)
-        save_figure(growth_figure(table), directory, "growth", kinds=["svg"])
+        save_figure(growth_figure(table), directory, "growth", kinds=["png"])
         print(table.to_string(float_format="%.3g"))
         ranks = table.rank()
         for name in (APART, KEPT):
