@@ -29,10 +29,14 @@ def numbers(analysis: Analysis) -> dict[str, np.ndarray]:
         "share of disturbed robots that keep the gait, %": 100.0 * disturbed["kept"].to_numpy(),
     }
     if len(analysis.unseen):
-        walks = analysis.unseen.groupby("trial")[["distance_in", "met"]].mean()
+        unseen = analysis.unseen.fillna({"distance_in": 0.0})
+        unseen = unseen.assign(valid_in=unseen["distance_in"] * unseen["met"])
+        walks = unseen.groupby("trial")[["distance_in", "met", "valid_in"]].mean()
         by_name["mean distance on unseen ground, in"] = walks["distance_in"].to_numpy()
-        met = 100.0 * walks["met"].to_numpy()
-        by_name["share of unseen grounds where requirements are met, %"] = met
+        by_name["share of these walks that meet the requirements, %"] = (
+            100.0 * walks["met"].to_numpy()
+        )
+        by_name["mean distance, 0 where they are not met, in"] = walks["valid_in"].to_numpy()
     return by_name
 
 
