@@ -67,6 +67,25 @@ def test_only_what_an_engine_can_simulate_is_asked_of_it():
     assert set(analyse.settings_of(load_scenario("incline"))) == {analyse.TIGHT, analyse.MUJOCO}
 
 
+def test_gaits_walk_on_unseen_ground_and_may_miss_requirements_there(folder, monkeypatch):
+    monkeypatch.setattr(analyse, "UNSEEN", range(1001, 1003))
+    run = load_run(folder)
+    gaits = {0: run.gait(0, 2), 2: run.gait(2, 0)}
+    ground = {"terrain": load_scenario("rough").terrain, "require": {"clearance": "0 in"}}
+    rough = run.scenario.with_changes(ground)
+    rows = analyse.on_unseen_ground(rough, gaits, workers=1)
+    assert [(row["trial"], row["seed"]) for row in rows] == [
+        (trial, seed) for trial in (0, 2) for seed in (1001, 1002)
+    ]
+    for row in rows:
+        unseen = rough.with_changes({"terrain.seed": row["seed"]})
+        walked = simulate(scenario=unseen, gait=gaits[row["trial"]])
+        assert row["distance_in"] == walked.metrics.distance_in and row["met"]
+    apart = rough.with_changes({"require": {"clearance": "6 in"}})
+    assert not any(row["met"] for row in analyse.on_unseen_ground(apart, gaits, workers=1))
+    assert analyse.on_unseen_ground(run.scenario, gaits, workers=1) == []
+
+
 def test_a_run_without_any_fitness_is_refused(tmp_path, refused):
     run = write_run(tmp_path / "run", [[[(None, 0)]]])
     with refused(run, "", "fitness"):
