@@ -49,7 +49,7 @@ VIEWER, PICTURE, FILM = "meshcat.js", "walking.png", "walking.gif"
 DIAGRAM = "gait"
 """Name of the picture of the gait diagram, without its suffix."""
 TIMES, EXPORTED = "times.json", "lab"
-RATE = 100.0
+RATE = 50.0
 """Hz: samples of exported commands."""
 
 
