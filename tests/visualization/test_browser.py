@@ -14,6 +14,7 @@ import sys
 import animation
 import numpy as np
 import pytest
+import xarray
 from helpers import quick_figures
 from helpers.meshcat_page import unpack
 from helpers.synthetic_run import write_run
@@ -199,18 +200,26 @@ def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
     page.locator("#play").click()
 
 
-def test_a_still_has_ghosts_and_neither_heading_nor_bar(browser, replay):
-    with opened(browser, replay.as_uri(), size=(300, 200)) as page:
+@pytest.mark.parametrize(
+    ("speed", "shown"), [(0.0, ["0 s", "5 s"]), (0.1, ["0 s", "2.5 s", "5 s"])]
+)
+def test_a_still_shows_instants_that_do_not_hide_each_other(
+    browser, trajectory, tmp_path, speed, shown
+):
+    """The robot walks one inch, and in the second case 0.5 m more, its own length."""
+    way = speed * trajectory["time"] * xarray.DataArray([1.0, 0.0, 0.0], dims="axis")
+    moved = {name: trajectory[name] + way for name in ("p_WN", "p_WB")}
+    path = tmp_path / "replay.html"
+    robot = Robot.of(load_scenario("thesis"))
+    save_replay(path, robot=robot, trajectory=trajectory.assign(moved), title="a: b")
+    with opened(browser, path.as_uri(), size=(300, 200)) as page:
         animation.wait_until_loaded(page)
         robots = "viewer.scene.children.filter(child => child.name == 'robot').length"
         assert page.evaluate(robots) == 1
         animation.still(page, [0.0, 2.5, 5.0])
-        assert page.evaluate(robots) == 3
-        assert page.locator("#labels span:visible").all_text_contents()[:3] == [
-            "0 s",
-            "2.5 s",
-            "5 s",
-        ]
+        assert page.evaluate(robots) == len(shown)
+        labels = page.locator("#labels span:visible").all_text_contents()
+        assert labels[: len(shown)] == shown
         assert not page.locator("#bar, #heading, #legend").filter(visible=True).count()
 
 

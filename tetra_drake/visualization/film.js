@@ -325,12 +325,24 @@ window.addEventListener("load", () => {
       viewer.scene.add(ghost);
     }
   }
-  function still(moments) {
+  // The moments at which the robot is half its size apart, and the first and the last.
+  function moments_apart(moments) {
+    const at = moments.map((moment) => mean(around(moment))), last = moments.length - 1;
+    let before = at[0];
+    return moments.filter((_, i) => {
+      if (i == 0 || i == last) return true;
+      if (Math.min(at[i].distanceTo(before), at[i].distanceTo(at[last])) < 0.5 * size) return false;
+      before = at[i];
+      return true;
+    });
+  }
+  function still(instants) {
     dress(false);
     labels.splice(0).forEach(({span}) => span.remove());
     element("labels").hidden = false;
-    camera({times: moments, from: [0.35, -1, 0.4]});
     const walked = progress.what == "walked";  // else the instants lie one above the other
+    const moments = walked ? moments_apart(instants) : instants;
+    camera({times: moments, from: [0.35, -1, 0.4]});
     moments.forEach((moment, i) => {
       show(moment);
       const above = mean(places), last = i == moments.length - 1;
