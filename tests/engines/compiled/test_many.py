@@ -168,6 +168,18 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
     assert len({each.metrics.distance for each in alone}) == len(alone), "all of them differ"
 
 
+def test_robots_that_differ_in_numbers_alone_share_an_engine(short):
+    """Else disturbed robots would walk one after another."""
+    engine = LaneEngine(prepared(short), width=2)
+    stiff = {"robot.cables.outer_stiffness": "0.21 lbf/in", "robot.cables.damping": "0.04 lbf*s/in"}
+    wide = {"robot.spacing": "3 in", "ground.stiffness": "20 lbf/in"}
+    moved = {"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}
+    for change in (stiff, wide, moved):
+        assert engine.accepts(prepared(short.with_changes(change))), change
+    for change in ({"robot.tetrahedra": 3}, {"robot.cables.slack": True}):
+        assert not engine.accepts(prepared(short.with_changes(change))), change
+
+
 def test_failures_stand_in_the_place_of_results(short):
     failing = {
         "a body's velocity": FALLING,

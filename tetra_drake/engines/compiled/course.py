@@ -85,12 +85,13 @@ class PreparedGait:
     def kind(self) -> tuple[object, ...]:
         """Properties that simulations on one engine must share."""
         structure, ground = self.robot.structure, self.robot.ground
-        joins = structure.cables[["node_a", "node_b", "signal"]].tobytes()
+        cables = structure.cables
         return (
             structure.first_node.tobytes(),
             structure.struts.tobytes(),
             structure.contacts.tobytes(),
-            joins,
+            # One by one: the bytes of a view of several fields are those of all fields.
+            *(cables[name].tobytes() for name in ("node_a", "node_b", "signal")),
             structure.isotropic,
             self.robot.model.slack,
             self.live,
