@@ -74,6 +74,7 @@ def growth_figure(table: pandas.DataFrame) -> Figure:
         panel.plot(table[GROWTH], table[name], "o", color=OKABE_ITO["blue"])
         for trial, row in table.iterrows():
             panel.annotate(str(trial), (row[GROWTH], row[name]), (4, 2), textcoords="offset points")
+        panel.margins(0.1)
         panel.set(xscale="log", xlabel="growth of 1 nm in 15 s", ylabel=name)
     panels[0].set_yscale("log")
     return figure
