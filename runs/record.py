@@ -146,8 +146,8 @@ EXPERIMENTS = {
     ),
     "prism": Experiment("a prism of three struts", "prism", _STRUCTURE),
     "six-bar": Experiment("a six-bar tensegrity", "six_bar", _STRUCTURE),
-    "mast": Experiment("a mast of prisms, lying", "mast", _STRUCTURE),
-    "pair": Experiment("two prisms side by side", "pair", _STRUCTURE),
+    "mast": Experiment("a mast of four vertebrae, lying", "mast", _STRUCTURE),
+    "pair": Experiment("two nested tetrahedra", "pair", _STRUCTURE),
     "winch": Experiment("stiff cables on winches", "winch", _by(CmaEs(), 3, 1500), exported=True),
     "motors": Experiment(
         "the thesis's robot carries motors", "motors", _by(CmaEs(), 3, 1500), exported=True
