@@ -58,10 +58,8 @@ def centre_of(state: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["prism", "six_bar"])
 def test_the_compiled_step_moves_as_the_independent_simulation(name, data):
-    recorded, robot = (
-        recorded_structure(data, name),
-        Robot.of(load_scenario(name).with_changes(NO_BRISTLES)),
-    )
+    recorded = recorded_structure(data, name)
+    robot = Robot.of(load_scenario(name).with_changes(NO_BRISTLES))
     model, phase, h = robot.model, np.array(recorded["drive"]["phase"]), 1e-4
     solver, work, forces = Solver.of(model), make_step(model), Forces.of(model)
     modes = np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
@@ -84,10 +82,8 @@ def test_the_compiled_step_moves_as_the_independent_simulation(name, data):
 
 @pytest.mark.parametrize("name", ["prism", "six_bar"])
 def test_the_diagrams_systems_move_as_the_independent_simulation(name, data):
-    recorded, robot = (
-        recorded_structure(data, name),
-        Robot.of(load_scenario(name).with_changes(NO_BRISTLES)),
-    )
+    recorded = recorded_structure(data, name)
+    robot = Robot.of(load_scenario(name).with_changes(NO_BRISTLES))
     structure, phase = robot.structure, np.array(recorded["drive"]["phase"])
     builder = DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(time_step=0.0))
@@ -210,13 +206,13 @@ def distance_in(scenario: Scenario, engine: Compiled | Drake | Mujoco, seed: int
 
 
 @pytest.mark.parametrize("name", ["prism", "six_bar"])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [2, 3, 4])
 def test_structures_walk_as_far_on_the_diagram_as_on_the_compiled_engine(name, seed):
     times = {"simulation.duration": "2.5 s", "simulation.steady_from": "1 s"}
     scenario = load_scenario(name).with_changes({"cpg.start_up": "0.25 s", **times})
     ours, drakes = (distance_in(scenario, FINE[engine], seed) for engine in ("compiled", "drake"))
     assert ours == pytest.approx(drakes, abs=1e-4)  # seen: 1e-5
-    assert abs(ours) > 0.01
+    assert abs(ours) > 0.02
 
 
 @pytest.mark.skipif(not installed(), reason=INSTALL)
