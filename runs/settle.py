@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from analyse import Analysis, load_analysis
 
-from tetra_drake.analysis.statistics import RESAMPLES
+from tetra_drake.analysis.statistics import middle, resampled
 from tetra_drake.errors import InputError
 from tetra_drake.formatting import Table, fixed, listed, ranged
 from tetra_drake.scenario.units import INCH
@@ -43,19 +43,17 @@ def numbers(analysis: Analysis) -> dict[str, np.ndarray]:
 def difference_of_means(one: np.ndarray, other: np.ndarray) -> tuple[float, float, float]:
     """Mean of `other` (m,) less that of `one` (n,), and its 95 % interval by bootstrap."""
     generator = np.random.default_rng(0)
-    resampled = [
-        values[generator.integers(len(values), size=(RESAMPLES, len(values)))].mean(axis=1)
-        for values in (one, other)
-    ]
-    low, high = np.quantile(resampled[1] - resampled[0], [0.025, 0.975])
-    return float(other.mean() - one.mean()), float(low), float(high)
+    means, other_means = resampled(one, generator), resampled(other, generator)
+    return float(other.mean() - one.mean()), *middle(other_means - means)
 
 
 def settled(first: Path, second: Path) -> Table:
     """The comparison of two runs."""
     one, other = (numbers(load_analysis(run)) for run in (first, second))
     rows = []
-    for name in [name for name in one if name in other]:
+    for name in one:
+        if name not in other:
+            continue
         means = [fixed(values[name].mean()) for values in (one, other)]
         rows.append([name, *means, ranged(*difference_of_means(one[name], other[name]))])
     return Table(["mean of the trials", first.name, second.name, "difference"], rows)

@@ -25,8 +25,20 @@ def interval(values: npt.ArrayLike, statistic: Callable[..., Any] = np.mean) -> 
     numbers = numbers[~np.isnan(numbers)]
     if not len(numbers):
         return math.nan, math.nan
-    picks = np.random.default_rng(0).integers(len(numbers), size=(RESAMPLES, len(numbers)))
-    low, high = np.quantile(statistic(numbers[picks], axis=1), [0.025, 0.975])
+    return middle(resampled(numbers, np.random.default_rng(0), statistic))
+
+
+def resampled(
+    values: np.ndarray, generator: np.random.Generator, statistic: Callable[..., Any] = np.mean
+) -> np.ndarray:
+    """The statistic of RESAMPLES resamples of the values (n,), each of n drawn with replacement."""
+    picks = generator.integers(len(values), size=(RESAMPLES, len(values)))
+    return np.asarray(statistic(values[picks], axis=1))
+
+
+def middle(resamples: np.ndarray) -> tuple[float, float]:
+    """The ends of the middle 95 % of resamples: a confidence interval, by bootstrap."""
+    low, high = np.quantile(resamples, [0.025, 0.975])
     return float(low), float(high)
 
 
