@@ -53,14 +53,26 @@ def test_a_read_only_installation_caches_in_the_users_folder_if_it_can(
     assert any(tmp_path.rglob("oscillator.oscillator_output*.nbc")) == caches
 
 
-def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(package, tmp_path):
+@pytest.mark.parametrize(
+    ("imported", "value"),
+    [
+        ("from {package}.constant import VALUE", "VALUE"),
+        ("from {package} import constant", "constant.VALUE"),
+        ("from {package} import (\n    constant as other,\n)", "other.VALUE"),
+        ("import {package}.constant as constant", "constant.VALUE"),
+    ],
+    ids=["name", "module", "renamed module", "dotted module"],
+)
+def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(
+    package, tmp_path, imported, value
+):
     # outer() contains inner(), which uses a constant of a third module; they may be in any folder.
     kernels, name = package / "tetra_drake" / "elsewhere" / "deeper", "tetra_drake.elsewhere.deeper"
     kernels.mkdir(parents=True)
     begin = "from tetra_drake.simd.compiling import compiled, inlined\n"
     (kernels / "constant.py").write_text("VALUE = 1.0\n")
     (kernels / "inner.py").write_text(
-        f"{begin}from {name}.constant import VALUE\n@inlined\ndef inner():\n    return VALUE\n"
+        f"{begin}{imported.format(package=name)}\n@inlined\ndef inner():\n    return {value}\n"
     )
     (kernels / "outer.py").write_text(
         f"{begin}from {name}.inner import inner\n@compiled\ndef outer():\n    return inner()\n"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import functools
 import hashlib
 import inspect
 import logging
 import pickle
-import re
 import sys
 import threading
 from collections.abc import Callable
@@ -173,10 +173,20 @@ def source_stamp(file: str) -> str:
 
 @functools.cache
 def _imported(path: Path) -> tuple[Path, ...]:
-    """The files of the modules of this package that a module's source names in imports."""
+    """The files of the modules of this package that a module imports.
+
+    What an import takes from a package may be a module: `from tetra_drake.physics import contact`.
+    """
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
     package = __name__.partition(".")[0]
     root = Path(__file__).resolve().parents[__name__.count(".")]
-    imports = rf"^\s*(?:from|import)\s+({package}(?:\.\w+)+)"
-    names = re.findall(imports, path.read_text(encoding="utf-8"), re.MULTILINE)
-    files = (root.joinpath(*name.split(".")).with_suffix(".py") for name in names)
+    modules = [root.joinpath(*name.split(".")) for name in names if name.startswith(f"{package}.")]
+    files = [module.with_suffix(".py") for module in modules]
+    files += [module / "__init__.py" for module in modules]
     return tuple(file for file in files if file.is_file())
