@@ -71,3 +71,48 @@ def test_every_draw_has_another_terrain(load_text):
     seeds = {disturbed(scenario, draw_disturbances(scenario, (k,))).terrain.seed for k in range(9)}
     assert len(seeds) == 9
     assert scenario.terrain.seed == 0
+
+
+DAMPING, RANGE, OTHER = "robot.cables.damping", "friction.stiction_range", "robot.density"
+ROUGH = {"terrain": "!Rough {amplitude: 0.1 in, wavelength: 2 in}"}
+
+
+@pytest.mark.parametrize(
+    "spreads",
+    [
+        {DAMPING: 0.2},
+        {OTHER: 0.1, DAMPING: 0.2, RANGE: 0.1},
+        {RANGE: 0.1, DAMPING: 0.2, OTHER: 0.1},
+        {f"{OTHER}, {RANGE}": 0.1, DAMPING: 0.2},
+    ],
+    ids=["alone", "second", "second of others", "after joined keys"],
+)
+def test_what_else_is_disturbed_changes_no_number_of_a_draw(scenario, spreads):
+    both = {"draws": 2, "start": 0.1}
+    first = scenario.with_changes(ROUGH | {"disturbances": both | {"spreads": {DAMPING: 0.2}}})
+    other = scenario.with_changes(ROUGH | {"disturbances": both | {"spreads": spreads}})
+    for k in range(5):
+        expected, draw = (draw_disturbances(each, (3, 0, 1, k)) for each in (first, other))
+        assert draw.factors[DAMPING] == expected.factors[DAMPING]
+        assert draw.terrain_seed == expected.terrain_seed
+        assert np.array_equal(draw.moves, expected.moves)
+
+
+def test_keys_are_drawn_independently(scenario):
+    spreads = {DAMPING: 0.1, RANGE: 0.1, OTHER: 0.1, "ground.damping": 0.1}
+    changes = {"disturbances": {"draws": 2, "spreads": spreads, "start": 0.1}}
+    changed = scenario.with_changes(ROUGH | changes)
+    rows = []
+    for k in range(400):
+        draw = draw_disturbances(changed, (3, k))
+        rows.append([*draw.factors.values(), *draw.moves[0, :2], draw.terrain_seed])
+    correlations = np.corrcoef(np.array(rows).T) - np.eye(7)
+    assert np.abs(correlations).max() < 0.2  # 4 standard deviations of independent numbers
+
+
+def test_joined_keys_have_one_factor_in_any_order(scenario):
+    def factor(joined: str) -> float:
+        changed = scenario.with_changes({"disturbances": {"draws": 2, "spreads": {joined: 0.2}}})
+        return draw_disturbances(changed, (3, 1)).factors[joined]
+
+    assert factor(f"{DAMPING}, {RANGE}") == factor(f"{RANGE},{DAMPING}") != factor(DAMPING)

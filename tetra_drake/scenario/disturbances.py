@@ -6,6 +6,7 @@ iteration have the same. Those by which gaits are judged have seeds of their own
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -31,20 +32,29 @@ class Draw:
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
     """The draw of a seed; none of its numbers depends on the scenario's values."""
-    settings, generator = scenario.disturbances, np.random.default_rng(list(seed))
+    settings = scenario.disturbances
     if settings is None:
         return Draw({})
-    # All that can be drawn is drawn, so that no change of one setting changes another's numbers.
-    moves = generator.uniform(-1.0, 1.0, (scenario.robot.body_count, 3))
-    terrain_seed = int(generator.integers(2**31))
+    factors = {}
+    for joined, spread in settings.spreads.items():
+        factors[joined] = 1.0 + _stream(seed, *separate(joined)).uniform(-spread, spread)
+    moves = _stream(seed, "start").uniform(-1.0, 1.0, (scenario.robot.body_count, 3))
     moves[:, 2] = np.abs(moves[:, 2])  # not into the ground
     reach = settings.start * scenario.robot.size
-    sizes = {key: generator.uniform(-size, size) for key, size in settings.spreads.items()}
+    terrain_seed = int(_stream(seed, "terrain").integers(2**31))
     return Draw(
-        factors={key: 1.0 + size for key, size in sizes.items()},
+        factors=factors,
         moves=reach * moves if reach else None,
         terrain_seed=terrain_seed if hasattr(scenario.terrain, "seed") else None,
     )
+
+
+def _stream(seed: Sequence[int], *names: str) -> np.random.Generator:
+    """The random numbers by which a draw changes what has these names: the same ones whatever else
+    is disturbed."""
+    digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
+    words = np.frombuffer(digest, dtype="<u4")
+    return np.random.default_rng(np.random.SeedSequence(list(seed), spawn_key=words.tolist()))
 
 
 def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
