@@ -14,7 +14,7 @@ from __future__ import annotations
 import decimal
 import json
 import lzma
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from tetra_drake.evolution.entries import (
     EVALUATIONS,
     ITERATIONS,
     REEVALUATIONS,
-    read_entries,
+    RecordFile,
     trial_folder,
 )
 from tetra_drake.evolution.json_lines import compressed
@@ -54,18 +54,19 @@ def thin(source: Path, out: Path) -> None:
     whole = {(int(trial), int(index)) for trial, index in _that_matter(run)}
     metrics = _that_choose(run.scenario)
     for trial in range(run.scenario.evolution.trials):
-        old, new = trial_folder(source, trial), trial_folder(out, trial)
-        entries = read_entries(old / EVALUATIONS)
+        entries = run.file(EVALUATIONS, trial).read()
         thinned = [e if (trial, e["index"]) in whole else _thinned(e, metrics) for e in entries]
         for entry in thinned:
             entry["wall_time_s"] = _rounded(entry["wall_time_s"], _WALL_TIME_DIGITS)
-        again = read_entries(old / REEVALUATIONS)
-        _write(new / EVALUATIONS, thinned)
-        _write(new / ITERATIONS, read_entries(old / ITERATIONS))
-        _write(new / REEVALUATIONS, [entry | {"genome": None} for entry in again])
-        if (old / BEST_GAIT).exists():
-            write_whole(new / BEST_GAIT, (old / BEST_GAIT).read_text(encoding="utf-8"))
-    _write(out / ELITES, read_entries(source / ELITES))
+        again = run.file(REEVALUATIONS, trial).read()
+        _write(run, out, EVALUATIONS, thinned, trial=trial)
+        _write(run, out, ITERATIONS, run.file(ITERATIONS, trial).read(), trial=trial)
+        _write(run, out, REEVALUATIONS, [e | {"genome": None} for e in again], trial=trial)
+        best_gait = trial_folder(source, trial) / BEST_GAIT
+        if best_gait.exists():
+            text = best_gait.read_text(encoding="utf-8")
+            write_whole(trial_folder(out, trial) / BEST_GAIT, text)
+    _write(run, out, ELITES, run.file(ELITES).read())
     write_whole(out / SCENARIO, (source / SCENARIO).read_text(encoding="utf-8"))
     write_whole(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
 
@@ -116,9 +117,17 @@ def _rounded(value: Any, digits: int) -> Any:
     return value
 
 
-def _write(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
-    """Writes lines compressed, if there are any."""
-    text = "".join(json.dumps(entry, allow_nan=False) + "\n" for entry in entries)
-    if text:
-        packed = lzma.compress(text.encode(), preset=9 | lzma.PRESET_EXTREME)
-        write_whole(compressed(path), packed)
+def _write(
+    run: Run,
+    out: Path,
+    name: str,
+    entries: Sequence[Mapping[str, Any]],
+    *,
+    trial: int | None = None,
+) -> None:
+    """Writes lines of a run into its folder `out`, compressed, if there are any."""
+    file = RecordFile.of(out, run.manifest.run, name, trial=trial)
+    lines = [json.dumps({**file.owner, **entry}, allow_nan=False) for entry in entries]
+    if lines:
+        packed = lzma.compress("\n".join([*lines, ""]).encode(), preset=9 | lzma.PRESET_EXTREME)
+        write_whole(compressed(file.path), packed)

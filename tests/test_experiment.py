@@ -174,6 +174,47 @@ def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
     assert (tmp_path / "run" / "trial_00").is_dir()
 
 
+def test_an_empty_folder_may_be_overwritten(tiny, tmp_path):
+    (tmp_path / "run").mkdir()
+    options = {"overwrite": True, "reevaluate": False, "report": False}
+    assert len(tetra_drake.evolve(tiny, tmp_path / "run", **options).evaluations) == 8
+
+
+WRONG = {
+    "workers": (0, -1, 1.5),
+    "seed": (-1, "1"),
+    "optimizer": ("!CmaEs",),
+    "objective": (1.0,),
+    "executor": (2,),
+    "progress": (print,),
+}
+
+
+@pytest.mark.parametrize(("key", "value"), [(k, v) for k, values in WRONG.items() for v in values])
+def test_a_wrong_argument_is_refused_before_anything_is_written(
+    tiny, tmp_path, run_small, refused, key, value
+):
+    run = run_small()
+    before = read_record(run)
+    for out in (run, tmp_path / "new"):
+        with refused("evolve", key, "expected"):
+            tetra_drake.evolve(tiny, out, overwrite=True, **{key: value})
+    assert read_record(run) == before
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_call_that_fails_before_its_first_line_leaves_the_old_run(tiny, tmp_path, run_small):
+    run = run_small()
+    before = read_record(run)
+    failing = [{"optimizer": lambda space: None}, {"objective": lambda result: result.nothing}]
+    for options in failing:
+        for out in (run, tmp_path / "new"):
+            with pytest.raises((TypeError, AttributeError)):
+                tetra_drake.evolve(tiny, out, overwrite=True, workers=1, **options)
+    assert read_record(run) == before
+    assert not (tmp_path / "new").exists()
+
+
 def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
     tiny, tmp_path, refused, capsys, interrupting, reports
 ):
@@ -340,9 +381,16 @@ def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, t
         assert capsys.readouterr().err.startswith(f"tetra-drake: {out}: {key}: ")
 
 
-def test_an_interrupted_run_says_how_to_continue(
+def test_an_interrupted_run_says_how_to_continue_once_there_is_one(
     evolve, tmp_path, capsys, monkeypatch, interrupting
 ):
+    out = tmp_path / "my run"
     monkeypatch.setattr("tetra_drake.experiment.process_executor", interrupting)
-    assert evolve(*SMALL, "--out", tmp_path / "run") == 130
-    assert f"tetra-drake evolve --out {tmp_path / 'run'} --resume" in capsys.readouterr().err
+    assert evolve(*SMALL, "--out", out) == 130
+    printed = capsys.readouterr()
+    assert f"tetra-drake evolve --out '{out}' --resume" in printed.err
+    assert f"tetra-drake figures '{out}'" in printed.out
+    interrupting.left = 0
+    assert evolve(*SMALL, "--out", tmp_path / "other") == 130
+    assert "--resume" not in capsys.readouterr().err
+    assert not (tmp_path / "other").exists()

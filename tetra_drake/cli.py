@@ -7,6 +7,7 @@ import contextlib
 import inspect
 import os
 import re
+import shlex
 import signal
 import sys
 import threading
@@ -195,6 +196,7 @@ def _evolve(options: Options) -> None:
     result depends on scenario and seed only. At the end it writes report.html, replay.html,
     figures/ and, for a map, elites/ (gait files) into the run directory.
     """
+    from tetra_drake.evolution.manifest import MANIFEST
     from tetra_drake.evolution.progress import Display
     from tetra_drake.experiment import evolve
     from tetra_drake.report.summary import run_text
@@ -217,7 +219,9 @@ def _evolve(options: Options) -> None:
                 reevaluate=options.reevaluate,
             )
     except KeyboardInterrupt:
-        resume = f"tetra-drake evolve --out {options.out} --resume"
+        if not (options.out / MANIFEST).exists():
+            raise KeyboardInterrupt("(no gait was evaluated yet)") from None
+        resume = f"tetra-drake evolve --out {shlex.quote(str(options.out))} --resume"
         raise KeyboardInterrupt(f"(nothing is lost; continue with: {resume})") from None
     print(run_text(run))
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -76,6 +78,11 @@ def evolve(
     Raises InputError for what cannot be used, EvaluationImpossible if no evaluation can run.
     """
     check_guard()
+    _check_counts(seed=(seed, 0), workers=(workers, 1))
+    _check_functions(optimizer=optimizer, objective=objective, executor=executor)
+    if not isinstance(progress, Progress | None):
+        problem = f"found {progress!r}, expected an evolution.progress.Progress"
+        raise InputError("evolve", "progress", problem)
     out, progress = Path(out), progress or Progress()
     workers = getattr(executor, "workers", None) or workers or available_cores()
     given = None if scenario is None else given_scenario(scenario)
@@ -93,9 +100,9 @@ def evolve(
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
         check_sendable(GaitEvaluation(scenario, objective), where)
-        if overwrite:
-            RunRecord.remove(out)
-        record = RunRecord.create(out, scenario=scenario, seed=seed or 0, method=method)
+        record = RunRecord.create(
+            out, scenario=scenario, seed=int(seed or 0), method=method, overwrite=overwrite
+        )
     with record, progress:
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
@@ -113,6 +120,21 @@ def evolve(
         if report:
             _report(out, progress)
     return load_run(out)
+
+
+def _check_counts(**given: tuple[int | None, int]) -> None:
+    """Raises InputError for an argument that is no integer or less than its least value."""
+    for name, (value, least) in given.items():
+        if value is not None and not (isinstance(value, Integral) and value >= least):
+            problem = f"found {value!r}, expected an integer, {least} or more"
+            raise InputError("evolve", name, problem)
+
+
+def _check_functions(**given: object) -> None:
+    """Raises InputError for an argument that cannot be called."""
+    for name, value in given.items():
+        if value is not None and not callable(value):
+            raise InputError("evolve", name, f"found {value!r}, expected a function")
 
 
 def _run_in_lanes(
@@ -177,9 +199,14 @@ def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: 
     if report:
         text += (
             f"\nat the end: {directory / 'replay.html'}, the best gait walking, and "
-            f"{directory / 'report.html'}; at any time before: tetra-drake figures {directory}"
+            f"{directory / 'report.html'}; at any time before: {_draw_again(directory)}"
         )
     return text
+
+
+def _draw_again(directory: Path) -> str:
+    """The command that draws the figures and the report of a run."""
+    return f"tetra-drake figures {shlex.quote(str(directory))}"
 
 
 def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
@@ -203,5 +230,5 @@ def _report(directory: Path, progress: Progress) -> None:
         cause = str(error) if isinstance(error, (InputError, SimulationFailure)) else repr(error)
         progress.warn(
             f"the run is complete, but its report could not be written: {cause}; try again with: "
-            f"tetra-drake figures {directory}"
+            f"{_draw_again(directory)}"
         )

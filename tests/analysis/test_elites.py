@@ -14,7 +14,6 @@ from tetra_drake.analysis.elites import (
     robust,
 )
 from tetra_drake.analysis.robustness import Judgement
-from tetra_drake.evolution.json_lines import json_line
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.quality_diversity import FLOOR
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -37,11 +36,11 @@ def run_of(tmp_path):
 
 def keep(run, shares):
     """Records shares of draws kept, by (trial, index)."""
-    lines = [
-        json_line({"trial": trial, "index": index, "kept": kept, "mean_distance": None})
-        for (trial, index), kept in shares.items()
-    ]
-    (run.directory / "elites.jsonl").write_text("".join(lines))
+    file = run.file("elites.jsonl")
+    file.path.unlink(missing_ok=True)
+    for (trial, index), kept in shares.items():
+        line = {"trial": trial, "index": index, "kept": kept, "mean_distance": None}
+        file.append([line])
 
 
 def keys(gaits):

@@ -43,7 +43,7 @@ def test_what_is_given_from_python_has_its_module_and_fields_in_its_name(objecti
 def test_a_method_survives_its_file_and_what_the_package_brings_has_no_module(tmp_path):
     method = Method.of(small_scenario(), objective=Weighted(2.5), optimizer=scaled)
     assert method.given_from_python == ["objective", "optimizer"]
-    manifest = Manifest(small_scenario(), 3, {"numpy": "2.0"}, method)
+    manifest = Manifest(small_scenario(), 3, {"numpy": "2.0"}, method, "a1b2")
     write_manifest(tmp_path, manifest)
     assert read_manifest(tmp_path) == manifest
     built_in = Method.of(small_scenario())

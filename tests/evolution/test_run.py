@@ -42,6 +42,8 @@ def test_a_run_in_progress_loads_and_is_left_alone(run_small):
     path = run / "trial_00" / "evaluations.jsonl"
     path.write_bytes(path.read_bytes()[:-10])
     torn = path.read_bytes()
+    iterations = path.with_name("iterations.jsonl")
+    iterations.write_bytes(b"".join(iterations.read_bytes().splitlines(keepends=True)[:-1]))
     assert len(load_run(run).evaluations) == 2 * 42 - 1
     assert path.read_bytes() == torn
     for file in run.glob("trial_*/*"):

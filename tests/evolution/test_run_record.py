@@ -27,7 +27,9 @@ def cut(path, lost):
 
 
 def create(directory):
-    return RunRecord.create(directory, scenario=small_scenario(), seed=5)
+    record = RunRecord.create(directory, scenario=small_scenario(), seed=5)
+    record.begin()
+    return record
 
 
 class Counted:
@@ -59,7 +61,7 @@ def test_the_manifest_holds_seed_versions_and_method_and_the_scenario_its_own_fi
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("schema", 2), ("seed", -1), ("versions", []), ("objective", 7)]
+    ("key", "value"), [("schema", 3), ("seed", -1), ("versions", []), ("objective", 7)]
 )
 def test_a_damaged_manifest_is_reported(run_small, refused, key, value):
     run = run_small(population=4, iterations=1)
@@ -258,14 +260,121 @@ def test_a_folder_where_a_file_belongs_is_reported(run_small, refused):
         (run / "away").rename(run / name)
     (run / "trial_00").rename(run / "away")
     (run / "trial_00").touch()
-    with refused(run / "trial_00", "", "is a file"):
+    with refused(run / "trial_00" / "evaluations.jsonl", "", "ot a directory"):
         run_small(resume=True)
+
+
+# Lines of other runs and trials, lines that contradict each other
+
+
+def both(run, run_small):
+    """The ways to read a run, by which a line is refused alike."""
+    return (lambda: load_run(run), lambda: run_small(run.name, resume=True))
+
+
+@pytest.mark.parametrize("name", ["evaluations", "iterations"])
+def test_files_of_another_run_or_trial_are_refused(run_small, refused, name):
+    run = run_small()
+    path = run / "trial_00" / f"{name}.jsonl"
+    ours = path.read_bytes()
+    strangers = {
+        "run ": run_small("other", changes={"simulation.duration": "14 s"}) / "trial_00",
+        "trial 1": run / "trial_01",
+        "": run_small("longer", oscillators=5) / "trial_00",
+    }
+    for whose, folder in strangers.items():
+        theirs = (folder / path.name).read_bytes()
+        path.write_bytes(theirs)
+        for read in both(run, run_small):
+            with refused(path, "line 1", whose):
+                read()
+        lines = ours.splitlines(keepends=True)
+        lines[8] = theirs.splitlines(keepends=True)[8]
+        path.write_bytes(b"".join(lines))
+        for read in both(run, run_small):
+            with refused(path, "line 9", whose):
+                read()
+
+
+@pytest.mark.parametrize("key", ["evaluations", "best_fitness", "best_evaluation"])
+def test_iterations_that_contradict_evaluations_are_refused(run_small, refused, key):
+    run = run_small(trials=1)
+    path = run / "trial_00" / "iterations.jsonl"
+    value = json.loads(path.read_text().splitlines()[4])[key] + 1
+    path.write_bytes(with_value(5, key, value)(path.read_bytes()))
+    for read in both(run, run_small):
+        with refused(path, "line 5", key):
+            read()
+
+
+def test_a_genome_of_another_length_is_refused(run_small, refused):
+    run = run_small(trials=1)
+    path = run / "trial_00" / "evaluations.jsonl"
+    path.write_bytes(with_value(7, "genome", [2.0] * 20)(path.read_bytes()))
+    for read in both(run, run_small):
+        with refused(path, "line 7", "genome"):
+            read()
+
+
+def test_a_line_that_is_there_twice_is_refused(run_small, refused):
+    run = load_run(run_small(trials=1))
+    judged = {"trial": 0, "index": 3, "kept": 1.0, "mean_distance": 0.2}
+    entry = run.file("evaluations.jsonl", 0).read()[3]
+    for name, trial, line in (("elites.jsonl", None, judged), ("reevaluations.jsonl", 0, entry)):
+        file = run.file(name, trial)
+        file.append([line, line])
+        with refused(file.path, "line 2", "index"):
+            file.read()
+
+
+# A run that begins, and one that replaces another
+
+
+def test_nothing_is_written_before_the_first_line(run_small, tmp_path):
+    def interrupt(genome):
+        raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        run_small("runs/new", evaluate=interrupt)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_is_replaced_when_the_first_line_of_the_new_one_is_written(run_small, tmp_path):
+    run = run_small()
+    (run / "report.html").touch()
+    before = read_record(run)
+    line = evaluation_entry(0, 0, np.ones(26), Evaluation(1.0))
+    with RunRecord.create(run, scenario=small_scenario(), seed=6, overwrite=True) as record:
+        trial = TrialRecord(record, 0)
+        assert trial.recall(0, np.zeros(26)) is None
+        assert read_record(run) == before
+        trial.keep(line)
+    assert sorted(read_record(run)) == [
+        *(".lock", "manifest.json", "scenario.yaml", "trial_00/in_progress.jsonl")
+    ]
+    assert read_manifest(run).seed == 6
+
+
+def test_a_run_stays_if_that_which_replaces_it_cannot_begin(run_small, monkeypatch, refused):
+    run = run_small()
+    before = read_record(run)
+
+    def fail(*_):
+        raise InputError(run, "", "disk full")
+
+    monkeypatch.setattr("tetra_drake.evolution.run_record.write_manifest", fail)
+    with RunRecord.create(run, scenario=small_scenario(), seed=6, overwrite=True) as record:
+        with refused(run, "", "disk full"):
+            record.begin()
+        assert read_record(run) == before
+    with RunRecord.resume(run):
+        pass
 
 
 # Resuming
 
 
-@pytest.mark.parametrize("count", [0, 12, 25, 84])
+@pytest.mark.parametrize("count", [1, 12, 25, 84])
 def test_an_interrupted_run_ends_like_one_that_was_not_and_makes_no_evaluation_again(
     run_small, count
 ):
@@ -284,11 +393,13 @@ def test_an_interrupted_run_ends_like_one_that_was_not_and_makes_no_evaluation_a
 def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, refused):
     genome = np.linspace(1.0, 2.0, 26)
     failed = Evaluation(-math.inf, {}, "why", 1.25)
-    TrialRecord(tmp_path).keep(evaluation_entry(3, 1, genome, failed))
-    with (tmp_path / "in_progress.jsonl").open("a") as file:
-        file.write('{"index": 4, "torn')
-    record = TrialRecord(tmp_path)
-    assert record.recall(3, genome) == failed
-    assert record.recall(4, genome) is None
-    with refused(tmp_path / "in_progress.jsonl", "line 1", "genome"):
-        record.recall(3, genome + 1.0)
+    path = tmp_path / "trial_00" / "in_progress.jsonl"
+    with create(tmp_path) as run:
+        TrialRecord(run, 0).keep(evaluation_entry(3, 1, genome, failed))
+        with path.open("a") as file:
+            file.write('{"index": 4, "torn')
+        record = TrialRecord(run, 0)
+        assert record.recall(3, genome) == failed
+        assert record.recall(4, genome) is None
+        with refused(path, "line 1", "genome"):
+            record.recall(3, genome + 1.0)

@@ -6,7 +6,6 @@ from helpers.drawn import panels
 from helpers.synthetic_run import tiny_scenario, write_run
 from matplotlib.collections import QuadMesh
 
-from tetra_drake.evolution.json_lines import json_line
 from tetra_drake.evolution.run import load_run
 from tetra_drake.figures.map import map_of_gaits
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -27,11 +26,10 @@ def draw(tmp_path):
     run = write_run(tmp_path / "run", [trial], scenario=scenario, metrics=metrics)
 
     def draw(kept):
-        lines = [
-            json_line({"trial": 0, "index": index, "kept": share, "mean_distance": 0.1})
-            for index, share in kept.items()
-        ]
-        (run / "elites.jsonl").write_text("".join(lines))
+        (run / "elites.jsonl").unlink(missing_ok=True)
+        for index, share in kept.items():
+            line = {"trial": 0, "index": index, "kept": share, "mean_distance": 0.1}
+            load_run(run).file("elites.jsonl").append([line])
         return map_of_gaits(load_run(run))
 
     return draw

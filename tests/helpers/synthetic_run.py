@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.evolution.entries import evaluation_entry, trial_folder
+from tetra_drake.evolution.entries import evaluation_entry
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import ParameterSpace
@@ -44,9 +44,10 @@ def write_run(
     """
     scenario = scenario or tiny_scenario()
     scenario = scenario.with_changes({"evolution.trials": len(trials)})
-    with RunRecord.create(directory, scenario=scenario, seed=7):
+    with RunRecord.create(directory, scenario=scenario, seed=7) as record:
+        record.begin()
         for number, iterations in enumerate(trials):
-            trial = TrialRecord(trial_folder(directory, number))
+            trial = TrialRecord(record, number)
             entries, population = [], {}
             for iteration, children in enumerate(iterations):
                 begin = len(entries)

@@ -12,7 +12,6 @@ from thinning import last_population, thin
 
 from tetra_drake.analysis.comparison import compare
 from tetra_drake.analysis.elites import elites
-from tetra_drake.evolution.json_lines import append_lines, read_lines
 from tetra_drake.evolution.reevaluation import BEST_GAITS, reevaluate
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord
@@ -64,9 +63,11 @@ def runs(tmp_path_factory):
     }
     scenario = tiny_scenario().with_changes(changes)
     run = write_run(folder / "run", TRIALS, scenario=scenario, metrics=metrics)
-    entry = read_lines(run / "trial_00/evaluations.jsonl")[AGAIN]
-    append_lines(run / "trial_00/reevaluations.jsonl", [entry | {"engine": "drake"}])
-    append_lines(run / "elites.jsonl", [{"trial": 0, "index": 1, "kept": 1, "mean_distance": 2.0}])
+    recorded = load_run(run)
+    entry = recorded.file("evaluations.jsonl", 0).read()[AGAIN]
+    recorded.file("reevaluations.jsonl", 0).append([entry | {"engine": "drake"}])
+    on_map = {"trial": 0, "index": 1, "kept": 1, "mean_distance": 2.0}
+    recorded.file("elites.jsonl").append([on_map])
     thin(run, folder / "thinned")
     return load_run(run), load_run(folder / "thinned")
 

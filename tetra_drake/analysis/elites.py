@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetra_drake.analysis.robustness import by_gait, judge
-from tetra_drake.evolution.entries import ELITES, read_entries
-from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
+from tetra_drake.evolution.entries import ELITES, RecordFile
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number
@@ -43,7 +42,7 @@ def elites(run: Run) -> pandas.DataFrame:
     import pandas
 
     table, kind = run.whole, run.scenario.optimizer
-    judged = pandas.DataFrame(read_entries(run.directory / ELITES), columns=[*_KEY, *_JUDGED])
+    judged = pandas.DataFrame(run.file(ELITES).read(), columns=[*_KEY, *_JUDGED])
     if isinstance(kind, QualityDiversity) and not table.empty:
         table = table[table["fitness"] > FLOOR].dropna(subset=list(kind.measures))
         table[CELLS] = _cells(table, kind)
@@ -67,10 +66,11 @@ def judge_elites(
 ) -> None:
     """Simulates the elites of a run on robots disturbed as judge() does, as often as the scenario
     says, and adds to the record how far they walk. Those that have been are skipped."""
-    kind = read_manifest(directory).scenario.optimizer
+    manifest = read_manifest(directory)
+    kind, file = manifest.scenario.optimizer, RecordFile.of(directory, manifest.run, ELITES)
     if not isinstance(kind, QualityDiversity) or not kind.draws:
         return
-    repair_torn_line(directory / ELITES)
+    file.repair()
     run = load_run(directory)
     scenario, gaits_of_map = run.scenario, elites(run)
     missing = gaits_of_map[gaits_of_map["kept"].isna()]
@@ -86,7 +86,7 @@ def judge_elites(
         {"trial": trial, "index": index, "kept": kept, "mean_distance": json_number(mean)}
         for (trial, index), kept, mean in zip(keys, table["kept"], table["mean"], strict=True)
     ]
-    append_lines(directory / ELITES, lines)
+    file.append(lines)
 
 
 def robust(gaits: pandas.DataFrame) -> pandas.DataFrame:

@@ -7,18 +7,22 @@ trial_00/
   best_gait.json          the fittest gait so far, a gait file
   reevaluations.jsonl     gaits evaluated once more on the Drake diagram
 elites.jsonl              of a map: its gaits on disturbed robots
+
+Each line of a trial begins with the name of its run and the number of its trial, each line of a map
+with the name of its run.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.json_lines import REMEDY, read_lines
-from tetra_drake.files import json_number
+from tetra_drake.evolution.json_lines import REMEDY, append_lines, read_lines, repair_torn_line
+from tetra_drake.files import json_number, make_folder
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Vector
 
@@ -27,7 +31,10 @@ IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
 
 _COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
-"""The key that counts the lines of a file."""
+"""Key that counts the lines of a file."""
+
+_UNIQUE = {IN_PROGRESS: ("index",), REEVALUATIONS: ("index",), ELITES: ("trial", "index")}
+"""Keys that no two lines of a file share."""
 
 
 def trial_folder(directory: Path, number: int) -> Path:
@@ -66,14 +73,56 @@ def recorded_evaluation(entry: Mapping[str, Any]) -> Evaluation:
     )
 
 
-def read_entries(path: Path) -> list[dict[str, Any]]:
-    """The lines of a file of a record; InputError, naming file and line, where one is damaged or
-    missing."""
-    entries = read_lines(path)
-    counter = _COUNTERS.get(path.name)
-    if counter is not None:
+@dataclass(frozen=True)
+class RecordFile:
+    """A file of lines of a run, which say that they are the run's."""
+
+    path: Path
+    owner: Mapping[str, Any]
+    """Keys and values that each line begins with: run, and trial in the folder of a trial."""
+
+    @classmethod
+    def of(cls, directory: Path, run: str, name: str, *, trial: int | None = None) -> RecordFile:
+        """A file of a run, or of one of its trials, by their names."""
+        if trial is None:
+            return cls(directory / name, {"run": run})
+        return cls(trial_folder(directory, trial) / name, {"run": run, "trial": trial})
+
+    def read(self) -> list[dict[str, Any]]:
+        """The content of all whole lines, without their owner.
+
+        Raises InputError, naming file and line, where a line is damaged, missing, there twice or
+        of another run or trial.
+        """
+        entries = read_lines(self.path)
+        counter = _COUNTERS.get(self.path.name)
         for row, entry in enumerate(entries):
-            if entry.get(counter) != row:
-                problem = f"{counter} is {entry.get(counter)}, expected {row}"
-                raise InputError(path, f"line {row + 1}", f"is damaged: {problem}; {REMEDY}")
-    return entries
+            for key, ours in self.owner.items():
+                if (theirs := entry.pop(key, None)) != ours:
+                    self.refuse(row, f"is of {key} {theirs}, expected {key} {ours}")
+            if counter is not None and entry.get(counter) != row:
+                problem = f"is damaged: {counter} is {entry.get(counter)}, expected {row}"
+                self.refuse(row, f"{problem}; {REMEDY}")
+        self._check_unique(entries)
+        return entries
+
+    def _check_unique(self, entries: Sequence[Mapping[str, Any]]) -> None:
+        keys, seen = _UNIQUE.get(self.path.name, ()), set()
+        for row, entry in enumerate(entries if keys else ()):
+            values = tuple(entry.get(key) for key in keys)
+            if values in seen:
+                self.refuse(row, f"has {' and '.join(keys)} of a line before it; {REMEDY}")
+            seen.add(values)
+
+    def append(self, entries: Iterable[Mapping[str, Any]]) -> None:
+        """Appends lines; their folder is made if need be."""
+        make_folder(self.path.parent)
+        append_lines(self.path, [{**self.owner, **entry} for entry in entries])
+
+    def repair(self) -> None:
+        """Cuts off a last line that was not written to its end."""
+        repair_torn_line(self.path)
+
+    def refuse(self, row: int, problem: str) -> NoReturn:
+        """Raises InputError of a line, counted from 0."""
+        raise InputError(self.path, f"line {row + 1}", problem)

@@ -1,7 +1,9 @@
 """The manifest of a run: what defines it, on disk and in memory.
 
-    manifest.json    seed, versions, method (objective, optimiser), SHA-256 of
+    manifest.json    name of the run, seed, versions, method (objective, optimiser), SHA-256 of
     scenario.yaml    the scenario in full
+
+The run's name is a digest of all this as the run began. Each line of the record has it.
 
 Objective and optimiser are names. A name is what a person compares, and what a run without its
 parts is refused by. What proves that the parts are the same when a run is resumed is its record:
@@ -25,13 +27,17 @@ from pydantic import Field
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.draws import SeededVector
 from tetra_drake.files import read_text, write_whole
+from tetra_drake.machine import versions
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import Section
 
-SCHEMA = 3
+SCHEMA = 4
 MANIFEST, SCENARIO = "manifest.json", "scenario.yaml"
+
+_NAME = 12
+"""Characters of a run's name."""
 
 FITNESS = "fitness"
 """The name of the scenario's objective."""
@@ -88,8 +94,17 @@ class Manifest:
     seed: int
     versions: Mapping[str, str]
     method: Method
+    run: str
+    """Name of the run in the lines of its record."""
     thinned: bool = False
     """True if most genomes were left out, as in the runs recorded beside the package."""
+
+    @classmethod
+    def of(cls, scenario: Scenario, seed: int, method: Method) -> Manifest:
+        """The manifest of a new run, with the versions that are installed."""
+        now = versions(scenario.engine.packages)
+        parts = (dump_scenario(scenario), seed, now, vars(method))
+        return cls(scenario, seed, now, method, _sha256(json.dumps(parts))[:_NAME])
 
     def gait(self, vector: Vector, *, trial: int, index: int) -> Gait:
         """The gait of a recorded evaluation."""
@@ -120,7 +135,7 @@ def read_manifest(directory: Path) -> Manifest:
     if file.scenario_sha256 != _sha256(read_text(scenario_file, "scenario file")):
         raise InputError(scenario_file, "", f"is not what {MANIFEST} says: it was changed")
     method = Method(file.objective, file.optimizer)
-    return Manifest(scenario, file.seed, file.versions, method, file.thinned)
+    return Manifest(scenario, file.seed, file.versions, method, file.run, file.thinned)
 
 
 def write_manifest(directory: Path, manifest: Manifest) -> None:
@@ -129,6 +144,7 @@ def write_manifest(directory: Path, manifest: Manifest) -> None:
     write_whole(directory / SCENARIO, text)
     content = {
         "schema": SCHEMA,
+        "run": manifest.run,
         "seed": manifest.seed,
         "versions": dict(manifest.versions),
         "scenario_sha256": _sha256(text),
@@ -142,6 +158,7 @@ class _File(Section):
     """The content of manifest.json."""
 
     version: int = Field(alias="schema", ge=SCHEMA, le=SCHEMA)
+    run: str
     seed: int = Field(ge=0)
     versions: dict[str, str]
     scenario_sha256: str

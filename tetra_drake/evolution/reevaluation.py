@@ -8,10 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.entries import REEVALUATIONS, evaluation_entry, trial_folder
+from tetra_drake.evolution.entries import REEVALUATIONS, evaluation_entry
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import MakeExecutor, evaluate_all, process_executor
-from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
@@ -44,8 +43,9 @@ def reevaluate(
     if given != recorded:
         problem = f"the run was made with {recorded}, not {given}"
         raise InputError(run.directory, "objective", problem)
-    for trial in range(scenario.evolution.trials):
-        repair_torn_line(trial_folder(run.directory, trial) / REEVALUATIONS)
+    files = [run.file(REEVALUATIONS, trial) for trial in range(scenario.evolution.trials)]
+    for file in files:
+        file.repair()
     done = set(zip(run.reevaluations["trial"], run.reevaluations["index"], strict=True))
     best = run.best(max(1, BEST_GAITS // scenario.draws))
     rows = best[["trial", "index", "iteration"]].itertuples(index=False, name=None)
@@ -62,7 +62,6 @@ def reevaluate(
     results = evaluate_all(evaluate, tasks, workers=workers, executor=executor)
     for finished, (i, evaluation) in enumerate(results, start=1):
         trial, index, iteration = missing[i]
-        entry = evaluation_entry(index, iteration, vectors[i], evaluation)
-        append_lines(trial_folder(run.directory, trial) / REEVALUATIONS, [entry])
+        files[trial].append([evaluation_entry(index, iteration, vectors[i], evaluation)])
         progress.stage(_TITLE, finished, len(missing))
     return load_run(run.directory)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,9 +16,9 @@ from tetra_drake.evolution.entries import (
     EVALUATIONS,
     ITERATIONS,
     REEVALUATIONS,
-    read_entries,
-    trial_folder,
+    RecordFile,
 )
+from tetra_drake.evolution.json_lines import REMEDY
 from tetra_drake.evolution.manifest import Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.results.metrics import headline
@@ -48,7 +49,8 @@ class Run:
     evaluations: pandas.DataFrame
     """One row per evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
     wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
-    have one), the metrics (distance ...), lifted_T1 ... (Metrics.lifted_shares), distance_in, and
+    have one), the metrics (distance ...), lifted_T1 ... (Metrics.lifted_shares, by the names of the
+    bodies), distance_in, and
     the parameters: weight_1 ... in the listing's order, gain_length ...,
     tau_a_s, tau_b_s, NaN where thinning has left them out. Among disturbances, also draws_fitness
     and draws_distance (m), lists with a number for each draw (missing if it failed), and
@@ -126,6 +128,10 @@ class Run:
         say trial and evaluation."""
         return [self._gait_of(row) for _, row in self.best(count).iterrows()]
 
+    def file(self, name: str, trial: int | None = None) -> RecordFile:
+        """A file of the run, or of one of its trials."""
+        return RecordFile.of(self.directory, self.manifest.run, name, trial=trial)
+
     def initial(self) -> pandas.DataFrame:
         """The evaluations of iteration 0."""
         return self.evaluations[self.evaluations["iteration"] == 0]
@@ -180,14 +186,37 @@ def load_run(path: str | Path) -> Run:
     """
     directory = Path(path)
     manifest = read_manifest(directory)
-    evaluations = _table(directory, manifest.scenario, EVALUATIONS)
-    iterations = _table(directory, manifest.scenario, ITERATIONS)
-    reevaluations = _table(directory, manifest.scenario, REEVALUATIONS)
+    # Iterations first: a run at work writes them last, so each has its evaluations.
+    iterations = _table(directory, manifest, ITERATIONS)
+    evaluations = _table(directory, manifest, EVALUATIONS)
+    reevaluations = _table(directory, manifest, REEVALUATIONS)
     if not iterations.empty:
+        for trial, lines in iterations.groupby("trial"):
+            file = RecordFile.of(directory, manifest.run, ITERATIONS, trial=int(trial))
+            _check_iterations(file, lines, evaluations[evaluations["trial"] == trial])
         distances = evaluations.set_index(["trial", "index"])["distance_in"].to_dict()
         best = zip(iterations["trial"], iterations["best_evaluation"], strict=True)
         iterations["best_distance_in"] = [distances.get(key, math.nan) for key in best]
     return Run(directory, manifest, evaluations, iterations, reevaluations)
+
+
+def _check_iterations(
+    file: RecordFile, iterations: pandas.DataFrame, evaluations: pandas.DataFrame
+) -> None:
+    """Raises InputError, naming file and line, if the iterations of a trial contradict its
+    evaluations."""
+    made = np.searchsorted(evaluations["iteration"], iterations["iteration"], side="right")
+    fitnesses = evaluations["fitness"].fillna(-math.inf).to_numpy()
+    recorded = iterations.fillna({"best_fitness": -math.inf, "best_evaluation": -1})
+    for row, line in enumerate(recorded.to_dict("records")):
+        so_far = fitnesses[: made[row]]
+        best = so_far.max(initial=-math.inf)
+        fittest = int(so_far.argmax()) if best > -math.inf else -1
+        found = {"evaluations": len(so_far), "best_fitness": best, "best_evaluation": fittest}
+        for key, value in found.items():
+            if line[key] != value:
+                problem = f"is damaged: {key} is {line[key]}, {EVALUATIONS} has {value}"
+                file.refuse(row, f"{problem}; {REMEDY}")
 
 
 def _parameters(scenario: Scenario) -> list[str]:
@@ -198,15 +227,20 @@ def _parameters(scenario: Scenario) -> list[str]:
     return [f"weight_{number}" for number in range(1, weights + 1)] + others
 
 
-def _table(directory: Path, scenario: Scenario, name: str) -> pandas.DataFrame:
+def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
     """The lines of a file of all trials."""
     import pandas
 
-    columns = _parameters(scenario)
+    columns = _parameters(manifest.scenario)
+    bodies = manifest.scenario.robot.body_names
     rows = []
-    for trial in range(scenario.evolution.trials):
-        for entry in read_entries(trial_folder(directory, trial) / name):
-            row = _flat(entry, columns) if "genome" in entry else entry
+    for trial in range(manifest.scenario.evolution.trials):
+        file = RecordFile.of(directory, manifest.run, name, trial=trial)
+        for number, entry in enumerate(file.read()):
+            if len(entry.get("genome") or columns) != len(columns):
+                found = f"a genome of {len(entry['genome'])} numbers"
+                file.refuse(number, f"is damaged: found {found}, expected {len(columns)}")
+            row = _flat(entry, columns, bodies) if "genome" in entry else entry
             rows.append({"trial": trial, **row})
     table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
     kinds = dict.fromkeys(_NUMBERS.intersection(table), "float")
@@ -214,12 +248,12 @@ def _table(directory: Path, scenario: Scenario, name: str) -> pandas.DataFrame:
     return table.astype(kinds).copy()  # in one piece, as astype() makes one of each column
 
 
-def _flat(entry: dict[str, Any], columns: list[str]) -> dict[str, Any]:
+def _flat(entry: dict[str, Any], columns: list[str], bodies: Sequence[str]) -> dict[str, Any]:
     """A line of evaluations with a column for each number."""
     genome = entry.pop("genome") or [math.nan] * len(columns)
     metrics = dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
-    for number, share in enumerate(metrics.pop("lifted_shares", []), start=1):
-        metrics[f"lifted_T{number}"] = share
+    for body, share in zip(bodies, metrics.pop("lifted_shares", []), strict=False):
+        metrics[f"lifted_{body}"] = share
     metrics["distance_in"] = metrics["distance"] / INCH
     draws = entry.pop("draws", None)
     if draws is not None:

@@ -15,10 +15,9 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import shutil
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, BinaryIO
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import (
@@ -26,10 +25,10 @@ from tetra_drake.evolution.entries import (
     EVALUATIONS,
     IN_PROGRESS,
     ITERATIONS,
-    read_entries,
+    RecordFile,
     recorded_evaluation,
+    trial_folder,
 )
-from tetra_drake.evolution.json_lines import append_lines, repair_torn_line
 from tetra_drake.evolution.manifest import (
     MANIFEST,
     SCENARIO,
@@ -39,40 +38,48 @@ from tetra_drake.evolution.manifest import (
     write_manifest,
 )
 from tetra_drake.files import check_folder, make_folder
-from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Gait, Vector, save_gait
 from tetra_drake.scenario.schema import Scenario
 
 LOCK = ".lock"
 
+_ASIDE = ".replaced"
+"""Folder of a run that is replaced, for the moment in which that is done."""
+
 _Lines = Sequence[dict[str, Any]]
 
 
-@dataclass(frozen=True)
 class RunRecord:
-    """An open run directory, locked against other processes until closed."""
+    """A run directory, locked against other processes until closed; a new one from its begin."""
 
-    directory: Path
-    manifest: Manifest
-    _lock: BinaryIO
+    def __init__(self, directory: Path, manifest: Manifest, lock: BinaryIO | None = None) -> None:
+        """See create() and resume()."""
+        self.directory = directory
+        self.manifest = manifest
+        self.begun = False
+        """True if the manifest is written."""
+        self._lock = lock
 
     @classmethod
     def create(
-        cls, directory: Path, *, scenario: Scenario, seed: int, method: Method | None = None
+        cls,
+        directory: Path,
+        *,
+        scenario: Scenario,
+        seed: int,
+        method: Method | None = None,
+        overwrite: bool = False,
     ) -> RunRecord:
-        """Begins a run in a directory that does not exist or is empty."""
-        now = versions(scenario.engine.packages)
-        manifest = Manifest(scenario, seed, now, method or Method.of(scenario))
+        """A new run, in a directory that does not exist or is empty, or with `overwrite` holds a
+        run, which nobody else may be at work on. Nothing is written before begin()."""
+        manifest = Manifest.of(scenario, seed, method or Method.of(scenario))
         check_folder(directory)
-        _refuse_a_used(directory)
-        make_folder(directory)
-        with contextlib.ExitStack() as undo:
-            lock = undo.enter_context(_lock(directory))
-            _refuse_a_used(directory)  # Another process may have been faster.
-            write_manifest(directory, manifest)
-            undo.pop_all()
-        return cls(directory, manifest, lock)
+        if not overwrite or _is_empty(directory):
+            _check_empty(directory)
+            return cls(directory, manifest)
+        read_manifest(directory)
+        return cls(directory, manifest, _locked(directory))
 
     @classmethod
     def resume(
@@ -95,24 +102,32 @@ class RunRecord:
                 raise InputError(directory, key, problem)
         if method is not None:
             manifest.method.check_same(method, directory)
-        return cls(directory, manifest, _lock(directory))
+        record = cls(directory, manifest, _locked(directory))
+        record.begun = True
+        return record
 
-    @staticmethod
-    def remove(directory: Path) -> None:
-        """Removes a run with all that its directory holds, if there is such a directory.
+    def begin(self) -> None:
+        """Writes the manifest unless that is done; a run that was there before goes."""
+        if self.begun:
+            return
+        if self._lock is None:
+            make_folder(self.directory)
+            self._lock = _locked(self.directory)
+            _check_empty(self.directory)  # another process may have been faster
+        with _set_aside(self.directory):
+            write_manifest(self.directory, self.manifest)
+        self.begun = True
 
-        Raises InputError if it holds no run, or if a process is at work on it.
-        """
-        if directory.exists():
-            read_manifest(directory)
-            with _lock(directory):
-                shutil.rmtree(directory)
+    def file(self, name: str, trial: int) -> RecordFile:
+        """A file of a trial."""
+        return RecordFile.of(self.directory, self.manifest.run, name, trial=trial)
 
     def __enter__(self) -> RunRecord:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._lock.close()
+        if self._lock is not None:
+            self._lock.close()
 
 
 _NOT_REPEATED = (
@@ -124,79 +139,110 @@ _NOT_REPEATED = (
 class TrialRecord:
     """The files of one trial. What is recorded already is checked instead of written."""
 
-    def __init__(self, folder: Path) -> None:
-        make_folder(folder)
-        for name in (EVALUATIONS, ITERATIONS, IN_PROGRESS):
-            repair_torn_line(folder / name)
-        self._folder = folder
-        self._evaluations = read_entries(folder / EVALUATIONS)
-        self._iterations = read_entries(folder / ITERATIONS)
-        self._recorded: dict[int, tuple[str, int, dict[str, Any]]] = {}
-        """File, row and entry of each evaluation, by its index."""
-        for row, entry in enumerate(read_entries(folder / IN_PROGRESS)):
-            self._recorded[entry["index"]] = IN_PROGRESS, row, entry
-        for row, entry in enumerate(self._evaluations):
-            self._recorded[row] = EVALUATIONS, row, entry
+    def __init__(self, run: RunRecord, number: int) -> None:
+        self._run = run
+        names = (EVALUATIONS, ITERATIONS, IN_PROGRESS)
+        self._files = {name: run.file(name, number) for name in names}
+        self._best_gait = trial_folder(run.directory, number) / BEST_GAIT
+        self._lines: dict[str, _Lines] = dict.fromkeys(names, ())
+        """Recorded lines of each file."""
+        for name in names if run.begun else ():
+            self._files[name].repair()
+            self._lines[name] = self._files[name].read()
+        self._recorded: dict[int, tuple[str, int]] = {}
+        """File and row of each recorded evaluation, by its index."""
+        for name in (IN_PROGRESS, EVALUATIONS):
+            for row, entry in enumerate(self._lines[name]):
+                self._recorded[entry["index"]] = name, row
 
     def recall(self, index: int, vector: Vector) -> Evaluation | None:
         """The recorded evaluation of this index, None if there is none; InputError if it is of
         another vector."""
         if index not in self._recorded:
             return None
-        name, row, entry = self._recorded[index]
+        name, row = self._recorded[index]
+        entry = self._lines[name][row]
         if entry["genome"] != vector.tolist():
-            self._refuse(name, row, _NOT_REPEATED.format("the genome"))
+            self._files[name].refuse(row, _NOT_REPEATED.format("the genome"))
         return recorded_evaluation(entry)
 
     def keep(self, entry: dict[str, Any]) -> None:
         """Saves an evaluation whose iteration is not complete yet."""
-        append_lines(self._folder / IN_PROGRESS, [entry])
+        self._append(IN_PROGRESS, [entry])
 
     def complete(self, evaluations: _Lines, iteration: dict[str, Any]) -> None:
         """Writes an iteration's lines, or checks those that are there."""
         # In this order: a kill in between leaves nothing that repeating the run cannot complete.
-        self._write(EVALUATIONS, self._evaluations, evaluations, first=evaluations[0]["index"])
-        self._write(ITERATIONS, self._iterations, [iteration], first=iteration["iteration"])
-        if evaluations[-1]["index"] >= len(self._evaluations):
-            (self._folder / IN_PROGRESS).unlink(missing_ok=True)
+        self._write(EVALUATIONS, evaluations, first=evaluations[0]["index"])
+        self._write(ITERATIONS, [iteration], first=iteration["iteration"])
+        if evaluations[-1]["index"] >= len(self._lines[EVALUATIONS]):
+            self._files[IN_PROGRESS].path.unlink(missing_ok=True)
 
     def save_best(self, gait: Gait, scenario: Scenario) -> None:
         """Writes the best gait."""
-        save_gait(gait, self._folder / BEST_GAIT, scenario)
+        save_gait(gait, self._best_gait, scenario)
 
     def finish(self, evaluations: int) -> None:
         """Checks that the record ends where the trial does."""
-        if len(self._evaluations) > evaluations:
-            self._refuse(EVALUATIONS, evaluations, "the trial ends before this evaluation")
-        (self._folder / IN_PROGRESS).unlink(missing_ok=True)
+        if len(self._lines[EVALUATIONS]) > evaluations:
+            self._files[EVALUATIONS].refuse(evaluations, "the trial ends before this evaluation")
+        self._files[IN_PROGRESS].path.unlink(missing_ok=True)
 
-    def _write(self, name: str, recorded: _Lines, entries: _Lines, *, first: int) -> None:
-        missing = []
+    def _write(self, name: str, entries: _Lines, *, first: int) -> None:
+        recorded, missing = self._lines[name], []
         for row, entry in enumerate(entries, start=first):
             if row >= len(recorded):
                 missing.append(entry)
                 continue
             for key in recorded[row] | entry:
                 if recorded[row].get(key) != entry.get(key):
-                    self._refuse(name, row, _NOT_REPEATED.format(key))
+                    self._files[name].refuse(row, _NOT_REPEATED.format(key))
         if missing:
-            append_lines(self._folder / name, missing)
+            self._append(name, missing)
 
-    def _refuse(self, name: str, row: int, problem: str) -> NoReturn:
-        raise InputError(self._folder / name, f"line {row + 1}", problem)
+    def _append(self, name: str, entries: _Lines) -> None:
+        self._run.begin()
+        self._files[name].append(entries)
 
 
-def _refuse_a_used(directory: Path) -> None:
-    """Raises InputError if more is there than a run killed in its first moment leaves."""
+def _is_empty(directory: Path) -> bool:
+    """True if nothing is there but what a process leaves that is killed as it begins a run."""
+    ours = (LOCK, SCENARIO, _ASIDE, ".manifest.", ".scenario.")
+    if not directory.is_dir():
+        return True
+    return all(file.name.startswith(ours) for file in directory.iterdir())
+
+
+def _check_empty(directory: Path) -> None:
+    """Raises InputError if a directory holds a run or anything else."""
     if (directory / MANIFEST).exists():
         problem = "holds a run already; to go on with it, use --resume (in Python, resume=True)"
         raise InputError(directory, "", problem)
-    ours = (LOCK, SCENARIO, ".manifest.", ".scenario.")
-    if directory.is_dir() and not all(f.name.startswith(ours) for f in directory.iterdir()):
+    if not _is_empty(directory):
         raise InputError(directory, "", "is not empty, expected a new directory")
 
 
-def _lock(directory: Path) -> BinaryIO:
+@contextlib.contextmanager
+def _set_aside(directory: Path) -> Iterator[None]:
+    """Removes what a directory holds, the lock aside, if the block succeeds."""
+    aside = directory / _ASIDE
+    shutil.rmtree(aside, ignore_errors=True)
+    aside.mkdir()
+    names = [file.name for file in directory.iterdir() if file.name not in (LOCK, _ASIDE)]
+    names.sort(key=lambda name: name != MANIFEST)  # without its manifest it is no run
+    try:
+        for name in names:
+            (directory / name).rename(aside / name)
+        yield
+    except BaseException:
+        for file in aside.iterdir():
+            file.replace(directory / file.name)
+        raise
+    finally:
+        shutil.rmtree(aside)
+
+
+def _locked(directory: Path) -> BinaryIO:
     """The run's locked file, which the system releases whenever this process ends; InputError if
     another process has locked it."""
     with contextlib.ExitStack() as undo:

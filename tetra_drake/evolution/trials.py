@@ -12,14 +12,13 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.draws import SeededVector
-from tetra_drake.evolution.entries import evaluation_entry, trial_folder
+from tetra_drake.evolution.entries import evaluation_entry
 from tetra_drake.evolution.executors import (
     EvaluationPool,
     MakeExecutor,
     evaluate_all,
     process_executor,
 )
-from tetra_drake.evolution.manifest import Manifest
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import Evaluate, Evaluation, MakeOptimizer, Optimizer
@@ -80,17 +79,15 @@ class Trial:
     `evolution.evaluations` are done or the optimiser stops. What the record holds already it goes
     through at once."""
 
-    def __init__(
-        self, number: int, *, manifest: Manifest, optimizer: Optimizer, folder: Path
-    ) -> None:
-        self.status = TrialStatus(number, manifest.scenario.evolution.evaluations)
+    def __init__(self, number: int, *, run: RunRecord, optimizer: Optimizer) -> None:
+        self._manifest = run.manifest
+        self.status = TrialStatus(number, self._manifest.scenario.evolution.evaluations)
         self.unevaluated: dict[int, Vector] = {}
         """Vectors to evaluate before the optimiser can go on, by index; empty at the end."""
         self.recalled: Evaluated | None = None
         """The first recorded vector with a fitness."""
-        self._manifest = manifest
         self._optimizer = optimizer
-        self._record = TrialRecord(folder)
+        self._record = TrialRecord(run, number)
         self._results: dict[int, Evaluated] = {}
         """The evaluated vectors of this iteration, by index."""
         self._best: Evaluated | None = None
@@ -189,13 +186,8 @@ def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) ->
     seeds = np.random.SeedSequence(record.manifest.seed).spawn(scenario.evolution.trials)
     trials = []
     for number, seed in enumerate(seeds):
-        trial = Trial(
-            number,
-            manifest=record.manifest,
-            optimizer=make(space, scenario.evolution, np.random.default_rng(seed)),
-            folder=trial_folder(record.directory, number),
-        )
-        trials.append(trial)
+        made = make(space, scenario.evolution, np.random.default_rng(seed))
+        trials.append(Trial(number, run=record, optimizer=made))
     return trials
 
 

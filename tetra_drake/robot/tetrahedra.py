@@ -34,7 +34,7 @@ def MakeTetrahedra(scenario: Scenario, robot: Tetrahedra) -> Structure:
     """
     n = robot.tetrahedra
     p_BN = tetrahedron_nodes(robot.strut_length)
-    bodies = tuple(f"T{i + 1}" for i in range(n))
+    bodies = robot.body_names
     x, _, z = p_BN[BOTTOM_LEFT]
     p_WB = np.array([[i * robot.spacing - x, 0.0, -z] for i in range(n)])
     actuation = Actuation.of(scenario)

@@ -102,6 +102,11 @@ class Tetrahedra(Section):
         return self.tetrahedra
 
     @property
+    def body_names(self) -> tuple[str, ...]:
+        """The names of the bodies, T1 being the front one."""
+        return tuple(f"T{i + 1}" for i in range(self.tetrahedra))
+
+    @property
     def slack(self) -> bool:
         """True if the cables never push."""
         return self.cables.slack
