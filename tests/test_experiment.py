@@ -321,6 +321,31 @@ def test_a_report_that_fails_is_no_failed_run_and_other_versions_are_told(
         tetra_drake.evolve(None, tmp_path / "run", resume=True, reevaluate=False, report=False)
 
 
+def test_what_cannot_be_evaluated_again_is_named_and_the_report_is_written(
+    tiny, tmp_path, reports, monkeypatch
+):
+    compiled_alone = tiny.with_changes({"simulation.duration": "3000 s"})
+    monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda *_: Bowl())
+    progress = Told()
+    run = tetra_drake.evolve(compiled_alone, tmp_path / "run", progress=progress)
+    assert reports == [run.directory] and run.reevaluations.empty
+    (warning,) = progress.warnings
+    assert "Drake diagram" in warning and "cpg.listing_step" in warning
+
+
+def test_the_map_is_simulated_on_as_many_local_threads_as_there_are_cores(
+    tiny, tmp_path, reports, monkeypatch
+):
+    asked = []
+    monkeypatch.setattr(
+        "tetra_drake.experiment.judge_elites", lambda out, workers: asked.append(workers)
+    )
+    monkeypatch.setattr("tetra_drake.experiment.reevaluation.reevaluate", lambda *_, **__: None)
+    tetra_drake.evolve(tiny, tmp_path / "threads", workers=3)
+    tetra_drake.evolve(tiny, tmp_path / "cluster", workers=32, executor=OneByOne)
+    assert asked == [3, None]
+
+
 # The command
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +16,6 @@ from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution import reevaluation
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
 from tetra_drake.evolution.executors import (
-    EvaluationImpossible,
     MakeExecutor,
     check_guard,
     check_sendable,
@@ -65,7 +65,8 @@ def evolve(
     overwrite: replaces the run in `out`, with all that its directory holds.
     optimizer: optimizer(space, scenario.evolution, generator) makes the optimiser of a trial
         (see optimizers.base); by default the scenario's.
-    objective: objective(result) -> float, to be maximised; by default the scenario's fitness.
+    objective: objective(result) -> float, to be maximised; by default the scenario's fitness. One
+        that reads result.trajectory has the attribute `needs_trajectory = True`.
     executor: executor(workers) makes a concurrent.futures.Executor; by default worker processes,
         for which an objective must be defined in a module. On the compiled engine, by default,
         threads simulate the candidates of all trials side by side; see simulate_many. Others:
@@ -115,10 +116,22 @@ def evolve(
                 _run_in_lanes(trials, scenario, objective, lanes, progress)
         else:
             _run(trials, scenario, objective, workers, where, progress)
+        if reevaluate and scenario.engine_name != "drake":
+            with _completing(progress, "the best gaits were not evaluated on the Drake diagram"):
+                reevaluation.reevaluate(
+                    out,
+                    objective,
+                    workers=workers,
+                    executor=executor or process_executor,
+                    progress=progress,
+                )
         if reevaluate:
-            _reevaluate(record, objective, workers, executor or process_executor, progress)
+            with _completing(progress, "gaits of the map were not simulated on disturbed robots"):
+                judge_elites(out, workers=None if executor else workers)
         if report:
-            _report(out, progress)
+            again = f"try again with: {_draw_again(out)}"
+            with _completing(progress, f"the report was not written; {again}"):
+                _write_report(out, progress)
     return load_run(out)
 
 
@@ -169,27 +182,15 @@ def _run(
     run_trials(trials, evaluate=evaluate, workers=workers, executor=executor, show=progress.show)
 
 
-def _reevaluate(
-    record: RunRecord,
-    objective: Objective | None,
-    workers: int,
-    executor: MakeExecutor,
-    progress: Progress,
-) -> None:
-    """Evaluates the best gaits on the Drake diagram, unless that was the engine, and simulates
-    those of a map on disturbed robots; the run is complete even if that cannot be done."""
-    directory, scenario = record.directory, record.manifest.scenario
-    if scenario.engine_name != "drake":
-        try:
-            reevaluation.reevaluate(
-                directory, objective, workers=workers, executor=executor, progress=progress
-            )
-        except EvaluationImpossible as error:
-            progress.warn(f"the best gaits were not evaluated on the Drake diagram: {error}")
+@contextlib.contextmanager
+def _completing(progress: Progress, failing: str) -> Iterator[None]:
+    """A block without which a run is complete: an error becomes a warning that begins with what is
+    missing."""
     try:
-        judge_elites(directory, workers=workers)
-    except InputError as error:
-        progress.warn(f"the gaits of the map were not simulated on disturbed robots: {error}")
+        yield
+    except Exception as error:
+        cause = str(error) if isinstance(error, (InputError, SimulationFailure)) else repr(error)
+        progress.warn(f"{failing}: {cause}")
 
 
 def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
@@ -219,16 +220,8 @@ def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
         )
 
 
-def _report(directory: Path, progress: Progress) -> None:
-    """Writes the report; the run is complete even if that fails."""
+def _write_report(directory: Path, progress: Progress) -> None:
     from tetra_drake.report.run_page import write_report
 
     progress.say("drawing figures and the report")
-    try:
-        write_report(directory)
-    except Exception as error:
-        cause = str(error) if isinstance(error, (InputError, SimulationFailure)) else repr(error)
-        progress.warn(
-            f"the run is complete, but its report could not be written: {cause}; try again with: "
-            f"{_draw_again(directory)}"
-        )
+    write_report(directory)

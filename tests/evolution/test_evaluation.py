@@ -48,6 +48,26 @@ def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vect
     assert twisting.metrics == here[0].metrics
 
 
+def highest(result):
+    """Greatest height of a node."""
+    return result.trajectory["p_WN"].sel(axis="z").max()
+
+
+@pytest.mark.parametrize("engine", ["!Drake", "!Compiled"])
+def test_an_objective_that_reads_the_trajectory_says_so(
+    tiny, vectors, engine, refused, monkeypatch
+):
+    scenario = tiny.with_changes({"engine": engine})
+    with refused("objective", "", "needs_trajectory"):
+        GaitEvaluation(scenario, highest)(vectors[0])
+    monkeypatch.setattr(highest, "needs_trajectory", True, raising=False)
+    evaluation = GaitEvaluation(scenario, highest)(vectors[0])
+    gait = ParameterSpace.of(scenario).gait(vectors[0], name="any")
+    result = simulate(scenario, gait, record=True)
+    assert evaluation.fitness == highest(result) > 0.05
+    assert evaluation.metrics == result.metrics.to_json()
+
+
 @pytest.mark.parametrize(
     ("changes", "objective", "kind"),
     [

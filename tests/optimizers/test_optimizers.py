@@ -250,6 +250,16 @@ def test_elites_are_the_cells_of_gaits_above_the_floor_that_have_not_failed(monk
     assert iterations[-1].report["elites"] == 0
 
 
+@pytest.mark.parametrize("measure", [None, math.nan, math.inf])
+def test_nothing_is_learnt_from_a_batch_without_a_measure(measure):
+    optimizer, elites = make(DIVERSE), []
+    for metrics in ({}, {"lifted": measure}, {}):
+        evaluations = [bowl(vector) for vector in optimizer.ask()]
+        changed = [dataclasses.replace(e, metrics=e.metrics | metrics) for e in evaluations]
+        elites.append(optimizer.tell(changed).report["elites"])
+    assert 0 < elites[0] == elites[1] < elites[2]
+
+
 def test_the_map_is_fuller_and_fitter_than_that_of_random_search():
     runs = (run(kind, walker, budget=4000) for kind in (DIVERSE, RandomSearch()))
     ours, theirs = (cells(batches) for batches, _ in runs)

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from tetra_drake.engines.compiled.lane_pool import LanePool
 
 Objective = Callable[[SimulationResult], float]
-"""Function of a result that evolution maximises, without trajectory. -inf or NaN is a failure."""
+"""Function of a result that evolution maximises; -inf or NaN is a failure. One that reads the
+trajectory has the attribute `needs_trajectory = True`."""
 
 _SEEDS_KEPT = 32
 """Number of seeds whose draws are kept: more than there are vectors under way."""
@@ -100,7 +101,8 @@ class GaitEvaluation:
         """Evaluates all tasks, and all their draws, at once."""
         plans = [self._walks(task) for task in tasks]
         walks = [(scenario, gait) for gait, scenarios in plans for scenario in scenarios]
-        futures = iter(lanes.submit(walks, time_budget=self.scenario.evolution.time_budget))
+        budget = self.scenario.evolution.time_budget
+        futures = iter(lanes.submit(walks, record=self._records, time_budget=budget))
         evaluations = []
         for task, (_, scenarios) in zip(tasks, plans, strict=True):
             draws = []
@@ -127,7 +129,11 @@ class GaitEvaluation:
 
     def _simulate(self, scenario: Scenario, gait: Gait) -> SimulationResult:
         with time_limit(self.scenario.evolution.time_budget):
-            return simulate(scenario=scenario, gait=gait)
+            return simulate(scenario=scenario, gait=gait, record=self._records)
+
+    @property
+    def _records(self) -> bool:
+        return bool(getattr(self.objective, "needs_trajectory", False))
 
     def _evaluation(
         self, scenario: Scenario, simulation: Callable[[], SimulationResult]
@@ -142,7 +148,7 @@ class GaitEvaluation:
             if scenario is self.scenario:
                 raise
             return Evaluation.failed(f"no start: {error}")
-        fitness = result.fitness if self.objective is None else float(self.objective(result))
+        fitness = self._fitness(result)
         metrics, wall_time = result.metrics.to_json(), result.wall_time
         if not math.isfinite(fitness):
             reason = "diverged: the fitness is not finite"
@@ -151,6 +157,17 @@ class GaitEvaluation:
             reason = f"requirement: {'; '.join(unmet)}"
             return Evaluation(-math.inf, metrics, reason, wall_time)
         return Evaluation(fitness, metrics, wall_time=wall_time)
+
+    def _fitness(self, result: SimulationResult) -> float:
+        if self.objective is None:
+            return result.fitness
+        try:
+            return float(self.objective(result))
+        except InputError as error:
+            if result.recorded is not None or error.key != "trajectory":
+                raise
+            problem = "reads the trajectory, expected its attribute needs_trajectory to be True"
+            raise InputError("objective", "", problem) from error
 
 
 _KINDS: dict[type[Exception], str] = {

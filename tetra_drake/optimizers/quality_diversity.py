@@ -36,7 +36,8 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
     above the level of its cell.
 
     A failure, or what lacks a measure, never enters the archive; it counts as farther below than
-    all others. Reports besides elites, the number of cells with a gait.
+    all others. From a batch without any other, nothing is learnt. Reports besides elites, the
+    number of cells with a gait.
     """
 
     def __post_init__(self) -> None:
@@ -47,7 +48,8 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
         self._roots: Matrix = np.empty((0, self._ranges.size))
         """Roots of the points drawn last; see Ranges.from_roots()."""
         self._told: dict[str, npt.NDArray[Any]] = {}
-        """Arguments of tell() of the emitters: `solution` (roots), `objective`, `measures`."""
+        """Arguments of tell() of the emitters: `solution` (roots), `objective`, `measures`; none
+        after a batch of which nothing may enter the archive."""
         self._added: dict[str, npt.NDArray[Any]] = {}
         """The archive's `status` and `value` of each."""
         self._archive = GridArchive(
@@ -90,6 +92,7 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
                 number = evaluation.metrics.get(name)
                 measures[i, j] = np.nan if number is None else number
         enters = np.isfinite(objective) & np.isfinite(measures).all(axis=1)
+        self._told = {}
         if enters.any():
             added = self._archive.add(
                 solution=self._roots[:count][enters],
@@ -100,12 +103,12 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
             value[~enters] = np.min(added["value"]) - 1.0
             objective[~enters] = np.min(objective[enters])
             measures[~enters] = measures[enters][0]  # no emitter looks at them
-        self._told = {"solution": self._roots, "objective": objective, "measures": measures}
-        self._added = {"status": status, "value": value}
+            self._told = {"solution": self._roots, "objective": objective, "measures": measures}
+            self._added = {"status": status, "value": value}
         return super().tell(evaluations)
 
     def _learn(self, fitnesses: Vector) -> None:
-        if self._archive.empty:
+        if self._archive.empty or not self._told:
             return
         for i, emitter in enumerate(self._emitters):
             batch = slice(i * BATCH, (i + 1) * BATCH)

@@ -124,12 +124,7 @@ class Robot:
             raise InputError("steering", "", "no oscillator is on one side of the robot")
         step = self.scenario.cpg.listing_step
         times = step * np.arange(round(self.scenario.simulation.duration / step) + 1)
-        turns = np.array([float(steering(time)) for time in times.tolist()])
-        wrong = ~(np.abs(turns) <= 1.0)
-        if wrong.any():
-            time, turn = times[wrong.argmax()], turns[wrong.argmax()]
-            raise InputError("steering", f"at {time:g} s", f"found {turn}, expected -1 to 1")
-        return turns
+        return np.array([checked_turn(float(steering(time)), time=time) for time in times.tolist()])
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
         """(..., 2m): u0 by neuron for turns (...); see physics.oscillator.steered_input."""
@@ -185,6 +180,13 @@ def constant_steering(turn: float) -> SteeringSignal:
         expected = "a number from -1 to 1, or a function of the time in s"
         raise InputError("steering", "", f"found {turn!r}, expected {expected}")
     return lambda time: turn
+
+
+def checked_turn(turn: float, *, time: float) -> float:
+    """The turn at a time (s); InputError if it is not a number from -1 to 1."""
+    if not abs(turn) <= 1.0:
+        raise InputError("steering", f"at {time:g} s", f"found {turn}, expected -1 to 1")
+    return turn
 
 
 def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:

@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from tetra_drake.robot.robot import checked_turn
+
 
 class Steering(LeafSystem):
     """The tonic input of the oscillators by the turn asked for; no state.
@@ -14,7 +16,7 @@ class Steering(LeafSystem):
     | port  | shape | unit | meaning                                                         |
     |-------|-------|------|-----------------------------------------------------------------|
     | turn  | (1,)  | 1    | from -1 to 1, how much stronger the left is; if not connected,  |
-    |       |       |      | as constructed                                                  |
+    |       |       |      | as constructed; InputError if it is beyond                      |
     | tonic | (2m,) | 1    | u0 of Eq. 7 for the neurons of m oscillators                    |
     """
 
@@ -40,4 +42,5 @@ class Steering(LeafSystem):
             turn = self._turn.Eval(context)[0]
         elif callable(turn):
             turn = turn(context.get_time())
+        turn = checked_turn(turn, time=context.get_time())
         output.SetFromVector(self._tonic_input(np.array(turn)))
