@@ -102,6 +102,10 @@ def test_only_search_may_differ_without_a_note(run):
     assert compare([base, searches]).notes == []
     (note,) = compare([base, run("c", trial(1.0), changes={"robot.cables.slack": True})]).notes
     assert "robot.cables.slack" in note
+    required = run("d", trial(1.0), changes={"require.clearance": "1 mm"})
+    for pair in ([base, required], [required, base]):
+        (note,) = compare(pair).notes
+        assert "require.clearance" in note
 
 
 def test_different_objectives_and_runs_given_twice_are_refused(run, refused):

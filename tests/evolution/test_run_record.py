@@ -26,8 +26,8 @@ def cut(path, lost):
     path.write_bytes(path.read_bytes()[:-lost])
 
 
-def create(directory):
-    record = RunRecord.create(directory, scenario=small_scenario(), seed=5)
+def create(directory, scenario=None):
+    record = RunRecord.create(directory, scenario=scenario or small_scenario(), seed=5)
     record.begin()
     return record
 
@@ -80,6 +80,31 @@ def test_a_changed_scenario_is_reported(run_small, refused):
     scenario.write_text(scenario.read_text().replace("population: 4", "population: 3"))
     with refused(scenario, "", "manifest.json"):
         RunRecord.resume(run)
+
+
+ADDED = [
+    ({"disturbances": {"draws": 2, "start": 0.1}}, "disturbances.draws"),
+    ({"objective.lead": "1 /m"}, "objective.lead"),
+    ({"require.clearance": "1 mm"}, "require.clearance"),
+]
+
+
+@pytest.mark.parametrize("has_it", [True, False], ids=["of the run", "of what is given"])
+@pytest.mark.parametrize(("changes", "key"), ADDED)
+def test_a_run_is_not_resumed_with_a_scenario_that_adds_or_lacks_something(
+    tmp_path, refused, changes, key, has_it
+):
+    plain = small_scenario()
+    ours, given = plain.with_changes(changes), plain
+    if not has_it:
+        ours, given = given, ours
+    run = tmp_path / "run"
+    with create(run, ours):
+        pass
+    with refused(run, key, "has" if has_it else "has none"):
+        RunRecord.resume(run, scenario=given)
+    with RunRecord.resume(run, scenario=ours.with_changes({"name": "another"})):
+        pass
 
 
 def test_no_run_is_resumed_where_there_is_none_and_none_begun_in_a_used_directory(

@@ -83,11 +83,30 @@ def test_values_of_every_type_load_and_dump_back(text, name, value):
     assert Settings.from_tree(parse_yaml(shown(settings), ""), "dump") == settings
 
 
-def test_defaults_are_neither_shared_nor_dumped():
+def test_defaults_are_not_shared():
     settings = load("")
     settings.weights["twist"] = 1.0
     assert load("").weights == {"distance": 1.0}
-    assert parse_yaml(shown(load("")), "file") == {"count": 2, "inner": {"slope": "0.0 rad"}}
+
+
+def test_a_tree_is_full_unless_it_is_sparse():
+    full = parse_yaml(shown(load("")), "file")
+    assert full.keys() == Settings.model_fields.keys()
+    assert full["inner"] == {"slope": "0.0 rad", "surface": "rough"}
+    assert tree_of(load(""), sparse=True) == {"count": 2, "inner": {"slope": "0.0 rad"}}
+
+
+def test_sections_of_the_same_values_are_equal_and_have_the_same_hash():
+    one, same = load("limits: {a: 1 kN, share: 1}"), load("limits: {a: 1000 N, share: 1.0}")
+    assert one == same and hash(one) == hash(same)
+    others = [
+        load("limits: {share: 1, a: 1 kN}"),  # names number things
+        load("limits: {a: 1 kN}"),
+        load("probes: [{at: [0 m, 0 m, 0 m]}]"),
+        load("terrain: !Incline {slope: 0 rad}"),
+    ]
+    assert len({one, same, *others}) == 5
+    assert one != one.model_dump()
 
 
 def test_values_cannot_be_changed_in_place():

@@ -65,10 +65,11 @@ def test_people_read_inches_pounds_force_and_degrees_of_the_same_size(unit, read
         ("5 deg", "rad"),
         ("1 /rad", "1/rad"),
         ("0.125", ""),
+        ("0", "m"),
     ],
 )
 def test_a_setting_is_shown_in_the_unit_in_which_it_is_a_round_number(text, unit):
-    number = quantity_to_si(text, unit) if unit else float(text)
+    number = quantity_to_si(text, unit) if " " in text else float(text)
     assert plainest(number, unit) == text
 
 

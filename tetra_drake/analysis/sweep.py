@@ -94,7 +94,7 @@ def _labels(
     numbers = [flattened(changed.model_dump()).get(key) for changed in scenarios]
     if not all(isinstance(number, int | float) for number in numbers):
         return [str(value) for value in values], {}
-    unit = flattened(tree_of(scenarios[0], show=lambda _, unit: unit, sparse=False))[key]
+    unit = flattened(tree_of(scenarios[0], show=lambda _, unit: unit))[key]
     return numbers, {"units": unit if isinstance(unit, str) else "1"}
 
 

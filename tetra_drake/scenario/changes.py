@@ -29,7 +29,7 @@ def _given(value: Any) -> Any:
     """A value from Python as a file would hold it."""
     value = python_value(value)
     if isinstance(value, Section):
-        return Whole({TAG: type(value).__name__} | tree_of(value, sparse=False))
+        return Whole({TAG: type(value).__name__} | tree_of(value))
     if isinstance(value, str) and value.startswith("!"):
         return parse_yaml(value, value)
     if isinstance(value, list):

@@ -42,7 +42,8 @@ def given_scenario(scenario: Scenario | str | Path) -> Scenario:
 
 
 def dump_scenario(scenario: Scenario) -> str:
-    """The scenario as a complete scenario file: SI units, loads back to the same numbers."""
+    """The scenario as a scenario file that gives all values, in SI: it loads back to the same
+    scenario, whatever the defaults."""
     return dump_yaml(tree_of(scenario))
 
 

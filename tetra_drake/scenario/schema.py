@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -112,21 +113,30 @@ class Scenario(Section):
         return dump_yaml(self.tree)
 
     def differences(self, base: Scenario) -> list[tuple[str, str]]:
-        """(key, value) of what differs from `base`, the name aside, in the units in which it was
-        written; of a record, which is written in SI, in those in which the number is round."""
-        ours, theirs, written = _values(self), _values(base), flattened(self.tree)
-        in_si = flattened(tree_of(self, sparse=False))
-        found = []
-        for key, value in ours.items():
-            if key != "name" and _text(value) != _text(theirs.get(key)):
-                given = written.get(key, in_si[key])
-                text = _text(value if given == in_si[key] else given)
-                found.append((key.removesuffix(f".{TAG}"), text))
-        return found
+        """(key, value) of what differs from `base`, in units in which the number is round.
 
-    def __eq__(self, other: object) -> bool:
-        # Units in which a number was written do not matter.
-        return type(other) is type(self) and vars(other) == vars(self)
+        A value that only `base` has is "none", and left out where kinds of other names explain it.
+        There are no differences exactly if the scenarios are equal.
+        """
+        ours, theirs = dict(self.content()), dict(base.content())
+        our_texts, their_texts = _texts(self), _texts(base)
+        kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs[key]]
+        other_kinds = tuple(key.removesuffix(TAG) for key in kinds)
+        found = []
+        for key in dict.fromkeys([*ours, *theirs]):
+            is_of_other_kind = key not in ours and key.startswith(other_kinds)
+            if ours.get(key) == theirs.get(key) or is_of_other_kind:
+                continue
+            text = our_texts.get(key, _NONE)
+            if text == their_texts.get(key, _NONE):  # only the last digits differ
+                text = _texts(self, exact=True)[key]
+            found.append((key.removesuffix(f".{TAG}"), text))
+        return found + _differences_in_order(ours, theirs)
+
+    def content(self) -> tuple[tuple[str, Any], ...]:
+        """The values by their dotted keys, in order, without the name, which is only a label:
+        scenarios of the same values are equal."""
+        return tuple(item for item in super().content() if item[0] != "name")
 
     @property
     def tree(self) -> Tree:
@@ -293,14 +303,32 @@ def _thesis() -> Scenario:
     return Scenario.from_tree(parse_yaml(read_text(file, "scenario file"), file), file)
 
 
-def _values(scenario: Scenario) -> dict[str, Any]:
-    """The values of a scenario by their keys; quantities as plain texts."""
-    return flattened(tree_of(scenario, show=plainest, sparse=False))
+_NONE = "none"
+"""Text of a value that a scenario does not have."""
 
 
-def _text(value: Any) -> str:
-    """A value of a tree as text."""
-    return rounded(json.dumps(value)).replace('"', "")
+def _texts(scenario: Scenario, *, exact: bool = False) -> dict[str, str]:
+    """The values of a scenario as texts, by their keys; numbers have six digits unless `exact`."""
+    tree = tree_of(scenario) if exact else tree_of(scenario, show=plainest)
+    texts = {}
+    for key, value in flattened(tree).items():
+        text = json.dumps(value).replace('"', "") if value is not None else _NONE
+        texts[key] = text if exact else rounded(text)
+    return texts
+
+
+def _differences_in_order(
+    ours: Mapping[str, Any], theirs: Mapping[str, Any]
+) -> list[tuple[str, str]]:
+    """The mapping, if any, that has the same names in another order."""
+    in_common = [key for key in ours if key in theirs], [key for key in theirs if key in ours]
+    for key, other in zip(*in_common, strict=True):
+        if key != other:
+            pairs = zip(key.split("."), other.split("."), strict=False)
+            shared = itertools.takewhile(lambda pair: pair[0] == pair[1], pairs)
+            mapping = ".".join(part for part, _ in shared)
+            return [(mapping, "another order of names")]
+    return []
 
 
 def _with_number(value: Any, names: Sequence[str], number: float) -> Any:

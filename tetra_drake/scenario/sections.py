@@ -108,6 +108,18 @@ class Section(BaseModel):
             tree[name] = each_number(tree[name], _unit(type(self).model_fields[name]), write)
         return tree
 
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and other.content() == self.content()
+
+    def __hash__(self) -> int:
+        return hash(self.content())
+
+    def content(self) -> tuple[tuple[str, Any], ...]:
+        """The values by their dotted keys, in order, by which sections are compared. The order
+        counts, as it numbers the bodies and oscillators of a structure."""
+        values = flattened(self.model_dump())
+        return tuple((key, _hashable(value)) for key, value in values.items())
+
     @classmethod
     def _advice(cls, name: str) -> str:
         """Advice on an unknown key: a key of a section, or a similar one."""
@@ -123,6 +135,13 @@ class Section(BaseModel):
         except ValidationError as error:
             refused = error.errors(include_url=False)[0]["ctx"]
             raise InputError(source, _joined(key, refused["key"]), refused["problem"]) from None
+
+
+def _hashable(value: Any) -> Any:
+    """A value with tuples in place of lists and mappings."""
+    if isinstance(value, dict):
+        value = list(value.items())
+    return tuple(map(_hashable, value)) if isinstance(value, (list, tuple)) else value
 
 
 def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
@@ -154,9 +173,7 @@ class Kinds:
             return _kind(value, kinds).model_validate(value, context=info.context)
 
         def write(section: Section, info: core_schema.SerializationInfo) -> Tree:
-            # In full, so that another default does not change what a record means.
-            tree = section.model_dump(context=info.context)
-            return {TAG: type(section).__name__} | tree
+            return {TAG: type(section).__name__} | section.model_dump(context=info.context)
 
         serializer = core_schema.plain_serializer_function_ser_schema(write, info_arg=True)
         return core_schema.with_info_plain_validator_function(read, serialization=serializer)
@@ -315,10 +332,11 @@ def merge(base: Any, changes: Any) -> Any:
     return merged
 
 
-def tree_of(section: Section, *, show: Show = "{!r} {}".format, sparse: bool = True) -> Tree:
-    """The tree of a section; `show` gives the text of a quantity from number and unit.
+def tree_of(section: Section, *, show: Show = "{!r} {}".format, sparse: bool = False) -> Tree:
+    """The tree of a section in full, so that another default does not change what a file means.
 
-    If `sparse`, values that are their fields' defaults are left out, but not those of kinds.
+    show: gives the text of a quantity from number and unit.
+    sparse: True to leave out values that are their fields' defaults.
     """
     return section.model_dump(context={"show": show}, exclude_defaults=sparse)
 

@@ -76,6 +76,8 @@ def shown(number: float, unit: str) -> str:
 
 def plainest(number: float, unit: str) -> str:
     """A number of an SI unit in the unit that needs the fewest digits, such as "6 in", "20 ms"."""
+    if number == 0.0:
+        return "0"
     candidates = [customary(unit), *_SMALL.get(unit, []), (1.0, unit.removeprefix("1"))]
 
     def digits(candidate: tuple[float, str]) -> int:
