@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import math
 import os
 import re
@@ -102,6 +103,23 @@ def check_folder(folder: str | Path) -> None:
 def json_number(value: Any) -> Any:
     """A value as JSON holds it: None for a number that is not finite."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def read_json(path: str | Path, what: str) -> Any:
+    """Content of a JSON file. Raises InputError as read_bytes(), also for a key given twice."""
+    try:
+        return json.loads(read_text(path, what), object_pairs_hook=_unique_keys)
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(path, "", f"is not JSON: {error}") from error
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        raise ValueError("a key is given twice")
+    return content
 
 
 def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:

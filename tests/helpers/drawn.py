@@ -15,8 +15,9 @@ def result_of(
 ) -> SimulationResult:
     """A result of which nothing but the motion is known."""
     unknown = cast(Any, None)
-    result = SimulationResult(
+    return SimulationResult(
         scenario=robot.scenario,
+        robot=robot,
         name=name,
         gait=None,
         metrics=unknown,
@@ -28,8 +29,6 @@ def result_of(
         path=unknown,
         recorded=trajectory,
     )
-    vars(result)["robot"] = robot  # which may be of no scenario
-    return result
 
 
 def panels(figure: Figure) -> list[Axes]:

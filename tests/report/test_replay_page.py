@@ -105,6 +105,39 @@ def test_a_metric_that_is_missing_and_a_gait_of_another_robot_are_refused(folder
         load_or_simulate(folder)
 
 
+DAMAGES = {
+    "name": lambda content: content.pop("name"),
+    "gait": lambda content: content.pop("gait"),
+    "duration_s": lambda content: content.update(duration_s=0.0),
+    "metrics.lifted_shares": lambda content: content["metrics"].update(lifted_shares=1.0),
+    "metrics.twist": lambda content: content["metrics"].update(twist=[0.0]),
+    "integrator.steps": lambda content: content["integrator"].pop("steps"),
+    "integrator.step": lambda content: content["integrator"].update(step=1.0),
+    "integrator": lambda content: content.update(integrator=[]),
+    "path.x_m": lambda content: content["path"]["x_m"].pop(),
+    "path.heading_rad": lambda content: content["path"].update(heading_rad=[]),
+    "path.time_s": lambda content: content["path"].update(time_s=[0.0]),
+}
+
+
+@pytest.mark.parametrize("key", DAMAGES)
+def test_a_damaged_result_is_refused_by_its_key(folder, key, refused):
+    file = folder / "result.json"
+    content = json.loads(file.read_text())
+    DAMAGES[key](content)
+    file.write_text(json.dumps(content))
+    with refused(file, key, ""):
+        load_result(folder)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "3", "null", "[" * 100_000, '{"name": 1, "name": 1}'])
+def test_a_result_of_another_content_is_refused(folder, text):
+    (folder / "result.json").write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_result(folder)
+    assert caught.value.source == str(folder / "result.json")
+
+
 def test_a_result_stands_for_files_that_are_complete(folder, tiny, gait, result, monkeypatch):
     def fail(*arguments, **options):
         raise OSError("disk full")

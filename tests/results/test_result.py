@@ -30,7 +30,7 @@ def result_of(robot, states) -> SimulationResult:
         modes=np.zeros((len(states), len(robot.structure.contacts), MODE_COLUMNS)),
         drives=np.zeros((len(states), 0)),
     )
-    work = IntegratorWork("none", 1.0, 1, 1)
+    work = IntegratorWork(scheme="none", accuracy=1.0, steps=1, derivative_evaluations=1)
     totals = make_totals()
     gait = seeded_gait(robot.scenario)
     return make_result(robot, gait, motion, totals=totals, work=work, wall_time=1.0, record=False)

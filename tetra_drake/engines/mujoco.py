@@ -125,7 +125,9 @@ class MujocoEngine(Engine):
             gait,
             simulator.motion(times, states, signals_kept),
             totals=totals,
-            work=IntegratorWork(INTEGRATOR, step, steps, steps),
+            work=IntegratorWork(
+                scheme=INTEGRATOR, accuracy=step, steps=steps, derivative_evaluations=steps
+            ),
             wall_time=wall_time,
             record=record,
         )

@@ -8,25 +8,27 @@ result.json       the numbers, the gait, and the path of the centre
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+import pydantic
+from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.files import check_folder, read_text, write_whole
+from tetra_drake.files import check_folder, read_json, write_whole
 from tetra_drake.results.result import IntegratorWork, SimulationResult, save_result
 from tetra_drake.results.trajectory import DIMENSIONS, labels, with_indexes
+from tetra_drake.robot.command import robot_without_network
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.metric_units import METRICS, Metrics
-from tetra_drake.scenario.sections import Section
+from tetra_drake.scenario.sections import Section, refuse
 
 if TYPE_CHECKING:
     import xarray
@@ -70,19 +72,22 @@ def load_result(folder: str | Path) -> SimulationResult:
         if not (folder / name).is_file():
             problem = f"holds no {name}, so it was not written by `simulate`"
             raise InputError(folder, name, problem)
-    scenario = load_scenario(folder / SCENARIO)
-    gait = load_gait(folder / RESULT, scenario, key="gait")
-    trajectory = _load_trajectory(folder / TRAJECTORY, Robot.of(scenario).structure)
-    file = _read_result_file(folder / RESULT)
+    scenario, file = load_scenario(folder / SCENARIO), _read_result_file(folder / RESULT)
+    if file.gait is None:  # a command was played
+        gait, robot = None, robot_without_network(scenario)
+    else:
+        gait, robot = load_gait(folder / RESULT, scenario, key="gait"), Robot.of(scenario)
+    trajectory = _load_trajectory(folder / TRAJECTORY, robot.structure)
     return SimulationResult(
         scenario=scenario,
-        name=gait.name,
+        robot=robot,
+        name=file.name,
         gait=gait,
         metrics=Metrics(**file.metrics),
         fitness=_number(file.fitness),
         duration=file.duration_s,
         wall_time=file.wall_time_s,
-        integrator=IntegratorWork(**file.integrator),
+        integrator=file.integrator,
         engine=file.engine,
         path=file.path.columns(),
         recorded=trajectory,
@@ -98,6 +103,15 @@ class _Path(Section):
     z_m: list[float]
     heading_rad: list[float | None]
 
+    @pydantic.model_validator(mode="after")
+    def _check_lengths(self) -> Self:
+        count = len(self.time_s)
+        for name, column in self:
+            if len(column) != count or count < 2:
+                expected = f"{max(count, 2)}, as many as time_s"
+                refuse(name, f"found {len(column)} numbers, expected {expected}")
+        return self
+
     def columns(self) -> CentrePath:
         """The path as arrays."""
         centre = np.column_stack([self.x_m, self.y_m, self.z_m])
@@ -106,23 +120,29 @@ class _Path(Section):
 
 
 class _ResultFile(Section):
-    """What is read of result.json, beside the gait."""
+    """What is read of result.json."""
 
+    name: str
     metrics: dict[str, Any]
     fitness: float | None
-    duration_s: float
-    wall_time_s: float
+    duration_s: float = Field(gt=0)
+    wall_time_s: float = Field(gt=0)
     engine: str
-    integrator: dict[str, Any]
+    integrator: IntegratorWork
+    gait: Any
+    """See GaitFile; None if a command was played."""
     path: _Path
 
 
 def _read_result_file(path: Path) -> _ResultFile:
-    """The numbers of result.json; InputError if one is missing."""
-    content = json.loads(read_text(path, "result"))
-    read = {name: content[name] for name in _ResultFile.model_fields if name in content}
-    file = _ResultFile.from_tree(read, path)
-    shares = file.metrics.get("lifted_shares", [])
+    """The content of result.json; InputError if something is missing."""
+    content = read_json(path, "result")
+    if isinstance(content, dict):
+        content = {name: content[name] for name in _ResultFile.model_fields if name in content}
+    file = _ResultFile.from_tree(content, path)
+    shares = file.metrics.get("lifted_shares")
+    if not isinstance(shares, list) or not all(isinstance(share, float) for share in shares):
+        raise InputError(path, "metrics.lifted_shares", "is missing, or no list of numbers")
     numbers: dict[str, Any] = {"lifted_shares": tuple(shares)}
     for name in METRICS:
         if not isinstance(file.metrics.get(name, ""), float | None):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import functools
 import html
 import json
 import tempfile
@@ -25,6 +23,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.metric_units import METRICS, Metrics
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.sections import Section
 from tetra_drake.scenario.settings import SimulationSection
 from tetra_drake.scenario.units import INCH
 
@@ -34,8 +33,7 @@ if TYPE_CHECKING:
 SCHEMA = 1
 
 
-@dataclass(frozen=True)
-class IntegratorWork:
+class IntegratorWork(Section):
     """Integrator settings and cost."""
 
     scheme: str
@@ -52,6 +50,8 @@ class SimulationResult:
     """Result of simulate()."""
 
     scenario: Scenario = field(repr=False, compare=False)
+    robot: Robot = field(repr=False, compare=False)
+    """The robot that was simulated; with a command, without the scenario's network."""
     name: str
     """Name of the gait, or of the command that was played."""
     gait: Gait | None = field(repr=False, compare=False)
@@ -80,11 +80,6 @@ class SimulationResult:
 
     def __repr__(self) -> str:
         return f"<SimulationResult {self.title}>"
-
-    @functools.cached_property
-    def robot(self) -> Robot:
-        """The scenario's robot."""
-        return Robot.of(self.scenario)
 
     @property
     def trajectory(self) -> xarray.Dataset:
@@ -172,6 +167,7 @@ def make_result(
     )
     return SimulationResult(
         scenario=robot.scenario,
+        robot=robot,
         name=gait.name,
         gait=None if len(robot.commanded) else gait,
         metrics=metrics,
@@ -199,6 +195,7 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
     lengths = [name for name, unit in METRICS.items() if unit == "m"]
     content = {
         "schema": SCHEMA,
+        "name": result.name,
         "scenario": scenario.name,
         "metrics": result.metrics.to_json(),
         **{f"{name}_in": json_number(metrics[name] / INCH) for name in lengths},
@@ -208,7 +205,7 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
         "wall_time_s": result.wall_time,
         "real_time_factor": result.duration / result.wall_time,
         "engine": result.engine,
-        "integrator": dataclasses.asdict(result.integrator),
+        "integrator": result.integrator.model_dump(),
         "versions": versions(scenario.engine.packages),
         "gait": gait and gait.to_json(scenario),
         "path": {

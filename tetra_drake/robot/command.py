@@ -38,24 +38,34 @@ class Command:
 
 
 def commanded_robot(scenario: Scenario, command: Command) -> Robot:
-    """The robot of a scenario that follows a command: each driven cable has a signal of its own.
+    """The robot of a scenario that follows a command.
 
-    There is no network, so no start-up and no feedback. A tension motor plays no spring and damper,
-    which are in its command, and starts with its first tension. Raises InputError if the command is
-    for another number of cables.
+    A tension motor starts with its first tension. Raises InputError if the command is for another
+    number of cables.
     """
-    plain = Robot.of(scenario)
-    driven, kind = plain.driven, plain.model.actuator.kind
+    robot = robot_without_network(scenario)
+    driven = robot.driven
     if command.samples.shape[1:] != driven.shape:
         problem = f"is of shape {command.samples.shape}, expected {driven.size} driven cables"
         raise InputError(f"command {command.name}", "samples", problem)
-    cables = plain.structure.cables.copy()
-    cables["signal"][driven] = np.arange(driven.size)
     signals = held_samples(command, scenario.cpg.listing_step, scenario.simulation.duration)
-    if kind == TENSION_MOTOR:
+    if robot.model.actuator.kind == WINCH:
+        law = robot.structure.cables[driven]
+        signals = law["stiffness"] * (law["free_length"] - signals)
+    return dataclasses.replace(robot, commanded=signals)
+
+
+def robot_without_network(scenario: Scenario) -> Robot:
+    """The robot of a scenario in which each driven cable has a signal of its own.
+
+    There is no network, so no start-up and no feedback. A tension motor plays no spring and damper,
+    which are in its command.
+    """
+    plain = Robot.of(scenario)
+    driven, cables = plain.driven, plain.structure.cables.copy()
+    cables["signal"][driven] = np.arange(driven.size)
+    if plain.model.actuator.kind == TENSION_MOTOR:
         cables["stiffness"][driven] = cables["damping"][driven] = 0.0
-    if kind == WINCH:
-        signals = cables["stiffness"][driven] * (cables["free_length"][driven] - signals)
     layout = dataclasses.replace(
         plain.actuation.layout,
         oscillators=tuple(plain.structure.cable_names[cable] for cable in driven),
@@ -65,8 +75,7 @@ def commanded_robot(scenario: Scenario, command: Command) -> Robot:
     structure = dataclasses.replace(plain.structure, cables=cables, actuation=actuation)
     without_network = {"signals": "listing", "feedback": [], "start_up": 0.0}
     cpg = scenario.cpg.model_copy(update=without_network)
-    robot = Robot.of(scenario.with_sections(cpg=cpg), structure)
-    return dataclasses.replace(robot, commanded=signals)
+    return Robot.of(scenario.with_sections(cpg=cpg), structure)
 
 
 def held_samples(command: Command, step: float, duration: float) -> np.ndarray:

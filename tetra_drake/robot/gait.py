@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_text, write_whole
+from tetra_drake.files import read_json, write_whole
 from tetra_drake.formatting import Table
 from tetra_drake.robot.actuation import KINDS, Actuation
 from tetra_drake.scenario.schema import Scenario
@@ -261,11 +261,7 @@ def given_gait(gait: Gait | str | Path, scenario: Scenario) -> Gait:
 
 def _read_file(path: str | Path, key: str) -> GaitFile:
     """Content of a gait file, or of a JSON file under `key`."""
-    text = read_text(path, "gait file")
-    try:
-        raw = json.loads(text, object_pairs_hook=_unique_keys)
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, "", f"is not JSON: {error}") from error
+    raw = read_json(path, "gait file")
     if key and isinstance(raw, dict):
         raw = raw.get(key)
     return GaitFile.from_tree(raw, path, key=key)
@@ -305,10 +301,3 @@ def _check_names(given: Collection[str], wanted: tuple[str, ...], source: object
     if problems:
         problem = f"found {len(given)}, expected the {len(wanted)} of the scenario"
         raise InputError(source, key, f"{problem}; {' and '.join(problems)}")
-
-
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    content = dict(pairs)
-    if len(content) < len(pairs):
-        raise ValueError("a key is given twice")
-    return content

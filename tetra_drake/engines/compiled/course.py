@@ -212,7 +212,12 @@ def make_outcome(prepared: PreparedGait, course: Course) -> SimulationResult:
         prepared.gait,
         course.motion,
         totals=course.totals,
-        work=IntegratorWork("ros2", tolerance, course.steps, course.evaluations),
+        work=IntegratorWork(
+            scheme="ros2",
+            accuracy=tolerance,
+            steps=course.steps,
+            derivative_evaluations=course.evaluations,
+        ),
         wall_time=course.wall_time,
         record=prepared.record,
     )

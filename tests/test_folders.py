@@ -1,0 +1,97 @@
+"""The folders that commands write: each command that takes one reads it, the others refuse it."""
+
+import re
+from pathlib import Path
+
+import pytest
+from helpers import quick_figures
+from helpers.actuations import MOTOR, WINCH
+
+from tetra_drake.cli import main
+from tetra_drake.files import write_whole
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+
+BRIEF = {
+    "engine": "!Compiled",
+    "simulation.duration": "0.3 s",
+    "simulation.steady_from": "0.1 s",
+    "evolution.trials": 1,
+    "evolution.evaluations": 6,
+    "optimizer": {"population": 4, "tournament": 2},
+}
+MAP = {"optimizer": {"_tag": "QualityDiversity", "cells": [2, 2]}}
+SCENARIOS = {
+    "force": ("thesis", BRIEF),
+    "map": ("thesis", BRIEF | MAP),
+    "winch": ("coulomb", BRIEF | WINCH),
+    "motor": ("coulomb", BRIEF | MOTOR),
+}
+
+PLAY = "simulate --command export_{0}/command.csv --scenario export_{0}/scenario.yaml"
+WRITERS = {
+    "simulate": "simulate --scenario force.yaml",
+    "export_force": "export --scenario force.yaml",
+    "export_winch": "export --scenario winch.yaml",
+    "export_motor": "export --scenario motor.yaml",
+    "play_force": PLAY.format("force"),
+    "play_winch": PLAY.format("winch"),
+    "play_motor": PLAY.format("motor"),
+    "evolve": "evolve --scenario force.yaml --no-reevaluate --workers 1",
+    "evolve_map": "evolve --scenario map.yaml --no-reevaluate --workers 1",
+    "robustness": "robustness evolve --draws 1 --workers 1",
+    "compare": "compare evolve",
+    "figures": "figures simulate",
+}
+"""Commands by the folders that they write."""
+
+RESULTS = {"simulate", "play_force", "play_winch", "play_motor"}
+RUNS = {"evolve", "evolve_map"}
+READERS = {
+    "replay {}": RESULTS | RUNS,
+    "figures {}": RESULTS | RUNS,
+    "simulate --gait {}": RUNS,
+    "export {}": RUNS,
+    "cpg --gait {}": RUNS,
+    "robustness {} --draws 1 --workers 1": RUNS,
+    "compare {}": RUNS,
+}
+"""Commands that take a folder, with the folders that they read."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick_drawing():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tetra_drake.report.book.save_figure", quick_figures.save_figure)
+        yield
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Path:
+    """A folder with what each writer writes."""
+    folder = tmp_path_factory.mktemp("written")
+    for name, (base, changes) in SCENARIOS.items():
+        scenario = load_scenario(base).with_changes(changes)
+        write_whole(folder / f"{name}.yaml", dump_scenario(scenario))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for name, command in WRITERS.items():
+            assert main([*command.split(), "--out", name]) == 0, command
+    return folder
+
+
+@pytest.mark.parametrize("writer", WRITERS)
+@pytest.mark.parametrize("reader", READERS)
+def test_a_folder_is_read_or_refused_in_one_line(
+    reader, writer, written, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(written)
+    out = tmp_path / "out"
+    status = main([*reader.format(writer).split(), "--out", str(out)])
+    captured = capsys.readouterr()
+    if writer in READERS[reader]:
+        assert (status, captured.err) == (0, "")
+        assert out.exists()
+        return
+    assert status == 2 and not out.exists()
+    (line,) = captured.err.splitlines()
+    assert re.match(rf"tetra-drake: {writer}\b", line), line
