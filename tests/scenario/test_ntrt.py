@@ -10,6 +10,7 @@ from helpers.structures import statics_of
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.structure_files import read_structure
 
 # Height 2, radius 1, the upper triangle twisted by 30 deg about the vertical, which is y.
 PRISM = """
@@ -110,6 +111,13 @@ def test_a_prism_in_decimetres(tmp_path: Path) -> None:
     assert (len(statics.self_stresses), statics.mechanisms) == (1, 1)
 
 
+def test_a_builder_has_no_pretension_unless_it_says_so(tmp_path: Path) -> None:
+    for text in ("stiffness: 800", "pretension: 0"):
+        rest = ", damping: 5, pretension: 1200, radius: 2, history: true"
+        file = write(tmp_path, PRISM.replace("stiffness: 800", text).replace(rest, ""))
+        assert read(file).cables["vertical/string"].tension == 0.0
+
+
 def test_y_is_up_and_the_frame_stays_right_handed(tmp_path: Path) -> None:
     given = read(write(tmp_path, PRISM.replace("low1: [1, 0, 0]", "low1: [1, 2, 3]")))
     assert given.nodes["low1"] == pytest.approx([0.3, 0.1, 0.2])
@@ -183,13 +191,15 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("text", "key", "fact"),
     [
-        ("nods: {}", "nods", "'nodes'"),
-        ("{}", "struts", "at least 1"),
+        ("nodes: {}\nnods: {}", "nods", "'nodes'"),
+        ("nodes: {}", "struts", "at least 1"),
         ("nodes: {a: [0, 0]}", "nodes.a", "3 items"),
         (PRISM.replace("[low1, high2]", "[low1, hihg2]"), "pair_groups.prism_rod[0]", "'high2'"),
         (PRISM.replace("tgRodInfo", "tgBoxInfo"), "builders.prism_rod.class", "'tgBoxInfo'"),
         (PRISM.replace("density", "dens"), "builders.prism_rod.parameters.dens", "'density'"),
         (PRISM.replace(": 0.25", ": 0"), "builders.prism_rod.parameters.radius", "more than 0"),
+        (PRISM.replace(": 1200", ": -1"), "builders.vertical.parameters.pretension", "at least 0"),
+        (PRISM.replace("low1: [1,", "low1: [1e200,"), "nodes.low1[1]", "1e+15"),
         (PRISM.replace("prism_rod:\n    class", "rods:\n    class"), "builders", "'prism_rod'"),
         (PRISM + "  string: {class: tgBasicActuatorInfo}", "builders", "vertical and string"),
         (SPINE.replace("v3/node_node", "node_edge"), "bond_groups.string.v1/v2/node_edge", "'A/B"),
@@ -207,6 +217,53 @@ def test_problems_name_file_key_and_facts(text: str, key: str, fact: str, tmp_pa
         read(file)
     assert (caught.value.source, caught.value.key) == (str(file), key)
     assert fact in caught.value.problem
+
+
+SECRET = "r00t"
+OTHER_FILES = {"key.pem": f"-----\n{SECRET}\n-----", "shadow": f"{SECRET}:*:7:::\nd:*:7:::\n"}
+"""Files that are no structure: one of YAML's texts, and one of its mappings."""
+
+
+@pytest.mark.parametrize(("name", "text"), OTHER_FILES.items())
+def test_nothing_is_shown_of_a_file_that_is_no_structure(name, text, tmp_path) -> None:
+    other = write(tmp_path, text, name)
+    whole = write(tmp_path, f"substructures: {{v: {{path: {name}}}}}")
+    for file in (other, whole):
+        with pytest.raises(InputError) as caught:
+            read_structure(file, unit="dm")
+        assert caught.value.source == str(other)
+        assert SECRET not in str(caught.value)
+
+
+ROD = "pair_groups.rod[0]"
+
+
+@pytest.mark.parametrize(
+    ("part", "key"),
+    [
+        (VERTEBRA, "nodes"),
+        ("pair_groups: {}", "substructures"),
+        (f"nodes: {{a: [0, 0, 0], b: [1, 0, 0]}}\npair_groups: {{rod: [{'[a, b], ' * 100}]}}", ROD),
+    ],
+)
+def test_a_structure_that_multiplies_is_refused_before_it_is_whole(part, key, tmp_path) -> None:
+    """Ten of ten of ten ... parts: the whole would not fit in memory."""
+    write(tmp_path, part, "level0.yaml")
+    for level in range(1, 9):
+        names = "/".join("abcdefghij")
+        text = f"substructures: {{{names}: {{path: level{level - 1}.yaml, offset: [1, 0, 0]}}}}"
+        write(tmp_path, text, f"level{level}.yaml")
+    with pytest.raises(InputError) as caught:
+        read(tmp_path / "level8.yaml")
+    assert caught.value.key == key
+
+
+def test_a_substructure_may_have_no_nodes(tmp_path: Path) -> None:
+    """Such as one that holds builders only."""
+    write(tmp_path, "builders: {rod: {class: tgRodInfo, parameters: {radius: 2}}}", "kinds.yaml")
+    entry = "{path: kinds.yaml, rotation: {axis: [0, 1, 0], angle: 90}, translation: [1, 0, 0]}"
+    given = read(write(tmp_path, f"{SIX_BAR}\nsubstructures: {{kinds: {entry}}}"))
+    assert given.struts["rod"].diameter == pytest.approx(0.4)
 
 
 def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path) -> None:

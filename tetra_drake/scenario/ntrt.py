@@ -19,14 +19,23 @@ import pydantic
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_text
 from tetra_drake.scenario.nesting import Point
-from tetra_drake.scenario.robot_kinds import CableGroup, Pair, Structure, StrutGroup
-from tetra_drake.scenario.sections import Section, Tree, hint, refuse, tree_of
-from tetra_drake.scenario.yaml_text import parse_yaml
+from tetra_drake.scenario.robot_kinds import (
+    MOST_NODES,
+    MOST_PAIRS,
+    CableGroup,
+    Pair,
+    Structure,
+    StrutGroup,
+)
+from tetra_drake.scenario.sections import Section, Tree, hint, keys_of, refuse, tree_of
+from tetra_drake.scenario.yaml_text import read_mapping
 
 MOST_BYTES = 2**20
 """Upper limit of the size of a file."""
+
+MOST_PARTS = MOST_NODES // 2
+"""Upper limit of the substructures of a structure, nested ones included."""
 
 UNUSED = (
     "friction roll_friction restitution rotation history max_tension target_velocity "
@@ -123,13 +132,19 @@ class Assembly:
     pairs: dict[str, list[Pair]] = field(default_factory=dict)
     """By their tags, which blanks separate."""
     builders: dict[str, Builder] = field(default_factory=dict)
+    parts: int = 0
+    """The number of files that have been added, one for each substructure."""
+    pair_count: int = 0
+    _read: dict[Path, NtrtFile] = field(default_factory=dict)
+    """Content of the files, as many substructures may share one."""
 
     def add_file(self, file: Path, *, prefix: str = "", above: tuple[Path, ...] = ()) -> None:
         """Adds a file that the files `above` contain, with a prefix to the names of its nodes."""
         if file.resolve() in above:
             raise InputError(file, "substructures", "the structure contains itself")
-        content = read_text(file, "structure file of NTRT", most=MOST_BYTES)
-        given = NtrtFile.from_tree(parse_yaml(content, file), file)
+        self.parts += 1
+        _check_size(self.parts, MOST_PARTS, file, "substructures")
+        given = self._content(file)
         parts: dict[str, list[tuple[int, Substructure]]] = {}
         for joined, entry in given.substructures.items():
             for place, name in enumerate(joined.split("/")):
@@ -143,6 +158,7 @@ class Assembly:
             self.add_file(file.parent / paths[0], prefix=start, above=(*above, file.resolve()))
             self._place(start, entries)
         self.nodes |= {prefix + name: np.array(p) for name, p in given.nodes.items()}
+        _check_size(len(self.nodes), MOST_NODES, file, "nodes")
         self.builders |= given.builders
         for tags, pairs in given.pair_groups.items():
             self._add_pairs(tags, pairs, (prefix, prefix), file, f"pair_groups.{tags}")
@@ -154,10 +170,19 @@ class Assembly:
                     starts = f"{prefix}{first}.", f"{prefix}{second}."
                     self._add_pairs(tags, pairs, starts, file, key)
 
+    def _content(self, file: Path) -> NtrtFile:
+        if file not in self._read:
+            keys, what = keys_of(NtrtFile), "structure file of NTRT"
+            content = read_mapping(file, what, keys=keys, most=MOST_BYTES)
+            self._read[file] = NtrtFile.from_tree(content, file)
+        return self._read[file]
+
     def _place(self, start: str, entries: list[tuple[int, Substructure]]) -> None:
         """Turns the nodes that begin with `start`, then scales them about their centre, then moves
         them."""
         names = [name for name in self.nodes if name.startswith(start)]
+        if not names:
+            return
         p = np.array([self.nodes[name] for name in names])
         for _, entry in entries:
             if entry.rotation is not None:
@@ -173,6 +198,8 @@ class Assembly:
         """Adds pairs whose first and second nodes begin with `starts`. A path means the node with
         that ending which is the least nested, then the first."""
         for place, pair in enumerate(pairs):
+            self.pair_count += 1
+            _check_size(self.pair_count, MOST_PAIRS, file, f"{key}[{place}]")
             nodes = []
             for start, path in zip(starts, pair, strict=True):
                 inside = [name for name in self.nodes if name.startswith(start)]
@@ -182,6 +209,13 @@ class Assembly:
                     raise InputError(file, f"{key}[{place}]", problem)
                 nodes.append(min(fitting, key=lambda name: name.count(".")))
             self.pairs.setdefault(" ".join(tags.split()), []).append(nodes)
+
+
+def _check_size(count: int, most: int, file: Path, key: str) -> None:
+    """Refuses a whole that has grown too large, before it grows further."""
+    if count > most:
+        problem = f"found more than {most} in the whole structure, expected at most as many"
+        raise InputError(file, key, problem)
 
 
 def _bonded_parts(bond: str, parts: list[str], file: Path, key: str) -> Iterable[tuple[str, str]]:

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_text
-from tetra_drake.scenario.ntrt import MOST_BYTES, ntrt_tree
+from tetra_drake.scenario.ntrt import MOST_BYTES, NtrtFile, ntrt_tree
 from tetra_drake.scenario.robot_kinds import Structure
-from tetra_drake.scenario.sections import TAG, Tree, Whole, described, merge
+from tetra_drake.scenario.sections import TAG, Tree, Whole, described, keys_of, merge
 from tetra_drake.scenario.units import quantity_to_si
-from tetra_drake.scenario.yaml_text import parse_yaml
+from tetra_drake.scenario.yaml_text import read_mapping
 
 FOLDER = Path(__file__).parent / "structures"
 
@@ -69,9 +68,8 @@ def with_structure(tree: Tree, source: object) -> Tree:
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
     """Content of a structure file, or of a file of NTRT by the unit that `source` has at `key`."""
-    content = parse_yaml(read_text(file, "structure file", most=MOST_BYTES), file)
-    if not isinstance(content, dict):  # which may be any file: nothing of it is shown
-        raise InputError(file, "", "holds no mapping of keys, expected a structure")
+    keys = keys_of(Structure) | keys_of(NtrtFile)
+    content = read_mapping(file, "structure file", keys=keys, most=MOST_BYTES)
     if not KEYS_OF_NTRT & content.keys():
         return content
     if unit is None:

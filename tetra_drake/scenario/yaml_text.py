@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
+from pathlib import Path
 from typing import Any
 
 import yaml
 
 from tetra_drake.errors import InputError
+from tetra_drake.files import read_text
 from tetra_drake.scenario.sections import TAG, Tree
 
 
@@ -22,6 +25,20 @@ def parse_yaml(content: str, source: object) -> Any:
         raise InputError(source, "", f"is not YAML{place}: {error.problem}") from error
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise InputError(source, "", f"is not YAML: {error}") from error
+
+
+def read_mapping(file: Path, what: str, *, keys: Collection[str], most: int) -> Tree:
+    """Content of a YAML file of at most so many bytes, a mapping with some of these `keys`.
+
+    Raises InputError if it is anything else. The file may be any, so the error shows nothing of it.
+    """
+    content = parse_yaml(read_text(file, what, most=most), file)
+    if not isinstance(content, dict):
+        raise InputError(file, "", f"holds no mapping of keys, expected a {what}")
+    if content.keys().isdisjoint(keys):
+        problem = f"has none of the keys of a {what}, expected some of {', '.join(keys)}"
+        raise InputError(file, "", problem)
+    return content
 
 
 def dump_yaml(tree: Tree) -> str:
