@@ -29,7 +29,7 @@ def test_quantities_convert_by_the_exact_definitions(text, unit, expected):
     assert quantity_to_si(text, unit) == pytest.approx(expected, rel=1e-14)
 
 
-@pytest.mark.parametrize("value", [0.1 / 3, 5e-324, 1.7976931348623157e308])
+@pytest.mark.parametrize("value", [0.1 / 3, 5e-324, 9.876543210987654e14])
 def test_an_si_number_written_with_its_unit_reads_back_to_the_last_bit(value):
     assert quantity_to_si(f"{value!r} N*s/m^2", "N*s/m^2") == value
 
@@ -87,6 +87,9 @@ REFUSED = [
     "__import__('os').getcwd()",
     "nan in",
     "-inf m",
+    "1e16 m",
+    "-1e200 m",
+    "1e400 m",
 ]
 
 

@@ -21,6 +21,9 @@ _SMALL = {
 }
 """Other units of which settings may be round numbers: size in SI, name."""
 
+_LARGEST = 1e15
+"""Upper limit of the size of a number in SI units, so that products of a few do not overflow."""
+
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
 _FACTORS = rf"{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*"
@@ -31,7 +34,7 @@ _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*")
 def quantity_to_si(text: str, unit: str) -> float:
     """Reads a quantity such as "25 lbf/in", or "1 /in", as a number in the SI unit `unit` ("N/m").
 
-    Raises ValueError if the text is no quantity, or has another dimension.
+    Raises ValueError if the text is no quantity, has another dimension, or is beyond 1e15.
     """
     import pint
 
@@ -41,11 +44,14 @@ def quantity_to_si(text: str, unit: str) -> float:
         raise ValueError(f"found '{text}', which is not a quantity; {example}")
     try:
         given = f"1/{match[3]}" if match[2] else match[3]
-        return float(pint.Quantity(float(match[1]), given).to(unit).magnitude)
+        number = float(pint.Quantity(float(match[1]), given).to(unit).magnitude)
     except pint.DimensionalityError as error:
         raise ValueError(f"found '{text}', {example}") from error
     except Exception as error:  # pint raises tokenizer, syntax and type errors of many kinds
         raise ValueError(f"found '{text}', whose unit is unknown; {example}") from error
+    if not abs(number) <= _LARGEST:
+        raise ValueError(f"found '{text}', expected at most {_LARGEST:g} {unit}")
+    return number
 
 
 def rounded(text: str) -> str:
