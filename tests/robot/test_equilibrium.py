@@ -1,6 +1,7 @@
 """The robot at rest: against an independent simulation, a walk that is not driven, and statics."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from helpers.quantities import with_unit
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.laws import rest_of
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, TIP
@@ -118,6 +120,36 @@ def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario, robot)
         }
     )
     assert np.array_equal(Robot.of(elsewhere).rest.state, robot.rest.state)
+
+
+@pytest.mark.parametrize("where", [math.nan, 1e308])
+def test_forces_that_are_not_finite_end_the_search_at_once(scenario, robot, where, refused):
+    start = robot.structure.initial_state
+    start[7 + 4] = where  # x of T2
+    with refused("thesis", "robot", "not finite, is on 'T1'"):
+        rest_of(scenario, robot.structure, start)
+
+
+def test_a_step_whose_end_has_no_forces_is_too_long(robot, monkeypatch):
+    """Such as one on which the ends of a cable meet."""
+    expected, displaced, steps = robot.rest.lengths, equilibrium.displaced, []
+
+    def first_meeting(resting, state, step):
+        steps.append(np.abs(step).max())
+        return displaced(resting, state, step if len(steps) > 1 else math.nan * step)
+
+    monkeypatch.setattr(equilibrium, "displaced", first_meeting)
+    again = Robot.of(robot.scenario).rest
+    assert steps[1] <= 0.5 * steps[0]
+    assert np.array_equal(again.lengths, expected)
+
+
+def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
+    monkeypatch.setattr(equilibrium, "LONG", -1.0)
+    rest = robot.rest
+    assert [record.levelname for record in caplog.records] == ["WARNING"]
+    assert "thesis" in caplog.text
+    assert rest.feet
 
 
 def test_a_robot_that_finds_no_rest_is_refused_by_name(robot, refused, monkeypatch):

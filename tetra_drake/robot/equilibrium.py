@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
+import logging
+import math
+import time
 from collections.abc import Sequence
 from typing import NamedTuple, Self
 
@@ -14,7 +16,7 @@ from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, NormalForce, updat
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.kinematics import move_bodies
 from tetra_drake.physics.model import Model
-from tetra_drake.simd.compiling import compiled
+from tetra_drake.simd.compiling import LOGGER, compiled
 from tetra_drake.simd.lanes import Table
 
 TOLERANCE = 1e-11
@@ -37,9 +39,14 @@ DIFFERENCE = 1e-7
 LEAST_STIFFNESS = 1e-9
 """Least stiffness of a stable mode, as a share of the ground's stiffness."""
 
+LONG = 5.0
+"""Time (s) that a search takes before it is announced."""
+
 LENGTH_DIGITS = 9
 """Digits of a settled length (m) behind the point. What follows depends on the processor, as the
 linear algebra does, and a walk with feedback would enlarge it."""
+
+_LOG = logging.getLogger(LOGGER)
 
 
 class Rest(NamedTuple):
@@ -77,39 +84,53 @@ def find_rest(model: Model, start: np.ndarray, *, bodies: Sequence[str], source:
     """
     robot, state = Resting.of(model), start
     weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
-    reach = FIRST_REACH * radius
-    for _ in range(ITERATIONS):
+    reach, announce_at = FIRST_REACH * radius, math.inf
+    for iteration in range(ITERATIONS):
         force = force_at_rest(robot, state)
-        greatest = max(np.abs(robot.forces.pulls[:, TENSION]).max(), weight, LEAST_FORCE)
+        if not np.isfinite(force).all():
+            break
+        tensions = np.abs(robot.forces.pulls[:, TENSION])
+        greatest = max(tensions.max(initial=weight), LEAST_FORCE)
         if np.abs(force).max() <= TOLERANCE * greatest:
             lengths = np.round(robot.forces.pulls[:, LENGTH], LENGTH_DIGITS)
             feet = int(np.count_nonzero(robot.forces.pushes[:, NORMAL]))
             return Rest(state, lengths, feet)
+        now = time.perf_counter()
+        if iteration == 1:  # kernels are compiled by now
+            announce_at = now + LONG
+        if now > announce_at:
+            _LOG.warning("%s: finding the robot's rest takes a while", source)
+            announce_at = math.inf
         step = _newton_step(robot, state, force)
+        if step is None:
+            break
         step *= min(1.0, reach / np.abs(step).max())
         moved = displaced(robot, state, step)
-        if force_at_rest(robot, moved) @ step < -OVERSHOOT * (force @ step):
-            reach = 0.5 * np.abs(step).max()
-        else:
+        if force_at_rest(robot, moved) @ step >= -OVERSHOOT * (force @ step):
             state, reach = moved, min(2.0 * reach, LONGEST_REACH * radius)
+        else:  # NaN, too, where the ends of a cable meet
+            reach = 0.5 * np.abs(step).max()
     left = np.abs(force.reshape(-1, 6)).max(axis=1)
-    problem = f"finds no rest; the greatest force left, {left.max():.3g} N, is on"
-    raise InputError(source, "robot", f"{problem} '{bodies[left.argmax()]}'")
+    body = int(left.argmax())  # the first one with NaN, if there is any
+    amount = f"{left[body]:.3g} N" if np.isfinite(left[body]) else "which is not finite"
+    problem = f"finds no rest; the greatest force left, {amount}, is on '{bodies[body]}'"
+    raise InputError(source, "robot", problem)
 
 
-def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.ndarray:
+def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.ndarray | None:
     """Displacements (6 n,) that bring the force to zero where the potential energy is convex, and
-    lead downhill where it is not; the robot as a whole stays where it is."""
+    lead downhill where it is not; the robot as a whole stays where it is. None if the derivatives
+    of the forces are not finite."""
     stiffness, held = stiffness_at_rest(robot, state), _free_motions(robot, state)
     hard, shift = NormalForce(*robot.model.ground.normal).stiffness, 0.0
     stiffness = 0.5 * (stiffness + stiffness.T) + hard * held @ held.T
+    step = np.empty_like(force)
     while shift < np.inf:
         shifted = stiffness + shift * np.eye(len(force))
-        with contextlib.suppress(np.linalg.LinAlgError):  # not positive definite
-            if np.linalg.cholesky(shifted).diagonal().min() ** 2 > LEAST_STIFFNESS * hard:
-                return np.linalg.solve(shifted, force)
+        if solve_convex(shifted, force, LEAST_STIFFNESS * hard, step):
+            return step
         shift = max(10.0 * shift, LEAST_STIFFNESS * hard)
-    return np.full_like(force, np.nan)
+    return None
 
 
 def _free_motions(robot: Resting, state: np.ndarray) -> np.ndarray:
@@ -120,6 +141,29 @@ def _free_motions(robot: Resting, state: np.ndarray) -> np.ndarray:
     motions[:, 3, 0] = motions[:, 4, 1] = motions[:, 2, 2] = 1.0
     motions[:, 3, 2], motions[:, 4, 2] = -y, x
     return motions.reshape(-1, 3)
+
+
+@compiled
+def solve_convex(matrix: Table, right: Table, least: float, x: Table) -> bool:
+    """Solves a symmetric system by Cholesky's method, in place of the upper half of the matrix;
+    False if a pivot is not greater than `least`.
+
+    LAPACK's many threads wait for each other where processors are busy.
+    """
+    n = right.size
+    for i in range(n):
+        if not matrix[i, i] > least:
+            return False
+        matrix[i, i:] /= np.sqrt(matrix[i, i])
+        for row in range(i + 1, n):
+            matrix[row, row:] -= matrix[i, row] * matrix[i, row:]
+    x[:] = right
+    for i in range(n):
+        x[i] /= matrix[i, i]
+        x[i + 1 :] -= matrix[i, i + 1 :] * x[i]
+    for i in range(n - 1, -1, -1):
+        x[i] = (x[i] - (matrix[i, i + 1 :] * x[i + 1 :]).sum()) / matrix[i, i]
+    return True
 
 
 @compiled
