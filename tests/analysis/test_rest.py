@@ -72,6 +72,21 @@ def test_two_bars_side_by_side_bounce_as_masses_on_springs():
     assert study_rest(robot).frequencies == pytest.approx(expected, rel=2e-3)
 
 
+def test_one_rigid_body_without_cables_rests_and_is_shown(tmp_path):
+    bar = {"nodes": {"a": [0.0, 0.0, 0.0], "b": [0.3, 0.0, 0.0]}}
+    bar["struts"] = {"bar": {"pairs": [["a", "b"]], "diameter": 0.004, "density": 1e4}}
+    bar["struts"]["bar"]["node_diameter"] = 0.0
+    scenario = robot_of_file("prism").scenario
+    study = study_rest(Robot.of(scenario.with_sections(robot=Structure.model_validate(bar))))
+    assert study.nodes["load"].tolist() == pytest.approx([study.robot.weight / 2] * 2)
+    assert (study.statics.self_stresses.shape, study.statics.mechanisms) == ((0, 0), 0)
+    assert len(study.cables) == 0
+    assert "bar" in structure_text(study)
+    save_structure_page(study, tmp_path / "bar.html")
+    assert (tmp_path / "bar.html").stat().st_size > 0
+    assert "tendon" in make_mjcf(study.robot)
+
+
 def test_text_page_and_model_are_of_the_structure(studies, tmp_path):
     study = studies["prism"]
     text = structure_text(study)

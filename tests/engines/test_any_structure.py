@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tetra_drake.engines.simulate import check_scenario, simulate, simulate_many
+from tetra_drake.experiment import evolve
 from tetra_drake.physics.feedback import sense
 from tetra_drake.results.result import save_result
 from tetra_drake.robot.gait import seeded_gait
@@ -14,6 +15,7 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
+from tetra_drake.scenario.robot_kinds import Structure
 from tetra_drake.scenario.schema import Scenario
 
 STRUCTURES = ("prism", "six_bar", "mast", "pair")
@@ -96,12 +98,69 @@ def test_a_structure_walks_as_far_as_its_centre_of_mass():
     assert abs(float(way.mean("body")[0]) - x) > 1e-4, "the mean of the bodies goes another way"
 
 
-def test_a_structure_whose_cables_nothing_drives_is_refused(refused):
-    still = briefly("prism").with_changes({"robot.actuated": {}})
-    with refused("prism", "robot.actuated", "oscillator"):
-        check_scenario(still)
-    with refused("prism", "robot.actuated", "oscillator"):
-        simulate(scenario=still, gait=seeded_gait(still))
+# A pyramid of six struts, one rigid body.
+BODY = {
+    "nodes": {"a": [0, 0, 0], "b": ["0.1 m", 0, 0], "c": [0, "0.1 m", 0], "d": [0, 0, "0.1 m"]},
+    "struts": {
+        "edge": {
+            "pairs": [["a", "b"], ["a", "c"], ["a", "d"], ["b", "c"], ["b", "d"], ["c", "d"]],
+            "diameter": "8 mm",
+            "density": "1.2 g/cm^3",
+            "node_diameter": "10 mm",
+        }
+    },
+    "offsets": [["0 m", "0 m", "2 cm"]],
+}
+
+
+def undriven(name: str) -> Scenario:
+    """A prism whose cables nothing drives, or a body without cables, 2 cm above the ground."""
+    prism = briefly("prism")
+    if name == "prism":
+        return prism.with_changes({"robot.actuated": {}})
+    return prism.with_sections(name="body", robot=Structure.from_tree(BODY, "body"))
+
+
+@pytest.mark.parametrize("name", ["prism", "body"])
+@pytest.mark.parametrize("signals", ["listing", "live"])
+def test_a_robot_that_nothing_drives_falls_and_rests(name, signals, tmp_path):
+    scenario = undriven(name).with_changes({"cpg.signals": signals})
+    gait = seeded_gait(scenario)
+    result = simulate(scenario, gait, record=True)
+    robot, trajectory = Robot.of(scenario), result.trajectory
+    np.testing.assert_allclose(trajectory.p_WN[-1, :, 2], resting_heights(robot), atol=1e-5)
+    load = trajectory.normal_force[-1].sum()
+    assert float(load) == pytest.approx(robot.weight, rel=1e-3)
+    assert result.metrics.actuator_work == result.metrics.signal_rate == 0.0
+    for outcome in simulate_many(scenario, [gait, gait]):
+        assert repr(outcome.metrics) == repr(result.metrics)
+    diagram = simulate(scenario.with_changes({"engine": "!Drake"}), gait, record=True)
+    np.testing.assert_allclose(diagram.trajectory.p_WN, trajectory.p_WN, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["prism", "body"])
+def test_mujoco_lets_it_fall_alike(name):
+    pytest.importorskip("mujoco")
+    changes = {"engine": "!Mujoco", "friction.stiffness": "0 N/m"}
+    scenario = undriven(name).with_changes(changes)
+    trajectory = simulate(scenario, seeded_gait(scenario), record=True).trajectory
+    heights = trajectory.p_WN[-1, :, 2]
+    np.testing.assert_allclose(heights, resting_heights(Robot.of(scenario)), atol=1e-5)
+
+
+def resting_heights(robot: Robot) -> np.ndarray:
+    """(nodes,): of the nodes at rest, in m."""
+    return node_positions(robot.structure, robot.rest.state)[:, 2]
+
+
+@pytest.mark.parametrize("name", ["prism", "body"])
+def test_a_robot_that_nothing_drives_has_no_gaits_to_search(name, refused, tmp_path):
+    scenario = undriven(name)
+    with refused(scenario.name, "robot.actuated", "oscillator"):
+        check_scenario(scenario)
+    with refused(scenario.name, "robot.actuated", "oscillator"):
+        evolve(scenario, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def test_what_a_structure_lacks_is_null_in_its_result(tmp_path):

@@ -111,8 +111,11 @@ def simulate_many(
 
 
 def check_scenario(scenario: Scenario) -> None:
-    """Raises InputError if the scenario's engine cannot simulate it, say, as the robot would start
-    in the ground or nothing drives it."""
+    """Raises InputError if the scenario's gaits cannot be simulated: the engine cannot do it, the
+    robot would start in the ground, or nothing drives it."""
+    if not scenario.oscillators:
+        problem = "found no oscillator, expected one at least, which drives cables"
+        raise InputError(scenario.name, "robot.actuated", problem)
     Robot.of(scenario).network(seeded_gait(scenario))
     engine_of(scenario).check(scenario)
 

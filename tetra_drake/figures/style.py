@@ -270,7 +270,7 @@ def spread(values: np.ndarray, least: float) -> np.ndarray:
     order = np.argsort(moved)
     for lower, upper in itertools.pairwise(order):
         moved[upper] = max(moved[upper], moved[lower] + least)
-    return moved - (moved - values).mean()
+    return moved - (moved - values).sum() / max(values.size, 1)
 
 
 def save_findings(

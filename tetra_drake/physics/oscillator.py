@@ -50,10 +50,9 @@ class Network(NamedTuple):
         matrix = np.array(inhibition, dtype=float)
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] % 2:
             raise ValueError(f"found inhibition of shape {matrix.shape}, expected (2n, 2n)")
-        inhibits = matrix != 0.0
-        first = inhibits.argmax(axis=1)
-        beyond = np.where(inhibits.any(axis=1), len(matrix) - inhibits[:, ::-1].argmax(axis=1), 0)
-        neurons = len(matrix)
+        neurons, inhibiting = len(matrix), [np.flatnonzero(row) for row in matrix]
+        first = np.array([row[0] if row.size else 0 for row in inhibiting], dtype=np.int64)
+        beyond = np.array([row[-1] + 1 if row.size else 0 for row in inhibiting], dtype=np.int64)
         return cls(
             first,
             beyond,

@@ -51,8 +51,9 @@ def structure_text(study: RestStudy) -> str:
         f"Lowest natural frequencies on the ground, undamped: {lowest or 'none'} Hz.",
         "At rest, without actuation:",
         _bodies_table(study).text(),
-        _cables_table(study).text(),
     ]
+    if len(structure.cables):
+        lines.append(_cables_table(study).text())
     return "\n\n".join(lines)
 
 

@@ -82,7 +82,7 @@ def compute_metrics(
         path_curvature=curvature(steady_path),
         actuator_work=work,
         cost_of_transport=work / carried if carried else math.inf,
-        signal_rate=math.sqrt(per_time * float(totals.roughness[0]) / structure.signals),
+        signal_rate=math.sqrt(per_time * float(totals.roughness[0]) / max(structure.signals, 1)),
         lifted=sum(lifted) / len(lifted),
         clearance=float(totals.clearance[0]),
         tension=float(totals.tension[0]),

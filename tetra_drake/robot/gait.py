@@ -271,9 +271,6 @@ def check_gait(
     gait: Gait, scenario: Scenario, actuation: Actuation, *, source: object, key: str = ""
 ) -> None:
     """Raises InputError, naming source and key, for what does not fit the scenario."""
-    if not actuation.names:
-        problem = "found no oscillator, expected one at least, which drives cables"
-        raise InputError(scenario.name, "robot.actuated", problem)
     prefix = f"{key}." if key else ""
     count, expected = len(gait.weights), len(actuation.couplings)
     if count != expected:

@@ -86,7 +86,7 @@ class Robot:
     def senses(self) -> Senses:
         """Constants of what the oscillators sense; raises InputError if the robot finds no rest."""
         drivers, pathways = self.actuation.drivers, self.scenario.cpg.feedback
-        sizes = np.bincount(drivers[drivers != PASSIVE])[drivers]  # cables of each cable's group
+        sizes = np.bincount(drivers - PASSIVE)[drivers - PASSIVE]  # cables of each cable's group
         settled = self.rest.lengths if "length" in pathways else np.ones(len(drivers))
         per_load = 1.0 / self.weight if "load" in pathways else 0.0
         return Senses(

@@ -69,7 +69,9 @@ def signals_at(
     """The signals (times, m) in N that cables are fed at `times` (s), zero before the start-up."""
     samples, cpg = signal_samples(robot, gait, steering), robot.scenario.cpg
     grid = cpg.listing_step * np.arange(len(samples))
-    signals = np.column_stack([np.interp(times, grid, column) for column in samples.T])
+    signals = np.empty((len(times), samples.shape[1]))
+    for oscillator, column in enumerate(samples.T):
+        signals[:, oscillator] = np.interp(times, grid, column)
     signals[times < cpg.start_up - 1e-9] = 0.0
     return signals
 

@@ -26,14 +26,18 @@ class Statics(NamedTuple):
 
 
 def find_statics(*, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.ndarray) -> Statics:
-    """Statics of two or more bodies joined by cables; for the arguments see cable_wrenches()."""
+    """Statics of bodies joined by cables; for the arguments see cable_wrenches()."""
     bodies = int(body_of_node.max()) + 1
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
     wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, cable_ends=cable_ends)
     _, singular_values, tensions = np.linalg.svd(wrenches)
-    rank = int(np.count_nonzero(singular_values > TOLERANCE * singular_values[0]))
+    greatest = singular_values.max(initial=0.0)
+    rank = int(np.count_nonzero(singular_values > TOLERANCE * greatest))
     straight = sum(_is_straight(p_WN[body_of_node == body]) for body in range(bodies))
-    return Statics(self_stresses=tensions[rank:], mechanisms=6 * bodies - 6 - straight - rank)
+    # The spin of a structure on one line is the spin of its bodies.
+    of_whole = 5 if _is_straight(p_WN) else 6
+    mechanisms = 6 * bodies - of_whole - straight - rank
+    return Statics(self_stresses=tensions[rank:], mechanisms=mechanisms)
 
 
 def cable_wrenches(
@@ -49,10 +53,11 @@ def cable_wrenches(
     force = p_WN[node_b] - p_WN[node_a]
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     wrench = np.hstack([np.cross(p_WN[node_a], force), force])
-    wrenches = np.zeros((body_of_node.max() + 1, 6, len(cables)))
+    bodies = body_of_node.max() + 1
+    wrenches = np.zeros((bodies, 6, len(cables)))
     wrenches[body_of_node[node_a], :, cables] = wrench
     wrenches[body_of_node[node_b], :, cables] = -wrench
-    return wrenches.reshape(-1, len(cables))
+    return wrenches.reshape(6 * bodies, len(cables))
 
 
 def _is_straight(p_WN: np.ndarray) -> bool:

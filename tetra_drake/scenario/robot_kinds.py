@@ -258,6 +258,8 @@ class Structure(Section):
         if self.contacts != "all":
             for place, node in enumerate(self.contacts):
                 self._check_node(f"contacts[{place}]", node)
+        if not self.contact_nodes:
+            refuse("contacts", "found none, expected one node at least")
         check_one_per_body("offsets", self.offsets, self.body_count)
         return self
 

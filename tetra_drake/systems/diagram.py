@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder, System
-from pydrake.systems.primitives import Adder, TrajectorySource
+from pydrake.systems.primitives import Adder, ConstantVectorSource, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from tetra_drake.robot.bodies import AddBodies
@@ -41,7 +41,8 @@ def MakeTensegrityDiagram(
 
     With `cpg.signals: live`, cpg is the network, else its signals, computed beforehand; feedback is
     there if `cpg.feedback` is not empty, actuators with winches or tension motors. `steering` acts
-    in place of the gait's turn.
+    in place of the gait's turn. Without oscillators, start_up is a source of no signals, and there
+    is no cpg.
 
     Input port: turn (steering, of a live network). Output ports: state (plant), signals
     (start_up), drives (actuators), tensions and lengths (cables), normal_forces, friction_forces
@@ -57,16 +58,13 @@ def MakeTensegrityDiagram(
     plant.Finalize()
     plant.SetDefaultPositions(structure.initial_state[: plant.num_positions()])
 
-    cpg = _AddCpg(builder, robot, gait, steering)
-    gate = StartUpGate(structure.signals, start_up=scenario.cpg.start_up)
-    start_up = builder.AddNamedSystem("start_up", gate)
+    start_up = _AddSignals(builder, robot, gait, steering)
     cables = builder.AddNamedSystem("cables", CableNetwork(robot))
     witness = isinstance(scenario.engine, Drake) and scenario.engine.mode_changes == "witness"
     ground = builder.AddNamedSystem("ground", GroundContact(robot, witness=witness))
     forces = builder.AddNamedSystem("forces", Adder(2, 6 * len(structure.bodies)))
 
-    state, signals = plant.get_state_output_port(), start_up.GetOutputPort("signals")
-    builder.Connect(cpg.get_output_port(0), start_up.GetInputPort("ungated"))
+    state, signals = plant.get_state_output_port(), start_up.get_output_port()
     builder.Connect(signals, cables.GetInputPort("signals"))
     builder.Connect(state, cables.GetInputPort("state"))
     builder.Connect(state, ground.GetInputPort("state"))
@@ -78,7 +76,7 @@ def MakeTensegrityDiagram(
         builder.Connect(cables.GetOutputPort("rates"), actuators.GetInputPort("rates"))
         builder.Connect(actuators.get_output_port(), cables.GetInputPort("drives"))
         builder.ExportOutput(actuators.get_output_port(), "drives")
-    if scenario.cpg.feedback:
+    if structure.signals and scenario.cpg.feedback:
         gains = [gain for _, gain in gait.gains]
         feedback = builder.AddNamedSystem("feedback", Feedback(robot, gains=gains))
         builder.Connect(state, feedback.GetInputPort("state"))
@@ -86,6 +84,7 @@ def MakeTensegrityDiagram(
         builder.Connect(
             ground.GetOutputPort("normal_forces"), feedback.GetInputPort("normal_forces")
         )
+        cpg = builder.GetSubsystemByName("cpg")
         builder.Connect(feedback.get_output_port(), cpg.GetInputPort("feedback"))
 
     builder.ExportOutput(state, "state")
@@ -97,6 +96,20 @@ def MakeTensegrityDiagram(
     diagram = builder.Build()
     diagram.set_name("tensegrity_robot")
     return diagram
+
+
+def _AddSignals(
+    builder: DiagramBuilder, robot: Robot, gait: Gait, steering: SteeringSignal | None
+) -> System:
+    """Adds `start_up`, whose output port has the signals of the cables, and what drives it."""
+    size = robot.structure.signals
+    if not size:
+        return builder.AddNamedSystem("start_up", ConstantVectorSource(np.zeros(0)))
+    cpg = _AddCpg(builder, robot, gait, steering)
+    gate = StartUpGate(size, start_up=robot.scenario.cpg.start_up)
+    start_up = builder.AddNamedSystem("start_up", gate)
+    builder.Connect(cpg.get_output_port(0), start_up.get_input_port())
+    return start_up
 
 
 def _AddCpg(

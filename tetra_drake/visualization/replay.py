@@ -102,7 +102,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     paths = node_paths(structure)
     size = drawn_radii(structure)[0].min()
     tension, force = frames["tension"].values, ground_forces(robot, frames)
-    greatest = np.percentile(tension, _USUAL)
+    greatest = np.percentile(tension, _USUAL) if tension.size else 0.0
     per_newton = radius_per_newton(structure, greatest)
     usual_force = float(np.percentile(np.linalg.norm(force, axis=-1), _USUAL))
     inches = LONG_ARROW * float(np.ptp(frames["p_WN"].values[0, :, 2])) / INCH
