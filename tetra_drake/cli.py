@@ -87,7 +87,7 @@ def make_parser() -> Command:
 
 
 def _simulate_options(command: Command) -> None:
-    _add_scenario(command, default=_OF_GAIT)
+    _add_scenario(command, default="that of the gait's run, or beside the command; else thesis")
     gaits = _add_gait(command, "--gait")
     what = "a file of actuator commands (CSV) instead, as `export` writes"
     gaits.add_argument("--command", metavar="FILE", dest="command_file", type=Path, help=what)
@@ -110,11 +110,14 @@ def _simulate(options: Options) -> None:
     from tetra_drake.report.result_folder import REPLAY, check_result_folder, save_result_folder
     from tetra_drake.report.summary import result_text
 
-    gait: Gait | None
-    scenario, gait = _chosen_gait(options)
-    scenario, command = scenario.with_changes(_engine_change(options)), None
+    gait, command = None, None
+    if options.command_file is None:
+        scenario, gait = _chosen_gait(options)
+    else:
+        scenario = _scenario_of_command(options)
+    scenario = scenario.with_changes(_engine_change(options))
     if options.command_file is not None:
-        gait, command = None, load_command(options.command_file, scenario)
+        command = load_command(options.command_file, scenario)
     if options.meshcat:
         check_can_be_watched(scenario)
     check_result_folder(options.out)
@@ -136,14 +139,22 @@ def _simulate(options: Options) -> None:
             input("press Enter to close the view in the browser ")
 
 
+def _scenario_of_command(options: Options) -> Scenario:
+    """The given scenario, or the one beside the command, or the thesis's."""
+    from tetra_drake.prototype.command_file import scenario_beside
+
+    file, beside = options.command_file, scenario_beside(options.command_file)
+    scenario = load_scenario(options.scenario or beside or "thesis")
+    if options.scenario and beside:
+        _warn(f"{file}: simulated on scenario {scenario.name}, not on {beside} beside it")
+    return scenario
+
+
 def _export_options(command: Command) -> None:
     _add_gait(command, "gait", nargs="?")
     _add_scenario(command, default=_OF_GAIT)
     _add_engine(command)
-    rate = "samples per second (default: 100 Hz)"
-    command.add_argument(
-        "--rate", metavar="RATE", type=_quantity("Hz"), default="100 Hz", help=rate
-    )
+    _add_rate(command, default="100 Hz", shown="100 Hz")
     _add_path(command, "--out", "DIR", "the new folder to write", required=True)
 
 
@@ -350,22 +361,25 @@ def _compare(options: Options) -> None:
 def _cpg_options(command: Command) -> None:
     _add_scenario(command, default=_OF_GAIT)
     _add_gait(command, "--gait")
+    command.add_argument("--unit", choices=("lbf", "N"), default="lbf", help="default: lbf")
+    _add_rate(command, default=None, shown="2000 Hz, by the scenario's cpg.listing_step")
     _add_path(command, "--out", "FILE", "the CSV file to write", required=True)
 
 
 def _cpg(options: Options) -> None:
     """Write the oscillator signals of a gait to a CSV file.
 
-    Writes the signals in lbf that the cables of a gait are fed: time_s, signal_1, signal_2 ..., a
-    column per oscillator, 2000 times a second, zero before the start-up time. A positive signal
-    shortens the cables that its oscillator drives. The file's first lines, which begin with #, say
-    what each column is. Feedback depends on the robot: gaits with it are refused.
+    Writes the signals that the cables of a gait are fed: time_s, signal_1, signal_2 ..., a column
+    per oscillator, zero before the start-up time. A positive signal shortens the cables that its
+    oscillator drives. The file's first lines, which begin with #, say what each column is. Feedback
+    depends on the robot: gaits with it are refused.
     """
     from tetra_drake.robot.robot import Robot
     from tetra_drake.robot.signals import save_signals
 
     scenario, gait = _chosen_gait(options)
-    save_signals(options.out, Robot.of(scenario), gait)
+    robot = Robot.of(scenario)
+    save_signals(options.out, robot, gait, unit=options.unit, rate=options.rate)
 
 
 def _structure_options(command: Command) -> None:
@@ -416,6 +430,11 @@ def _add_path(command: Command, name: str, metavar: str, what: str, **more: Any)
 
 def _add_count(command: Command, name: str, what: str, **more: Any) -> None:
     command.add_argument(name, metavar="N", type=_integer(1), help=what, **more)
+
+
+def _add_rate(command: Command, *, default: str | None, shown: str) -> None:
+    what = f"samples per second (default: {shown})"
+    command.add_argument("--rate", metavar="RATE", type=_quantity("Hz"), default=default, help=what)
 
 
 def _add_workers(command: Command) -> None:

@@ -10,8 +10,8 @@ from helpers.actuations import FORCE, MOTOR, WINCH
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
-from tetra_drake.prototype.command_file import load_command
-from tetra_drake.prototype.export import COMMAND, EXPECTED, LIMITS, README, SCENARIO, export
+from tetra_drake.prototype.command_file import SCENARIO, load_command
+from tetra_drake.prototype.export import COMMAND, EXPECTED, LIMITS, README, export
 from tetra_drake.robot.gait import load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
@@ -153,7 +153,28 @@ def test_the_commands_write_and_play(short, tmp_path, monkeypatch, capsys):
     export_it = "export --seed 80 --scenario coulomb --rate 100Hz --out lab"
     assert main(export_it.split()) == 0
     assert "No motor is given" in capsys.readouterr().out
-    play = "simulate --command lab/command.csv --scenario lab/scenario.yaml --out out"
+    play = "simulate --command lab/command.csv --out out"
     assert main(play.split()) == 0
     assert capsys.readouterr().out.startswith("command.csv: walks")
     assert (tmp_path / "out/replay.html").exists()
+
+
+def test_a_command_is_played_on_the_scenario_beside_it(short, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    export(short, seeded_gait(short), rate=50.0, out="lab")
+    written = (tmp_path / "lab" / SCENARIO).read_text()
+    assert main(["simulate", "--command", "lab/command.csv", "--out", "beside"]) == 0
+    assert (tmp_path / "beside/scenario.yaml").read_text() == written
+    assert capsys.readouterr().err == ""
+    (tmp_path / "other.yaml").write_text("base: lab/scenario.yaml\nname: other\n")
+    given = "simulate --command lab/command.csv --scenario other.yaml --out given"
+    assert main(given.split()) == 0
+    assert load_scenario(tmp_path / "given/scenario.yaml").name == "other"
+    (line,) = capsys.readouterr().err.splitlines()
+    assert all(word in line for word in ("lab/command.csv", "other", "lab/scenario.yaml"))
+    (tmp_path / "lab" / SCENARIO).rename(tmp_path / "elsewhere.yaml")
+    assert (
+        main(["simulate", "--command", "lab/command.csv", "--engine", "compiled", "--out", "alone"])
+        == 0
+    )
+    assert load_scenario(tmp_path / "alone/scenario.yaml").name == "thesis"

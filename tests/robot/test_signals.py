@@ -70,3 +70,23 @@ def test_the_csv_holds_what_the_cables_are_fed(robot, gait, tmp_path):
     fed = signal_samples(robot, gait)[: len(table)] / 4.4482216152605
     assert not table[~started, 1:].any()
     np.testing.assert_allclose(table[started, 1:], fed[started], atol=1e-10)
+
+
+def test_the_csv_has_the_unit_and_the_rate_that_are_asked_for(robot, gait, tmp_path):
+    save_signals(tmp_path / "lbf.csv", robot, gait)
+    save_signals(tmp_path / "N.csv", robot, gait, unit="N", rate=30.0)
+    lbf, newton = (
+        np.loadtxt(tmp_path / name, delimiter=",", skiprows=7) for name in ("lbf.csv", "N.csv")
+    )
+    assert "force in N " in (tmp_path / "N.csv").read_text().splitlines()[1]
+    np.testing.assert_allclose(newton[:, 0], np.arange(451) / 30.0, rtol=1e-11)
+    fed = np.column_stack([np.interp(newton[:, 0], lbf[:, 0], column) for column in lbf.T[1:]])
+    np.testing.assert_allclose(newton[:, 1:], 4.4482216152605 * fed, atol=1e-9)
+    assert fed.any()
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, 2001.0, float("nan"), float("inf")])
+def test_a_rate_beyond_the_signals_own_is_refused(robot, gait, rate, tmp_path, refused):
+    with refused("rate", "", "Hz"):
+        save_signals(tmp_path / "a.csv", robot, gait, rate=rate)
+    assert not list(tmp_path.iterdir())

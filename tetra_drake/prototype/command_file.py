@@ -19,6 +19,9 @@ from tetra_drake.scenario.sections import hint
 
 TIME = "time_s"
 
+SCENARIO = "scenario.yaml"
+"""File beside a command: the scenario whose actuators the command is for."""
+
 QUANTITIES = {
     DIRECT: ("force_N", 1.0),
     WINCH: ("free_length_mm", 1e-3),
@@ -47,6 +50,12 @@ def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) ->
     """CSV with times (s) and values, a row for each time."""
     table = pandas.DataFrame(values, columns=columns, index=pandas.Index(times, name=TIME))
     return table.reset_index().to_csv(index=False, float_format="%.6f")
+
+
+def scenario_beside(path: Path) -> Path | None:
+    """The scenario file in the folder of a command, if there is one."""
+    scenario = path.parent / SCENARIO
+    return scenario if scenario.is_file() else None
 
 
 def load_command(path: str | Path, scenario: Scenario) -> Command:

@@ -13,7 +13,12 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import fixed
-from tetra_drake.prototype.command_file import command_text, load_command, table_text
+from tetra_drake.prototype.command_file import (
+    SCENARIO,
+    command_text,
+    load_command,
+    table_text,
+)
 from tetra_drake.prototype.loads import Loads, actuator_loads
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import Gait
@@ -22,7 +27,7 @@ from tetra_drake.scenario.load import dump_scenario
 from tetra_drake.scenario.schema import Scenario
 
 COMMAND, EXPECTED, LIMITS = "command.csv", "expected.csv", "limits.csv"
-SCENARIO, README = "scenario.yaml", "README.md"
+README = "README.md"
 
 LEAST_RATE = 1000.0
 """Hz: peaks are looked for at this rate at least, whatever the rate of the files."""

@@ -76,21 +76,38 @@ def signals_at(
     return signals
 
 
-def save_signals(path: str | Path, robot: Robot, gait: Gait) -> None:
-    """Writes the signals that the cables of a gait are fed as CSV: time_s, signal_1 ... signal_m,
-    in lbf, one sample per `cpg.listing_step`.
+UNITS = {"lbf": POUND_FORCE, "N": 1.0}
+"""Units of force in which save_signals() writes."""
+
+
+def save_signals(
+    path: str | Path, robot: Robot, gait: Gait, *, unit: str = "lbf", rate: float | None = None
+) -> None:
+    """Writes the signals that the cables of a gait are fed as CSV: time_s, signal_1 ... signal_m.
 
     The first lines, which begin with #, say what the columns are.
+
+    Args:
+        unit: one of UNITS.
+        rate: samples per second (Hz); one per `cpg.listing_step` by default.
+
+    Raises:
+        InputError: where the rate is beyond its default, or the file cannot be written.
     """
     scenario, cpg = robot.scenario, robot.scenario.cpg
     duration = scenario.simulation.duration
-    times = cpg.listing_step * np.arange(math.floor(duration / cpg.listing_step + 1e-9) + 1)
-    signals = signals_at(robot, gait, times) / POUND_FORCE
+    most = 1.0 / cpg.listing_step
+    if rate is not None and not 0.0 < rate <= most * (1.0 + 1e-9):
+        problem = f"found {rate:g} Hz, expected more than 0 and at most {most:g} Hz"
+        raise InputError("rate", "", problem)
+    period = cpg.listing_step if rate is None else 1.0 / rate
+    times = period * np.arange(math.floor(duration / period + 1e-9) + 1)
+    signals = signals_at(robot, gait, times) / UNITS[unit]
     names = [f"signal_{i + 1}" for i in range(robot.structure.signals)]
     cables = zip(names, robot.actuation.cables, strict=True)
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",
-        "# time_s: time in s; signal_i: force in lbf that shortens the cables",
+        f"# time_s: time in s; signal_i: force in {unit} that shortens the cables",
         *(f"# {name}: {driven}" for name, driven in cables),
         ",".join(["time_s", *names]),
     ]
