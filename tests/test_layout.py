@@ -14,7 +14,8 @@ import tetra_drake
 
 PACKAGE = Path(tetra_drake.__file__).parent
 ORDER = (
-    *("errors", "files", "formatting", "machine", "simd", "physics", "scenario", "robot"),
+    *("errors", "files", "formatting", "interrupts", "machine"),
+    *("simd", "physics", "scenario", "robot"),
     *("systems", "visualization", "results", "engines", "prototype", "optimizers", "evolution"),
     *("analysis", "figures", "report", "experiment", "cli"),
 )

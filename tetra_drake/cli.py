@@ -8,9 +8,7 @@ import inspect
 import os
 import re
 import shlex
-import signal
 import sys
-import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -19,6 +17,7 @@ from tetra_drake import __version__
 from tetra_drake.engines import ENGINES
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder, write_whole
+from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import hint
@@ -41,10 +40,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     if unknown:
         names = re.findall(r"--[\w-]+", options.command.format_usage())
         options.command.error(f"there is no {unknown[0]}; {hint(unknown[0], names)}")
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends a command as Ctrl-C does
     try:
-        options.run(options)
+        with heeding_interrupts():
+            options.run(options)
     except (InputError, SimulationFailure) as error:
         print(f"tetra-drake: {error}", file=sys.stderr)
         return BAD_INPUT if isinstance(error, InputError) else FAILED

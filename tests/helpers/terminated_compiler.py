@@ -1,0 +1,40 @@
+"""A command that gets a SIGTERM as LLVM tells that it has compiled: DIRECTORY."""
+
+import os
+import signal
+import sys
+import time
+
+import numba
+from numba.core.codegen import JITCodeLibrary
+
+told = JITCodeLibrary._object_compiled_hook
+
+
+def terminate(module, buffer):
+    """Takes the place of a callback of LLVM; Python drops what is raised in it."""
+    if module.name.startswith("terminated"):
+        print("compiled", flush=True)
+        os.kill(os.getpid(), signal.SIGTERM)
+    told(module, buffer)
+
+
+JITCodeLibrary._object_compiled_hook = staticmethod(terminate)  # before numba starts its compiler
+
+
+def terminated(x):
+    return x + 1
+
+
+def compile_terminated(scenario):
+    """Takes the place of prepare()."""
+    numba.njit(terminated)(1)
+    time.sleep(60.0)
+
+
+if __name__ == "__main__":
+    import tetra_drake.engines.simulate
+    from tetra_drake.cli import main
+
+    tetra_drake.engines.simulate.prepare = compile_terminated
+    sys.exit(main(["simulate", "--out", sys.argv[1]]))
