@@ -333,6 +333,15 @@ def test_what_cannot_be_evaluated_again_is_named_and_the_report_is_written(
     assert "Drake diagram" in warning and "cpg.listing_step" in warning
 
 
+def test_a_gain_that_hardly_acts_is_named_when_a_run_begins(tiny, tmp_path):
+    out, quick, progress = tmp_path / "run", {"reevaluate": False, "report": False}, Told()
+    weak = tiny.with_changes({"cpg.gain": "0.1 N"})
+    tetra_drake.evolve(weak, out, progress=progress, **quick)
+    tetra_drake.evolve(None, out, resume=True, progress=progress, **quick)
+    (warning,) = progress.warnings
+    assert "cpg.gain 0.1 N" in warning
+
+
 def test_the_map_is_simulated_on_as_many_local_threads_as_there_are_cores(
     tiny, tmp_path, reports, monkeypatch
 ):

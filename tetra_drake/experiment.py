@@ -30,6 +30,7 @@ from tetra_drake.evolution.trials import Trial, check_fitness, open_trials, run_
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import MakeOptimizer
+from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import given_scenario
 from tetra_drake.scenario.schema import Scenario
 
@@ -107,6 +108,8 @@ def evolve(
     with record, progress:
         progress.say(_introduction(out, record.manifest, workers, report=report))
         _warn_of_versions(record.manifest, progress)
+        if not resume and (remark := Robot.of(scenario).gain_remark()):
+            progress.warn(remark)
         trials = open_trials(record, optimizer=make_optimizer)
         if resume and (objective is not None or any(trial.unevaluated for trial in trials)):
             alone = GaitEvaluation(scenario, objective)

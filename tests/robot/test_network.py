@@ -9,6 +9,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import load_scenario
 
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
 
@@ -82,3 +83,21 @@ def test_a_gait_that_does_not_fit_is_refused(scenario, robot, refused):
     gait = dataclasses.replace(seeded_gait(scenario), weights=(1.0,) * 23)
     with refused(f"gait {gait.name}", "weights", "expected"):
         robot.network(gait)
+
+
+@pytest.mark.parametrize(
+    ("name", "gain", "problem"),
+    [
+        ("thesis", "0.05 N", "0.0048"),
+        ("thesis", "2 lbf", ""),
+        ("winch", "5 N", "0.0058"),
+        ("winch", "500 N", ""),
+        ("winch", "900 N", "-25 mm"),
+        ("motors", "3 lbf", ""),
+        ("motors", "90 N", "22.5 N"),
+    ],
+)
+def test_a_gain_that_hardly_acts_or_asks_too_much_is_named(name, gain, problem):
+    remark = Robot.of(load_scenario(name).with_changes({"cpg.gain": gain})).gain_remark()
+    assert bool(remark) == bool(problem)
+    assert problem in remark

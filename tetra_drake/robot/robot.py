@@ -7,7 +7,7 @@ import functools
 import numbers
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -29,6 +29,12 @@ from tetra_drake.robot.tetrahedra import MakeTetrahedra
 from tetra_drake.scenario import robot_kinds
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import CpgSection
+
+AMPLITUDE = 0.5
+"""Amplitude of y_extensor - y_flexor, as a share of u0: 0.44 to 0.53 in random gaits."""
+
+LEAST_MOTION = 0.01
+"""Share of a cable's length by which signals should be able to move it."""
 
 SteeringSignal = Callable[[float], float]
 """The turn, from -1 to 1, at a time in s."""
@@ -133,6 +139,20 @@ class Robot:
         steered: np.ndarray = steered_input(u0, turns[..., np.newaxis], sides)
         return steered
 
+    def gain_remark(self) -> str:
+        """Remark on a `cpg.gain` with which signals hardly move the cables, or ask more than the
+        actuators can; empty if neither."""
+        cpg, driven = self.scenario.cpg, self.structure.cables[self.driven]
+        signal = abs(cpg.gain) * AMPLITUDE * cpg.external_input
+        moved = signal / driven["stiffness"]
+        share = np.max(moved / self._starting_lengths())
+        if share < LEAST_MOTION:
+            problem = f"move no cable by more than {share:.2g} of its length"
+        else:
+            least = np.min(driven["free_length"] - moved)
+            problem = self.scenario.actuation.excess(signal, free_length=least)
+        return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
+
     def starting_drives(self) -> np.ndarray:
         """(drives,): free lengths (m) of winches, or tensions (N) of tension motors, at t = 0."""
         driven, kind = self.structure.cables[self.driven], self.model.actuator.kind
@@ -142,10 +162,16 @@ class Robot:
             return driven["free_length"].copy()
         if len(self.commanded):
             return np.maximum(self.commanded[0], 0.0)
+        law = CableLaw(*(driven[name] for name in CableLaw._fields))
+        lengths: Any = self._starting_lengths()
+        return np.maximum(np.asarray(cable_tension(lengths, 0.0, 0.0, law)), 0.0)
+
+    def _starting_lengths(self) -> np.ndarray:
+        """(driven cables,): lengths in m at t = 0."""
+        driven = self.structure.cables[self.driven]
         p_WN = node_positions(self.structure, self.structure.initial_state)
         lengths = np.linalg.norm(p_WN[driven["node_b"]] - p_WN[driven["node_a"]], axis=1)
-        law = CableLaw(*(driven[name] for name in CableLaw._fields))
-        return np.maximum(np.asarray(cable_tension(lengths, 0.0, 0.0, law)), 0.0)
+        return np.asarray(lengths)
 
     def starting_modes(self) -> np.ndarray:
         """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""

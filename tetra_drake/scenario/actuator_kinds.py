@@ -25,6 +25,11 @@ class Force(Section):
 
         return Actuator.of(DIRECT)
 
+    def excess(self, signal: float, *, free_length: float) -> str:
+        """What signals up to `signal` (N) ask beyond the actuator's limits, of a cable whose
+        commanded free length (m) then is least; empty if nothing."""
+        return ""
+
 
 class LimitedActuator(Section):
     """An actuator of limited force and speed on each driven cable, which then never pushes."""
@@ -51,6 +56,13 @@ class Winch(LimitedActuator):
 
         return Actuator.of(WINCH, **dict(self))
 
+    def excess(self, signal: float, *, free_length: float) -> str:
+        """See Force.excess()."""
+        if free_length >= self.least_length:
+            return ""
+        asked, least = 1e3 * free_length, 1e3 * self.least_length
+        return f"ask for a free length of {asked:.3g} mm, a winch winds to {least:.3g} mm at least"
+
 
 class TensionMotor(LimitedActuator):
     """A motor on each driven cable that controls its tension: signals, spring and damper of the
@@ -64,6 +76,12 @@ class TensionMotor(LimitedActuator):
         from tetra_drake.physics.actuator import TENSION_MOTOR, Actuator
 
         return Actuator.of(TENSION_MOTOR, **dict(self))
+
+    def excess(self, signal: float, *, free_length: float) -> str:
+        """See Force.excess()."""
+        if signal <= self.max_force:
+            return ""
+        return f"ask for {signal:.3g} N, a motor pulls with {self.max_force:.3g} N at most"
 
 
 Actuation = Annotated[Force | Winch | TensionMotor, Kinds()]
