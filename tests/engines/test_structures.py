@@ -21,8 +21,9 @@ from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.physics.cable import PASSIVE
-from tetra_drake.physics.contact import MODE_COLUMNS, modes_after_step
+from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.forces import Forces
+from tetra_drake.physics.mode_change import modes_after_step
 from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -32,6 +33,7 @@ from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_kinds import Structure as Kind
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.simd.packed import Packed
 from tetra_drake.systems import CableNetwork, GroundContact
 
 AMPLITUDE, FREQUENCY, INTERVAL = 1.5, 2.0 * np.pi, 0.5  # N, rad/s, s between recorded centres
@@ -63,7 +65,7 @@ def test_the_compiled_step_moves_as_the_independent_simulation(name, data):
     model, phase, h = robot.model, np.array(recorded["drive"]["phase"]), 1e-4
     solver, work, forces = Solver.of(model), make_step(model), Forces.of(model)
     modes = np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
-    points, every = (model.p_BN, model.first_node), round(INTERVAL / h)
+    every, parts = round(INTERVAL / h), Packed((model, forces))
 
     def signals(time: float) -> np.ndarray:
         return AMPLITUDE * np.sin(FREQUENCY * time + phase)
@@ -71,7 +73,7 @@ def test_the_compiled_step_moves_as_the_independent_simulation(name, data):
     work.state[:] = robot.structure.initial_state
     centres = [centre_of(work.state)]
     for i in range(10 * every):
-        modes_after_step(work.state, *points, model.ground, forces.nodes, forces.frames, modes)
+        modes_after_step(parts, work.state, modes)
         forces_at(model, work.state, modes, signals(i * h), forces, work.force)
         take_step(model, solver, work, modes, forces, signals((i + 1) * h), h, False)
         work.state[:] = work.end

@@ -46,8 +46,8 @@ def make_walk(
     modes = np.zeros((*stands.shape, MODE_COLUMNS))
     modes[..., CONTACT] = stands
     drives = np.zeros((len(times), 0))
-    pushes = np.stack([-0.5 * normal, 0.0 * normal, normal], axis=-1)
-    walk = make_dataset(robot, Motion(times, states, signals, modes, drives, pushes))
+    ground_forces = np.stack([-0.5 * normal, 0.0 * normal, normal], axis=-1)
+    walk = make_dataset(robot, Motion(times, states, signals, modes, drives, ground_forces))
     driver = structure.cables["signal"]
     walk.tension[:] = 3.0 + np.where(driver < 0, 0.0, signals[:, driver])
     return walk

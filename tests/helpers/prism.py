@@ -86,6 +86,6 @@ def slide_prism(robot: Robot, *, duration: float = 8.0) -> xarray.Dataset:
     modes = np.zeros((len(times), 6, MODE_COLUMNS))
     drives = np.zeros((len(times), 0))
     weights = np.array([0.2, 0.0, 0.2, 0.0, 0.2, 0.0])
-    pushes = np.zeros((len(times), 6, 3))
-    pushes[..., 2] = weights
-    return make_dataset(robot, Motion(times, states, signals, modes, drives, pushes))
+    ground_forces = np.zeros((len(times), 6, 3))
+    ground_forces[..., 2] = weights
+    return make_dataset(robot, Motion(times, states, signals, modes, drives, ground_forces))

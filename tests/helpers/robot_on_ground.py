@@ -2,19 +2,13 @@
 
 import numpy as np
 
-from tetra_drake.physics.contact import (
-    MODE_COLUMNS,
-    PUSH_COLUMNS,
-    add_ground_forces,
-    meet_ground,
-    update_modes,
-)
-from tetra_drake.physics.kinematics import NODE_COLUMNS
+from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
+from tetra_drake.physics.forces import Forces, add_ground_forces, move_contacts
 from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
-from tetra_drake.physics.terrain import FRAME_COLUMNS
-from tetra_drake.robot.ground import make_ground
+from tetra_drake.robot.laws import make_model
 from tetra_drake.robot.robot import MakeStructure
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.simd.packed import Packed
 
 REST = (0.0, 0.0, 0.0)
 TOUCHING = (0.0, 0.0, -1e-4)
@@ -30,8 +24,7 @@ class RobotOnGround:
 
     def __init__(self, scenario: Scenario, R: np.ndarray) -> None:
         self.structure, self.R = MakeStructure(scenario), R
-        self.points = self.structure.p_BN, self.structure.first_node
-        self.ground = make_ground(scenario, self.structure)
+        self.model = make_model(scenario, self.structure)
         self.modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
 
     def state(self, v=REST, p=TOUCHING) -> np.ndarray:
@@ -40,39 +33,36 @@ class RobotOnGround:
         state[35:].reshape(5, 6)[:, 3:] = self.R @ v
         return state
 
-    def meet(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def meet(self, state: np.ndarray) -> Forces:
         """The nodes and frames of a state."""
-        nodes = np.empty((len(self.structure.node_names), NODE_COLUMNS))
-        frames = np.empty((len(self.modes), FRAME_COLUMNS))
-        meet_ground(state, *self.points, self.ground, nodes, frames)
-        return nodes, frames
+        forces = Forces.of(self.model)
+        move_contacts(self.model, state, forces)
+        return forces
 
     def update_at(self, state: np.ndarray) -> bool:
         """Brings the modes up to date; whether they changed."""
-        nodes, frames = self.meet(state)
-        return update_modes(state, nodes, self.ground, frames, self.modes)
+        forces = self.meet(state)
+        return update_modes(state, forces.nodes, self.model.ground, forces.frames, self.modes)
 
     def update(self, v=REST, p=TOUCHING) -> bool:
         return self.update_at(self.state(v, p))
 
     def forces(self, v=REST, p=TOUCHING) -> tuple[np.ndarray, np.ndarray]:
-        """The nodes with the forces on them, and the ground's pushes."""
-        nodes, frames = self.meet(self.state(v, p))
-        pushes = np.full((len(self.modes), PUSH_COLUMNS), np.nan)
-        add_ground_forces(nodes, self.modes, self.ground, frames, True, pushes)
-        return nodes, pushes
+        """The nodes with the forces on them, and the `ground_forces`."""
+        forces = self.meet(self.state(v, p))
+        forces.ground_forces[:] = np.nan
+        add_ground_forces(self.model, self.modes, True, forces)
+        return forces.nodes, forces.ground_forces
 
     def time_to_change(self, v=REST, a=REST, p=TOUCHING) -> float:
         """Until the next mode change, at most 9 s, at an acceleration a (m/s²)."""
         state = self.state(v, p)
-        nodes, frames = self.meet(state)
         acceleration = np.tile([0.0, 0.0, 0.0, *(self.R @ a)], 5)
-        args = self.modes, self.ground, frames
-        return time_to_mode_change(state, acceleration, nodes, *args, 9.0)
+        forces = self.meet(state)
+        return time_to_mode_change(self.model, state, acceleration, self.modes, forces, 9.0)
 
     def margin_at(self, state: np.ndarray) -> float:
-        nodes, frames = self.meet(state)
-        return mode_margin(state, self.modes, *self.points, self.ground, nodes, frames)
+        return mode_margin(Packed((self.model, Forces.of(self.model))), state, self.modes)
 
     def margin(self, v=REST, p=TOUCHING) -> float:
         return self.margin_at(self.state(v, p))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tetra_drake.physics.actuator import CableLaw, Limits, Pull, motor_pull, winch_pull
+from tetra_drake.physics.actuator import ActuatorForce, CableLaw, Limits, motor_force, winch_force
 
 CABLE = CableLaw(stiffness=100.0, damping=5.0, free_length=0.2)
 """In N/m, N s/m and m."""
@@ -17,12 +17,12 @@ MOTOR = Limits(max_force=20.0, max_speed=0.4, time_constant=0.05, least_length=0
 
 def wind(
     drive: float, length: float, *, rate: float = 0.0, signal: float = 0.0, limits: Limits = WINCH
-) -> Pull:
-    return winch_pull(drive, length, rate, signal, CABLE, limits)
+) -> ActuatorForce:
+    return winch_force(drive, length, rate, signal, CABLE, limits)
 
 
-def pull(drive: float, length: float, *, rate: float = 0.0, signal: float = 0.0) -> Pull:
-    return motor_pull(drive, length, rate, signal, CABLE, MOTOR)
+def pull(drive: float, length: float, *, rate: float = 0.0, signal: float = 0.0) -> ActuatorForce:
+    return motor_force(drive, length, rate, signal, CABLE, MOTOR)
 
 
 def test_a_free_winch_follows_its_command_with_a_lag():
@@ -116,10 +116,10 @@ def test_the_slope_is_the_derivative_of_the_tension_by_the_rate():
             below, at, above = (
                 law(state, length, rate=rate + shift, signal=signal) for shift in (-step, 0.0, step)
             )
-            if below.slope == above.slope:  # else a regime ends here
+            if below.tension_per_rate == above.tension_per_rate:  # else a regime ends here
                 derivative = (above.tension - below.tension) / (2.0 * step)
-                assert at.slope == pytest.approx(derivative, abs=1e-6)
-                slopes.add(at.slope)
+                assert at.tension_per_rate == pytest.approx(derivative, abs=1e-6)
+                slopes.add(at.tension_per_rate)
     # Slack or limited; a free winch; one on the line; a motor on its line: 20 N / (0.4 m/s).
     assert sorted(slopes) == pytest.approx([0.0, 5.0 / 1.1, 5.0, 50.0])
 

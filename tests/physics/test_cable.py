@@ -6,11 +6,14 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.physics.actuator import DIRECT, DRIVE_COLUMNS, Actuator, CableLaw
-from tetra_drake.physics.cable import PULL_COLUMNS, TENSION, cable_forces, cable_tension
-from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, V_WN
+from tetra_drake.physics.actuator import CableLaw
+from tetra_drake.physics.cable import TENSION, cable_tension
+from tetra_drake.physics.forces import Forces, compute_cable_forces
+from tetra_drake.physics.kinematics import P_WN, V_WN
+from tetra_drake.physics.model import Model
 from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.simd.packed import Packed
 
 
 @pytest.fixture
@@ -20,15 +23,12 @@ def state(structure: Structure) -> np.ndarray:
 
 
 def forces_of_cables(
-    structure: Structure, state: np.ndarray, *signals: float
+    model: Model, state: np.ndarray, *signals: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The generalized force and the tensions."""
-    nodes, pulls, force = np.empty((20, NODE_COLUMNS)), np.empty((24, PULL_COLUMNS)), np.empty(30)
-    drives = np.empty((0, DRIVE_COLUMNS))
-    points = structure.p_BN, structure.first_node
-    law = structure.cables, *Actuator.of(DIRECT), False
-    cable_forces(state, np.array(signals), *points, *law, drives, nodes, pulls, force)
-    return force, pulls[:, TENSION]
+    forces, force = Forces.of(model), np.empty(30)
+    compute_cable_forces(Packed((model, forces)), state, np.array(signals), force)
+    return force, forces.cable_forces[:, TENSION]
 
 
 def test_tension_is_equation_6():
@@ -36,17 +36,17 @@ def test_tension_is_equation_6():
     assert cable_tension(0.3, -0.25, 1.5, CableLaw(35.0, 8.0, 0.1)) == pytest.approx(6.5, rel=1e-15)
 
 
-def test_cables_keep_momentum_and_angular_momentum(structure, state):
-    wrench = forces_of_cables(structure, state, 1.0, -2.0, 0.5, 3.0)[0].reshape(5, 6)
+def test_cables_keep_momentum_and_angular_momentum(robot, state):
+    wrench = forces_of_cables(robot.model, state, 1.0, -2.0, 0.5, 3.0)[0].reshape(5, 6)
     p_WB = state[:35].reshape(5, 7)[:, 4:]
     torque = wrench[:, :3] + np.cross(p_WB, wrench[:, 3:])
     np.testing.assert_allclose(wrench[:, 3:].sum(axis=0), 0.0, atol=1e-13)
     np.testing.assert_allclose(torque.sum(axis=0), 0.0, atol=1e-13)
 
 
-def test_power_of_the_cables_is_tension_times_shortening(structure, state):
+def test_power_of_the_cables_is_tension_times_shortening(robot, structure, state):
     # Virtual power: generalized force . v = - sum of T dl/dt.
-    force, tensions = forces_of_cables(structure, state, 1.0, 0.0, -1.0, 2.0)
+    force, tensions = forces_of_cables(robot.model, state, 1.0, 0.0, -1.0, 2.0)
     a, b = structure.cables["node_a"], structure.cables["node_b"]
     nodes = moved_nodes(structure, state)
     p_WN, v_WN = nodes[:, P_WN : P_WN + 3], nodes[:, V_WN : V_WN + 3]
@@ -55,7 +55,7 @@ def test_power_of_the_cables_is_tension_times_shortening(structure, state):
     assert force @ state[35:] == pytest.approx(-tensions @ rates, rel=1e-12)
 
 
-def test_passive_cables_are_drakes_linear_spring_dampers(structure, state):
+def test_passive_cables_are_drakes_linear_spring_dampers(robot, structure, state):
     def acceleration(*, springs: bool, force: np.ndarray) -> np.ndarray:
         plant = MultibodyPlant(time_step=0.0)
         bodies = AddBodies(plant, structure)
@@ -71,7 +71,7 @@ def test_passive_cables_are_drakes_linear_spring_dampers(structure, state):
         plant.get_applied_generalized_force_input_port().FixValue(context, force)
         return plant.EvalTimeDerivatives(context).get_generalized_velocity().CopyToVector()
 
-    ours, _ = forces_of_cables(structure, state, 0.0, 0.0, 0.0, 0.0)
+    ours, _ = forces_of_cables(robot.model, state, 0.0, 0.0, 0.0, 0.0)
     expected = acceleration(springs=True, force=np.zeros(30))
     found = acceleration(springs=False, force=ours)
     np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-9)

@@ -62,8 +62,8 @@ def test_a_node_in_the_air_has_no_friction_and_forgets_its_mode(robot_on_ground)
     v, lifted = (0.1, 0.0, 0.0), (0.0, 0.0, 1e-3)
     robot_on_ground.update(v, lifted)
     assert not robot_on_ground.modes[:, : MODE + 2].any()
-    nodes, pushes = robot_on_ground.forces(v, lifted)
-    assert not pushes.any()
+    nodes, ground_forces = robot_on_ground.forces(v, lifted)
+    assert not ground_forces.any()
     assert not nodes[:, FORCE:].any()
 
 

@@ -45,7 +45,7 @@ def reset(scenario: Scenario) -> RobotOnGround:
 
 
 def test_the_margin_crosses_zero_at_the_stiction_range_and_at_the_surface(reset):
-    p0 = ResetConstants(*reset.ground.friction.constants).stiction_range
+    p0 = ResetConstants(*reset.model.ground.friction.constants).stiction_range
     near, far = ((factor * p0, 0.0, -1e-4) for factor in (0.9, 1.1))
     assert reset.margin(p=near) > 0.0 > reset.margin(p=far)
     assert reset.margin(p=(0.0, 0.0, -1e-6)) > 0.0 > reset.margin(p=(0.0, 0.0, 1e-6))
@@ -142,8 +142,8 @@ def test_a_node_that_sticks_again_does_so_where_it_is(sliding):
     slow, there = (1e-3, 0.0, 0.0), (5e-3, 1e-3, -1e-4)
     assert sliding.update(slow, there), "70 * 1e-3 N is below 0.5 * 0.44 N"
     assert not sliding.modes[:, MODE : MODE + 2].any()
-    _, pushes = sliding.forces(slow, there)
-    np.testing.assert_allclose(pushes[:-1, :2], [[-0.07, 0.0]] * 10, atol=1e-9)
+    _, ground_forces = sliding.forces(slow, there)
+    np.testing.assert_allclose(ground_forces[:-1, :2], [[-0.07, 0.0]] * 10, atol=1e-9)
 
 
 def test_the_heading_is_that_of_the_body_at_touchdown(sliding):

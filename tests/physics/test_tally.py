@@ -14,10 +14,10 @@ from tetra_drake.physics.actuator import (
     TENSION_MOTOR,
     WINCH,
 )
-from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION, Cables
+from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS, LENGTH, PASSIVE, TENSION
 from tetra_drake.physics.tally import LIMITED_TIME, Tally, observe
 
-CABLES = Cables([3, 3], [4, 5], [0, PASSIVE], [1.0, 1.0], [0.0, 0.0], [0.0, 0.0])
+CABLES = SimpleNamespace(signal=[0, PASSIVE])
 """The first is driven."""
 
 NO_DRIVES = np.zeros((0, DRIVE_COLUMNS))
@@ -36,18 +36,20 @@ def tallied(
         begins=np.array([begins]), lengths=np.zeros(2), lifted=np.zeros(2), tension=np.full(1, 99.0)
     )
     tally = tally._replace(peaks=np.zeros(3), sums=np.zeros(4))
-    pulls, pushes = np.zeros((2, PULL_COLUMNS)), np.zeros((3, 3))
+    cable_forces, ground_forces = np.zeros((2, CABLE_FORCE_COLUMNS)), np.zeros((3, 3))
     ground, actuator = SimpleNamespace(carriers=CARRIERS), SimpleNamespace(kind=kind)
     robot = SimpleNamespace(cables=CABLES, ground=ground, actuator=actuator)
     for k, time in enumerate(times):
-        pulls[:, LENGTH] = lengths[k]
-        pulls[:, TENSION] = 1.0 if tensions is None else tensions[k]
-        pushes[:, 2] = 0.0 if loads is None else loads[k]
+        cable_forces[:, LENGTH] = lengths[k]
+        cable_forces[:, TENSION] = 1.0 if tensions is None else tensions[k]
+        ground_forces[:, 2] = 0.0 if loads is None else loads[k]
         # The rate of signals is 0 / 0 where no time has passed, which counts for nothing.
         with np.errstate(divide="ignore", invalid="ignore"):
             signal = np.array([signals[k]])
             driven = NO_DRIVES if drives is None else drives[k]
-            forces = SimpleNamespace(drives=driven, pulls=pulls, pushes=pushes)
+            forces = SimpleNamespace(
+                drives=driven, cable_forces=cable_forces, ground_forces=ground_forces
+            )
             observe(tally, robot, time, signal, forces)
     return tally
 
@@ -60,8 +62,8 @@ def test_a_constant_pull_works_along_the_way_by_which_its_cable_shortens():
     # that is not driven does not count.
     tally = tallied(TIMES, lengths=1.0 + 0.1 * np.sin(TIMES), signals=np.full(1001, 2.0))
     assert tally.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
-    pushes = tallied(TIMES, lengths=1.0 + 0.1 * np.sin(TIMES), signals=np.full(1001, -2.0))
-    assert pushes.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
+    result = tallied(TIMES, lengths=1.0 + 0.1 * np.sin(TIMES), signals=np.full(1001, -2.0))
+    assert result.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
 
 
 def test_a_pull_in_phase_with_the_shortening_does_the_work_of_its_circle():

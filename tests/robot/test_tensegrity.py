@@ -28,8 +28,8 @@ def test_rests_where_the_independent_simulation_does(name, data):
     tension = {cable["ends"][0] + cable["ends"][1]: i for i, cable in enumerate(recorded["cables"])}
     places = [tension["".join(name.split()[1:])] for name in structure.cable_names]
     expected = np.array(recorded["tensions_at_rest"])[places]
-    np.testing.assert_allclose(resting.forces.pulls[:, TENSION], expected, rtol=1e-6)
-    assert resting.forces.pushes[:, NORMAL].sum() == pytest.approx(robot.weight, rel=1e-9)
+    np.testing.assert_allclose(resting.forces.cable_forces[:, TENSION], expected, rtol=1e-6)
+    assert resting.forces.ground_forces[:, NORMAL].sum() == pytest.approx(robot.weight, rel=1e-9)
     assert robot.rest.feet == np.count_nonzero(theirs[:, 2] < 0.0) == 3
 
 

@@ -47,7 +47,7 @@ def study_rest(robot: Robot) -> RestStudy:
     resting = Resting.of(robot.model)
     force_at_rest(resting, rest.state)
     loads = np.zeros(len(structure.node_names))
-    loads[structure.contacts] = resting.forces.pushes[:, NORMAL]
+    loads[structure.contacts] = resting.forces.ground_forces[:, NORMAL]
     ends = np.column_stack([structure.cables["node_a"], structure.cables["node_b"]])
     bodies = np.array(structure.bodies)[structure.carriers]
     x, y, z = node_positions(structure, rest.state).T
@@ -56,7 +56,7 @@ def study_rest(robot: Robot) -> RestStudy:
         "group": structure.cable_groups,
         "length": rest.lengths,
         "free_length": structure.cables["free_length"],
-        "tension": resting.forces.pulls[:, TENSION],
+        "tension": resting.forces.cable_forces[:, TENSION],
     }
     return RestStudy(
         robot=robot,

@@ -246,11 +246,11 @@ class _Simulator:
         """The motion in MuJoCo's states at `times` (s), driven by the signals."""
         data = self._mujoco.MjData(self._model)
         rows = zip(states, signals, strict=True)
-        pushes = np.array([self._ground_forces(data, *row) for row in rows])
-        modes = np.zeros((*pushes.shape[:2], MODE_COLUMNS))  # of friction: 0, as there are none
-        modes[:, :, CONTACT] = pushes[:, :, 2] > 0.0
+        ground_forces = np.array([self._ground_forces(data, *row) for row in rows])
+        modes = np.zeros((*ground_forces.shape[:2], MODE_COLUMNS))
+        modes[:, :, CONTACT] = ground_forces[:, :, 2] > 0.0
         drives = np.tile(_NO_DRIVES, (len(times), 1))
-        return Motion(times, self.body_states(states), signals, modes, drives, pushes)
+        return Motion(times, self.body_states(states), signals, modes, drives, ground_forces)
 
     def _ground_forces(self, data: Any, state: Array, signals: Array) -> Array:
         """(contacts, 3): MuJoCo's contact forces on the nodes along t1, t2 and n, in N."""

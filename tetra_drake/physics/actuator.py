@@ -49,20 +49,20 @@ class Actuator(NamedTuple):
 
 
 class CableLaw(NamedTuple):
-    """Constants of a cable in SI units."""
+    """Constants of a cable, or of all cables, (cables,) each; SI units."""
 
     stiffness: Real
     damping: Real
     free_length: Real
 
 
-class Pull(NamedTuple):
+class ActuatorForce(NamedTuple):
     """What an actuator does to its cable."""
 
     tension: Real
     """N."""
-    slope: Real
-    """How much the tension rises with the rate of the length, N s/m."""
+    tension_per_rate: Real
+    """dT/d(dl/dt), N s/m: how much the tension rises with the rate of the length."""
     rate: Real
     """Rate of the drive, per s."""
     limited: Real
@@ -70,21 +70,21 @@ class Pull(NamedTuple):
 
 
 @inlined
-def actuator_pull(
+def actuator_force(
     actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
-) -> Pull:
-    """Pull of a winch or a tension motor, for a cable of `length` that lengthens at `rate`."""
+) -> ActuatorForce:
+    """The force of a winch or a tension motor, for a cable of `length` that lengthens at `rate`."""
     limits = named(Limits, actuator.limits)
     if actuator.kind == WINCH:
-        return winch_pull(drive, length, rate, signal, law, limits)
-    return motor_pull(drive, length, rate, signal, law, limits)
+        return winch_force(drive, length, rate, signal, law, limits)
+    return motor_force(drive, length, rate, signal, law, limits)
 
 
 @inlined
-def winch_pull(
+def winch_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
-) -> Pull:
-    """Pull of a winch whose cable has a free length `drive`.
+) -> ActuatorForce:
+    """The force of a winch whose cable has a free length `drive`.
 
     It follows its command with a lag, pays out at max_speed at most, and winds at most at
     max_speed (1 - tension / max_force). Above max_force it is driven backward. The tension depends
@@ -103,20 +103,20 @@ def winch_pull(
     slowed = on_line > maximum(allowed, -limits.max_speed)
     winds = maximum(allowed, maximum(on_line, -limits.max_speed))
     tension = elastic + law.damping * (rate - winds)
-    slope = select(slowed, law.damping / stiffening, law.damping)
-    return Pull(
+    tension_per_rate = select(slowed, law.damping / stiffening, law.damping)
+    return ActuatorForce(
         tension=maximum(tension, 0.0),
-        slope=select(tension > 0.0, slope, 0.0),
+        tension_per_rate=select(tension > 0.0, tension_per_rate, 0.0),
         rate=winds,
         limited=select(winds != wanted, 1.0, 0.0),
     )
 
 
 @inlined
-def motor_pull(
+def motor_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
-) -> Pull:
-    """Pull of a tension motor of tension `drive`.
+) -> ActuatorForce:
+    """The force of a tension motor of tension `drive`.
 
     It follows its command with a lag, pulls with max_force at most, and less the faster it winds:
     max_force (1 - winding speed / max_speed).
@@ -127,9 +127,9 @@ def motor_pull(
     command = law.stiffness * (length - law.free_length) + law.damping * rate + signal
     target = minimum(maximum(command, 0.0), limits.max_force)
     limited = (drive > most) | (command > limits.max_force)
-    return Pull(
+    return ActuatorForce(
         tension=minimum(drive, most),
-        slope=select(on_line, limits.max_force / limits.max_speed, 0.0),
+        tension_per_rate=select(on_line, limits.max_force / limits.max_speed, 0.0),
         rate=(target - drive) / limits.time_constant,
         limited=select(limited, 1.0, 0.0),
     )

@@ -91,17 +91,17 @@ def may_be_nearer(apart: Vector, reach: Real, least: Real) -> bool:
 @inlined
 def nearest_strut(struts: Struts, nodes: Table, a: int, body: int, least: Real) -> Real:
     """The least distance (m) of a strut to those of a body, or `least` if that is less."""
-    middle_a = middle(struts, nodes, a)
+    midpoint_a = midpoint(struts, nodes, a)
     for b in range(struts.first_strut[body], struts.first_strut[body + 1]):
-        apart = difference(middle_a, middle(struts, nodes, b))
+        apart = difference(midpoint_a, midpoint(struts, nodes, b))
         if may_be_nearer(apart, 0.5 * (struts.length[a] + struts.length[b]), least):
             least = minimum(least, strut_distance(struts, nodes, a, b))
     return least
 
 
 @inlined
-def middle(struts: Struts, nodes: Table, i: int) -> Vector:
-    """The middle of a strut (m)."""
+def midpoint(struts: Struts, nodes: Table, i: int) -> Vector:
+    """The midpoint of a strut (m)."""
     a_x, a_y, a_z = vector_at(nodes, struts.node_a[i], P_WN)
     b_x, b_y, b_z = vector_at(nodes, struts.node_b[i], P_WN)
     return 0.5 * (a_x + b_x), 0.5 * (a_y + b_y), 0.5 * (a_z + b_z)

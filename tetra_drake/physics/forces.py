@@ -1,4 +1,4 @@
-"""All forces on a robot, by cables, ground and gravity, at a state of its bodies."""
+"""The forces of cables, ground and gravity on a robot at a state of its bodies."""
 
 from __future__ import annotations
 
@@ -6,15 +6,21 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.physics.actuator import DIRECT, DRIVE, DRIVE_COLUMNS
-from tetra_drake.physics.cable import PASSIVE, PULL_COLUMNS, add_cable_forces
-from tetra_drake.physics.contact import PUSH_COLUMNS, add_ground_forces, meet_ground
-from tetra_drake.physics.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia
-from tetra_drake.physics.kinematics import NODE_COLUMNS, gather_forces
+from tetra_drake.physics import actuator, cable, contact, inertia, kinematics, terrain
+from tetra_drake.physics.friction import friction_force
 from tetra_drake.physics.model import Model
-from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.physics.vectors import (
+    add_vector,
+    difference,
+    dot,
+    put_vector,
+    scaled,
+    subtract_vector,
+    vector_at,
+)
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Table
+from tetra_drake.simd.lanes import Table, any_lane, inverse_sqrt, maximum, select
+from tetra_drake.simd.packed import Packed, unpacked
 
 
 class Forces(NamedTuple):
@@ -24,10 +30,10 @@ class Forces(NamedTuple):
     """(nodes, NODE_COLUMNS)."""
     frames: Table
     """(contacts, FRAME_COLUMNS): where the nodes meet the ground."""
-    pulls: Table
-    """(cables, PULL_COLUMNS): of the cables."""
-    pushes: Table
-    """(contacts, PUSH_COLUMNS): of the ground."""
+    cable_forces: Table
+    """(cables, CABLE_FORCE_COLUMNS)."""
+    ground_forces: Table
+    """(contacts, GROUND_FORCE_COLUMNS)."""
     inertia: Table
     """(bodies, INERTIA_COLUMNS): of the bodies along World's axes, unless they are isotropic."""
     drives: Table
@@ -37,26 +43,101 @@ class Forces(NamedTuple):
     @classmethod
     def of(cls, robot: Model) -> Self:
         """Room for the forces on a robot."""
-        cables, contacts = robot.cables.size, robot.ground.contacts.size
-        driven = np.count_nonzero(robot.cables["signal"] != PASSIVE)
-        drives = 0 if robot.actuator.kind == DIRECT else driven
+        drivers, contacts = robot.cables.signal, robot.ground.contacts.size
+        driven = np.count_nonzero(drivers != cable.PASSIVE)
+        drives = 0 if robot.actuator.kind == actuator.DIRECT else driven
         return cls(
-            nodes=np.zeros((len(robot.p_BN), NODE_COLUMNS)),
-            frames=np.zeros((contacts, FRAME_COLUMNS)),
-            pulls=np.zeros((cables, PULL_COLUMNS)),
-            pushes=np.zeros((contacts, PUSH_COLUMNS)),
-            inertia=np.zeros((len(robot.bodies.mass), INERTIA_COLUMNS)),
-            drives=np.zeros((drives, DRIVE_COLUMNS)),
+            nodes=np.zeros((len(robot.p_BN), kinematics.NODE_COLUMNS)),
+            frames=np.zeros((contacts, terrain.FRAME_COLUMNS)),
+            cable_forces=np.zeros((drivers.size, cable.CABLE_FORCE_COLUMNS)),
+            ground_forces=np.zeros((contacts, contact.GROUND_FORCE_COLUMNS)),
+            inertia=np.zeros((len(robot.bodies.mass), inertia.INERTIA_COLUMNS)),
+            drives=np.zeros((drives, actuator.DRIVE_COLUMNS)),
         )
 
 
 @inlined
 def move_robot(robot: Model, state: Table, forces: Forces) -> None:
     """Moves the nodes to where a state (13 bodies,) has them; no forces act on them yet."""
-    nodes, frames = forces.nodes, forces.frames
-    meet_ground(state, robot.p_BN, robot.first_node, robot.ground, nodes, frames)
+    move_contacts(robot, state, forces)
     if not robot.isotropic:
-        turn_inertia(state, robot.bodies.inertia, forces.inertia)
+        inertia.turn_inertia(state, robot.bodies.inertia, forces.inertia)
+
+
+@inlined
+def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
+    """Moves the nodes, and the `frames` in which they meet the ground."""
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    contact.meet_ground(robot.ground, forces.nodes, forces.frames)
+
+
+@inlined
+def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
+    """Adds the forces of all cables to those on the nodes.
+
+    `signals`, (signals,), are in N. Writes the rates of the drives, and with `write_parts` the
+    `cable_forces`.
+    """
+    nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
+    drive = 0
+    for i in range(parts.shape[0]):
+        a, b, driver = robot.cables.node_a[i], robot.cables.node_b[i], robot.cables.signal[i]
+        p_AB = difference(
+            vector_at(nodes, b, kinematics.P_WN), vector_at(nodes, a, kinematics.P_WN)
+        )
+        v_AB = difference(
+            vector_at(nodes, b, kinematics.V_WN), vector_at(nodes, a, kinematics.V_WN)
+        )
+        square = dot(p_AB, p_AB)
+        per_length = inverse_sqrt(square)
+        length, direction = square * per_length, scaled(per_length, p_AB)
+        signal = 0.0
+        if driver != cable.PASSIVE:
+            signal = signals[driver]
+        rate = dot(v_AB, direction)
+        law = cable.law_of(robot.cables, i)
+        if driver == cable.PASSIVE or robot.actuator.kind == actuator.DIRECT:
+            tension_per_rate = law.damping
+            tension = cable.cable_tension(length, rate, signal, law)
+            if robot.slack:
+                tension = maximum(tension, 0.0)
+        else:
+            driven = actuator.actuator_force(
+                robot.actuator, drives[drive, actuator.DRIVE], length, rate, signal, law
+            )
+            tension, tension_per_rate = driven.tension, driven.tension_per_rate
+            drives[drive, actuator.RATE] = driven.rate
+            drives[drive, actuator.LIMITED] = driven.limited
+            drive += 1
+        force = scaled(tension, direction)
+        add_vector(force, a, kinematics.FORCE, nodes)
+        subtract_vector(force, b, kinematics.FORCE, nodes)
+        if write_parts:
+            put_vector(direction, i, cable.DIRECTION, parts)
+            parts[i, cable.LENGTH], parts[i, cable.TENSION] = length, tension
+            parts[i, cable.TENSION_PER_RATE] = tension_per_rate
+
+
+@inlined
+def add_ground_forces(robot: Model, modes: Table, write_parts: bool, forces: Forces) -> None:
+    """Adds the forces of the ground to those on the nodes.
+
+    `modes` is (contacts, MODE_COLUMNS). With `write_parts`, writes the `ground_forces`.
+    """
+    ground, nodes, frames, parts = robot.ground, forces.nodes, forces.frames, forces.ground_forces
+    for i in range(parts.shape[0]):
+        touches = modes[i, contact.CONTACT] != 0.0
+        if not any_lane(touches | (contact.gap(nodes, ground, frames, i) <= 0.0)):
+            if write_parts:
+                put_vector((0.0, 0.0, 0.0), i, contact.FRICTION_1, parts)
+            continue
+        slide, _ = contact.sliding(nodes, modes, ground, frames, i)
+        f_1, f_2 = friction_force(slide, ground.friction)
+        f_1, f_2 = select(touches, f_1, 0.0), select(touches, f_2, 0.0)
+        if write_parts:
+            put_vector((f_1, f_2, slide.normal), i, contact.FRICTION_1, parts)
+        force = terrain.to_world(f_1, f_2, slide.normal, frames, i, ground.flat)
+        add_vector(force, ground.contacts[i], kinematics.FORCE, nodes)
 
 
 @inlined
@@ -65,27 +146,18 @@ def compute_forces(
     state: Table,
     modes: Table,
     signals: Table,
-    keep: bool,
+    write_parts: bool,
     forces: Forces,
     generalized: Table,
 ) -> None:
     """Writes all forces at a state to which the robot has just been moved, with gravity and
     gyroscopic torques, as (6 bodies,).
 
-    With `keep`, those of the cables and the ground by themselves, too.
+    With `write_parts`, the `cable_forces` and `ground_forces`, too.
     """
-    add_cable_forces(
-        forces.nodes,
-        signals,
-        robot.cables,
-        robot.actuator,
-        robot.slack,
-        keep,
-        forces.drives,
-        forces.pulls,
-    )
-    add_ground_forces(forces.nodes, modes, robot.ground, forces.frames, keep, forces.pushes)
-    gather_forces(forces.nodes, robot.first_node, generalized)
+    add_cable_forces(robot, signals, write_parts, forces)
+    add_ground_forces(robot, modes, write_parts, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
     bodies = generalized.size // 6
     for body in range(bodies):
         generalized[6 * body + 5] -= robot.bodies.weight[body]
@@ -94,10 +166,34 @@ def compute_forces(
     for body in range(bodies):
         t, v = 6 * body, 7 * bodies + 6 * body
         w_WB = state[v], state[v + 1], state[v + 2]
-        t_x, t_y, t_z = gyroscopic_torque(forces.inertia, body, w_WB)
+        t_x, t_y, t_z = inertia.gyroscopic_torque(forces.inertia, body, w_WB)
         generalized[t] += t_x
         generalized[t + 1] += t_y
         generalized[t + 2] += t_z
+
+
+@compiled
+def compute_cable_forces(
+    parts: Packed[tuple[Model, Forces]], state: Table, signals: Table, generalized: Table
+) -> None:
+    """Writes [t_W; f_W] of all cables at each Bo, (6 bodies,), for a state of the bodies; also the
+    nodes, the `cable_forces` and the rates of the drives."""
+    robot, forces = unpacked(parts)
+    kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
+    add_cable_forces(robot, signals, True, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
+
+
+@compiled
+def compute_ground_forces(
+    parts: Packed[tuple[Model, Forces]], state: Table, modes: Table, generalized: Table
+) -> None:
+    """Writes [t_W; f_W] of the ground at each Bo, (6 bodies,), for a state of the bodies; also the
+    nodes, the frames and the `ground_forces`."""
+    robot, forces = unpacked(parts)
+    move_contacts(robot, state, forces)
+    add_ground_forces(robot, modes, True, forces)
+    kinematics.gather_forces(forces.nodes, robot.first_node, generalized)
 
 
 @compiled
@@ -108,16 +204,19 @@ def forces_along(
     signals: Table,
     drives: Table,
     forces: Forces,
-    pulls: Table,
-    pushes: Table,
+    cable_forces: Table,
+    ground_forces: Table,
 ) -> None:
-    """Writes the `pulls` (k, cables, PULL_COLUMNS) and `pushes` (k, contacts, PUSH_COLUMNS) at
-    states (k, 13 bodies) with modes (k, contacts, MODE_COLUMNS), signals (k, m) in N and drives
-    (k, drives)."""
+    """Writes the forces along a motion: `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and
+    `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
+
+    The motion: states (k, 13 bodies) with modes (k, contacts, MODE_COLUMNS), signals (k, m) in N
+    and drives (k, drives).
+    """
     generalized = np.empty(6 * (states.shape[1] // 13))
     for k in range(states.shape[0]):
         move_robot(robot, states[k], forces)
-        forces.drives[:, DRIVE] = drives[k]
+        forces.drives[:, actuator.DRIVE] = drives[k]
         compute_forces(robot, states[k], modes[k], signals[k], True, forces, generalized)
-        pulls[k] = forces.pulls
-        pushes[k] = forces.pushes
+        cable_forces[k] = forces.cable_forces
+        ground_forces[k] = forces.ground_forces

@@ -24,6 +24,7 @@ from tetra_drake.simd.lanes import (
     maximum,
     minimum,
     named,
+    not_,
     select,
 )
 
@@ -182,8 +183,8 @@ class CoulombConstants(NamedTuple):
     per_lateral: Real
 
 
-class Pull(NamedTuple):
-    """Pull at a node's bristle: u = c v, in stick + k x."""
+class BristleForce(NamedTuple):
+    """The force u at a node's bristle: c v, in stick + k x. Friction is -u within the limit."""
 
     u_1: Real
     """N; along t1, and next along t2."""
@@ -202,15 +203,15 @@ def coulomb_sticks(mode: Pair) -> Truth:
 
 
 @inlined
-def coulomb_pull(slide: Slide, law: CoulombConstants) -> Pull:
-    """The pull at the bristle."""
+def bristle_force(slide: Slide, law: CoulombConstants) -> BristleForce:
+    """The force at the bristle of a node."""
     stuck = coulomb_sticks((slide.t1.mode, slide.t2.mode))
     stiffness = select(stuck, law.stiffness, 0.0)
     u_1 = law.damping * slide.t1.velocity + stiffness * slide.t1.deflection
     u_2 = law.damping * slide.t2.velocity + stiffness * slide.t2.deflection
     size = coulomb_size(u_1, u_2, slide.heading, law)
     limit = select(stuck, law.static, law.kinetic) * slide.normal
-    return Pull(u_1, u_2, size, limit, stuck)
+    return BristleForce(u_1, u_2, size, limit, stuck)
 
 
 @inlined
@@ -227,9 +228,9 @@ def coulomb_size(u_1: Real, u_2: Real, heading: Pair, law: CoulombConstants) -> 
 @inlined
 def coulomb_force(slide: Slide, law: CoulombConstants) -> Pair:
     """Friction (N): -u, as far as the normal force allows."""
-    pull = coulomb_pull(slide, law)
-    share = select(pull.size > pull.limit, pull.limit / pull.size, 1.0)
-    return -share * pull.u_1, -share * pull.u_2
+    bristle = bristle_force(slide, law)
+    share = select(bristle.size > bristle.limit, bristle.limit / bristle.size, 1.0)
+    return -share * bristle.u_1, -share * bristle.u_2
 
 
 @inlined
@@ -238,11 +239,11 @@ def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Re
 
     Beyond the limit only the direction of the force changes (exact without directional factors).
     """
-    pull = coulomb_pull(slide, law)
-    stiffness = select(pull.stuck, time * law.stiffness, 0.0)
-    slips = pull.size > pull.limit
-    rate = time * (law.damping + stiffness) * select(slips, pull.limit / pull.size, 1.0)
-    u_1, u_2 = pull.u_1, pull.u_2
+    bristle = bristle_force(slide, law)
+    stiffness = select(bristle.stuck, time * law.stiffness, 0.0)
+    slips = bristle.size > bristle.limit
+    rate = time * (law.damping + stiffness) * select(slips, bristle.limit / bristle.size, 1.0)
+    u_1, u_2 = bristle.u_1, bristle.u_2
     per_square = select(slips, rate / (u_1 * u_1 + u_2 * u_2), 0.0)
     return rate - per_square * u_1 * u_1, -per_square * u_1 * u_2, rate - per_square * u_2 * u_2
 
@@ -251,10 +252,10 @@ def coulomb_damping(slide: Slide, time: Real, law: CoulombConstants) -> tuple[Re
 def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> Pair:
     """The mode that follows: breaks free beyond the static limit moving outward, and sticks again
     where its damping alone holds it."""
-    pull = coulomb_pull(slide, law)
-    u_1, u_2 = pull.u_1, pull.u_2
-    beyond = pull.size > pull.limit
-    breaks = pull.stuck & beyond & (u_1 * slide.t1.velocity + u_2 * slide.t2.velocity > 0.0)
+    bristle = bristle_force(slide, law)
+    u_1, u_2 = bristle.u_1, bristle.u_2
+    beyond = bristle.size > bristle.limit
+    breaks = bristle.stuck & beyond & (u_1 * slide.t1.velocity + u_2 * slide.t2.velocity > 0.0)
     # A sum of products would be rounded differently in one lane and in several.
     square_1, square_2 = select(breaks, u_1 * u_1, 1.0), select(breaks, u_2 * u_2, 0.0)
     length = math.sqrt(square_1 + square_2)
@@ -267,28 +268,28 @@ def next_coulomb_mode(slide: Slide, law: CoulombConstants) -> Pair:
 @inlined
 def coulomb_margin(slide: Slide, law: CoulombConstants) -> float:
     """Mode margin (N): in stick what is left of the limit, in slip what exceeds it."""
-    pull = coulomb_pull(slide, law)
-    if not pull.stuck:
-        return pull.size - pull.limit
-    outward = pull.u_1 * slide.t1.velocity + pull.u_2 * slide.t2.velocity
-    return max(pull.limit - pull.size, -outward)
+    bristle = bristle_force(slide, law)
+    if not bristle.stuck:
+        return bristle.size - bristle.limit
+    outward = bristle.u_1 * slide.t1.velocity + bristle.u_2 * slide.t2.velocity
+    return max(bristle.limit - bristle.size, -outward)
 
 
 @inlined
 def time_to_coulomb_change(
     slide: Slide, acceleration: Pair, normal_rate: Real, law: CoulombConstants, horizon: Real
 ) -> Real:
-    """Time (s) until a node's pull crosses the limit, by its rate now."""
-    pull = coulomb_pull(slide, law)
-    stiffness = select(pull.stuck, law.stiffness, 0.0)
+    """Time (s) until the force at a node's bristle crosses the limit, by its rate now."""
+    bristle = bristle_force(slide, law)
+    stiffness = select(bristle.stuck, law.stiffness, 0.0)
     rate_1 = law.damping * acceleration[0] + stiffness * slide.t1.velocity
     rate_2 = law.damping * acceleration[1] + stiffness * slide.t2.velocity
-    time = 1e-6  # s; the difference gives the rate of the pull's size
-    u_1, u_2 = pull.u_1 + time * rate_1, pull.u_2 + time * rate_2
-    size_rate = (coulomb_size(u_1, u_2, slide.heading, law) - pull.size) / time
-    limit_rate = select(pull.stuck, law.static, law.kinetic) * normal_rate
-    sign = select(pull.stuck, 1.0, -1.0)
-    room, room_rate = pull.limit - pull.size, limit_rate - size_rate
+    time = 1e-6  # s; the difference gives the rate of the force's size
+    u_1, u_2 = bristle.u_1 + time * rate_1, bristle.u_2 + time * rate_2
+    size_rate = (coulomb_size(u_1, u_2, slide.heading, law) - bristle.size) / time
+    limit_rate = select(bristle.stuck, law.static, law.kinetic) * normal_rate
+    sign = select(bristle.stuck, 1.0, -1.0)
+    room, room_rate = bristle.limit - bristle.size, limit_rate - size_rate
     return first_zero(sign * room, sign * room_rate, 0.0, horizon)
 
 
@@ -343,11 +344,21 @@ def stuck_along(mode: Pair, friction: FrictionLaw) -> tuple[Truth, Truth]:
 
 
 @inlined
-def next_mode(slide: Slide, friction: FrictionLaw) -> Pair:
-    """The mode that follows on a node that stays on the ground."""
+def begins_to_stick(before: Pair, after: Pair, friction: FrictionLaw) -> tuple[Truth, Truth]:
+    """True along each tangent on which a mode sticks that did not stick before."""
+    stuck_1, stuck_2 = stuck_along(before, friction)
+    sticks_1, sticks_2 = stuck_along(after, friction)
+    return sticks_1 & not_(stuck_1), sticks_2 & not_(stuck_2)
+
+
+@inlined
+def next_mode(slide: Slide, stays: Truth, friction: FrictionLaw) -> Pair:
+    """The mode that follows on a node that `stays` on the ground; STICK on any other."""
     if friction.kind == COULOMB:
-        return next_coulomb_mode(slide, named(CoulombConstants, friction.constants))
-    return next_reset_mode(slide, named(ResetConstants, friction.constants))
+        after_1, after_2 = next_coulomb_mode(slide, named(CoulombConstants, friction.constants))
+    else:
+        after_1, after_2 = next_reset_mode(slide, named(ResetConstants, friction.constants))
+    return select(stays, after_1, STICK), select(stays, after_2, STICK)
 
 
 @inlined

@@ -6,102 +6,91 @@ import math
 
 import numpy as np
 
-from tetra_drake.physics.contact import (
-    CONTACT,
-    Ground,
-    NormalForce,
-    gap,
-    meet_ground,
-    modes_after_step,
-    sliding,
-)
-from tetra_drake.physics.friction import first_zero, friction_margin, time_to_friction_change
+from tetra_drake.physics import contact, friction
+from tetra_drake.physics.forces import Forces, move_contacts
 from tetra_drake.physics.kinematics import node_acceleration
+from tetra_drake.physics.model import Model
 from tetra_drake.physics.terrain import to_frame
 from tetra_drake.simd.compiling import compiled, inlined
-from tetra_drake.simd.lanes import Real, Table, any_lane, minimum, named, select
+from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, minimum, named, select
+from tetra_drake.simd.packed import Packed, unpacked
 
 Array = np.ndarray
 
 
 @compiled
-def mode_margin(
-    state: Array,
-    modes: Array,
-    p_BN: Array,
-    first_node: Array,
-    ground: Ground,
-    nodes: Array,
-    frames: Array,
-) -> float:
+def modes_after_step(parts: Packed[tuple[Model, Forces]], state: Table, modes: Table) -> Truth:
+    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with a state of the bodies, as
+    update_modes() does; writes the nodes and frames, too."""
+    robot, forces = unpacked(parts)
+    move_contacts(robot, state, forces)
+    return contact.update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
+
+
+@compiled
+def mode_margin(parts: Packed[tuple[Model, Forces]], state: Array, modes: Array) -> float:
     """Positive while no mode is due to change; crosses zero where the first one is.
 
     The least of: gap in the air, depth on the ground (m), the margin of friction. Only its sign has
-    a meaning. Writes `nodes` and `frames`.
+    a meaning. Writes the nodes and frames.
     """
-    meet_ground(state, p_BN, first_node, ground, nodes, frames)
-    margin, law = math.inf, named(NormalForce, ground.normal)
+    robot, forces = unpacked(parts)
+    move_contacts(robot, state, forces)
+    ground, nodes, frames = robot.ground, forces.nodes, forces.frames
+    margin = math.inf
     for i in range(ground.contacts.size):
-        distance = gap(nodes, ground, frames, i)
-        if modes[i, CONTACT] == 0.0:
+        distance = contact.gap(nodes, ground, frames, i)
+        if modes[i, contact.CONTACT] == 0.0:
             margin = min(margin, distance)
             continue
         margin = min(margin, -distance)
-        slide, _ = sliding(nodes, modes, ground, law, frames, i)
-        margin = min(margin, friction_margin(slide, ground.friction))
+        slide, _ = contact.sliding(nodes, modes, ground, frames, i)
+        margin = min(margin, friction.friction_margin(slide, ground.friction))
     return margin
 
 
 @inlined
 def time_to_mode_change(
-    state: Table,
-    acceleration: Table,
-    nodes: Table,
-    modes: Table,
-    ground: Ground,
-    frames: Table,
-    horizon: Real,
+    robot: Model, state: Table, acceleration: Table, modes: Table, forces: Forces, horizon: Real
 ) -> Real:
     """Time (s) to the next mode change, at most `horizon`, at constant node accelerations, over the
     local tangent plane.
 
-    `acceleration` is dv/dt, 6 numbers per body, and `nodes` that of `state`; the other arguments
-    are those of `add_ground_forces`.
+    `acceleration` is dv/dt, 6 numbers per body; `forces` has the nodes and frames of the state.
     """
-    time, law = horizon, named(NormalForce, ground.normal)
+    ground, nodes, frames = robot.ground, forces.nodes, forces.frames
+    time, law = horizon, named(contact.NormalForce, ground.normal)
     for i in range(ground.contacts.size):
         node, body = ground.contacts[i], ground.carriers[i]
         a_WN = node_acceleration(state, acceleration, nodes, node, body)
         a_1, a_2, a_n = to_frame(a_WN, frames, i, ground.flat)
-        slide, v_n = sliding(nodes, modes, ground, law, frames, i)
-        touches, distance = modes[i, CONTACT] != 0.0, gap(nodes, ground, frames, i)
+        slide, v_n = contact.sliding(nodes, modes, ground, frames, i)
+        touches = modes[i, contact.CONTACT] != 0.0
+        distance = contact.gap(nodes, ground, frames, i)
         up = select(touches, -1.0, 1.0)  # the way that leads to the ground's surface
-        time = minimum(time, first_zero(up * distance, up * v_n, up * a_n, horizon))
+        time = minimum(time, friction.first_zero(up * distance, up * v_n, up * a_n, horizon))
         if not any_lane(touches):
             continue
         rate = law.damping * (v_n * v_n + distance * a_n) - law.stiffness * v_n
         rate = select(slide.normal > 0.0, rate, 0.0)
-        change = time_to_friction_change(slide, (a_1, a_2), rate, ground.friction, horizon)
+        change = friction.time_to_friction_change(slide, (a_1, a_2), rate, ground.friction, horizon)
         time = minimum(time, select(touches, change, horizon))
     return time
 
 
 @compiled
 def next_mode_change(
+    parts: Packed[tuple[Model, Forces]],
     state: Array,
     acceleration: Array,
     modes: Array,
-    p_BN: Array,
-    first_node: Array,
-    ground: Ground,
-    nodes: Array,
-    frames: Array,
     horizon: float,
 ) -> tuple[bool, float]:
     """Mode change that is due in a state of the bodies, and the time (s) to the next change
     after that, as time_to_mode_change() predicts it.
 
-    Writes `nodes` and `frames`, and brings `modes` up to date.
+    Writes the nodes and frames, and brings `modes` up to date.
     """
-    due = modes_after_step(state, p_BN, first_node, ground, nodes, frames, modes)
-    return due, time_to_mode_change(state, acceleration, nodes, modes, ground, frames, horizon)
+    robot, forces = unpacked(parts)
+    due = modes_after_step(parts, state, modes)
+    return due, time_to_mode_change(robot, state, acceleration, modes, forces, horizon)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tetra_drake.physics.actuator import Actuator
+from tetra_drake.physics.cable import Cables
 from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.contact import Ground
 from tetra_drake.simd.lanes import Table
@@ -42,8 +43,7 @@ class Model(NamedTuple):
     """(nodes, 3): nodes in the frames of their bodies, body by body."""
     first_node: Table
     """(bodies + 1,): the index of each body's first node, and the number of nodes."""
-    cables: Table
-    """(cables,) of dtype CABLE or Cables."""
+    cables: Cables
     actuator: Actuator
     couplings: Couplings
     ground: Ground

@@ -51,7 +51,12 @@ class Tally(NamedTuple):
 def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
     """Adds the step that ends at a time (s) with these signals and forces. A second observation of
     the same time adds nothing."""
-    cables, kind, drives, pulls = robot.cables, robot.actuator.kind, forces.drives, forces.pulls
+    cables, kind, drives, cable_forces = (
+        robot.cables,
+        robot.actuator.kind,
+        forces.drives,
+        forces.cable_forces,
+    )
     passed = time - tally.time[0]
     counts = (passed > 0.0) & (tally.time[0] >= tally.begins[0])
     counted, per_time = select(counts, passed, 0.0), select(counts, 1.0 / passed, 0.0)
@@ -60,17 +65,17 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
     for i in range(tally.lengths.size):
         driver = cables.signal[i]
         if driver != PASSIVE:
-            force, left = 0.5 * (tally.signals[driver] + signals[driver]), pulls[i, LENGTH]
+            force, left = 0.5 * (tally.signals[driver] + signals[driver]), cable_forces[i, LENGTH]
             if kind != DIRECT:
-                force = pulls[i, TENSION]
+                force = cable_forces[i, TENSION]
                 left = drives[drive, DRIVE] if kind == WINCH else left
                 tally.sums[LIMITED_TIME] += counted * drives[drive, LIMITED]
                 drive += 1
             wound = select(counts, tally.lengths[i] - left, 0.0)
             tally.lengths[i] = left
             work += maximum(force * wound, 0.0)
-            add_actuator(tally, pulls[i, TENSION], wound, counted, per_time)
-        tension = minimum(tension, pulls[i, TENSION])
+            add_actuator(tally, cable_forces[i, TENSION], wound, counted, per_time)
+        tension = minimum(tension, cable_forces[i, TENSION])
     tally.tension[0] = tension
     for k in range(tally.signals.size):
         change = signals[k] - tally.signals[k]
@@ -78,7 +83,7 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
         tally.signals[k] = signals[k]
     tally.work[0] += work
     tally.roughness[0] += select(counts, roughness / passed, 0.0)
-    add_lifted(tally, robot.ground.carriers, counted, forces.pushes)
+    add_lifted(tally, robot.ground.carriers, counted, forces.ground_forces)
     tally.time[0] = time
 
 
@@ -97,13 +102,13 @@ def add_actuator(tally: Tally, tension: Real, wound: Real, passed: Real, per_tim
 
 
 @inlined
-def add_lifted(tally: Tally, carriers: Table, passed: Real, pushes: Table) -> None:
+def add_lifted(tally: Tally, carriers: Table, passed: Real, ground_forces: Table) -> None:
     """Adds the time (s) that has passed to each lifted body; `carriers` are a Ground's."""
     i = 0
     for body in range(tally.lifted.size):
         load = 0.0 * passed
         while i < carriers.size and carriers[i] == body:
-            load += pushes[i, NORMAL]
+            load += ground_forces[i, NORMAL]
             i += 1
         tally.lifted[body] += select(load == 0.0, passed, 0.0)
 

@@ -9,7 +9,14 @@ import numpy as np
 import pandas
 import xarray
 
-from tetra_drake.physics.actuator import DIRECT, WINCH, CableLaw, Limits, Pull, actuator_pull
+from tetra_drake.physics.actuator import (
+    DIRECT,
+    WINCH,
+    ActuatorForce,
+    CableLaw,
+    Limits,
+    actuator_force,
+)
 from tetra_drake.physics.cable import cable_tension
 from tetra_drake.robot.robot import Robot
 
@@ -41,8 +48,8 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
     rate = ((p_WN[:, b] - p_WN[:, a]) * (v_WN[:, b] - v_WN[:, a])).sum(axis=2) / length
 
     @np.vectorize
-    def pull(drive: float, length: float, rate: float, signal: float, *law: float) -> Pull:
-        return actuator_pull(actuator, drive, length, rate, signal, CableLaw(*law))
+    def pull(drive: float, length: float, rate: float, signal: float, *law: float) -> ActuatorForce:
+        return actuator_force(actuator, drive, length, rate, signal, CableLaw(*law))
 
     if actuator.kind == DIRECT:
         commands, left, limited = signal, length, np.full_like(length, math.nan)

@@ -11,8 +11,8 @@ import numpy as np
 
 from tetra_drake.files import write_whole
 from tetra_drake.physics.actuator import WINCH
-from tetra_drake.physics.cable import LENGTH, PASSIVE, PULL_COLUMNS, TENSION
-from tetra_drake.physics.contact import PUSH_COLUMNS, STICK_POINT
+from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS, LENGTH, PASSIVE, TENSION
+from tetra_drake.physics.contact import GROUND_FORCE_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces, forces_along
 from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.robot.robot import Robot
@@ -59,7 +59,7 @@ class Motion:
     whose end, the time lies."""
     drives: np.ndarray
     """(k, drives): free lengths (m) of winches, or tensions (N) of tension motors."""
-    pushes: np.ndarray | None = None
+    ground_forces: np.ndarray | None = None
     """(k, contacts, 3): forces of the ground along t1, t2 and n, of an engine that has a law of its
     own; otherwise they follow from states and modes."""
 
@@ -72,7 +72,7 @@ class Motion:
             signals=self.signals[rows],
             modes=self.modes[rows],
             drives=self.drives[rows],
-            pushes=None if self.pushes is None else self.pushes[rows],
+            ground_forces=None if self.ground_forces is None else self.ground_forces[rows],
         )
 
 
@@ -91,7 +91,7 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     structure, bodies = robot.structure, len(robot.structure.bodies)
     nodes = np.array([moved_nodes(structure, state) for state in motion.states])
     poses = motion.states[:, : 7 * bodies].reshape(-1, bodies, 7)
-    pulls, pushes = _forces(robot, motion)
+    cable_forces, ground_forces = _forces(robot, motion)
     modes = np.sign(motion.modes[:, :, :STICK_POINT]).astype(np.int8)
     slip = "0 sticks, +1 or -1 slips in that direction"
     variables = {
@@ -99,12 +99,12 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
         "v_WN": (nodes[..., V_WN : V_WN + 3], "m/s", "node velocity"),
         "p_WB": (poses[..., 4:], "m", "position of the body's origin"),
         "q_WB": (poses[..., :4], "1", "orientation of the body"),
-        "tension": (pulls[..., TENSION], "N", "cable tension"),
-        "length": (pulls[..., LENGTH], "m", "cable length"),
+        "tension": (cable_forces[..., TENSION], "N", "cable tension"),
+        "length": (cable_forces[..., LENGTH], "m", "cable length"),
         "free_length": (_free_lengths(robot, motion), "m", "free length of the cable"),
         "signal": (motion.signals, "N", "actuation signal"),
-        "normal_force": (pushes[..., 2], "N", "force along the normal of the ground"),
-        "friction_force": (pushes[..., :2], "N", "friction force"),
+        "normal_force": (ground_forces[..., 2], "N", "force along the normal of the ground"),
+        "friction_force": (ground_forces[..., :2], "N", "friction force"),
         "in_contact": (modes[..., 0], "1", "1 on the ground"),
         "friction_mode": (modes[..., 1:], "1", slip),
     }
@@ -134,14 +134,14 @@ def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:
 
 
 def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """The cables' `pulls` (k, cables, PULL_COLUMNS) and the ground's `pushes` (k, contacts, 3)."""
+    """The `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, 3)."""
     model, samples = robot.model, len(motion.times)
-    pulls = np.empty((samples, len(model.cables), PULL_COLUMNS))
-    pushes = np.empty((samples, len(model.ground.contacts), PUSH_COLUMNS))
+    cable_forces = np.empty((samples, len(model.cables.signal), CABLE_FORCE_COLUMNS))
+    ground_forces = np.empty((samples, len(model.ground.contacts), GROUND_FORCE_COLUMNS))
     forces = Forces.of(model)
     given = motion.states, motion.modes, motion.signals, motion.drives
-    forces_along(model, *given, forces, pulls, pushes)
-    return pulls, pushes if motion.pushes is None else motion.pushes
+    forces_along(model, *given, forces, cable_forces, ground_forces)
+    return cable_forces, ground_forces if motion.ground_forces is None else motion.ground_forces
 
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:

@@ -71,8 +71,7 @@ class Resting(NamedTuple):
     @classmethod
     def of(cls, model: Model) -> Self:
         """The robot of a model, no signal driving its cables."""
-        cables = model.cables.copy()
-        cables["signal"] = PASSIVE
+        cables = model.cables._replace(signal=np.full_like(model.cables.signal, PASSIVE))
         return cls(model._replace(cables=cables), Forces.of(model))
 
 
@@ -89,11 +88,11 @@ def find_rest(model: Model, start: np.ndarray, *, bodies: Sequence[str], source:
         force = force_at_rest(robot, state)
         if not np.isfinite(force).all():
             break
-        tensions = np.abs(robot.forces.pulls[:, TENSION])
+        tensions = np.abs(robot.forces.cable_forces[:, TENSION])
         greatest = max(tensions.max(initial=weight), LEAST_FORCE)
         if np.abs(force).max() <= TOLERANCE * greatest:
-            lengths = np.round(robot.forces.pulls[:, LENGTH], LENGTH_DIGITS)
-            feet = int(np.count_nonzero(robot.forces.pushes[:, NORMAL]))
+            lengths = np.round(robot.forces.cable_forces[:, LENGTH], LENGTH_DIGITS)
+            feet = int(np.count_nonzero(robot.forces.ground_forces[:, NORMAL]))
             return Rest(state, lengths, feet)
         now = time.perf_counter()
         if iteration == 1:  # kernels are compiled by now
@@ -170,7 +169,7 @@ def solve_convex(matrix: Table, right: Table, least: float, x: Table) -> bool:
 def force_at_rest(robot: Resting, state: Table) -> Table:
     """(6 n,): [t_W / radius; f_W] of all forces at each Bo; contact nodes stick where they are."""
     model, forces = robot.model, robot.forces
-    modes = np.zeros((forces.pushes.shape[0], MODE_COLUMNS))
+    modes = np.zeros((forces.ground_forces.shape[0], MODE_COLUMNS))
     generalized = np.empty(6 * (state.size // 13))
     move_robot(model, state, forces)
     update_modes(state, forces.nodes, model.ground, forces.frames, modes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tetra_drake.physics.cable import Cables
 from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.model import Bodies, Couplings, Model
 from tetra_drake.robot.equilibrium import Rest, find_rest
@@ -14,12 +15,12 @@ from tetra_drake.scenario.terrain_kinds import Flat
 
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:
-    """The structure and its laws as the kernels take them; cables are records."""
+    """The structure and its laws as the kernels take them."""
     distances = np.linalg.norm(structure.p_BN, axis=1)
     return Model(
         p_BN=structure.p_BN,
         first_node=structure.first_node,
-        cables=structure.cables,
+        cables=Cables.of(structure.cables),
         actuator=scenario.actuation.law(),
         couplings=_couplings(structure),
         ground=make_ground(scenario, structure),

@@ -14,9 +14,10 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.physics.actuator import DIRECT, WINCH, CableLaw
 from tetra_drake.physics.cable import PASSIVE, cable_tension
-from tetra_drake.physics.contact import MODE_COLUMNS, Ground, modes_after_step
+from tetra_drake.physics.contact import MODE_COLUMNS, Ground
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.forces import Forces
+from tetra_drake.physics.mode_change import modes_after_step
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.oscillator import Network, steered_input
 from tetra_drake.robot.actuation import Actuation
@@ -29,6 +30,7 @@ from tetra_drake.robot.tetrahedra import MakeTetrahedra
 from tetra_drake.scenario import robot_kinds
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import CpgSection
+from tetra_drake.simd.packed import Packed
 
 AMPLITUDE = 0.5
 """Amplitude of y_extensor - y_flexor, as a share of u0: 0.44 to 0.53 in random gaits."""
@@ -175,10 +177,9 @@ class Robot:
 
     def starting_modes(self) -> np.ndarray:
         """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
-        structure, forces = self.structure, Forces.of(self.model)
-        modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
-        start, points = structure.initial_state, (structure.p_BN, structure.first_node)
-        modes_after_step(start, *points, self.ground, forces.nodes, forces.frames, modes)
+        modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
+        parts = Packed((self.model, Forces.of(self.model)))
+        modes_after_step(parts, self.structure.initial_state, modes)
         return modes
 
 

@@ -73,9 +73,19 @@ def inlined(function: F) -> F:
     return function
 
 
+def machine_code(kernel: F, *arguments: object) -> F:
+    """The machine code of a kernel for arguments of the types of these.
+
+    A call does not look at types: with others it fails or computes nonsense.
+    """
+    if not hasattr(kernel, "compile"):  # compilation is switched off
+        return kernel
+    return cast(F, kernel.compile(tuple(numba.typeof(argument) for argument in arguments)))
+
+
 def _kernel(function: F, **options: Any) -> F:
     kernel: Any = numba.njit(**_OPTIONS, **options)(function)
-    if hasattr(kernel, "_cache"):  # else compilation is switched off (NUMBA_DISABLE_JIT)
+    if hasattr(kernel, "_cache"):  # else compilation is switched off by NUMBA_DISABLE_JIT
         kernel._cache = KernelCache(function)
     return cast(F, kernel)
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from tetra_drake.physics.actuator import DRIVE, RATE
-from tetra_drake.physics.cable import LENGTH, TENSION, cable_forces
-from tetra_drake.physics.forces import Forces
+from tetra_drake.physics import actuator, cable
+from tetra_drake.physics.forces import Forces, compute_cable_forces
 from tetra_drake.robot.robot import Robot
+from tetra_drake.simd.compiling import machine_code
+from tetra_drake.simd.packed import Packed
 
 
 class CableNetwork(LeafSystem):
@@ -30,13 +31,17 @@ class CableNetwork(LeafSystem):
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
-        structure, self._model = robot.structure, robot.model
+        structure = robot.structure
         bodies, count = len(structure.bodies), len(structure.cables)
         # Room for the kernel, which writes all of it at every call.
-        self._forces = Forces.of(self._model)
-        self._force = np.empty(6 * bodies)
-        self._state = self.DeclareVectorInputPort("state", 13 * bodies)
-        self._signals = self.DeclareVectorInputPort("signals", structure.signals)
+        self._forces, self._force = Forces.of(robot.model), np.empty(6 * bodies)
+        self._parts = Packed((robot.model, self._forces))
+        state, signals = np.empty(13 * bodies), np.empty(structure.signals)
+        self._compute_forces = machine_code(
+            compute_cable_forces, self._parts, state, signals, self._force
+        )
+        self._state = self.DeclareVectorInputPort("state", state.size)
+        self._signals = self.DeclareVectorInputPort("signals", signals.size)
         inputs = {self._state.ticket(), self._signals.ticket()}
         self._drives, drives = None, len(self._forces.drives)
         if drives:
@@ -47,36 +52,25 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
 
-    def _pull(self, context: Context) -> None:
-        """Writes the generalized force and the cables' `pulls`."""
+    def _compute(self, context: Context) -> None:
+        """Writes the generalized force and the `cable_forces`."""
         if self._drives is not None:
-            self._forces.drives[:, DRIVE] = self._drives.Eval(context)
-        cable_forces(
-            self._state.Eval(context),
-            self._signals.Eval(context),
-            self._model.p_BN,
-            self._model.first_node,
-            self._model.cables,
-            *self._model.actuator,
-            self._model.slack,
-            self._forces.drives,
-            self._forces.nodes,
-            self._forces.pulls,
-            self._force,
-        )
+            self._forces.drives[:, actuator.DRIVE] = self._drives.Eval(context)
+        state, signals = self._state.Eval(context), self._signals.Eval(context)
+        self._compute_forces(self._parts, state, signals, self._force)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._pull(context)
+        self._compute(context)
         output.SetFromVector(self._force)
 
     def _calc_tensions(self, context: Context, output: BasicVector) -> None:
-        self._pull(context)
-        output.SetFromVector(self._forces.pulls[:, TENSION])
+        self._compute(context)
+        output.SetFromVector(self._forces.cable_forces[:, cable.TENSION])
 
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
-        self._pull(context)
-        output.SetFromVector(self._forces.pulls[:, LENGTH])
+        self._compute(context)
+        output.SetFromVector(self._forces.cable_forces[:, cable.LENGTH])
 
     def _calc_rates(self, context: Context, output: BasicVector) -> None:
-        self._pull(context)
-        output.SetFromVector(self._forces.drives[:, RATE])
+        self._compute(context)
+        output.SetFromVector(self._forces.drives[:, actuator.RATE])

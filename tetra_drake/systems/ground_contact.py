@@ -15,19 +15,12 @@ from pydrake.systems.framework import (
     WitnessFunctionDirection,
 )
 
-from tetra_drake.physics.contact import (
-    MODE_COLUMNS,
-    NORMAL,
-    PUSH_COLUMNS,
-    STICK_POINT,
-    ground_arguments,
-    ground_forces,
-    modes_after_step,
-)
-from tetra_drake.physics.kinematics import NODE_COLUMNS
-from tetra_drake.physics.mode_change import mode_margin, next_mode_change
-from tetra_drake.physics.terrain import FRAME_COLUMNS
+from tetra_drake.physics import contact
+from tetra_drake.physics.forces import Forces, compute_ground_forces
+from tetra_drake.physics.mode_change import mode_margin, modes_after_step, next_mode_change
 from tetra_drake.robot.robot import Robot
+from tetra_drake.simd.compiling import machine_code
+from tetra_drake.simd.packed import Packed
 
 
 class GroundContact(LeafSystem):
@@ -56,18 +49,20 @@ class GroundContact(LeafSystem):
 
     def __init__(self, robot: Robot, *, witness: bool = False) -> None:
         super().__init__()
-        structure = robot.structure
-        self._p_BN, self._first_node = structure.p_BN, structure.first_node
-        self._ground = robot.ground
-        self._ground_arguments = ground_arguments(self._ground)
-        bodies, count = len(structure.bodies), len(structure.contacts)
+        bodies, count = len(robot.structure.bodies), len(robot.structure.contacts)
         # Room for the kernels, which write what they need of it at every call.
-        self._nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
-        self._frames = np.empty((count, FRAME_COLUMNS))
-        self._pushes = np.empty((count, PUSH_COLUMNS))
-        self._force = np.empty(6 * bodies)
-        self._state = self.DeclareVectorInputPort("state", 13 * bodies)
-        self.DeclareDiscreteState(MODE_COLUMNS * count)
+        self._forces, self._force = Forces.of(robot.model), np.empty(6 * bodies)
+        self._parts = Packed((robot.model, self._forces))
+        state, modes = np.empty(13 * bodies), np.empty((count, contact.MODE_COLUMNS))
+        self._compute_forces = machine_code(
+            compute_ground_forces, self._parts, state, modes, self._force
+        )
+        self._update_modes = machine_code(modes_after_step, self._parts, state, modes)
+        self._next_change = machine_code(
+            next_mode_change, self._parts, state, self._force, modes, 0.0
+        )
+        self._state = self.DeclareVectorInputPort("state", state.size)
+        self.DeclareDiscreteState(modes.size)
         self.DeclareInitializationDiscreteUpdateEvent(self._start)
         self.DeclarePerStepDiscreteUpdateEvent(self._update)
         # It carries no event of its own: it ends the step, and the update follows there.
@@ -89,24 +84,15 @@ class GroundContact(LeafSystem):
 
         `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
         """
-        return next_mode_change(
-            self._state.Eval(context),
-            acceleration,
-            self._modes(context).copy(),
-            self._p_BN,
-            self._first_node,
-            self._ground,
-            self._nodes,
-            self._frames,
-            horizon,
-        )
+        state, modes = self._state.Eval(context), self._modes(context).copy()
+        return self._next_change(self._parts, state, acceleration, modes, horizon)
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
         """The one witness, if asked for."""
         return self._witnesses
 
     def _modes(self, context: Context) -> np.ndarray:
-        return context.get_discrete_state_vector().value().reshape(-1, MODE_COLUMNS)
+        return context.get_discrete_state_vector().value().reshape(-1, contact.MODE_COLUMNS)
 
     def _start(self, context: Context, values: DiscreteValues) -> EventStatus:
         # From "nowhere in contact", an update makes every node in the ground stick where it is.
@@ -115,56 +101,31 @@ class GroundContact(LeafSystem):
         return EventStatus.Succeeded()
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
-        modes = values.get_mutable_value().reshape(-1, MODE_COLUMNS)
-        changed = modes_after_step(
-            self._state.Eval(context),
-            self._p_BN,
-            self._first_node,
-            self._ground,
-            self._nodes,
-            self._frames,
-            modes,
-        )
+        modes = values.get_mutable_value().reshape(-1, contact.MODE_COLUMNS)
+        changed = self._update_modes(self._parts, self._state.Eval(context), modes)
         if changed:
             return EventStatus.Succeeded()
         return EventStatus.DidNothing()  # so that what was computed at this state stays valid
 
     def _margin(self, context: Context) -> float:
-        return mode_margin(
-            self._state.Eval(context),
-            self._modes(context),
-            self._p_BN,
-            self._first_node,
-            self._ground,
-            self._nodes,
-            self._frames,
-        )
+        return mode_margin(self._parts, self._state.Eval(context), self._modes(context))
 
-    def _push(self, context: Context) -> None:
-        """Writes the generalized force and the ground's `pushes`."""
-        ground_forces(
-            self._state.Eval(context),
-            self._modes(context),
-            self._p_BN,
-            self._first_node,
-            *self._ground_arguments,
-            self._nodes,
-            self._frames,
-            self._pushes,
-            self._force,
-        )
+    def _compute(self, context: Context) -> None:
+        """Writes the generalized force and the `ground_forces`."""
+        state, modes = self._state.Eval(context), self._modes(context)
+        self._compute_forces(self._parts, state, modes, self._force)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._push(context)
+        self._compute(context)
         output.SetFromVector(self._force)
 
     def _calc_normal(self, context: Context, output: BasicVector) -> None:
-        self._push(context)
-        output.SetFromVector(self._pushes[:, NORMAL])
+        self._compute(context)
+        output.SetFromVector(self._forces.ground_forces[:, contact.NORMAL])
 
     def _calc_friction(self, context: Context, output: BasicVector) -> None:
-        self._push(context)
-        output.SetFromVector(self._pushes[:, :NORMAL].ravel())
+        self._compute(context)
+        output.SetFromVector(self._forces.ground_forces[:, : contact.NORMAL].ravel())
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._modes(context)[:, :STICK_POINT].ravel())
+        output.SetFromVector(self._modes(context)[:, : contact.STICK_POINT].ravel())

@@ -8,9 +8,10 @@ from helpers.steps import make_lines, make_rows
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate, implicit_matrix
-from tetra_drake.physics.contact import MODE_COLUMNS, modes_after_step
+from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.kinematics import move_bodies
+from tetra_drake.physics.mode_change import modes_after_step
 from tetra_drake.physics.model import Model
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -18,13 +19,14 @@ from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
+from tetra_drake.simd.packed import Packed
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
 def forces_of(robot: Model, state: np.ndarray, modes: np.ndarray) -> tuple[Forces, np.ndarray]:
     """All forces without actuation, and as forces on the bodies."""
     forces, generalized = Forces.of(robot), np.empty(6 * (len(state) // 13))
-    signals = np.zeros(1 + robot.cables["signal"].max())
+    signals = np.zeros(1 + robot.cables.signal.max())
     forces_at(robot, state, modes, signals, forces, generalized)
     return forces, generalized
 
@@ -58,9 +60,8 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
     whole = Robot.of(scenario)
     robot, structure = whole.model, whole.structure
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
-    modes, forces = np.zeros((len(structure.contacts), MODE_COLUMNS)), Forces.of(robot)
-    points = robot.p_BN, robot.first_node
-    modes_after_step(state, *points, robot.ground, forces.nodes, forces.frames, modes)
+    modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
+    modes_after_step(Packed((robot, Forces.of(robot))), state, modes)
     assert np.count_nonzero(modes[:, 0]) > 0, "some nodes touch the ground"
     return robot, state, modes
 

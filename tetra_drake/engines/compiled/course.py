@@ -23,7 +23,6 @@ from tetra_drake.engines.compiled.loop import (
 from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE, Limits
-from tetra_drake.physics.cable import Cables
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.inertia import INERTIA_COLUMNS
 from tetra_drake.physics.oscillator import make_neurons
@@ -120,10 +119,9 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
     cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
     # Up to its time constant, NaN if it has none, Heun's method is stable for an actuator.
     max_step = np.fmin(engine.max_step, Limits(*model.actuator.limits).time_constant)
-    cables = Cables(*(model.cables[name].copy() for name in Cables._fields))
     ground = model.ground._replace(heights=None)  # of which lanes have different numbers
     return Constants(
-        robot=model._replace(cables=cables, ground=ground),
+        robot=model._replace(ground=ground),
         solver=solver,
         network=robot.network(gait),
         senses=robot.senses,

@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK, Schedule
-from tetra_drake.physics.cable import DIRECTION, SLOPE
+from tetra_drake.physics.cable import DIRECTION, TENSION_PER_RATE
 from tetra_drake.physics.contact import (
     CONTACT,
     NORMAL,
@@ -144,10 +144,9 @@ def implicit_matrix(
             adds = cable > couplings.first_cable[pair]
             add_cables(robot, forces, time, pair, cable, last, adds, column, lines, rows)
     add_masses(robot, forces.inertia, rows)
-    law = named(NormalForce, robot.ground.normal)
     for i in range(robot.ground.contacts.size):
         if any_lane(modes[i, CONTACT] != 0.0):
-            add_contact(modes, forces, robot.ground, law, i, time, rows)
+            add_contact(modes, forces, robot.ground, i, time, rows)
 
 
 @inlined
@@ -196,8 +195,8 @@ def add_cables(
             for c in range(LINE_COLUMNS):
                 lines[j, c] = 0.0
             continue
-        d_x, d_y = forces.pulls[i, DIRECTION], forces.pulls[i, DIRECTION + 1]
-        d_z = forces.pulls[i, DIRECTION + 2]
+        d_x, d_y = forces.cable_forces[i, DIRECTION], forces.cable_forces[i, DIRECTION + 1]
+        d_z = forces.cable_forces[i, DIRECTION + 2]
         a, b = robot.cables.node_a[i], robot.cables.node_b[i]
         p_x, p_y = forces.nodes[a, P_BN_W], forces.nodes[a, P_BN_W + 1]
         p_z = forces.nodes[a, P_BN_W + 2]
@@ -210,14 +209,14 @@ def add_cables(
         lines[j, 4] = p_z * d_x - p_x * d_z
         lines[j, 5] = p_x * d_y - p_y * d_x
         lines[j, 6], lines[j, 7], lines[j, 8] = d_x, d_y, d_z
-    pulls = forces.pulls
+    cable_forces = forces.cable_forces
     weights = (
-        time * pulls[first, SLOPE],
-        time * pulls[min(first + 1, last - 1), SLOPE],
-        time * pulls[min(first + 2, last - 1), SLOPE],
-        time * pulls[min(first + 3, last - 1), SLOPE],
-        time * pulls[min(first + 4, last - 1), SLOPE],
-        time * pulls[min(first + 5, last - 1), SLOPE],
+        time * cable_forces[first, TENSION_PER_RATE],
+        time * cable_forces[min(first + 1, last - 1), TENSION_PER_RATE],
+        time * cable_forces[min(first + 2, last - 1), TENSION_PER_RATE],
+        time * cable_forces[min(first + 3, last - 1), TENSION_PER_RATE],
+        time * cable_forces[min(first + 4, last - 1), TENSION_PER_RATE],
+        time * cable_forces[min(first + 5, last - 1), TENSION_PER_RATE],
     )
     rear, front = robot.couplings.first[pair], robot.couplings.second[pair]
     turn, shift = column, column + 3  # the columns of the front body's rotation and translation
@@ -281,17 +280,17 @@ def product(column: tuple[Real, ...], lines: Table, c: int) -> Real:
 
 @inlined
 def add_contact(
-    modes: Table, forces: Forces, ground: Ground, law: NormalForce, i: int, time: Real, rows: Table
+    modes: Table, forces: Forces, ground: Ground, i: int, time: Real, rows: Table
 ) -> None:
     """Adds time * damping + time² * stiffness of a contact, which acts where it touches."""
-    nodes, frames = forces.nodes, forces.frames
+    nodes, frames, law = forces.nodes, forces.frames, named(NormalForce, ground.normal)
     touches, node, body = modes[i, CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
     depth = -gap(nodes, ground, frames, i)
-    slide, _ = sliding(nodes, modes, ground, law, frames, i)
+    slide, _ = sliding(nodes, modes, ground, frames, i)
     k_1, k_12, k_2 = friction_damping(slide, time, ground.friction)
     k_1, k_2 = select(touches, k_1, 0.0), select(touches, k_2, 0.0)
     k_12 = select(touches, k_12, 0.0)
-    presses = touches & (forces.pushes[i, NORMAL] > 0.0)
+    presses = touches & (forces.ground_forces[i, NORMAL] > 0.0)
     k_n = select(presses, time * (law.damping * depth + time * law.stiffness), 0.0)
     # The columns of the matrix in World, and from the frame's: R K, then (R K) Rᵀ.
     a = to_world(k_1, k_12, 0.0, frames, i, ground.flat)

@@ -293,13 +293,7 @@ def aim(constants: Constants, walk: Walk) -> Real:
     accelerate(robot, walk.forces.inertia, walk.step.force, walk.acceleration)
     planned = clock[PLANNED]
     change = time_to_mode_change(
-        walk.step.state,
-        walk.acceleration,
-        walk.forces.nodes,
-        walk.modes,
-        robot.ground,
-        walk.forces.frames,
-        planned,
+        robot, walk.step.state, walk.acceleration, walk.modes, walk.forces, planned
     )
     step = minimum(planned, AIM_FACTOR * change + constants.look_ahead[0])
     remaining = clock[MARK] - clock[TIME]
@@ -361,9 +355,9 @@ def feel(constants: Constants, walk: Walk, log: Log, time: Real, state: Table) -
     """Writes the inputs of a live network at a time (s), for a state and its forces."""
     steer(constants, walk, log, time / constants.period[0])
     for i in range(walk.lengths.size):
-        walk.lengths[i] = walk.forces.pulls[i, LENGTH]
+        walk.lengths[i] = walk.forces.cable_forces[i, LENGTH]
     for i in range(walk.normal_forces.size):
-        walk.normal_forces[i] = walk.forces.pushes[i, NORMAL]
+        walk.normal_forces[i] = walk.forces.ground_forces[i, NORMAL]
     sense(constants.senses, constants.gains, state, walk.lengths, walk.normal_forces, walk.inputs)
     for i in range(walk.inputs.size):
         walk.inputs[i] += walk.tonic[i]

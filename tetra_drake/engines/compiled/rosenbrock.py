@@ -65,11 +65,11 @@ def take_step(
     forces: Forces,
     signals: Table,
     step: Real,
-    keep: bool,
+    write_parts: bool,
 ) -> Real:
     """Writes the end of a step (s); `signals` are the end's. What is given of the state: `forces`,
-    whose nodes and frames are overwritten, and work.force. With `keep`, all `forces` become those
-    of the second stage, at the end of the step to order 1.
+    whose nodes and frames are overwritten, and work.force. With `write_parts`, all `forces` become
+    those of the second stage, at the end of the step to order 1.
 
     Returns the difference to the first-order solution within: the largest of any body's
     velocity (m/s), of rotation that of its nodes; NaN if one is.
@@ -98,7 +98,7 @@ def take_step(
         stage[i] = state[first + i] + scaled * k1[i]
         end[first + i] = state[first + i] + step * k1[i]
     move_bodies(state, stage, step, end)
-    compute_end_forces(robot, work, modes, forces, signals, keep)
+    compute_end_forces(robot, work, modes, forces, signals, write_parts)
     for body in range(bodies):
         gained = momentum(robot, work.inertia, k1, body)
         for j in range(BLOCK):
@@ -118,12 +118,12 @@ def take_step(
 
 @inlined
 def compute_end_forces(
-    robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, keep: bool
+    robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, write_parts: bool
 ) -> None:
     """Writes work.end_force, in which torques are those that the mass matrix at the beginning of
     the step needs."""
     move_robot(robot, work.end, forces)
-    compute_forces(robot, work.end, modes, signals, keep, forces, work.end_force)
+    compute_forces(robot, work.end, modes, signals, write_parts, forces, work.end_force)
     if not robot.isotropic:
         refer_torques(work.inertia, forces.inertia, work.end_force)
 

@@ -1,0 +1,130 @@
+"""Arguments that are packed once for all calls of a kernel.
+
+Numba looks at each array of a call: 44 ns for one by itself, 120 ns for one in a NamedTuple, and in
+the kernel each has a reference count to maintain. Of the constants of a robot, which are the same
+at every call, that is more than the computation takes.
+
+`Packed(values)` writes the addresses, lengths and numbers in NamedTuples into one row of words. The
+kernel takes the address of this row, and `unpacked(packed)` gives it the NamedTuples again, with a
+Field in place of each array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import (
+    NativeValue,
+    intrinsic,
+    models,
+    overload,
+    register_model,
+    typeof_impl,
+    unbox,
+)
+
+from tetra_drake.simd.lanes import Field, FieldArray
+
+Values = TypeVar("Values", bound=tuple)
+
+_intrinsic: Callable[..., Any] = intrinsic
+
+_WORD = ir.IntType(64)
+
+
+class PackedKind(types.Type):
+    """The numba type of packed values of the type `content`."""
+
+    def __init__(self, content: types.Type) -> None:
+        self.content = content
+        super().__init__(name=f"Packed({content})")
+
+
+class Packed(Generic[Values]):
+    """Tuples of arrays, whole numbers, truth values and such tuples, as one argument of a kernel.
+
+    A kernel sees what is written to the arrays later. Raises ValueError for an array that cannot be
+    a Field.
+    """
+
+    def __init__(self, values: Values) -> None:
+        self.values = values
+        words: list[int] = []
+        self.kind = PackedKind(_pack(values, words))
+        self._words = np.array(words, dtype=np.int64)
+        self.address = self._words.ctypes.data
+
+
+def _pack(value: Any, words: list[int]) -> types.Type:
+    """The type of a value, whose words are appended."""
+    if isinstance(value, tuple):
+        kinds = [_pack(item, words) for item in value]
+        named = hasattr(value, "_fields")
+        return types.NamedTuple(kinds, type(value)) if named else types.Tuple(kinds)
+    if isinstance(value, np.ndarray):
+        field = FieldArray(value, any_size=True)
+        words += [field.address, *field.shape]
+        return field.kind
+    words.append(int(value))
+    return types.boolean if isinstance(value, bool) else types.intp
+
+
+def unpacked(packed: Packed[Values]) -> Values:
+    """The values of a Packed, in a kernel or in Python."""
+    return packed.values
+
+
+@register_model(PackedKind)
+class _PackedModel(models.OpaqueModel):
+    pass
+
+
+@typeof_impl.register(Packed)
+def _typeof(value: Packed[Any], context: Any) -> PackedKind:
+    return value.kind
+
+
+@unbox(PackedKind)
+def _unbox(kind: PackedKind, value: Any, c: Any) -> NativeValue:
+    address = c.pyapi.object_getattr_string(value, "address")
+    pointer = c.builder.inttoptr(c.pyapi.long_as_longlong(address), c.context.get_value_type(kind))
+    c.pyapi.decref(address)
+    return NativeValue(pointer)
+
+
+@_intrinsic
+def _unpacked(context: Any, packed: PackedKind) -> Any:
+    def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
+        words = builder.bitcast(args[0], _WORD.as_pointer())
+        place = 0
+
+        def next_word() -> Any:
+            nonlocal place
+            word = builder.load(builder.gep(words, [ir.Constant(_WORD, place)]))
+            place += 1
+            return word
+
+        def unpack(kind: Any) -> Any:
+            if hasattr(kind, "types"):  # a tuple's
+                return c.make_tuple(builder, kind, [unpack(item) for item in kind.types])
+            if isinstance(kind, Field):
+                field = cgutils.create_struct_proxy(kind)(c, builder)
+                field.data = builder.inttoptr(next_word(), field.data.type)
+                count = len(kind.lengths)
+                lengths = [next_word() for _ in range(count)]
+                field.lengths = c.make_tuple(builder, types.UniTuple(types.intp, count), lengths)
+                return field._getvalue()
+            word = next_word()
+            return builder.trunc(word, ir.IntType(1)) if kind == types.boolean else word
+
+        return unpack(packed.content)
+
+    return packed.content(packed), emit
+
+
+overload(unpacked)(lambda packed: lambda packed: _unpacked(packed))
