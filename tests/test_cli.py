@@ -68,7 +68,7 @@ def unchanged(work):
         ("cpg --out a.csv --scenario feedback", "gait random gait 80", "gains:"),
         ("cpg --scenario short.yaml --out good.json/a.csv", "good.json/a.csv", ""),
         ("structure six_baer", "six_baer", ""),
-        ("structure good.json", "good.json", "schema"),
+        ("structure good.json", "good.json", "none nodes struts"),
         ("structure prism --out good.json/a.html", "good.json/a.html", ""),
         ("replay --out new/a.html missing", "missing", ""),
         ("replay good.json --out folder", "folder", ""),

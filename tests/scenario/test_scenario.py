@@ -370,6 +370,7 @@ BAD = [
     ("objective: {}", "objective", "at least 1"),
     ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
     ("optimizer: !CmaEs {population: 3}", "optimizer.population", "3"),
+    (f"robot: {{payload: [{'1 g,' * 7}]}}", "robot.payload", "found 7 items"),
     ("optimizer: !QualityDiversity {cells: [9, 1]}", "optimizer.cells[1]", "1"),
     ("optimizer: !QualityDiversity {measures: {twist: [0 m, 1 m]}}", "optimizer.measures", "1"),
     (
@@ -438,25 +439,55 @@ def test_a_fault_names_the_file_that_has_it(tmp_path, refused):
 def test_what_is_no_text_file_is_refused(tmp_path, refused):
     (tmp_path / "binary.yaml").write_bytes(b"\x89PNG\r\n\x1a\n\x00\xff")
     (tmp_path / "large.yaml").write_text("#" * (2**20 + 1))
-    for name in ("missing.yaml", "binary.yaml", "large.yaml", "/dev/zero"):
+    for name in ("missing.yaml", "binary.yaml", "large.yaml", "/dev/zero", "nul\0", "a" * 300):
         with refused(tmp_path / name, "", ""):
             load_scenario(tmp_path / name)
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        "root:x:0:0:secret:/root:/bin/sh\ndaemon:x:1:1:secret:/:/bin/sh\n",  # YAML: a text
-        "a: [1, 2\nsecret: {x: 1\n  secret\n",
-    ],
-)
-def test_a_base_that_is_no_scenario_is_not_shown(tmp_path, content):
-    (tmp_path / "any").write_text(content)
-    file = write(tmp_path, "base: any\n")
-    with pytest.raises(InputError) as caught:
+@pytest.mark.parametrize("name", ["coulom", "columb", "scenarios/coulom"])
+def test_a_name_that_is_nearly_right_leads_to_the_scenario(tmp_path, refused, name):
+    with refused(name, "", "'coulomb'"):
+        load_scenario(name)
+    file = write(tmp_path, f"base: {name}\n")
+    with refused(file, "base", "'coulomb'"):
         load_scenario(file)
-    assert caught.value.source == str(tmp_path / "any")
-    assert "secret" not in caught.value.problem
+
+
+PRIVATE = [
+    "root:x:0:0:secret:/root:/bin/sh\ndaemon:x:1:1:secret:/:/bin/sh\n",  # YAML: a text
+    "root:$6$secret:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n",  # YAML: a mapping
+    "a: [1, 2\nsecret: {x: 1\n  secret\n",
+    "*secret\n",
+    "&secret 1\n&secret 2\n",
+    "!secret {a: 1}\n",
+    "!$6$secret text\n",
+    "!secret!name text\n",
+    "secret one: 1\nsecret one: 2\n",
+    "name: !!int secret\n",
+    "name: !!bool secret\n",
+    "name: !!timestamp secret\n",
+    "- secret\n",
+]
+
+
+@pytest.mark.parametrize("content", PRIVATE)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "base: any",
+        "base: thesis\nrobot: !Structure {file: any}",
+        "base: thesis\nrobot: !Structure {file: parts.yaml, unit: m}",
+        "base: thesis\nterrain: !HeightField {file: any, cell: 1 m}",
+    ],
+    ids=["scenario", "structure", "substructure", "heights"],
+)
+def test_nothing_is_shown_of_a_file_that_is_something_else(tmp_path, content, text):
+    (tmp_path / "any").write_text(content)
+    write(tmp_path, "substructures: {part: {path: any}}", "parts.yaml")
+    with pytest.raises(InputError) as caught:
+        load_scenario(write(tmp_path, text))
+    assert "secret" not in str(caught.value)
+    assert str(tmp_path / "any") in str(caught.value)
 
 
 # Printing

@@ -1,5 +1,6 @@
 """Scenarios whose robot is a structure from a file."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -196,6 +197,22 @@ def test_a_fault_of_a_structure_file_names_that(
     file.write_text(BAR.replace(old, new))
     with refused(file, key, fact):
         load(folder, "!Structure {file: bar.yaml, cables: {side: {stiffness: 1 N/m}}}")
+
+
+@pytest.mark.parametrize("name", ["prims", "nul\0", "a" * 300])
+def test_a_structure_that_is_not_there_is_one_line(tmp_path: Path, name: str, refused) -> None:
+    with refused(name, "", "'prism'" if name == "prims" else "no such"):
+        read_structure(name)
+    parts = tmp_path / "parts.yaml"
+    parts.write_text(f"substructures: {{part: {{path: {json.dumps(name)}}}}}")
+    with refused(tmp_path / name, "", ""):
+        read_structure(parts, unit="m")
+
+
+def test_too_many_nodes_are_counted(refused) -> None:
+    nodes = {f"n{i}": [0.0, 0.0, float(i)] for i in range(1001)}
+    with refused("scenario prism", "robot.nodes", "at most 1000 items, not 1001"):
+        load_scenario("prism").with_changes({"robot": {"nodes": nodes, "unit": "m"}})
 
 
 def test_only_a_scenario_is_told_of_a_base(folder: Path) -> None:

@@ -39,7 +39,7 @@ class LimitedActuator(Section):
     max_force: float = quantity("N", gt=0)
     max_speed: float = quantity("m/s", gt=0)
     time_constant: float = quantity("s", gt=0)
-    """Time constant of the lag with which free length or tension follows its command."""
+    """Time constant of the lag with which the actuator follows its command."""
 
 
 class Winch(LimitedActuator):
@@ -48,6 +48,9 @@ class Winch(LimitedActuator):
     It winds at most at max_speed (1 - tension / max_force); above max_force it is driven backward.
     """
 
+    time_constant: float = quantity("s", default=0.02, gt=0)
+    """Time constant of the lag with which the free length follows its command. The default is the
+    1 / (2 pi f) of a position loop with a bandwidth f of 8 Hz, as small geared motors have."""
     least_length: float = quantity("m", default=0.0, ge=0)
     """Least free length of a cable."""
 

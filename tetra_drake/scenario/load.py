@@ -6,11 +6,10 @@ import os
 from pathlib import Path
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_text
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import Tree, tree_of
+from tetra_drake.scenario.sections import Tree, keys_of, no_such, tree_of
 from tetra_drake.scenario.structure_files import structure_file
-from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
+from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 
 MOST_BYTES = 2**20
 """Upper limit of the size of a scenario file."""
@@ -30,7 +29,10 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     Raises InputError, naming file and key, for whatever is wrong in the file, or in the structure
     or height file that it names.
     """
-    file = _file(str(name_or_file), Path())
+    name = str(name_or_file)
+    file = _file(name, Path())
+    if not os.path.exists(file):
+        raise InputError(name, "", no_such("scenario file", name, shipped_scenarios()))
     scenario = _load(file)
     scenario.terrain.grid(ahead=0.0, source=file)
     return scenario
@@ -56,13 +58,10 @@ def _file(name: str, folder: Path) -> Path:
 
 def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
     """The scenario of a file, whose bases are loaded first."""
-    expected = f"scenario file (shipped: {', '.join(shipped_scenarios())})"
-    content = read_text(file, expected, most=MOST_BYTES)
+    keys = [*keys_of(Scenario), "base"]
+    given = read_mapping(file, "scenario file", keys=keys, most=MOST_BYTES)
     if file.resolve() in seen:
         raise InputError(file, "base", "the scenario is based on itself")
-    given = parse_yaml(content, file)
-    if not isinstance(given, dict):  # which may be any file: nothing of it is shown
-        raise InputError(file, "", "holds no mapping of keys, expected a scenario")
     _resolve_files(given, file)
     base = given.pop("base", None)
     if base is None:
@@ -71,7 +70,8 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
         raise InputError(file, "base", f"found {base!r}, expected the name of a scenario")
     base_file = _file(base, file.parent)
     if not os.path.exists(base_file):
-        raise InputError(file, "base", f"'{base}': no such {expected}")
+        problem = no_such("scenario file", base, shipped_scenarios())
+        raise InputError(file, "base", f"'{base}': {problem}")
     return _load(base_file, (*seen, file.resolve())).with_file(given, file)
 
 

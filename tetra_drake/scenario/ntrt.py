@@ -140,11 +140,11 @@ class Assembly:
 
     def add_file(self, file: Path, *, prefix: str = "", above: tuple[Path, ...] = ()) -> None:
         """Adds a file that the files `above` contain, with a prefix to the names of its nodes."""
+        given = self._content(file)
         if file.resolve() in above:
             raise InputError(file, "substructures", "the structure contains itself")
         self.parts += 1
         _check_size(self.parts, MOST_PARTS, file, "substructures")
-        given = self._content(file)
         parts: dict[str, list[tuple[int, Substructure]]] = {}
         for joined, entry in given.substructures.items():
             for place, name in enumerate(joined.split("/")):

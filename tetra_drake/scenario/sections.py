@@ -7,8 +7,9 @@ units. A tagged kind, written `!Name {...}` as in Drake's YAML, is a mapping wit
 from __future__ import annotations
 
 import difflib
+import itertools
 import typing
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NoReturn, Self
 
 import pydantic
@@ -272,7 +273,7 @@ def _in_words(error: ErrorDetails, section: type[Section], tree: Any) -> tuple[s
         words, name = _LIMITS[error["type"]]
         unit = _unit(keys_of(section)[str(error["loc"][0])])
         if "length" in name:
-            unit = f"items, not {context['actual_length']}"
+            unit = f"items, not {len(value)}"
         expected = f"{words} {context[name]:.4g} {unit}".rstrip()
     return key, f"found {described(value)}, expected {expected}"
 
@@ -305,13 +306,25 @@ def described(value: Any) -> str:
     return f"'{value}'" if isinstance(value, str) else str(value)[:40]
 
 
+_MOST_NAMES, _LONGEST_NAME = 2000, 100
+"""Upper limits of what is compared with a misspelt name, which takes a while."""
+
+
 def hint(name: Any, names: Iterable[str]) -> str:
     """Advice on a misspelt name."""
-    names = list(names)
-    close = difflib.get_close_matches(str(name), names, n=1)
+    names = list(itertools.islice(names, _MOST_NAMES))
+    close = difflib.get_close_matches(str(name)[:_LONGEST_NAME], names, n=1)
     if close:
         return f"did you mean '{close[0]}'?"
     return f"expected one of {', '.join(names)}" if names else "expected none"
+
+
+def no_such(what: str, name: str, shipped: Sequence[str]) -> str:
+    """The problem with a name, or a path, of what is neither shipped nor a file."""
+    last = name.rpartition("/")[2][:_LONGEST_NAME]
+    if close := difflib.get_close_matches(last, shipped, n=1):
+        return f"no such {what}; did you mean '{close[0]}'?"
+    return f"no such {what} (shipped: {', '.join(shipped)})"
 
 
 class Whole(Tree):

@@ -9,7 +9,7 @@ from typing import Any
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.ntrt import MOST_BYTES, NtrtFile, ntrt_tree
 from tetra_drake.scenario.robot_kinds import Structure
-from tetra_drake.scenario.sections import TAG, Tree, Whole, described, keys_of, merge
+from tetra_drake.scenario.sections import TAG, Tree, Whole, described, keys_of, merge, no_such
 from tetra_drake.scenario.units import quantity_to_si
 from tetra_drake.scenario.yaml_text import read_mapping
 
@@ -30,13 +30,10 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
     unit: length of NTRT's unit, such as "dm". Raises InputError that names file and key.
     """
     file = structure_file(str(name_or_file), Path())
-    if not file.exists():
-        raise InputError(name_or_file, "", f"no such structure file (shipped: {_shipped()})")
+    if not os.path.exists(file):
+        problem = no_such("structure file", str(name_or_file), shipped_structures())
+        raise InputError(name_or_file, "", problem)
     return Structure.from_tree(_tree_of_file(file, unit, source=file, key="unit"), file)
-
-
-def _shipped() -> str:
-    return ", ".join(shipped_structures())
 
 
 def structure_file(name: str, folder: Path) -> Path:
@@ -58,8 +55,8 @@ def with_structure(tree: Tree, source: object) -> Tree:
     changes = {key: value for key, value in robot.items() if key not in (TAG, "file")}
     name = robot["file"]
     if not isinstance(name, str) or not os.path.exists(structure_file(name, Path())):
-        problem = f"{described(name)}: no such structure file (shipped: {_shipped()})"
-        raise InputError(source, "robot.file", problem)
+        problem = no_such("structure file", str(name), shipped_structures())
+        raise InputError(source, "robot.file", f"{described(name)}: {problem}")
     file = structure_file(name, Path())
     content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
     Structure.from_tree(content, file)

@@ -16,15 +16,18 @@ from tetra_drake.scenario.sections import TAG, Tree
 
 def parse_yaml(content: str, source: object) -> Any:
     """Content of YAML text; raises InputError if it is not YAML."""
+    # Errors show no lines and no names of what may be any file.
     try:
         return yaml.load(content, _Loader)
     except yaml.MarkedYAMLError as error:
-        # Without the lines that the error shows: the file may be any.
         mark = error.problem_mark or error.context_mark
         place = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-        raise InputError(source, "", f"is not YAML{place}: {error.problem}") from error
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise InputError(source, "", f"is not YAML: {error}") from error
+        problem = re.sub(r" (alias|anchor|tag|handle) '.*", r" \1", str(error.problem))
+        raise InputError(source, "", f"is not YAML{place}: {problem}") from error
+    except RecursionError as error:
+        raise InputError(source, "", "is not YAML: it is nested too deeply") from error
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:  # by wrong tags
+        raise InputError(source, "", "is not YAML: it holds what YAML cannot") from error
 
 
 def read_mapping(file: Path, what: str, *, keys: Collection[str], most: int) -> Tree:
@@ -50,18 +53,27 @@ class _Loader(yaml.SafeLoader):
     """YAML with tagged kinds, in which no key may be given twice, and 1e-3 is a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                problem = f"found the key '{key}' twice"
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
-        return super().construct_mapping(node, deep)
+        keys = [key for key, _ in node.value]
+        tree = super().construct_mapping(node, deep)
+        seen = set()
+        for key_node in keys:
+            key = self.construct_object(key_node, deep=True)
+            if key in seen:
+                problem = f"found {_shown(str(key), 'a key')} twice"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
+            seen.add(key)
+        return tree
 
     def construct_kind(self, name: str, node: Any) -> dict[Any, Any]:
         if node.value and not isinstance(node, yaml.MappingNode):
-            problem = f"found !{name} without a mapping of keys"
+            problem = f"found {_shown(f'!{name}', 'a tag')} without a mapping of keys"
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
         return {TAG: name} | (self.construct_mapping(node, deep=True) if node.value else {})
+
+
+def _shown(name: str, what: str) -> str:
+    """A name in quotes; what it is where it does not look like a name."""
+    return f"'{name}'" if re.fullmatch(r"!?[\w.]{1,40}", name) else what
 
 
 class _Dumper(yaml.SafeDumper):
