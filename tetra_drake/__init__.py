@@ -1,7 +1,7 @@
 """A Drake model of walking tensegrity robots driven by a Matsuoka central pattern generator.
 
     >>> import tetra_drake as td
-    >>> scenario = td.load_scenario("quick").with_changes({"robot.tetrahedra": 3})
+    >>> scenario = td.load_scenario("quick").with_changes({"robot.tetrahedra": 7})
     >>> run = td.evolve(scenario, "runs/mine", overwrite=True)
     >>> result = td.simulate(scenario, run.best_gait(), record=True)
     >>> print(result)

@@ -9,6 +9,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.signals import raw_output
 from tetra_drake.scenario.load import load_scenario
 
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
@@ -22,6 +23,21 @@ def test_weights_stand_in_the_listings_order(robot):
     assert matrix[0].tolist() == [0, 1.5, 1, 0, 2, 0, 3, 0]
     assert matrix[1].tolist() == [1.5, 0, 0, 4, 0, 5, 0, 6]
     assert matrix[7].tolist() == [0, 22, 0, 23, 0, 24, 1.5, 0]
+
+
+@pytest.mark.parametrize(("low", "high", "swings"), [(0.0, 1.99, True), (2.01, 3.4, False)])
+def test_two_oscillators_silence_each_other_with_weights_above_two(scenario, low, high, swings):
+    """An extensor and the other oscillator's flexor settle at y = u0 / (1 + beta); the two others
+    stay silent where (partner weight + w) y > u0, so where w > 1 + beta - partner weight."""
+    bounds = {"gait_bounds.weight_min": low, "gait_bounds.weight_max": high}
+    two = scenario.with_changes({"robot.tetrahedra": 3, "simulation.duration": "40 s"} | bounds)
+    robot, still = Robot.of(two), two.cpg.external_input / (1.0 + two.cpg.self_inhibition_weight)
+    for seed in range(20):
+        late = raw_output(robot, seeded_gait(two, seed))[-10_000:]
+        if swings:
+            assert (np.ptp(late, axis=0) > 0.1).all()
+        else:
+            np.testing.assert_allclose(np.abs(late), still, rtol=1e-3)
 
 
 def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
