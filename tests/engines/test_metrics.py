@@ -53,6 +53,10 @@ def test_tallied_metrics_are_those_of_the_trajectory(short, walk):
     assert metrics.cost_of_transport == pytest.approx(expected, rel=2e-3)
     rate = np.diff(steady.signal.values, axis=0) / 1e-3
     assert metrics.signal_rate == pytest.approx(np.sqrt((rate**2).mean()), rel=1e-3)
+    # Peaks are those of the whole walk; the speed is the greatest at its start.
+    speed = np.abs(np.diff(walk.trajectory.length.values[:, driven], axis=0)).max(axis=1) / 1e-3
+    assert metrics.peak_actuator_speed == pytest.approx(speed.max(), rel=0.01)
+    assert speed[walk.trajectory.time.values[1:] > 0.5].max() < 0.9 * speed.max()
     # A foot may touch and leave within a sample.
     shares = lifted(steady).mean("time").values
     assert metrics.lifted_shares == pytest.approx(shares, abs=5e-3)

@@ -109,9 +109,9 @@ EFFORT = {
 WOUND = np.array([1.0, 0.9, 0.5, 0.7])
 """0.1 m in 1 s, 0.4 m in 2 s, then 0.2 m paid out."""
 
-# Peaks: 4 N, 0.2 m/s, 3 N * 0.2 m/s. Sums: 1 * 2 + 2 * 3 + 1 * 4 N s, 0.1 + 0.4 + 0.2 m,
+# Peaks: 9 N, 0.2 m/s, 3 N * 0.2 m/s. Sums: 1 * 2 + 2 * 3 + 1 * 4 N s, 0.1 + 0.4 + 0.2 m,
 # 2 N * 0.1 m + 3 N * 0.4 m, without what is paid out.
-PEAKS_AND_SUMS = {"peaks": [4.0, 0.2, 0.6], "sums": [12.0, 0.7, 1.4]}
+PEAKS_AND_SUMS = {"peaks": [9.0, 0.2, 0.6], "sums": [12.0, 0.7, 1.4]}
 
 
 def effort_of(tally: Tally) -> dict[str, list[float]]:
@@ -139,7 +139,15 @@ def test_winches_wind_their_free_length_and_are_limited_for_a_time():
     assert tally.work[0] == pytest.approx(1.4), "of the tension"
 
 
-def test_the_effort_before_the_steady_stretch_does_not_count():
+def test_only_peaks_count_before_the_steady_stretch():
     tally = tallied(lengths=WOUND, begins=3.0, **EFFORT)
     # The last step, in which 0.2 m are paid out at 4 N.
-    assert effort_of(tally) == {"peaks": [4.0, 0.0, 0.0], "sums": [4.0, pytest.approx(0.2), 0.0]}
+    assert effort_of(tally)["sums"] == [4.0, pytest.approx(0.2), 0.0]
+    assert effort_of(tally)["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
+
+
+def test_a_peak_of_speed_counts_in_either_direction():
+    tally = tallied(lengths=WOUND[::-1], **EFFORT)
+    assert tally.peaks.tolist() == pytest.approx([9.0, 0.2, 0.4])
+    paid_out = tallied(lengths=np.array([0.0, 0.1, 0.2, 0.9]), **EFFORT)
+    assert paid_out.peaks.tolist() == pytest.approx([9.0, 0.7, 0.0])

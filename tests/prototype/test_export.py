@@ -84,9 +84,9 @@ def test_a_tension_motor_is_commanded_the_whole_law_of_the_cable(short, tmp_path
 
 @pytest.mark.parametrize("actuation", [FORCE, MOTOR, WINCH])
 def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
-    # The metrics look at every step of the steady stretch, here all; the file at every millisecond.
-    from_start = {"simulation.steady_from": "0 s", "cpg.start_up": "0 s"}
-    driven = short.with_changes(actuation | from_start)
+    # The metrics look at every step; the file at every millisecond, which misses how the tension
+    # overshoots for a tenth of that where forces jump at the end of a start-up.
+    driven = short.with_changes(actuation | {"cpg.start_up": "0 s"})
     export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
     metrics = simulate(scenario=driven, gait=seeded_gait(short)).metrics
     rows = rows_of(tmp_path / "lab" / LIMITS)
@@ -95,13 +95,17 @@ def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
         return max(float(row[name]) for row in rows)
 
     assert peak("peak_force_N") == pytest.approx(metrics.peak_actuator_force, rel=0.05)
+    speed = 1e-3 * peak("peak_speed_mm_per_s")
+    assert speed == pytest.approx(metrics.peak_actuator_speed, rel=0.05)
     assert peak("peak_power_W") == pytest.approx(metrics.peak_actuator_power, rel=0.1)
+    power = np.mean([float(row["mean_power_W"]) for row in rows])
+    assert power == pytest.approx(metrics.mean_actuator_power, rel=0.05)
     if actuation is not FORCE:
         # Half the greatest force at half the greatest speed: 5 N times 0.25 m/s.
         assert peak("limit_of_power_W") == 1.25
         shares = [float(row["time_at_a_limit_percent"]) for row in rows]
         limited = 100.0 * metrics.actuator_limited
-        assert np.mean(shares) == pytest.approx(limited, abs=0.15 * limited)
+        assert np.mean(shares) == pytest.approx(limited, abs=0.05 * limited)
 
 
 def test_a_weak_motor_is_told_to_be_too_weak(short, tmp_path):

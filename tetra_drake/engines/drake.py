@@ -44,6 +44,7 @@ class DrakeEngine(Engine):
         steering: SteeringSignal | None = None,
     ) -> SimulationResult:
         settings, engine = robot.scenario.simulation, robot.scenario.settings_of(Drake)
+        start_up = robot.scenario.cpg.start_up
         diagram = MakeTensegrityDiagram(robot, gait, steering=steering)
         simulator = MakeSimulator(diagram, engine)
         integrator, state = simulator.get_integrator(), diagram.GetOutputPort("state")
@@ -63,6 +64,10 @@ class DrakeEngine(Engine):
             aimer.aim(context, velocities)
             sampler.after_step(context)
             observer.add(now, bodies, signals.Eval(context), drives_at(context))
+            if now == start_up and len(robot.actuation.names):  # its event comes after this step
+                cpg = diagram.GetSubsystemByName("cpg")
+                begun = cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context))
+                observer.add(now, bodies, begun, drives_at(context))
             if viewer is not None and viewer.wants(now):
                 viewer.show(make_dataset(robot, motion_of(diagram, [Sample.of(context)])))
 

@@ -208,11 +208,14 @@ class _Simulator:
         return kept
 
     def _observe(self, observer: Observer, states: Array, signals: Array, first: int) -> None:
-        """Shows an observer every _OBSERVED-th of the states after step `first` and the next."""
-        chosen = np.arange(_OBSERVED - 1, len(states), _OBSERVED)
+        """Shows an observer every _OBSERVED-th of the states after step `first` and the next, and
+        the one at which signals begin to act."""
+        begins = round(self._robot.scenario.cpg.start_up / self._step)
+        observed = np.arange(first + 1, first + len(states) + 1)
+        chosen = np.flatnonzero((observed % _OBSERVED == 0) | (observed == begins))
         if not chosen.size:
             return
-        steps: list[int] = (first + chosen + 1).tolist()
+        steps: list[int] = observed[chosen].tolist()
         for step, state in zip(steps, self.body_states(states[chosen]), strict=True):
             now = signals[min(step, len(signals) - 1)]
             observer.add(self._step * step, state, now, _NO_DRIVES)

@@ -18,7 +18,7 @@ FORCE, SPEED, POWER, LIMITED_TIME = range(4)
 
 
 class Tally(NamedTuple):
-    """Sums over the steps that begin at `begins` or later, and least values of all steps."""
+    """Sums over the steps that begin at `begins` or later; least values and peaks of all steps."""
 
     begins: Table
     """(1,): time in s."""
@@ -33,7 +33,7 @@ class Tally(NamedTuple):
     """(1,): the integral of max(0, -S dl/dt) of the driven cables, in J. With winches and tension
     motors, S is the tension."""
     peaks: Table
-    """(3,): greatest tension (N), winding speed (m/s) and power (W) of an actuator."""
+    """(3,): greatest tension (N), speed of either sign (m/s) and power (W) of an actuator."""
     sums: Table
     """(4,): integrals, summed over all actuators, of tension, of winding speed of either sign and
     of positive power; and the time at a limit."""
@@ -51,15 +51,12 @@ class Tally(NamedTuple):
 def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
     """Adds the step that ends at a time (s) with these signals and forces. A second observation of
     the same time adds nothing."""
-    cables, kind, drives, cable_forces = (
-        robot.cables,
-        robot.actuator.kind,
-        forces.drives,
-        forces.cable_forces,
-    )
+    cables, kind = robot.cables, robot.actuator.kind
+    drives, cable_forces = forces.drives, forces.cable_forces
     passed = time - tally.time[0]
-    counts = (passed > 0.0) & (tally.time[0] >= tally.begins[0])
-    counted, per_time = select(counts, passed, 0.0), select(counts, 1.0 / passed, 0.0)
+    moves = passed > 0.0
+    counts, per_time = moves & (tally.time[0] >= tally.begins[0]), select(moves, 1.0 / passed, 0.0)
+    counted = select(counts, passed, 0.0)
     work, roughness, tension = 0.0 * passed, 0.0 * passed, tally.tension[0]
     drive = 0
     for i in range(tally.lengths.size):
@@ -71,10 +68,12 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
                 left = drives[drive, DRIVE] if kind == WINCH else left
                 tally.sums[LIMITED_TIME] += counted * drives[drive, LIMITED]
                 drive += 1
-            wound = select(counts, tally.lengths[i] - left, 0.0)
+            wound = select(moves, tally.lengths[i] - left, 0.0)
             tally.lengths[i] = left
+            note_peaks(tally.peaks, cable_forces[i, TENSION], wound * per_time)
+            wound = select(counts, wound, 0.0)
             work += maximum(force * wound, 0.0)
-            add_actuator(tally, cable_forces[i, TENSION], wound, counted, per_time)
+            add_actuator(tally.sums, cable_forces[i, TENSION], wound, counted)
         tension = minimum(tension, cable_forces[i, TENSION])
     tally.tension[0] = tension
     for k in range(tally.signals.size):
@@ -88,17 +87,21 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
 
 
 @inlined
-def add_actuator(tally: Tally, tension: Real, wound: Real, passed: Real, per_time: Real) -> None:
+def note_peaks(peaks: Table, tension: Real, speed: Real) -> None:
+    """Notes the tension (N) and the winding speed (m/s) of an actuator where they are peaks; the
+    speed counts in either direction."""
+    peaks[FORCE] = maximum(peaks[FORCE], tension)
+    peaks[SPEED] = maximum(peaks[SPEED], abs(speed))
+    peaks[POWER] = maximum(peaks[POWER], tension * speed)
+
+
+@inlined
+def add_actuator(sums: Table, tension: Real, wound: Real, passed: Real) -> None:
     """Adds an actuator that has `wound` some of its cable (m) under a tension (N) in the time that
     has passed (s); all but the tension is 0 where a step does not count."""
-    peaks, sums, work = tally.peaks, tally.sums, tension * wound
-    force = select(passed > 0.0, tension, 0.0)
-    peaks[FORCE] = maximum(peaks[FORCE], force)
-    peaks[SPEED] = maximum(peaks[SPEED], wound * per_time)
-    peaks[POWER] = maximum(peaks[POWER], work * per_time)
     sums[FORCE] += passed * tension
     sums[SPEED] += abs(wound)
-    sums[POWER] += maximum(work, 0.0)
+    sums[POWER] += maximum(tension * wound, 0.0)
 
 
 @inlined

@@ -20,6 +20,7 @@ from tetra_drake.prototype.command_file import (
     table_text,
 )
 from tetra_drake.prototype.loads import Loads, actuator_loads
+from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
@@ -63,7 +64,7 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
         write_whole(folder / SCENARIO, dump_scenario(scenario))
 
         played, distance = _played(scenario, folder / COMMAND), fixed(result.metrics.distance_in)
-        verdict = load_verdict(loads, result.trajectory.time.values)
+        verdict = load_verdict(loads, result)
         verdict += f"\n{played}; the gait itself goes {distance} in."
         template = resources.files("tetra_drake") / "prototype/README.template.md"
         about = {"gait": gait.name, "scenario": scenario.name, "rate": rate, "verdict": verdict}
@@ -81,9 +82,9 @@ def check_rate(rate: float, scenario: Scenario) -> None:
         raise InputError("--rate", "", f"found {rate:g} Hz, expected {expected}")
 
 
-def load_verdict(loads: Loads, times: np.ndarray) -> str:
-    """The greatest loads, the limits, and whether actuators can bear the loads at times (s)."""
-    worst = loads.table.max()
+def load_verdict(loads: Loads, result: SimulationResult) -> str:
+    """The greatest loads, the limits, and whether actuators can bear the loads in a simulation."""
+    worst = loads.table.drop(columns="time_at_a_limit_percent").max()
     worst["least_length_mm"] = loads.table["least_length_mm"].min()
     table = worst.dropna().to_string(float_format=fixed)
     if np.isnan(loads.limited).any():
@@ -91,9 +92,12 @@ def load_verdict(loads: Loads, times: np.ndarray) -> str:
     if not loads.limited.any():
         return f"{table}\nThe actuators can play it: no limit binds."
     first, cable = np.argwhere(loads.limited)[0]
-    share, name = fixed(100.0 * loads.limited.mean()), loads.table.index[cable]
-    binds = f"a limit binds {share} % of the time, first at {times[first]:.3f} s ({name})"
-    return f"{table}\nThe actuators cannot play all of it: {binds}."
+    time, name = result.trajectory.time.values[first], loads.table.index[cable]
+    share = fixed(100.0 * result.metrics.actuator_limited)
+    return (
+        f"{table}\nThe actuators cannot play all of it: a limit binds first at {time:.3f} s "
+        f"({name}), and {share} % of the steady stretch, mean of all actuators."
+    )
 
 
 def _played(scenario: Scenario, file: Path) -> str:

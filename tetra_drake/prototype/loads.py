@@ -18,6 +18,7 @@ from tetra_drake.physics.actuator import (
     actuator_force,
 )
 from tetra_drake.physics.cable import cable_tension
+from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
 
 _HAIR = 1e-9
@@ -32,8 +33,9 @@ class Loads(NamedTuple):
     limited: np.ndarray
     """(times, driven cables): 1 where a limit binds, or else 0; NaN for forces without limits."""
     table: pandas.DataFrame
-    """Peaks and means, a row for each driven cable, with units in the names; NaN where there is no
-    limit. What is wound is the free length with winches, else the cable."""
+    """Peaks at any time and means over the steady stretch, a row for each driven cable, with units
+    in the names; NaN where there is no limit. What is wound is the free length with winches, else
+    the cable."""
 
 
 def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
@@ -59,7 +61,7 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
     else:
         commands = np.clip(cable_tension(length, rate, signal, law), 0.0, limits.max_force)
         left, limited = length, pull(tension + _HAIR, length, rate, signal, *law)[3]
-    power = -tension * rate
+    power, steady = -tension * rate, trajectory.time.values >= steady_start(robot.scenario)
     columns = {
         "peak_force_N": tension.max(axis=0),
         "limit_of_force_N": limits.max_force,
@@ -70,7 +72,7 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
         "limit_of_length_mm": 1e3 * limits.least_length,
         "peak_power_W": power.max(axis=0),
         "limit_of_power_W": 0.25 * limits.max_force * limits.max_speed,  # half of both
-        "mean_power_W": np.maximum(power, 0.0).mean(axis=0),
-        "time_at_a_limit_percent": 100.0 * limited.mean(axis=0),
+        "mean_power_W": np.maximum(power, 0.0)[steady].mean(axis=0),
+        "time_at_a_limit_percent": 100.0 * limited[steady].mean(axis=0),
     }
     return Loads(commands, limited, pandas.DataFrame(columns, index=walk.cable.to_index()))

@@ -19,11 +19,16 @@ from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, shown
 
 
+def steady_start(scenario: Scenario) -> float:
+    """Time (s) at which the steady stretch begins, over which means are taken."""
+    return max(scenario.simulation.steady_from, scenario.cpg.start_up)
+
+
 def empty_tally(robot: Robot) -> Tally:
     """The tally of a walk that begins."""
-    scenario, structure = robot.scenario, robot.structure
+    structure = robot.structure
     return Tally(
-        begins=np.array([max(scenario.simulation.steady_from, scenario.cpg.start_up)]),
+        begins=np.array([steady_start(robot.scenario)]),
         time=np.zeros(1),
         signals=np.zeros(structure.signals),
         lengths=np.zeros(len(structure.cables)),

@@ -80,19 +80,20 @@ class Metrics:
     """0 if the signals stand along the robot, 1 if they travel, in the steady stretch. See
     results.measures."""
     peak_actuator_force: float = _metric("N", most=True)
-    """Greatest tension of a driven cable in the steady stretch, as are the next ones."""
+    """Greatest tension of a driven cable at any time."""
     mean_actuator_force: float = _metric("N")
-    """Mean tension of the driven cables."""
+    """Mean tension of the driven cables in the steady stretch."""
     peak_actuator_speed: float = _metric("m/s", most=True)
-    """Greatest speed at which an actuator winds: a winch its free length, another one its cable."""
+    """Greatest speed of an actuator at any time, winding or paying out: a winch its free length,
+    another one its cable."""
     mean_actuator_speed: float = _metric("m/s")
-    """Mean speed, winding or paying out."""
+    """Mean speed in the steady stretch, winding or paying out."""
     peak_actuator_power: float = _metric("W", most=True)
-    """Greatest product of an actuator's tension and winding speed."""
+    """Greatest product of an actuator's tension and winding speed, at any time."""
     mean_actuator_power: float = _metric("W", most=True)
-    """Mean positive power of an actuator: the effort of a gait."""
+    """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
     actuator_limited: float = _metric("", most=True)
-    """Share of time in which a limit binds, mean of all winches or tension motors."""
+    """Share of the steady stretch in which a limit binds, mean of all winches or tension motors."""
     lifted_shares: tuple[float, ...] = ()
     """The share of `lifted` of each body, from T1 on."""
 
