@@ -66,19 +66,19 @@ def test_the_ground_is_named_with_its_terrain_and_friction(scenario, changes, wo
 
 
 def test_a_run_is_summed_up_by_the_metric_of_its_objective(tmp_path):
-    # By trials, in inches: from 2 to 3, from 5 to 6, from 1 to 4; the fittest walks 6 in.
+    # By trials, in inches: from 2 to 3, from 5 to 6, from 5.5 to 4; the fittest walks 6 in.
     trials = [
         [[(4.0, 0)], [(6.0, 0)]],
         [[(10.0, 0)], [(12.0, 0), (None, 1)]],
-        [[(2.0, 0)], [(8.0, 0)]],
+        [[(11.0, 0)], [(8.0, 0)]],
     ]
     walked = dict(results(load_run(write_run(tmp_path / "far", trials))))
     assert walked["distance"].startswith("6.00 in, trial 1, evaluation 1")
-    assert walked["best initial gait"].startswith("5.00 in, trial 1, evaluation 0")
+    assert walked["best initial gait"].startswith("5.50 in, trial 2, evaluation 0")
     assert re.findall(r"[\d.]+ in", walked["best of each trial"]) == [
-        "4.00 in",
-        "3.50 in",
-        "5.00 in",
+        "5.50 in",
+        "4.25 in",
+        "5.75 in",
     ]
     assert walked["evaluations"].startswith("7,") and "1" in walked["evaluations"]
     assert walked["time per evaluation"] == "500 ms"

@@ -126,7 +126,8 @@ def results(run: Run) -> list[tuple[str, str]]:
     if best.empty:
         return effort
     fittest = run.fittest()
-    initial = run.initial_best(fittest["trial"])
+    starts = [run.initial_best(trial) for trial in best["trial"]]
+    initial = max(starts, key=lambda gait: gait["fitness"])
     name = _about(run)
     title, unit = name.replace("_", " "), METRICS[name]
     rows = [
