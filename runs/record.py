@@ -26,6 +26,8 @@ from typing import Any
 from analyse import ANALYSIS, analyse
 from thinning import thin
 
+from tetra_drake.analysis.elites import judge_elites
+from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.progress import Display
@@ -37,7 +39,6 @@ from tetra_drake.files import write_whole
 from tetra_drake.formatting import duration, listed
 from tetra_drake.machine import available_cores
 from tetra_drake.prototype.export import export
-from tetra_drake.report.replay_page import load_or_simulate
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, OptimizerKind, QualityDiversity
@@ -172,6 +173,7 @@ def record(name: str, experiment: Experiment, *, scratch: Path, out: Path) -> No
         evolve(scenario, made, resume=resume, reevaluate=False, report=False, progress=progress)
     if not analysis.exists():
         with timed(name, "analysis", out):
+            judge_elites(made)
             analyse(made, workers=available_cores())
     with timed(name, "pages", out):
         make_folder(made, shown)
@@ -207,9 +209,10 @@ def timed(name: str, stage: str, out: Path) -> Iterator[None]:
 
 
 def show(directory: Path, *, viewer: Path, film: bool) -> None:
-    """Draws a run's best gait: the page, the picture, the gait diagram and, if asked for, the
-    film."""
-    result = load_or_simulate(directory)
+    """Draws a run's best gait on the compiled engine: the page, the picture, the gait diagram and,
+    if asked for, the film."""
+    run = load_run(directory)
+    result = simulate(run.scenario.with_changes(_COMPILED), run.best_gait(), record=True)
     result.save_replay(directory / REPLAY, viewer=viewer)
     films = [directory / FILM] if film else []
     take_pictures(directory / REPLAY, *films, directory / PICTURE)

@@ -7,10 +7,12 @@ import record
 from analyse import ANALYSIS
 from helpers.meshcat_page import read_page
 
+from tetra_drake.analysis.elites import elites
 from tetra_drake.evolution.run import load_run
-from tetra_drake.scenario.optimizer_kinds import CmaEs
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 
-SMALL = {"engine": "!Compiled", "robot.tetrahedra": 2, "optimizer": CmaEs(sample=4)}
+MAP = QualityDiversity(cells=[2, 2], draws=1)
+SMALL = {"engine": "!Compiled", "robot.tetrahedra": 2, "optimizer": MAP}
 SHORT = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.1 s"}
 FEW = {"evolution.trials": 2, "evolution.evaluations": 8}
 TINY = record.Experiment("two tetrahedra", "thesis", SMALL | SHORT | FEW, film=True)
@@ -47,7 +49,8 @@ def test_an_experiment_becomes_a_thinned_run_and_is_made_once(tmp_path, analysed
     assert run.manifest.thinned and run.manifest.scenario == TINY.scenario("tiny")
     assert run.evaluations.groupby("trial").size().tolist() == [8, 8]
     assert run.reevaluations.empty
-    made = {"manifest.json", "scenario.yaml", "trial_00", "trial_01"}
+    assert elites(run)["kept"].notna().all()
+    made = {"manifest.json", "scenario.yaml", "trial_00", "trial_01", "elites.jsonl.xz"}
     shown = {"replay.html", "walking.png", "walking.gif", "gait.svg", "analysis.json"}
     assert {file.name for file in (out / "tiny").iterdir()} == kept | made | shown
     assert 'src="../meshcat.js"' in read_page(out / "tiny/replay.html")
