@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas
 
 from tetra_drake.analysis.robustness import PERCENT, by_gait, judge
@@ -31,6 +32,7 @@ from tetra_drake.machine import available_cores, versions
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
+from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
@@ -38,7 +40,7 @@ from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.scenario.units import INCH
 
-SCHEMA = 5
+SCHEMA = 6
 ANALYSIS = "analysis.json"
 
 TIGHT, MUJOCO = "runge_kutta3, witness", "MuJoCo"
@@ -50,17 +52,20 @@ LAWS = {"reset integrator": "thesis", "Coulomb": "coulomb"}
 UNSEEN = range(1001, 1021)
 """Seeds of random ground on which no gait was evolved."""
 
+WAYS, DISPLACEMENT = 10, 1e-9
+"""Number of displaced starts of a gait, and displacement of each body there (m)."""
+
 SHOWN = ("cost_of_transport", "tension", "clearance")
 """The metrics of the best gaits that pages show."""
 
 _MEAN, _KEPT = ("mean", "mean_low", "mean_high"), ("kept", "kept_low", "kept_high")
 _COLUMNS = {
-    "best_gaits": ("trial", "evaluation", "evaluations", "fitness", *SHOWN),
+    "best_gaits": ("trial", "evaluation", "evaluations", "fitness", *SHOWN, "sensitivity_in"),
     "resimulations": ("trial", "setting", "distance_in"),
     "unseen": ("trial", "seed", "distance_in", "met"),
     "disturbed": ("gait", "undisturbed", *_MEAN, *_KEPT, "failed", "missed"),
 }
-_NUMBERS = [*SHOWN, "distance_in"]
+_NUMBERS = [*SHOWN, "sensitivity_in", "distance_in"]
 """Columns that may be null in all rows."""
 
 
@@ -68,10 +73,9 @@ _NUMBERS = [*SHOWN, "distance_in"]
 class Analysis:
     """Content of analysis.json."""
 
-    versions: Mapping[str, str]
     best_gaits: pandas.DataFrame
     """The fittest gait of each trial. Index: trial. Columns: evaluation, evaluations (of the whole
-    trial), fitness and the metrics SHOWN, in SI units."""
+    trial), fitness, the metrics SHOWN in SI units, and sensitivity_in (see sensitivity())."""
     resimulations: pandas.DataFrame
     """Fittest gaits on other engines and under other laws of friction: trial, setting, distance_in
     (NaN where it failed)."""
@@ -111,7 +115,6 @@ def load_analysis(directory: Path) -> Analysis:
             numbers = frame.columns.intersection(_NUMBERS)
             frame[numbers] = frame[numbers].astype(float)
         return Analysis(
-            raw["versions"],
             best_gaits=frames["best_gaits"].set_index("trial"),
             resimulations=frames["resimulations"],
             unseen=frames["unseen"],
@@ -134,6 +137,8 @@ def analyse(
     run.fittest()  # InputError if there is none
     best = best_gaits(run)
     gaits = {row["trial"]: run.gait(row["trial"], row["evaluation"]) for row in best}
+    for row, change in zip(best, sensitivity(scenario, [*gaits.values()], workers), strict=True):
+        row["sensitivity_in"] = json_number(change)
     judgement = judge(scenario, gaits, percent=PERCENT, alone=False, workers=workers)
     content = {
         "schema": SCHEMA,
@@ -157,6 +162,30 @@ def best_gaits(run: Run) -> list[dict[str, Any]]:
         numbers = {name: json_number(float(gait[name])) for name in ("fitness", *SHOWN)}
         rows.append(row | numbers)
     return rows
+
+
+def sensitivity(scenario: Scenario, gaits: Sequence[Gait], workers: int) -> list[float]:
+    """Largest change (in) of each gait's distance on the compiled engine if every body starts
+    DISPLACEMENT away, in WAYS random directions; NaN if one of these simulations fails."""
+    generator = np.random.default_rng(0)
+    directions = generator.normal(size=(WAYS, scenario.robot.body_count, 3))
+    directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+    directions[:, :, 2] = np.abs(directions[:, :, 2])  # not into the ground
+    starts = [Draw({}), *(Draw({}, moves=DISPLACEMENT * each) for each in directions)]
+    compiled = scenario.with_changes({"engine": "!Compiled"})
+    scenarios = [disturbed(compiled, start) for start in starts]
+    outcomes = simulate_many(
+        scenarios * len(gaits), [gait for gait in gaits for _ in scenarios], workers=workers
+    )
+    distances = np.array(
+        [
+            outcome.metrics.distance_in if isinstance(outcome, SimulationResult) else math.nan
+            for outcome in outcomes
+        ]
+    )
+    undisplaced, *displaced = distances.reshape(len(gaits), len(scenarios)).T
+    largest: list[float] = np.abs(displaced - undisplaced).max(axis=0).tolist()
+    return largest
 
 
 def resimulate(

@@ -86,7 +86,7 @@ def trials_table(run: Analysis) -> str:
     if not apart:
         return table
     trials = "trial" if len(apart) == 1 else "trials"
-    return f"{table}\n\nThe engines differ by more than {APART} in in {trials} {listed(apart)}."
+    return f"{table}\n\nThe engines differ by more than {APART} inches in {trials} {listed(apart)}."
 
 
 def pages(runs: Runs) -> list[Path]:

@@ -1,6 +1,7 @@
 """What analyse.py simulates of a run's best gaits."""
 
 import json
+import math
 from concurrent.futures import ThreadPoolExecutor
 
 import analyse
@@ -40,7 +41,8 @@ def test_the_best_gait_of_each_trial_is_analysed(folder):
     analysis = analyse.load_analysis(folder)
     counts = {"evaluation": [2, 0], "evaluations": [3, 2], "fitness": [5.0, 3.0]}
     metrics = {name: [value, value] for name, value in METRICS.items()}
-    assert analysis.best_gaits.to_dict("list") == counts | metrics
+    best = analysis.best_gaits
+    assert best.drop(columns="sensitivity_in").to_dict("list") == counts | metrics
     assert analysis.best_gaits.index.tolist() == [0, 2]
     assert analysis.best_trial == 0
 
@@ -59,6 +61,19 @@ def test_they_are_simulated_on_other_engines_and_under_other_laws(folder):
     assert by_setting["reset integrator"] == distances(run, scenario)
     assert by_setting[analyse.TIGHT] == distances(run, settings[analyse.TIGHT])
     assert again["distance_in"].nunique() > 2
+
+
+def test_sensitivity_is_of_each_gait_and_grows_with_the_displacement(folder, monkeypatch):
+    run, recorded = load_run(folder), analyse.load_analysis(folder).best_gaits["sensitivity_in"]
+    gaits = [run.gait(0, 2), run.gait(2, 0)]
+    for gait, sensitivity in zip(gaits, recorded, strict=True):
+        assert [sensitivity] == analyse.sensitivity(run.scenario, [gait], workers=1)
+        assert 1e-10 < sensitivity < 1e-6, "1 nm in 0.3 s"
+    monkeypatch.setattr(analyse, "DISPLACEMENT", 1e-6)
+    further = analyse.sensitivity(run.scenario, gaits, workers=1)
+    assert all(100.0 < a / b < 10_000.0 for a, b in zip(further, recorded, strict=True))
+    fails = run.scenario.with_changes({"simulation.max_evaluations": 10})
+    assert all(math.isnan(each) for each in analyse.sensitivity(fails, gaits, workers=1))
 
 
 def test_only_what_an_engine_can_simulate_is_asked_of_it():

@@ -13,15 +13,24 @@ from analyse import load_analysis
 
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import read_manifest
-from tetra_drake.machine import versions
+from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.robot.gait import ParameterSpace, load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.units import INCH
 
-TOLERANCE = 0.05
-"""in; processors and versions of packages differ in the last digits, which a walk enlarges."""
+ROUNDINGS = 2.0
+"""Tolerance of a distance, in multiples of the gait's own sensitivity: the largest change of the
+distance in ten starts that are displaced by 1 nm.
+
+Processors, versions of packages and changes of the code round differently, in the sixteenth digit;
+1 nm is in the eighth digit of a position. Some gaits enlarge both by the same factor: the change
+by rounding is then a ten-millionth of the sensitivity. In the others, the lengths of steps soon
+have nothing in common, and the distance differs by the integration error, the same for 1 nm and
+for rounding. Rounding is then an eleventh draw: one gait in eleven exceeds the largest of ten
+draws, but hardly by half. (Without fused products, 2 of 120 gaits did, at most by a fifth.)
+"""
 
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
 """Runs of one's own may lie beside them."""
@@ -46,13 +55,21 @@ def test_the_best_gaits_walk_as_recorded(name):
     folder = tables.HERE / name
     analysis, scenario = load_analysis(folder), load_scenario(folder / "scenario.yaml")
     scenario = scenario.with_changes({"engine": "!Compiled"})
-    tolerance = 0.0 if analysis.versions == versions() else TOLERANCE
-    recorded = analysis.disturbed["undisturbed"] / INCH
-    assert len(recorded) == scenario.evolution.trials
-    for trial, distance in recorded.items():
+    best = analysis.best_gaits
+    assert len(best) == scenario.evolution.trials
+    for trial, sensitivity in best["sensitivity_in"].items():
         gait = load_gait(folder / f"trial_{trial:02d}/best_gait.json", scenario)
         walked = simulate(scenario=scenario, gait=gait).metrics.distance_in
-        assert walked == pytest.approx(distance, rel=0, abs=tolerance), f"trial {trial}"
+        recorded = pytest.approx(analysis.undisturbed(trial), rel=0, abs=ROUNDINGS * sensitivity)
+        assert walked == recorded, f"trial {trial}"
+
+
+def test_the_diagram_walks_as_recorded():
+    """Ten starts that are displaced by 1 nm change this distance by at most 0.0022 in."""
+    run = load_run(tables.HERE / "thesis-drake")
+    walked = simulate(scenario=run.scenario, gait=run.best_gait()).metrics.distance_in
+    recorded = run.fittest()["distance"] / INCH
+    assert walked == pytest.approx(recorded, rel=0, abs=ROUNDINGS * 0.0022)
 
 
 @pytest.mark.parametrize("name", FOLDERS)
