@@ -13,7 +13,6 @@ from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.physics.model import Model
 from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.structure import Structure, moved_nodes
-from tetra_drake.simd.packed import Packed
 
 
 @pytest.fixture
@@ -27,7 +26,7 @@ def forces_of_cables(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The generalized force and the tensions."""
     forces, force = Forces.of(model), np.empty(30)
-    compute_cable_forces(Packed((model, forces)), state, np.array(signals), force)
+    compute_cable_forces((model, forces), state, np.array(signals), force)
     return force, forces.cable_forces[:, TENSION]
 
 

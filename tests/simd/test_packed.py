@@ -51,7 +51,9 @@ def test_a_kernel_gets_all_that_is_packed(flag, flips):
     assert gather_sums(packed, x) == machine_code(gather_sums, packed, x)(packed, x)
     assert gather_sums(packed, x) == sign * total + 7
     assert parts[1].tolist() == [sign * 210.0, sign * 543.0]
-    assert gather_sums.py_func(packed, x) == sign * total + 7, "in Python, too"
+    for given in (packed, parts):
+        assert gather_sums.py_func(given, x) == sign * total + 7, "in Python, too"
+    assert gather_sums(parts, x) == sign * total + 7
 
 
 def test_a_kernel_sees_what_is_written_to_the_arrays_later():

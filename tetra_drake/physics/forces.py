@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 
@@ -54,6 +54,10 @@ class Forces(NamedTuple):
             inertia=np.zeros((len(robot.bodies.mass), inertia.INERTIA_COLUMNS)),
             drives=np.zeros((drives, actuator.DRIVE_COLUMNS)),
         )
+
+
+Parts: TypeAlias = Packed[tuple[Model, Forces]] | tuple[Model, Forces]
+"""A robot and room for the forces on it, packed for kernels that Python calls often."""
 
 
 @inlined
@@ -173,9 +177,7 @@ def compute_forces(
 
 
 @compiled
-def compute_cable_forces(
-    parts: Packed[tuple[Model, Forces]], state: Table, signals: Table, generalized: Table
-) -> None:
+def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> None:
     """Writes [t_W; f_W] of all cables at each Bo, (6 bodies,), for a state of the bodies; also the
     nodes, the `cable_forces` and the rates of the drives."""
     robot, forces = unpacked(parts)
@@ -185,9 +187,7 @@ def compute_cable_forces(
 
 
 @compiled
-def compute_ground_forces(
-    parts: Packed[tuple[Model, Forces]], state: Table, modes: Table, generalized: Table
-) -> None:
+def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized: Table) -> None:
     """Writes [t_W; f_W] of the ground at each Bo, (6 bodies,), for a state of the bodies; also the
     nodes, the frames and the `ground_forces`."""
     robot, forces = unpacked(parts)

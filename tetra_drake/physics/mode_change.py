@@ -7,19 +7,19 @@ import math
 import numpy as np
 
 from tetra_drake.physics import contact, friction
-from tetra_drake.physics.forces import Forces, move_contacts
+from tetra_drake.physics.forces import Forces, Parts, move_contacts
 from tetra_drake.physics.kinematics import node_acceleration
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.terrain import to_frame
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, minimum, named, select
-from tetra_drake.simd.packed import Packed, unpacked
+from tetra_drake.simd.packed import unpacked
 
 Array = np.ndarray
 
 
 @compiled
-def modes_after_step(parts: Packed[tuple[Model, Forces]], state: Table, modes: Table) -> Truth:
+def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
     """Brings `modes`, (contacts, MODE_COLUMNS), up to date with a state of the bodies, as
     update_modes() does; writes the nodes and frames, too."""
     robot, forces = unpacked(parts)
@@ -28,7 +28,7 @@ def modes_after_step(parts: Packed[tuple[Model, Forces]], state: Table, modes: T
 
 
 @compiled
-def mode_margin(parts: Packed[tuple[Model, Forces]], state: Array, modes: Array) -> float:
+def mode_margin(parts: Parts, state: Array, modes: Array) -> float:
     """Positive while no mode is due to change; crosses zero where the first one is.
 
     The least of: gap in the air, depth on the ground (m), the margin of friction. Only its sign has
@@ -80,7 +80,7 @@ def time_to_mode_change(
 
 @compiled
 def next_mode_change(
-    parts: Packed[tuple[Model, Forces]],
+    parts: Parts,
     state: Array,
     acceleration: Array,
     modes: Array,

@@ -30,7 +30,6 @@ from tetra_drake.robot.tetrahedra import MakeTetrahedra
 from tetra_drake.scenario import robot_kinds
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import CpgSection
-from tetra_drake.simd.packed import Packed
 
 AMPLITUDE = 0.5
 """Amplitude of y_extensor - y_flexor, as a share of u0: 0.44 to 0.53 in random gaits."""
@@ -178,7 +177,7 @@ class Robot:
     def starting_modes(self) -> np.ndarray:
         """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
         modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
-        parts = Packed((self.model, Forces.of(self.model)))
+        parts = self.model, Forces.of(self.model)
         modes_after_step(parts, self.structure.initial_state, modes)
         return modes
 

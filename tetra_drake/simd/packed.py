@@ -48,8 +48,8 @@ class PackedKind(types.Type):
 class Packed(Generic[Values]):
     """Tuples of arrays, whole numbers, truth values and such tuples, as one argument of a kernel.
 
-    A kernel sees what is written to the arrays later. Raises ValueError for an array that cannot be
-    a Field.
+    A kernel sees what is written to the arrays later. Packing takes half a millisecond: for a few
+    calls the tuple itself will do. Raises ValueError for an array that cannot be a Field.
     """
 
     def __init__(self, values: Values) -> None:
@@ -74,9 +74,9 @@ def _pack(value: Any, words: list[int]) -> types.Type:
     return types.boolean if isinstance(value, bool) else types.intp
 
 
-def unpacked(packed: Packed[Values]) -> Values:
-    """The values of a Packed, in a kernel or in Python."""
-    return packed.values
+def unpacked(values: Packed[Values] | Values) -> Values:
+    """The values of a Packed, in a kernel or in Python; of a tuple, the tuple."""
+    return values.values if isinstance(values, Packed) else values
 
 
 @register_model(PackedKind)
@@ -127,4 +127,10 @@ def _unpacked(context: Any, packed: PackedKind) -> Any:
     return packed.content(packed), emit
 
 
-overload(unpacked)(lambda packed: lambda packed: _unpacked(packed))
+overload(unpacked)(
+    lambda values: (
+        (lambda values: _unpacked(values))
+        if isinstance(values, PackedKind)
+        else (lambda values: values)
+    )
+)

@@ -19,7 +19,6 @@ from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
-from tetra_drake.simd.packed import Packed
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
@@ -61,7 +60,7 @@ def disturbed_robot(scenario: Scenario, seed: int) -> tuple[Model, np.ndarray, n
     robot, structure = whole.model, whole.structure
     state = disturbed(structure, seed, pose=1e-3, speed=0.05)
     modes = np.zeros((len(structure.contacts), MODE_COLUMNS))
-    modes_after_step(Packed((robot, Forces.of(robot))), state, modes)
+    modes_after_step((robot, Forces.of(robot)), state, modes)
     assert np.count_nonzero(modes[:, 0]) > 0, "some nodes touch the ground"
     return robot, state, modes
 
