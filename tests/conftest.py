@@ -93,6 +93,7 @@ def refused() -> Refused:
             yield
         error = caught.value
         assert (error.source, error.key) == (str(source), key)
+        source = str(source).replace("\0", r"\x00")
         assert str(error).startswith(f"{source}: {key}: " if key else f"{source}: ")
         assert problem in str(error)
         assert len(str(error).splitlines()) == 1

@@ -27,3 +27,8 @@ def test_little_is_quoted_of_what_is_long(problem, kept):
 def test_a_usual_problem_is_told_in_full():
     problem = f"found '{LONG[:200]}', expected one of " + ", ".join(f"name_{i}" for i in range(30))
     assert str(InputError("a.yaml", "key", problem)) == f"a.yaml: key: {problem}"
+
+
+def test_a_message_is_one_line_that_a_terminal_does_not_obey():
+    error = InputError("a\nb.csv", "\x1b[2J", "found '1\x1b[31m\r\n2\0'")
+    assert str(error) == "a b.csv: \\x1b[2J: found '1\\x1b[31m 2\\x00'"

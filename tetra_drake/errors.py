@@ -23,16 +23,22 @@ class InputError(ValueError):
         self.key = key
         self.problem = _shortened(problem)
         place = f"{_cut(self.source, _LONGEST_PATH)}: {_cut(key, _QUOTED)}".removesuffix(": ")
-        super().__init__(" ".join(f"{place}: {self.problem}".split()))
+        super().__init__(_one_line(f"{place}: {self.problem}"))
 
 
 def _shortened(problem: str) -> str:
     """The problem on one line, without most of what it quotes, if that is long: it may be a whole
     file."""
-    problem = " ".join(problem.split())
+    problem = _one_line(problem)
     problem = re.sub(rf"'([^']{{{_QUOTED}}})[^']+'", r"'\1 ...'", problem)
     problem = re.sub(rf"([^\s']{{{_QUOTED}}})[^\s']+", r"\1 ...", problem)
     return problem if len(problem) <= _LONGEST else _cut(problem, _QUOTED)
+
+
+def _one_line(text: str) -> str:
+    """The text on one line, with escapes for control characters, which a terminal would obey."""
+    line = " ".join(text.split())
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in line)
 
 
 def _cut(text: str, length: int) -> str:

@@ -436,6 +436,12 @@ def test_a_fault_names_the_file_that_has_it(tmp_path, refused):
         load_scenario(file)
 
 
+@pytest.mark.parametrize("length", ["1e-15 m", "20 km"])
+def test_struts_of_no_size_that_can_be_computed_with_are_refused(scenario, length, refused):
+    with refused("scenario thesis", "robot.strut_length", "expected 0.0001 m to 10000 m"):
+        scenario.with_changes({"robot.strut_length": length, "robot.spacing": "3 in"})
+
+
 def test_what_is_no_text_file_is_refused(tmp_path, refused):
     (tmp_path / "binary.yaml").write_bytes(b"\x89PNG\r\n\x1a\n\x00\xff")
     (tmp_path / "large.yaml").write_text("#" * (2**20 + 1))

@@ -57,6 +57,29 @@ def check_one_per_body(key: str, items: Sequence[object], bodies: int) -> None:
         refuse(key, f"found {len(items)} items, expected none or {bodies}, one for each body")
 
 
+LONGEST, SHORTEST = 1e4, 1e-4
+"""Limits of the length of a strut, in m; nodes are no farther from the origin."""
+
+THINNEST = 1e-5
+"""Least diameter of a strut, as a share of its length: the moment about its axis must not vanish
+beside the others."""
+
+LIGHTEST = 1e-12
+"""Least mass of a strut, in kg."""
+
+
+def check_strut(key: str, *, length: float, diameter: float, density: float) -> None:
+    """Refuses a strut of a size (SI units) that forces and motions cannot be computed with."""
+    if not SHORTEST <= length <= LONGEST:
+        refuse(key, f"is {length:.3g} m long, expected {SHORTEST:g} m to {LONGEST:g} m")
+    if diameter < THINNEST * length:
+        thick = f"is {diameter:.3g} m thick and {length:.3g} m long"
+        refuse(key, f"{thick}, expected a diameter of at least {THINNEST:g} of the length")
+    mass = 0.25 * math.pi * diameter**2 * length * density
+    if mass < LIGHTEST:
+        refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
+
+
 class RowCables(Section):
     """The cables of a row (Table 3). A slack cable has tension 0 where it would push."""
 
@@ -162,6 +185,12 @@ class Tetrahedra(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Tetrahedra:
+        check_strut(
+            "strut_length",
+            length=self.strut_length,
+            diameter=self.strut_diameter,
+            density=self.density,
+        )
         check_one_per_body("offsets", self.offsets, self.tetrahedra)
         check_one_per_body("payload", self.payload, self.tetrahedra)
         cables = [cable for group in self.actuation for cable in group]

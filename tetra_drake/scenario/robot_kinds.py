@@ -17,7 +17,7 @@ from pydantic import Field
 
 from tetra_drake.scenario.layout import Layout
 from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
-from tetra_drake.scenario.nesting import Point, Tetrahedra, check_one_per_body
+from tetra_drake.scenario.nesting import LONGEST, Point, Tetrahedra, check_one_per_body, check_strut
 from tetra_drake.scenario.sections import (
     Kinds,
     Section,
@@ -249,6 +249,7 @@ class Structure(Section):
     @pydantic.model_validator(mode="after")
     def _check(self) -> Structure:
         self._check_pairs()
+        self._check_sizes()
         self._check_places()
         self._check_bodies()
         self._check_tensions()
@@ -277,6 +278,16 @@ class Structure(Section):
             earlier = keys.setdefault(frozenset(member.nodes), member.key)
             if earlier != member.key:
                 refuse(member.key, f"found the nodes of {earlier}, expected each pair once")
+
+    def _check_sizes(self) -> None:
+        for node, place in self.nodes.items():
+            if max(map(abs, place)) > LONGEST:
+                refuse(
+                    f"nodes.{node}", f"found {place}, expected coordinates of at most {LONGEST:g} m"
+                )
+        for strut in self.all_struts:
+            group, length = self.struts[strut.group], self._length(strut)
+            check_strut(strut.key, length=length, diameter=group.diameter, density=group.density)
 
     def _check_places(self) -> None:
         least = LEAST_DISTANCE * self.size
