@@ -103,6 +103,50 @@ def test_options_that_make_no_sense_are_refused_in_one_line(arguments, values, u
     assert all(value in line for value in values.split()), line
 
 
+IMPOSSIBLE = {"long": 300 * "b", "null": "b\0"}
+
+
+@pytest.mark.parametrize("name", IMPOSSIBLE)
+@pytest.mark.parametrize(
+    "command",
+    [
+        "simulate --scenario short.yaml --out",
+        "simulate --gait",
+        "simulate --command",
+        "simulate --scenario",
+        "export --scenario short.yaml --out",
+        "evolve --scenario quick --out",
+        "evolve --resume --out",
+        "replay --out a.html",
+        "replay good.json --out",
+        "figures",
+        "robustness good.json --draws 1 --out",
+        "robustness",
+        "compare",
+        "cpg --out",
+        "structure",
+        "structure prism --out",
+    ],
+)
+def test_a_name_that_no_file_can_have_is_refused_in_one_line(command, name, unchanged, capsys):
+    assert main([*command.split(), IMPOSSIBLE[name]]) == 2
+    captured = capsys.readouterr()
+    (line,) = captured.err.splitlines()
+    assert line.startswith(f"tetra-drake: {IMPOSSIBLE[name]}: ") and captured.out == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is full")
+@pytest.mark.parametrize("command", ["simulate --scenario brief.yaml", "structure prism"])
+def test_a_full_disk_behind_the_output_is_told_in_one_line(command, work):
+    (work / "brief.yaml").write_text(SHORT + "engine: !Compiled {}\n")
+    line = [sys.executable, "-m", "tetra_drake", *command.split()]
+    with open("/dev/full", "w") as full:
+        process = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, timeout=300)
+    assert process.returncode == 1
+    assert process.stderr.splitlines()[-1].startswith("tetra-drake: output: ")
+    assert "Traceback" not in process.stderr and "Exception" not in process.stderr
+
+
 def test_the_process_ends_with_the_status_and_no_traceback(unchanged):
     line = [sys.executable, "-m", "tetra_drake", "simulate", "--gait", "missing.json"]
     process = subprocess.run(line, capture_output=True, text=True, timeout=60)

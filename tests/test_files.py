@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray
 
-from tetra_drake.files import read_text, whole_file, write_whole
+from tetra_drake.files import check_file, check_folder, read_text, whole_file, write_whole
 from tetra_drake.results.trajectory import save_dataset
 
 
@@ -56,6 +56,25 @@ def test_what_cannot_be_written_is_refused(tmp_path, place, refused):
         write_whole(tmp_path / place, "new")
     assert (tmp_path / "a.txt").read_text() == "old"
     assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_a_device_is_not_replaced_by_a_file(tmp_path, refused):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("/dev/null")
+    (tmp_path / "broken").symlink_to("nowhere")
+    for name in ("pipe", "link", "broken"):
+        for write in (check_file, lambda path: write_whole(path, "text")):
+            with refused(tmp_path / name, "", "expected a file"):
+                write(tmp_path / name)
+    assert stat.S_ISFIFO(os.stat(tmp_path / "pipe").st_mode)
+    assert (tmp_path / "link").is_symlink()
+
+
+@pytest.mark.parametrize("place", ["a.txt", "a.txt/b", 300 * "b", "b\0"], ids=repr)
+def test_what_cannot_become_a_folder_is_refused(tmp_path, place, refused):
+    (tmp_path / "a.txt").touch()
+    with refused(tmp_path / place, "", ""):
+        check_folder(tmp_path / place)
 
 
 def test_what_a_killed_writer_left_is_removed_by_the_next_but_not_that_of_a_living_one(tmp_path):

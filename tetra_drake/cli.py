@@ -43,16 +43,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with heeding_interrupts():
             options.run(options)
+            sys.stdout.flush()
     except (InputError, SimulationFailure) as error:
         print(f"tetra-drake: {error}", file=sys.stderr)
         return BAD_INPUT if isinstance(error, InputError) else FAILED
-    except BrokenPipeError:  # the reader of our output has closed it, as `| head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        # Its reader has closed our output, as `| head` does; the disk is full.
+        if not isinstance(error, BrokenPipeError):
+            what = error.filename or "output"
+            print(f"tetra-drake: {what}: {error.strerror or error}", file=sys.stderr)
+        _drop_output()
         return FAILED
     except KeyboardInterrupt as interrupt:
         print("\ntetra-drake: interrupted", *interrupt.args, file=sys.stderr)
         return INTERRUPTED
     return 0
+
+
+def _drop_output() -> None:
+    """Lets what has been printed but not written disappear, which Python would try to write at its
+    end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class Command(argparse.ArgumentParser):

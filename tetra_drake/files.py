@@ -31,8 +31,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     Raises InputError if `path` cannot be written.
     """
     path = Path(path)
-    if os.path.isdir(path):
-        raise InputError(path, "", "is a directory, expected a file to write")
+    _check_no_other(path)
     make_folder(path.parent, source=path)
     try:
         _remove_stale(path)
@@ -41,7 +40,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         )
         os.close(handle)
     except (OSError, ValueError) as error:
-        raise InputError(path, "", f"cannot be written: {error}") from error
+        raise InputError(path, "", f"cannot be written: {_reason(error)}") from error
     temporary = Path(name)
     try:
         yield temporary
@@ -51,7 +50,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         if error.errno not in _FULL:
             raise
-        raise InputError(path, "", f"cannot be written: {error.strerror}") from error
+        raise InputError(path, "", f"cannot be written: {_reason(error)}") from error
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -84,12 +83,31 @@ def make_folder(folder: Path, *, source: Path | None = None) -> None:
         what = "is a file" if source == folder else "cannot be written: its folder is a file"
         raise InputError(source, "", what) from error
     except (OSError, ValueError) as error:
-        raise InputError(source, "", f"cannot be written: {error}") from error
+        raise InputError(source, "", f"cannot be written: {_reason(error)}") from error
+
+
+def check_file(path: str | Path) -> None:
+    """Raises InputError if `path` is not, and cannot become, a file to write."""
+    _check_no_other(path)
+    check_folder(Path(path).parent)
+
+
+def _check_no_other(path: str | Path) -> None:
+    """Raises InputError for a folder, and for a device, which a file would replace."""
+    if os.path.lexists(path) and not os.path.isfile(path):
+        what = "directory" if os.path.isdir(path) else "device, a pipe or a broken link"
+        raise InputError(path, "", f"is a {what}, expected a file to write")
 
 
 def check_folder(folder: str | Path) -> None:
     """Raises InputError if `folder` is not, and cannot become, a folder to write to."""
     folder = Path(folder)
+    try:
+        os.stat(folder)
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except (OSError, ValueError) as error:  # such as a name that is too long
+        raise InputError(folder, "", f"cannot be written: {_reason(error)}") from error
     existing = folder
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -98,6 +116,11 @@ def check_folder(folder: str | Path) -> None:
         raise InputError(folder, "", f"{what}, expected a folder to write to")
     if not os.access(existing, os.W_OK | os.X_OK):
         raise InputError(folder, "", f"'{existing}' is not writable")
+
+
+def _reason(error: Exception) -> str:
+    """What went wrong, without the path, which messages name already."""
+    return getattr(error, "strerror", None) or str(error)
 
 
 def json_number(value: Any) -> Any:
@@ -144,7 +167,7 @@ def read_bytes(path: str | Path, what: str, *, most: int = MOST_BYTES) -> bytes:
     except FileNotFoundError as error:
         raise InputError(path, "", f"no such {what}") from error
     except (OSError, ValueError) as error:
-        raise InputError(path, "", f"cannot be read: {error}") from error
+        raise InputError(path, "", f"cannot be read: {_reason(error)}") from error
     if not stat.S_ISREG(mode):
         kind = "directory" if stat.S_ISDIR(mode) else "device or a pipe"
         raise InputError(path, "", f"is a {kind}, expected a {what}")

@@ -94,6 +94,33 @@ def test_samples_closer_than_the_signals_are_refused(robot, period, problem, loa
         load(text)
 
 
+@pytest.mark.parametrize(("late", "is_even"), [(0.045, True), (-0.045, True), (0.055, False)])
+def test_times_may_be_uneven_by_a_twentieth(robot, late, is_even, load, refused):
+    text = command_text(robot, Command("uneven", 0.01, np.zeros((9, 8))))
+    changed = text.replace("0.040000,", f"{0.04 + 0.01 * late:.6f},")
+    if is_even:
+        assert load(changed).period == pytest.approx(0.01)
+    else:
+        with refused("c.csv", "line 6, time_s", "found 0.04055 after 0.03"):
+            load(changed)
+
+
+@pytest.mark.parametrize(("share", "is_enough"), [(0.955, True), (0.945, False)])
+def test_samples_may_be_a_twentieth_closer_than_the_signals(
+    robot, scenario, share, is_enough, load, refused
+):
+    period = share * scenario.cpg.listing_step
+    text = command_text(robot, Command("dense", period, np.zeros((5, 8))))
+    rows = text.splitlines()
+    exact = [f"{k * period:.9f},{row.partition(',')[2]}" for k, row in enumerate(rows[1:])]
+    text = "\n".join([rows[0], *exact])
+    if is_enough:
+        assert load(text).period == pytest.approx(period)
+    else:
+        with refused("c.csv", "time_s", "samples 0.0004725 s apart"):
+            load(text)
+
+
 def test_a_file_that_only_goes_back_is_refused(robot, load, refused):
     text = command_text(robot, Command("back", -0.01, np.zeros((5, 8))))
     with refused("c.csv", "time_s", "found samples -0.01 s apart"):

@@ -108,6 +108,24 @@ def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
         assert np.mean(shares) == pytest.approx(limited, abs=0.05 * limited)
 
 
+@pytest.mark.parametrize(
+    ("actuation", "what"), [(FORCE, "length"), (MOTOR, "length"), (WINCH, "free_length")]
+)
+def test_the_least_length_and_the_travel_are_those_of_what_is_wound(
+    short, actuation, what, tmp_path
+):
+    driven = short.with_changes(actuation | {"simulation.sample_period": "1 ms"})
+    export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
+    result = simulate(scenario=driven, gait=seeded_gait(short), record=True)
+    wound = 1e3 * result.trajectory[what].isel(cable=result.robot.driven)
+    for row, cable in zip(rows_of(tmp_path / "lab" / LIMITS), wound.cable.values, strict=True):
+        values = wound.sel(cable=cable).values
+        assert row["cable"] == cable
+        assert float(row["least_length_mm"]) == pytest.approx(values.min(), rel=1e-5)
+        assert float(row["travel_mm"]) == pytest.approx(np.ptp(values), rel=1e-4)
+        assert np.ptp(values) > 1.0
+
+
 def test_a_weak_motor_is_told_to_be_too_weak(short, tmp_path):
     weak = short.with_changes(MOTOR).with_changes({"actuation.max_force": "2 N"})
     verdict = export(weak, seeded_gait(short), rate=100.0, out=tmp_path / "lab")

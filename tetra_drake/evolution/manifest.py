@@ -16,6 +16,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import os
 import types
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -123,7 +124,7 @@ class Manifest:
 def read_manifest(directory: Path) -> Manifest:
     """The manifest of a run directory; InputError if there is none or it is damaged."""
     path = directory / MANIFEST
-    if not path.exists():
+    if not os.path.exists(path):
         raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
     try:
         content = json.loads(read_text(path, "manifest of a run"))

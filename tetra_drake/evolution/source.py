@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +41,7 @@ def load_source(
         chosen = load_scenario(scenario or "thesis")
     else:
         chosen = read_manifest(folder).scenario
-    if source.is_dir():
+    if os.path.isdir(source):
         run = load_run(source)
         best, trials = run.best_gait(), run.best()["trial"]
         gaits = {f"trial {trial}": gait for trial, gait in zip(trials, run.gaits(), strict=True)}
@@ -56,4 +57,4 @@ def load_source(
 def _run_folder(source: Path) -> Path | None:
     """The folder of the run that a path is, or is in: run/trial_00/best_gait.json."""
     folders = (source, *source.absolute().parents[:2])
-    return next((folder for folder in folders if (folder / MANIFEST).is_file()), None)
+    return next((folder for folder in folders if os.path.isfile(folder / MANIFEST)), None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -55,7 +56,7 @@ def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) ->
 def scenario_beside(path: Path) -> Path | None:
     """The scenario file in the folder of a command, if there is one."""
     scenario = path.parent / SCENARIO
-    return scenario if scenario.is_file() else None
+    return scenario if os.path.isfile(scenario) else None
 
 
 def load_command(path: str | Path, scenario: Scenario) -> Command:

@@ -43,9 +43,9 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
     """
     check_rate(rate, scenario)
     out = Path(out)
+    check_folder(out)
     if out.exists():
         raise InputError(out, "", "exists, expected a new folder")
-    check_folder(out)
     refinement = math.ceil(LEAST_RATE / rate)
     finely = scenario.simulation.model_copy(update={"sample_period": 1.0 / (rate * refinement)})
     recorded = scenario.with_sections(simulation=finely)

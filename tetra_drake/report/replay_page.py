@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.source import load_source
-from tetra_drake.files import check_folder
+from tetra_drake.files import check_file
 from tetra_drake.report.result_folder import RESULT, load_result
 from tetra_drake.results.result import SimulationResult
 
@@ -29,9 +30,7 @@ def write_replay(
     Raises InputError, before anything is simulated, if the files cannot be written.
     """
     for file in (out,) if viewer is None else (out, viewer):
-        if file.is_dir():
-            raise InputError(file, "", "is a directory, expected a file to write")
-        check_folder(file.parent)
+        check_file(file)
     result = load_or_simulate(source, scenario=scenario, warn=warn)
     result.save_replay(out, viewer=viewer)
     return result.title
@@ -46,12 +45,12 @@ def load_or_simulate(
     Raises InputError if there is no motion, or if a scenario is given for a folder, and
     SimulationFailure.
     """
-    if source.is_dir() and scenario is not None:
+    if os.path.isdir(source) and scenario is not None:
         raise InputError("--scenario", "", f"is for gait files; {source} has one of its own")
-    is_run = (source / MANIFEST).exists()
-    if (source / RESULT).exists() and not is_run:
+    is_run = os.path.exists(source / MANIFEST)
+    if os.path.exists(source / RESULT) and not is_run:
         return load_result(source)
-    if not source.is_file() and not is_run:
+    if not os.path.isfile(source) and not is_run:
         raise InputError(source, "", "expected a folder of `simulate` or `evolve`, or a gait file")
     loaded = load_source(source, scenario=scenario, warn=warn)
     return simulate(loaded.scenario, loaded.best, record=True)

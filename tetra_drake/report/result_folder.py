@@ -9,6 +9,7 @@ result.json       the numbers, the gait, and the path of the centre
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -69,7 +70,7 @@ def load_result(folder: str | Path) -> SimulationResult:
     """
     folder = Path(folder)
     for name in (RESULT, SCENARIO, TRAJECTORY):
-        if not (folder / name).is_file():
+        if not os.path.isfile(folder / name):
             problem = f"holds no {name}, so it was not written by `simulate`"
             raise InputError(folder, name, problem)
     scenario, file = load_scenario(folder / SCENARIO), _read_result_file(folder / RESULT)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,12 +53,12 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
     anew, too. Raises InputError.
     """
     folder = out or source / FIGURES
-    if (source / MANIFEST).exists():
+    if os.path.exists(source / MANIFEST):
         check_folder(folder)
         if out is None:
             return write_report(source)
         draw_run(study_run(load_run(source)), folder)
-    elif (source / RESULT).exists():
+    elif os.path.exists(source / RESULT):
         check_folder(folder)
         draw_trajectory(load_result(source), folder)
     else:
