@@ -336,7 +336,7 @@ def _robustness(options: Options) -> None:
     )
     print(robustness_text(judgement))
     if options.out:
-        from tetra_drake.figures.disturbed import save_judgement
+        from tetra_drake.figures.robustness import save_judgement
 
         print(f"wrote {', '.join(save_judgement(judgement, options.out))} to {options.out}/")
 
@@ -365,7 +365,7 @@ def _compare(options: Options) -> None:
     compared = compare(options.runs, reach=options.reach)
     print(comparison_text(compared))
     if options.out:
-        from tetra_drake.figures.search import save_comparison
+        from tetra_drake.figures.comparison import save_comparison
 
         print(f"wrote {', '.join(save_comparison(compared, options.out))} to {options.out}/")
 

@@ -10,7 +10,7 @@ from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 
 from tetra_drake.analysis.comparison import compare
 from tetra_drake.cli import main
-from tetra_drake.figures.search import search
+from tetra_drake.figures.comparison import search
 from tetra_drake.report.analysis_text import comparison_text
 from tetra_drake.scenario.settings import Disturbances
 from tetra_drake.scenario.units import INCH

@@ -17,7 +17,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures import fitness, forces, motion
 from tetra_drake.figures.gait_diagram import gait_diagram
-from tetra_drake.figures.map import map_of_gaits
+from tetra_drake.figures.gait_map import map_of_gaits
 from tetra_drake.figures.style import save_figure
 from tetra_drake.results.result import SimulationResult
 

@@ -7,7 +7,7 @@ from helpers.synthetic_run import tiny_scenario, write_run
 from matplotlib.collections import QuadMesh
 
 from tetra_drake.evolution.run import load_run
-from tetra_drake.figures.map import map_of_gaits
+from tetra_drake.figures.gait_map import map_of_gaits
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.units import INCH
 
