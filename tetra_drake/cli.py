@@ -355,7 +355,7 @@ def _compare(options: Options) -> None:
     Compares the best fitness of each trial at the same number of simulations. An evaluation is
     one simulation, or one for each draw of disturbances. Prints interquartile means with bootstrap
     intervals, simulations until a trial reaches a distance, and time. With --out it writes
-    trials.csv, curves.csv, summary.json and the figure search.
+    trials.csv, curves.csv, summary.json and the figure comparison.
     """
     from tetra_drake.analysis.comparison import compare
     from tetra_drake.report.analysis_text import comparison_text

@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from tetra_drake.analysis.comparison import Compared, comparison_numbers
 from tetra_drake.figures.style import (
-    common_style,
-    figure_of,
+    Drawn,
+    Page,
+    figure_function,
     legend_below,
     line_style,
     name_panel,
-    page,
+    page_of,
     save_findings,
-    split,
+    set_title,
     units_named,
 )
 
@@ -31,25 +31,22 @@ def save_comparison(compared: Compared, folder: Path) -> list[str]:
     """Writes trials.csv, curves.csv, summary.json (lengths in m) and the figure to the folder;
     returns the names. Raises InputError if a file cannot be written."""
     tables = {"trials": compared.trials, "curves": compared.curves}
-    figure, summary = search(compared), comparison_numbers(compared)
-    return save_findings(figure, folder, "search", tables=tables, summary=summary)
+    figure, summary = comparison(compared), comparison_numbers(compared)
+    return save_findings(figure, folder, "comparison", tables=tables, summary=summary)
 
 
-@common_style()
-def search(compared: Compared, *, axes: Axes | None = None, units: str = "in") -> Figure:
+@figure_function
+def comparison(compared: Compared, *, figure: Page | None = None, units: str = "in") -> Drawn:
     """Best fitness so far, median and interquartile band over the trials of each run, and the share
     of trials whose fittest gait so far walks the distance to be reached.
 
     Trials that have ended go on with their last values; a dot marks the end of a run."""
-    columns = 1 if compared.reach is None else 2
+    columns, unit = 1 if compared.reach is None else 2, units_named(units)
     labels = []
     for label, count in compared.runs["trials"].items():
         labels.append(f"{label} (1 trial)" if count == 1 else f"{label} ({count} trials)")
-    styles = {label: line_style(place) for place, label in enumerate(labels)}
-    host = page(axes, height_in=3.4 + 0.1 * len(labels))
-    unit, below = units_named(units), legend_below(host, styles)
-    size: Any = {"widths": [1.0] * columns, "gap_x": 48.0}
-    row = split(host, **size, above=16.0, below=below)[0]
+    page = page_of(figure, height_in=3.4 + 0.1 * len(labels))
+    row = page.subplots(1, columns, squeeze=False)[0]
     ends = compared.curves.groupby("run", sort=False)["cost"].max()
     first = min(_FIRST, ends.min())
     for place, label in enumerate(compared.runs.index):
@@ -66,8 +63,9 @@ def search(compared: Compared, *, axes: Axes | None = None, units: str = "in") -
         panel.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         panel.xaxis.set_minor_formatter(NullFormatter())
     name_panel(row[0], "best fitness so far: median and quartiles")
-    host.set_title("How well runs search", loc="left")
-    return figure_of(host)
+    legend_below(page, {label: line_style(place) for place, label in enumerate(labels)})
+    set_title(page, "How well runs search")
+    return page
 
 
 def _draw_best(axes: Axes, compared: Compared, label: str, first: int, style: Any) -> None:

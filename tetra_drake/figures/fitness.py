@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import pandas
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.evolution.run import Run
 from tetra_drake.figures.style import (
     OKABE_ITO,
-    common_style,
-    figure_of,
+    Drawn,
+    Page,
+    figure_function,
     legend_below,
-    page,
-    split,
-    spread,
+    line_style,
+    page_of,
+    set_title,
     units_named,
-    write_beside,
 )
 from tetra_drake.formatting import fixed
 from tetra_drake.scenario.units import INCH
@@ -28,10 +27,11 @@ from tetra_drake.scenario.units import INCH
 _TICKS = 20  # largest number of trial numbers below the axes
 _SEVERAL = 4  # trials from which on quartiles are drawn
 
-_TRIAL: Any = {"color": "0.6", "linewidth": 0.8, "linestyle": "-"}
+_TRIAL: Any = {"color": "0.7", "linewidth": 0.8, "linestyle": "-"}
 _MEDIAN: Any = {"color": OKABE_ITO["blue"], "linewidth": 2.0, "linestyle": "-"}
+_FITTEST: Any = {"color": "0.2", "linewidth": 1.0, "linestyle": "-"}
+_LEAST_FIT: Any = {"color": "0.2", "linewidth": 1.0, "linestyle": (0, (4, 2))}
 _BAND: Any = {"color": OKABE_ITO["blue"], "alpha": 0.18, "linewidth": 0.0}
-_NAME_HEIGHT = 0.06  # of the name of a trial, as a share of the height of the axes
 
 
 def initial_extremes(run: Run) -> pandas.DataFrame:
@@ -44,22 +44,17 @@ def initial_extremes(run: Run) -> pandas.DataFrame:
     return pandas.DataFrame({"best": distances.last(), "worst": distances.first()})
 
 
-@common_style()
-def initial_distances(run: Run, *, axes: Axes | None = None, units: str = "in") -> Figure:
+@figure_function
+def initial_distances(run: Run, *, figure: Page | None = None, units: str = "in") -> Drawn:
     """Distances of the fittest and the least fit gait of each trial's first iteration, without
     those that failed."""
     unit, width = units_named(units), 0.4
     extremes = initial_extremes(run) * INCH / unit.length
-    host = page(axes, height_in=3.6)
-    looks = {
-        "fittest gait of a trial": {"color": OKABE_ITO["blue"]},
-        "least fit gait of a trial": {"color": OKABE_ITO["orange"]},
-    }
-    thick: Any = {"linewidth": 6.0, "linestyle": "-", "solid_capstyle": "butt"}
-    below = legend_below(host, {label: look | thick for label, look in looks.items()})
-    panel = split(host, below=below)[0, 0]
-    panel.bar(extremes.index - width / 2, extremes["best"], width, color=OKABE_ITO["blue"])
-    panel.bar(extremes.index + width / 2, extremes["worst"], width, color=OKABE_ITO["orange"])
+    page = page_of(figure, height_in=3.6)
+    panel = page.subplots()
+    blue, orange = OKABE_ITO["blue"], OKABE_ITO["orange"]
+    best = panel.bar(extremes.index - width / 2, extremes["best"], width, color=blue)
+    worst = panel.bar(extremes.index + width / 2, extremes["worst"], width, color=orange)
     panel.axhline(0.0, color="black", linewidth=0.8)
     margin = max(0.9, 2.0 - len(extremes) / 2)  # else the bars of a single trial fill the axes
     duration = run.scenario.simulation.duration
@@ -70,17 +65,21 @@ def initial_distances(run: Run, *, axes: Axes | None = None, units: str = "in") 
         xticks=extremes.index[:: math.ceil(len(extremes) / _TICKS)],
     )
     panel.grid(visible=False, axis="x")
-    host.set_title("Best and worst initial gait of each trial", loc="left")
-    return figure_of(host)
+    best.set_label("fittest gait of a trial")
+    worst.set_label("least fit gait of a trial")
+    legend_below(page, {}, best, worst)
+    set_title(page, "Best and worst initial gait of each trial")
+    return page
 
 
-@common_style()
-def initial_fitness(run: Run, trial: int, *, axes: Axes | None = None) -> Figure:
+@figure_function
+def initial_fitness(run: Run, trial: int, *, figure: Page | None = None) -> Drawn:
     """Histogram of the fitness of a trial's initial gaits; those that walk backward are hatched."""
     initial = run.initial().query("trial == @trial")
     walked = initial.dropna(subset="fitness")
     fitness, backward = walked["fitness"], walked["distance_in"] < 0.0
-    panel = page(axes, height_in=3.4)
+    page = page_of(figure, height_in=3.6)
+    panel = page.subplots()
     # Bin edges at round numbers, zero among them where the values pass it.
     locator = MaxNLocator(nbins=20, steps=[1, 2, 2.5, 5, 10])
     panel.hist(
@@ -96,11 +95,11 @@ def initial_fitness(run: Run, trial: int, *, axes: Axes | None = None) -> Figure
     panel.set(xlabel="fitness", ylabel="gaits", xmargin=0.02)
     panel.yaxis.set_major_locator(MaxNLocator(integer=True))
     panel.grid(visible=False, axis="x")
-    panel.legend(loc="best")
+    legend_below(page, {}, *panel.get_legend_handles_labels()[0])
     failed = len(initial) - len(walked)
     title = f"Fitness of the initial gaits of trial {trial}"
-    panel.set_title(title + (f"; {failed} failed" if failed else ""), loc="left")
-    return figure_of(panel)
+    set_title(page, title + (f"; {failed} failed" if failed else ""))
+    return page
 
 
 def quartiles_over_trials(run: Run, fitness: pandas.DataFrame) -> pandas.DataFrame:
@@ -116,33 +115,44 @@ def quartiles_over_trials(run: Run, fitness: pandas.DataFrame) -> pandas.DataFra
     return pandas.DataFrame({name: table.quantile(q, axis=1) for name, q in shares.items()})
 
 
-@common_style()
-def fitness_of_trials(run: Run, *, axes: Axes | None = None) -> Figure:
+@figure_function
+def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
     """Fitness over evaluations: the mean of each trial's population, or the best if the optimiser
-    reports no mean. Grey: trials. Blue: their median, and from the lower to the upper quartile.
+    reports no mean. Four trials or more are grey, but the fittest and the least fit. Blue: their
+    median, and from the lower to the upper quartile.
 
     A trial that has ended counts in the quartiles with its last value."""
     kind = "mean" if "mean_fitness" in run.iterations else "best"
     whole = _whole_iterations(run)
     table = whole.pivot(index="evaluations", columns="trial", values=f"{kind}_fitness")
     table = table.dropna(axis="columns", how="all")
-    panel = page(axes, height_in=3.6)
+    page = page_of(figure, height_in=3.6)
+    panel = page.subplots()
+    ends = table.ffill().iloc[-1].sort_values(ascending=False)
+    looks = _looks(list(ends.index))
     for trial in table:
         series = table[trial].dropna()
         # The dot marks the end of a line, and makes a line of one point visible.
         dot: Any = {"marker": "o", "markersize": 3.0, "markevery": [-1]}
-        panel.plot(series.index, series, label=f"trial {trial}", **_TRIAL, **dot)
-    ends = table.ffill().iloc[-1].sort_values().rename("trial {}".format)
+        panel.plot(series.index, series, label=f"trial {trial}", **looks.get(trial, _TRIAL), **dot)
+    legend = {f"trial {trial}: {fixed(ends[trial], 1)}": look for trial, look in looks.items()}
     if len(ends) >= _SEVERAL:
         quartiles = quartiles_over_trials(run, table)
         panel.plot(quartiles.index, quartiles["median"], label="median", **_MEDIAN)
         panel.fill_between(quartiles.index, quartiles["low"], quartiles["high"], **_BAND)
-        ends = pandas.concat([ends.iloc[[0, -1]], quartiles.iloc[-1][["median"]]])
+        legend[f"median: {fixed(quartiles['median'].iloc[-1], 1)}"] = _MEDIAN
     panel.set(xlabel="evaluations", ylabel=f"{kind} fitness", xmargin=0.02)
     panel.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10], integer=True))
-    _name_lines(panel, ends)
-    panel.set_title(f"{kind.capitalize()} fitness of each trial", loc="left")
-    return figure_of(panel)
+    legend_below(page, legend)
+    set_title(page, f"{kind.capitalize()} fitness of each trial")
+    return page
+
+
+def _looks(trials: Sequence[int]) -> dict[int, Any]:
+    """Line styles of the trials that the legend names, the fittest first."""
+    if len(trials) < _SEVERAL:
+        return {trial: line_style(place) for place, trial in enumerate(trials)}
+    return {trials[0]: _FITTEST, trials[-1]: _LEAST_FIT}
 
 
 def _whole_iterations(run: Run) -> pandas.DataFrame:
@@ -153,12 +163,3 @@ def _whole_iterations(run: Run) -> pandas.DataFrame:
     is_last = ~rows.duplicated("trial", keep="last")
     before = sizes.groupby(rows["trial"]).shift()
     return rows[~(is_last & (sizes < before))]
-
-
-def _name_lines(panel: Axes, last: pandas.Series) -> None:
-    """Names lines beside the axes at their last values."""
-    low, high = panel.get_ylim()
-    places = spread(last.to_numpy(), _NAME_HEIGHT * (high - low))
-    for (name, value), place in zip(last.items(), places, strict=True):
-        colour = _MEDIAN["color"] if name == "median" else "0.35"
-        write_beside(panel, place, f"{name}: {fixed(value, 1)}", color=colour)

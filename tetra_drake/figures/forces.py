@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.figures.gait_diagram import foot_name
 from tetra_drake.figures.style import (
     OKABE_ITO,
     SHADE,
-    common_style,
-    figure_of,
-    inches,
+    Drawn,
+    Page,
+    figure_function,
     legend_below,
     name_panel,
-    page,
+    page_of,
+    panels_in_columns,
+    set_title,
     shown_part,
-    split,
     units_named,
 )
 from tetra_drake.formatting import fixed
@@ -41,17 +41,18 @@ _TOP = 0.92  # height of the marks of landings, as a share of a panel's height
 _IMPACTS = 0.01  # share of the samples at either end that does not count for the scale of forces
 _MARGIN = 0.25  # free space above and below the others, as a share of their range
 _ROWS, _COLUMNS = 10, 4  # largest number of panels one below the other, and of columns
+_LETTERS = 80  # largest number of letters of the names of panels in a row
 _MIRRORED = 0.01  # mean difference over mean force, below which two nodes are mirror images
 
 
-@common_style()
+@figure_function
 def signals_and_tensions(
     result: SimulationResult,
     *,
-    axes: Axes | None = None,
+    figure: Page | None = None,
     time: tuple[float, float] | None = None,
     units: str = "in",
-) -> Figure:
+) -> Drawn:
     """Actuation signals, and the tension of the cable that each drives, in the last 4 s.
 
     The title of a panel is the name of the cable. If a signal drives several, the first is shown.
@@ -62,30 +63,29 @@ def signals_and_tensions(
     driven = [signals.index(oscillator) for oscillator in oscillators]
     groups = len(driven) // len(np.unique(forces.cable_bodies[driven]))
     start_up = result.scenario.cpg.start_up
-    looks: dict[str, Any] = {"cable tension": _FIRST, "signal": _SECOND}
     others = []
     if float(trajectory.time[0]) < start_up:
         others.append(Patch(color=SHADE, label="start-up"))
-    cables = {str(i): forces.cable.values[cable] for i, cable in enumerate(driven)}
-    host, panels = _panels_over_time(axes, cables, looks, *others, groups=groups)
-    for cable, oscillator, panel in zip(driven, oscillators, panels.values(), strict=True):
+    page, panels = _panels_over_time(figure, forces.cable.values[driven], groups=groups)
+    for cable, oscillator, panel in zip(driven, oscillators, panels, strict=True):
         panel.axhline(0.0, color="0.6", linewidth=0.6)
         if others:
             panel.axvspan(float(trajectory.time[0]), start_up, color=SHADE, linewidth=0.0)
         panel.plot(forces.time, forces.tension[:, cable], **_FIRST)
         panel.plot(forces.time, forces.signal.sel(oscillator=oscillator), **_SECOND)
-    host.set_title(f"Signals and tensions of actuated cables ({unit.force_name})", loc="left")
-    return figure_of(host)
+    legend_below(page, {"cable tension": _FIRST, "signal": _SECOND}, *others)
+    set_title(page, f"Signals and tensions of actuated cables ({unit.force_name})")
+    return page
 
 
-@common_style()
+@figure_function
 def ground_forces(
     result: SimulationResult,
     *,
-    axes: Axes | None = None,
+    figure: Page | None = None,
     time: tuple[float, float] | None = None,
     units: str = "in",
-) -> Figure:
+) -> Drawn:
     """Normal force and friction along x in the last 4 s; on uneven ground, friction along the
     forward tangent, which is x projected on the slope.
 
@@ -93,14 +93,11 @@ def ground_forces(
     of impacts are cut off, as they are shorter than the time between samples."""
     unit, end = units_named(units), shown_part(result.trajectory, time or _last(result))
     forces = end[["normal_force", "friction_force"]] / unit.force
-    along = "along x" if result.robot.ground.flat else "along the forward tangent"
-    looks = {"normal force": _FIRST, f"friction {along}": _SECOND, "landing": _LANDING}
     feet = _feet_to_show(end)
     _, per_body = np.unique(end.contact_body.sel(contact=list(feet)), return_counts=True)
-    stance = Patch(color=SHADE, label="stance")
-    host, panels = _panels_over_time(axes, feet, looks, stance, groups=per_body.min())
+    page, panels = _panels_over_time(figure, list(feet.values()), groups=per_body.min())
     limits = _limits_between_impacts(forces)
-    for foot, panel in panels.items():
+    for foot, panel in zip(feet, panels, strict=True):
         node, stands = forces.sel(contact=foot), ~off_ground(end.sel(contact=foot))
         spans = intervals(stands.time.values, stands.values)
         for start, stop in spans:
@@ -113,8 +110,11 @@ def ground_forces(
         share = fixed(100.0 * share_of_time(stands), 0)
         panel.set_title(f"stands {share} %", loc="right", fontsize="small", pad=3.0)
         panel.set_ylim(limits)
-    host.set_title(f"Forces of the ground ({unit.force_name})", loc="left")
-    return figure_of(host)
+    along = "along x" if result.robot.ground.flat else "along the forward tangent"
+    looks = {"normal force": _FIRST, f"friction {along}": _SECOND, "landing": _LANDING}
+    legend_below(page, looks, Patch(color=SHADE, label="stance"))
+    set_title(page, f"Forces of the ground ({unit.force_name})")
+    return page
 
 
 def _last(result: SimulationResult) -> tuple[float, float]:
@@ -152,28 +152,18 @@ def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
 
 
 def _panels_over_time(
-    axes: Axes | None, names: Mapping[str, str], looks: Mapping[str, Any], *others: Any, groups: int
-) -> tuple[Axes, dict[str, Axes]]:
-    """The axes for a figure, and a panel of forces per key with a name as its title, in a column
-    for each group if these are few."""
+    figure: Page | None, names: Sequence[str], *, groups: int
+) -> tuple[Page, list[Axes]]:
+    """The page, and a panel of forces for each name, in a column for each group if these are
+    few."""
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)
-    row_height = float(np.clip(9.0 / rows, 0.7, 1.2))
-    host = page(axes, height_in=1.0 + rows * row_height)
-    below = legend_below(host, looks, *others)
-    size: Any = {"heights": [1.0] * rows, "widths": [1.0] * columns}
-    grid = split(host, **size, gap_x=24.0, gap_y=17.0, above=14.0, below=below, share_y=True)
-    for unused in grid.ravel()[len(names) :]:
-        unused.remove()
-    for panel in grid.ravel()[: len(names)][-columns:]:
-        panel.set_xlabel("time (s)")
-        panel.tick_params(labelbottom=True)
-        panel.xaxis.set_major_locator(MaxNLocator(nbins=9 // columns, steps=[1, 2, 5, 10]))
-    panels = dict(zip(names, grid.ravel(), strict=False))
-    size_of_name = 60 * inches(host)[0] / 6.0 / columns
-    for key, panel in panels.items():
-        name = names[key].replace("_", " ")
-        name_panel(panel, name if len(name) < size_of_name else f"{name[: int(size_of_name)]}…")
+    page = page_of(figure, height_in=1.0 + min(1.2 * rows, 9.0))
+    panels = panels_in_columns(
+        page, len(names), columns, x_label="time (s)", sharex=True, sharey=True
+    )
+    for name, panel in zip(names, panels, strict=True):
+        name_panel(panel, textwrap.shorten(name.replace("_", " "), _LETTERS // columns))
         panel.set_xmargin(0.0)
-    return host, panels
+    return page, panels

@@ -9,20 +9,19 @@ import numpy as np
 import xarray
 from matplotlib import rcParams
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from tetra_drake.figures.style import (
     OKABE_ITO,
     REFERENCE,
+    Drawn,
+    Page,
     Units,
-    common_style,
-    figure_of,
-    inches,
+    figure_function,
     name_panel,
     own_words,
-    page,
+    page_of,
+    set_title,
     shown_part,
-    split,
     units_named,
     write_beside,
 )
@@ -34,11 +33,10 @@ from tetra_drake.robot.structure import Structure
 _CYCLES = 3
 _LAST_SHARE = 0.25  # share of the time that is shown where no signal oscillates
 
-_FEW_FEET = 14  # largest number of feet of which each is named
-_NAME_HEIGHT = 0.13  # inches on paper
-_SIGNAL_HEIGHT, _FOOT_HEIGHT = 0.2, 0.16  # inches on paper
-_MOST_HEIGHT, _LEAST_HEIGHT = 3.2, 0.7  # of all signals, and of all feet
-_SPEED_HEIGHT, _MARGINS = 0.9, 1.1
+_ROW = 0.165  # height of a signal, or of a foot, in inches
+_ROWS = (4, 20)  # fewest and most rows of the heights of signals, and of feet
+_SPEED_ROWS = 5  # height of the speed, in rows
+_NAMED = 14  # largest number of feet, or of signals, all of which are named
 
 _BETWEEN_BODIES = 0.5  # gap between the feet of two bodies, in heights of a row
 _BAR = 0.78  # height of a stance bar, in heights of a row
@@ -52,14 +50,14 @@ _STANCE = {"left": OKABE_ITO["blue"], "right": OKABE_ITO["sky_blue"]}
 _OTHER_FOOT = "0.35"
 
 
-@common_style()
+@figure_function
 def gait_diagram(
     result: SimulationResult,
     *,
-    axes: Axes | None = None,
+    figure: Page | None = None,
     time: tuple[float, float] | None = None,
     units: str = "in",
-) -> Figure:
+) -> Drawn:
     """Gait diagram of the last three cycles: actuation signals, stance of each foot, and forward
     speed of the centre of mass.
 
@@ -70,29 +68,20 @@ def gait_diagram(
     cycle = measures.last_step(result.trajectory)
     trajectory = shown_part(result.trajectory, time or _last_cycles(result.trajectory, cycle))
     stands = _stance(trajectory, structure)
-    rows = _rows_of_feet(stands)
-    heights = [
-        float(np.clip(_SIGNAL_HEIGHT * structure.signals, _LEAST_HEIGHT, _MOST_HEIGHT)),
-        float(np.clip(_FOOT_HEIGHT * max(rows.values(), default=0.0), _LEAST_HEIGHT, _MOST_HEIGHT)),
-        _SPEED_HEIGHT,
-    ]
-    if not structure.signals:
-        del heights[0]
-    host = page(axes, height_in=sum(heights) + _MARGINS)
-    panels = split(host, heights=heights, gap_y=18.0, above=15.0)[:, 0]
-    # A caller's axes may be small.
-    scale = min(1.0, inches(host)[1] / sum(heights))
+    feet = _rows_of_feet(stands)
+    rows = [np.clip(max(feet.values(), default=0.0), *_ROWS), _SPEED_ROWS]
     if structure.signals:
-        _draw_signals(panels[0], trajectory, unit, names=int(scale * heights[0] / _NAME_HEIGHT))
-    each = len(rows) <= _FEW_FEET and scale * _FOOT_HEIGHT > 0.8 * _NAME_HEIGHT
-    _draw_stance(panels[-2], stands, rows, each=each)
+        rows.insert(0, np.clip(structure.signals, *_ROWS))
+    page = page_of(figure, height_in=_ROW * sum(rows) + 1.25)
+    panels = page.subplots(len(rows), sharex=True, height_ratios=rows)
+    if structure.signals:
+        _draw_signals(panels[0], trajectory, unit)
+    _draw_stance(panels[-2], stands, feet)
     _draw_speed(panels[-1], trajectory, structure, unit)
     _mark_cycles(panels, trajectory.time.values, cycle)
-    title = "Gait diagram"
-    if cycle is not None:
-        title += f", cycle of {fixed(cycle[1] - cycle[0])} s"
-    host.set_title(title, loc="left")
-    return figure_of(host)
+    of_cycle = "" if cycle is None else f", cycle of {fixed(cycle[1] - cycle[0])} s"
+    set_title(page, f"Gait diagram{of_cycle}")
+    return page
 
 
 def _last_cycles(
@@ -133,25 +122,24 @@ def foot_name(node: str) -> str:
     return node.replace("bottom_", "").replace("_", " ")
 
 
-def _draw_signals(panel: Axes, trajectory: xarray.Dataset, unit: Units, *, names: int) -> None:
-    """Signals one above the other, the last on top as the lead is, and so many of their names."""
+def _draw_signals(panel: Axes, trajectory: xarray.Dataset, unit: Units) -> None:
+    """Signals one above the other, the last on top as the lead is."""
     signals, oscillators = trajectory.signal / unit.force, trajectory.oscillator.values
     largest = float(np.abs(signals.values).max())
     scale = _SWING / largest if largest else 0.0
     for place, name in enumerate(oscillators):
         panel.axhline(place, color="0.8", linewidth=0.5)
         panel.plot(signals.time, place + scale * signals.sel(oscillator=name), **_LINE)
-    every = 1 + (len(oscillators) - 1) // max(names, 1)
+    every = 1 + (len(oscillators) - 1) // _NAMED
     panel.set_yticks(range(0, len(oscillators), every), own_words(oscillators)[::every])
     panel.set_ylim(-0.6, len(oscillators) - 0.4)
     panel.grid(visible=False, axis="y")
     name_panel(panel, f"actuation signals, up to {fixed(largest)} {unit.force_name}")
 
 
-def _draw_stance(
-    panel: Axes, stands: xarray.DataArray, rows: Mapping[str, float], *, each: bool
-) -> None:
-    """Stance bars; names and duty factors of each foot, or names of bodies alone."""
+def _draw_stance(panel: Axes, stands: xarray.DataArray, rows: Mapping[str, float]) -> None:
+    """Stance bars; names and duty factors of each foot or, of many, names of bodies alone."""
+    each = len(rows) <= _NAMED
     times = stands.time.values
     by_body: dict[str, list[float]] = {}
     for foot, row in rows.items():

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
 import pandas
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from tetra_drake.analysis.elites import CELLS, LUCKY, chosen, distinct_gaits, elites, robust
 from tetra_drake.evolution.run import Run, gait_label
-from tetra_drake.figures.style import BELOW, common_style, figure_of, name_panel, page, split
+from tetra_drake.figures.style import Drawn, Page, figure_function, name_panel, page_of, set_title
 from tetra_drake.formatting import listed
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -24,12 +22,9 @@ _LUCKY: Any = {"color": "0.55", "marker": "x", "linestyle": "", "markersize": 3.
 _NUMBER: Any = {"ha": "center", "va": "center", "fontsize": 7.0, "fontweight": "bold", "zorder": 4}
 _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "black"}
 
-_LINE = 110  # largest number of letters in a line below the panels
-_NOTE_HEIGHT = 0.17  # inches on paper
 
-
-@common_style()
-def map_of_gaits(run: Run, *, axes: Axes | None = None) -> Figure:
+@figure_function
+def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
     """The fittest gait in each cell of the map. White: cells without a gait.
 
     If gaits were simulated on disturbed robots: a cross marks a gait that keeps its distance in
@@ -45,11 +40,8 @@ def map_of_gaits(run: Run, *, axes: Axes | None = None) -> Figure:
         for (name, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True)
     ]
     named = distinct_gaits(chosen(run))
-    notes = _notes(named)
-    host = page(axes, height_in=3.9 + _NOTE_HEIGHT * len(notes))
-    below = BELOW + 8.0 + 72.0 * _NOTE_HEIGHT * len(notes)
-    size: Any = {"widths": [1.0] * count, "gap_x": 56.0, "share_y": True}
-    row = split(host, **size, above=18.0, below=below)[0]
+    page = page_of(figure, height_in=3.9 + 0.17 * len(named))
+    row = page.subplots(1, count, squeeze=False, sharey=True)[0]
     title = f"fitness ({len(kept)} of {math.prod(kind.cells)} cells)"
     _draw_cells(row[0], kept, kept["fitness"], edges, title=title, cmap="viridis")
     if judged:
@@ -63,19 +55,12 @@ def map_of_gaits(run: Run, *, axes: Axes | None = None) -> Figure:
         panel.set(xlabel=x_label)
         for number, (_, gait) in enumerate(named, start=1):
             panel.text(*_middles(gait, edges), str(number), bbox=_DISC, **_NUMBER)
-    place: Any = {"transform": host.transAxes, "va": "bottom", "linespacing": 1.35}
-    host.text(0.0, 0.0, "\n".join(notes), fontsize=8.0, **place)
-    host.set_title("Map of gaits", loc="left")
-    return figure_of(host)
-
-
-def _notes(named: Sequence[tuple[Sequence[str], pandas.Series]]) -> list[str]:
-    """Lines that say which gaits the numbers are."""
     notes = []
     for number, (names, gait) in enumerate(named, start=1):
-        label = f"{number}  {listed(names)}: {gait_label(gait)}"
-        notes += textwrap.wrap(label, _LINE, subsequent_indent="    ")
-    return notes
+        notes.append(f"{number}  {listed(names)}: {gait_label(gait)}")
+    page.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=8.0, wrap=True)
+    set_title(page, "Map of gaits")
+    return page
 
 
 def _draw_cells(
@@ -92,8 +77,7 @@ def _draw_cells(
     across, up = CELLS
     grid[gaits[across], gaits[up]] = values
     mesh = axes.pcolormesh(*edges, grid.T, rasterized=True, **look)
-    bar = axes.inset_axes((1.03, 0.0, 0.04, 1.0))
-    figure_of(axes).colorbar(mesh, cax=bar)
+    axes.figure.colorbar(mesh, ax=axes)
     axes.grid(visible=False)
     name_panel(axes, title)
 

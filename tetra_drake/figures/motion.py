@@ -11,57 +11,41 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.figures.style import (
-    BELOW,
     LINE_COLOURS,
     OKABE_ITO,
     WIDTH_IN,
+    Drawn,
+    Page,
     Units,
-    common_style,
-    figure_of,
-    inches,
+    figure_function,
     legend_below,
     line_style,
     name_panel,
-    page,
+    page_of,
+    panels_in_columns,
+    set_title,
     shown_part,
-    split,
-    spread,
     units_named,
-    write_beside,
 )
 from tetra_drake.formatting import fixed, signed
 from tetra_drake.results import measures
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.ground import ground_heights
-from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, followed_nodes, node_positions
 from tetra_drake.scenario.units import INCH
 
 X, Y, Z = range(3)
 
-OVERHEAD, SIDE = Y, Z  # World axis that a view shows up the page; across it is X
-
 # Metres of the robot's world.
 _MARGIN = 0.6 * INCH  # free space around a robot
 _PROFILE = 0.05 * INCH  # distance between points of the ground's profile
 
-# Inches on paper.
-_ROOM = (WIDTH_IN - 0.3, 6.8)  # for time lapses on a page of their own
-_TITLE, _GAP = 0.25, 0.12  # above each robot of a time lapse, and between two
-_EDGES = 1.05  # above and below all of them
-_NUMBERS = 0.5  # left of paths
-_LETTER, _NAME_HEIGHT = 0.075, 0.15  # of the name of a body
-_SQUARE = 5.0  # largest height of a path
-
+_PANEL_NAME, _GAP = 0.27, 0.13  # height of the name of a panel, and between panels, in inches
 _PATHS = 6  # largest number of panels of paths side by side
-_ARROW = 0.08  # length of an arrow over that of the path
 _STRAIGHT = 0.05  # a path is straight if it is narrower than this share of its length
-_TALL = 0.6  # height over width of a robot, from which on instants of a step are beside each other
 _CLEARANCE = 0.02  # from which on a body is off the ground, as a share of the robot's height
 
 _ON_GROUND, _LIFTED = "0.2", OKABE_ITO["vermillion"]
@@ -70,89 +54,74 @@ _GROUND: Any = {"color": "0.6", "linewidth": 0.8, "linestyle": "-"}
 _SECONDS: Any = {"color": "0.4", "marker": "o", "linestyle": "", "markersize": 1.8}
 _START: Any = {"color": "black", "marker": "o", "linestyle": "", "markerfacecolor": "white"}
 _END: Any = {"color": "black", "marker": "s", "linestyle": ""}
-_HEADING: Any = {
-    "color": OKABE_ITO["vermillion"],
-    "zorder": 2.5,
-    "width": 0.004,
-    "angles": "xy",
-    "scale_units": "xy",
-    "scale": 1.0,
-}
+_HEADING: Any = {"color": OKABE_ITO["vermillion"], "zorder": 2.5, "width": 0.004, "scale": 18.0}
 _HEADING_MARK: Any = {"color": OKABE_ITO["vermillion"], "marker": ">", "linestyle": "-"}
 _BEFORE: Any = {"color": "0.5", "linewidth": 1.3, "linestyle": "-"}
 _AFTER: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.6, "linestyle": "-"}
 
 
-@common_style()
+@figure_function
 def relative_distances(
     result: SimulationResult,
     *,
-    axes: Axes | None = None,
+    figure: Page | None = None,
     time: tuple[float, float] | None = None,
     units: str = "in",
-) -> Figure:
+) -> Drawn:
     """Distances along x from the first body to each other, between centres of mass, over time.
 
     Grey lines: the distances at the start."""
     unit, trajectory = units_named(units), shown_part(result.trajectory, time)
     distances = measures.relative_distances(trajectory) / unit.length
     first, *names = distances.body.values
-    panel = page(axes, height_in=1.5 + min(0.6 * len(names), 5.0))
+    page = page_of(figure, height_in=1.5 + min(0.6 * len(names), 5.0))
+    panel = page.subplots()
     for i, name in enumerate(names):
         line = distances.sel(body=name)
         panel.axhline(float(line[0]), color="0.6", linewidth=0.7)
         panel.plot(line.time, line, label=name, **line_style(i))
-    low, high = panel.get_ylim()
-    least = _NAME_HEIGHT / inches(panel)[1] * (high - low)
-    places = spread(distances.sel(body=names).values[-1], least)
-    for i, (name, end) in enumerate(zip(names, places, strict=True)):
-        write_beside(panel, end, name, color=line_style(i)["color"])
     panel.set(xlabel="time (s)", ylabel=f"distance from {first} ({unit.length_name})")
-    panel.set_title(f"Distance of each body from {first}", loc="left")
-    return figure_of(panel)
+    page.legend(loc="outside right upper", reverse=True, frameon=False)
+    set_title(page, f"Distance of each body from {first}")
+    return page
 
 
-@common_style()
+@figure_function
 def before_and_after(
     initial: SimulationResult,
     best: SimulationResult,
     *,
-    axes: Axes | None = None,
+    figure: Page | None = None,
     time: tuple[float, float] | None = None,
     units: str = "in",
-) -> Figure:
+) -> Drawn:
     """Distance walked over time by a run's best gait, and by the best gait of the first iteration
     of the same trial."""
     unit = units_named(units)
-    host = page(axes, height_in=3.8)
-    before, after = (textwrap.shorten(result.name, 80) for result in (initial, best))
-    looks = {f"before: {before}": _BEFORE, f"after: {after}": _AFTER}
-    panel = split(host, below=legend_below(host, looks))[0, 0]
-    ends = []
-    for result, style in zip((initial, best), (_BEFORE, _AFTER), strict=True):
+    page = page_of(figure, height_in=3.8)
+    panel = page.subplots()
+    legend = {}
+    for when, result, look in (("before", initial, _BEFORE), ("after", best, _AFTER)):
         part = shown_part(result.trajectory, time)
         walked = _distance_walked(result, unit).sel(time=part.time)
-        panel.plot(walked.time, walked, **style)
-        ends.append(float(walked[-1]))
-    low, high = panel.get_ylim()
-    places = spread(np.array(ends), _NAME_HEIGHT / inches(host)[1] * 1.3 * (high - low))
-    for end, place, style in zip(ends, places, (_BEFORE, _AFTER), strict=True):
-        text = f"{fixed(end, unit.digits)} {unit.length_name}"
-        write_beside(panel, place, text, color=style["color"])
+        panel.plot(walked.time, walked, **look)
+        way = f"{fixed(float(walked[-1]), unit.digits)} {unit.length_name}"
+        legend[f"{when}: {way}, {textwrap.shorten(result.name, 70)}"] = look
     panel.set(xlabel="time (s)", ylabel=f"distance ({unit.length_name})")
-    host.set_title("Distance walked, before and after evolution", loc="left")
-    return figure_of(host)
+    legend_below(page, legend)
+    set_title(page, "Distance walked, before and after evolution")
+    return page
 
 
-@common_style()
+@figure_function
 def time_lapse(
     result: SimulationResult,
     *,
-    axes: Axes | None = None,
+    figure: Page | None = None,
     time: tuple[float, float] | None = None,
     units: str = "in",
     instants: int = 6,
-) -> Figure:
+) -> Drawn:
     """The robot from above at some instants, to scale, with the distance walked. Forward is to the
     right. The line is the path of its centre so far, with a dot at each full second."""
     structure, unit = result.robot.structure, units_named(units)
@@ -161,41 +130,39 @@ def time_lapse(
     samples = _nearest(trajectory, np.linspace(first, last, instants))
     nodes, walked = trajectory.p_WN.values / unit.length, _distance_walked(result, unit)
     centre = structure.node_shares @ nodes
-    wide, high = _extents(np.concatenate([nodes[samples].reshape(-1, 3), centre]), OVERHEAD, unit)
-    room = _ROOM if axes is None else inches(axes)
-    columns = _columns(instants, wide=np.ptp(wide), high=np.ptp(high), room=room)
-    rows = math.ceil(instants / columns)
-    width = room[0] / columns - _GAP
-    host = page(axes, height_in=rows * (width * np.ptp(high) / np.ptp(wide) + _TITLE) + _EDGES)
-    panels = _lapse_panels(host, rows, columns)
-    for sample, panel in zip(samples, panels.ravel(), strict=False):
+    shown = np.concatenate([nodes[samples].reshape(-1, 3), centre])
+    wide, high = (_range(shown[:, axis], unit) for axis in (X, Y))
+    columns, height = _fit(instants, wide, high, figure, height_in=6.0)
+    page = page_of(figure, height_in=height + 0.9)
+    x_label = f"x, forward ({unit.length_name}) →"
+    panels = panels_in_columns(page, instants, columns, x_label=x_label)
+    looks = [{"color": LINE_COLOURS[i % len(LINE_COLOURS)]} for i in range(len(structure.bodies))]
+    for sample, panel in zip(samples, panels, strict=True):
         now = float(trajectory.time[sample])
-        colours = [LINE_COLOURS[i % len(LINE_COLOURS)] for i in range(len(structure.bodies))]
-        _draw_struts(panel, nodes[sample][:, [X, Y]], structure, colours)
+        _draw_struts(panel, nodes[sample][:, [X, Y]], structure, [look["color"] for look in looks])
         seconds = _nearest(trajectory, np.arange(math.ceil(first), now + 1e-9))
         panel.plot(centre[: sample + 1, X], centre[: sample + 1, Y], **_PATH)
         panel.plot(centre[seconds, X], centre[seconds, Y], **_SECONDS)
         way = signed(float(walked.sel(time=now)), unit.digits)
         name_panel(panel, f"{now:.4g} s: {way} {unit.length_name}")
-        panel.set(xlim=wide, ylim=high, aspect="equal")
-    for panel in panels.ravel()[instants:]:
-        panel.remove()
-    _name_bodies(panels[0, 0], nodes[samples[0]][:, [X, Y]], structure, width_in=width)
-    for panel in panels[-1]:
-        panel.set_xlabel(f"x, forward ({unit.length_name}) →")
-    host.set_title("Time lapse from above: time and distance walked", loc="left")
-    return figure_of(host)
+        _to_scale(panel, wide, high)
+    if structure.is_row:
+        _name_ends(panels[0], nodes[samples[0]], structure)
+    elif len(looks) <= len(LINE_COLOURS):
+        legend_below(page, dict(zip(structure.bodies, looks, strict=True)))
+    set_title(page, "Time lapse from above: time and distance walked")
+    return page
 
 
-@common_style()
+@figure_function
 def path_of_the_centre(
     result: SimulationResult,
     *,
-    axes: Axes | None = None,
+    figure: Page | None = None,
     time: tuple[float, float] | None = None,
     units: str = "in",
     instants: int = 9,
-) -> Figure:
+) -> Drawn:
     """The path of the robot's centre: from above and to scale, with arrows where a row heads; or,
     if it is straight, its height along x."""
     structure, unit = result.robot.structure, units_named(units)
@@ -203,131 +170,108 @@ def path_of_the_centre(
     path = measures.path_of_centre(trajectory, structure)
     points = path.centre / unit.length
     if np.ptp(points[:, Y]) < _STRAIGHT * np.ptp(points[:, X]):
-        return _draw_height(page(axes, height_in=2.6), points, result.robot, unit)
-    arrow = _ARROW * max(*np.ptp(points[:, :2], axis=0), _MARGIN / unit.length)
-    ratio = np.ptp(points[:, Y]) / max(np.ptp(points[:, X]), arrow)
-    host = page(axes, height_in=min((_ROOM[0] - _NUMBERS) * ratio, _SQUARE) + 1.4)
+        return _draw_height(page_of(figure, height_in=2.6), points, result.robot, unit)
+    ratio = np.ptp(points[:, Y]) / max(np.ptp(points[:, X]), _MARGIN / unit.length)
+    page = page_of(figure, height_in=min(WIDTH_IN * ratio, 5.0) + 1.4)
+    panel = page.subplots()
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
-    if structure.is_row:
-        looks["heading"] = _HEADING_MARK
-    panel = split(host, below=legend_below(host, looks))[0, 0]
     panel.plot(points[:, X], points[:, Y], **_PATH)
     if structure.is_row:
+        looks["heading"] = _HEADING_MARK
         samples = _nearest(trajectory, np.linspace(path.times[0], path.times[-1], instants))
-        _draw_headings(panel, path, points, arrow, samples)
+        heading, arrows = path.heading[samples], points[samples]
+        panel.quiver(arrows[:, X], arrows[:, Y], np.cos(heading), np.sin(heading), **_HEADING)
     panel.plot(points[0, X], points[0, Y], **_START)
     panel.plot(points[-1, X], points[-1, Y], **_END)
     panel.margins(0.1)
     panel.set_aspect("equal", adjustable="datalim")
     panel.set(xlabel=f"x ({unit.length_name})", ylabel=f"y ({unit.length_name})")
-    host.set_title("Path of the centre from above", loc="left")
-    return figure_of(host)
+    legend_below(page, looks)
+    set_title(page, "Path of the centre from above")
+    return page
 
 
-def _draw_headings(
-    panel: Axes, path: CentrePath, points: np.ndarray, length: float, samples: np.ndarray
-) -> None:
-    """Arrows along the heading at some samples."""
-    heading = path.heading[samples]
-    ways = length * np.column_stack([np.cos(heading), np.sin(heading)])
-    panel.quiver(points[samples, X], points[samples, Y], ways[:, X], ways[:, Y], **_HEADING)
-
-
-def _draw_height(panel: Axes, points: np.ndarray, robot: Robot, unit: Units) -> Figure:
+def _draw_height(page: Page, points: np.ndarray, robot: Robot, unit: Units) -> Page:
     """Heights of a path (samples, 3) along x, and of uneven ground below it."""
+    panel = page.subplots()
     panel.plot(points[:, X], points[:, Z], **_PATH)
     if not robot.ground.flat:
         heights = ground_heights(points[:, :2] * unit.length, robot.ground) / unit.length
         panel.plot(points[:, X], heights, **_GROUND)
     panel.set(xlabel=f"x ({unit.length_name})", ylabel=f"height ({unit.length_name})")
     panel.margins(x=0.02, y=0.1)
-    panel.set_title("Height of the centre along its path", loc="left")
-    return figure_of(panel)
+    set_title(page, "Height of the centre along its path")
+    return page
 
 
-@common_style()
+@figure_function
 def one_step(
     result: SimulationResult,
     *,
-    axes: Axes | None = None,
+    figure: Page | None = None,
     time: tuple[float, float] | None = None,
     units: str = "in",
-    instants: int = 5,
-) -> Figure:
-    """One step from above and from the side, to scale; bodies off the ground stand out.
+    instants: int = 6,
+) -> Drawn:
+    """One step to scale, from above and, below that, from the side; bodies off the ground stand
+    out.
 
     A body is off the ground if its feet are above it by 2 % of the robot's height. Below: the path
     of one bottom node per body, or of the centre. If no signal has two periods in the second half,
     the last quarter is shown."""
     robot, unit = result.robot, units_named(units)
     structure = robot.structure
-    ends = time or measures.last_step(result.trajectory)
-    title = "One step"
-    if ends is None:
-        end = float(result.trajectory.time[-1])
-        ends, title = (0.75 * end, end), "The last quarter"
+    ends, title = _shown_step(result, time)
     step = shown_part(result.trajectory, ends)
-    nodes, (lifted, least) = step.p_WN.values / unit.length, _clear_of_ground(step, robot)
-    samples = _nearest(step, np.linspace(*ends, instants))
-    profiles = [_profile(step.p_WN.values, sample, robot) / unit.length for sample in samples]
-    views = _views(nodes, np.concatenate([nodes.reshape(-1, 3), *profiles]), unit)
-    wide, tall = (float(np.ptp(limits)) for limits in views[SIDE])
+    samples, nodes = _nearest(step, np.linspace(*ends, instants)), step.p_WN.values / unit.length
+    grounds = [_profile(step.p_WN.values, sample, robot) / unit.length for sample in samples]
+    heights = np.concatenate([nodes[..., Z].ravel(), *(ground[:, Z] for ground in grounds)])
+    wide, above, side = (_range(v, unit) for v in (nodes[..., X], nodes[..., Y], heights))
+    shifts = {Y: 0.0, Z: above[0] - side[1]}  # of the views up the page: the second is below
+    high = side[0] + shifts[Z], above[1]
+    columns, height = _fit(instants, wide, high, figure, height_in=3.6)
     names = structure.bodies if structure.is_row else (structure.followed,)
-    # The instants of a tall robot are beside each other, of another one below each other.
-    rows, columns = (2, instants) if tall > _TALL * wide else (instants, 2)
-    width = (_ROOM[0] - _NUMBERS) / columns - _GAP
-    heights = [rows * (width * tall / wide + _TITLE) + 0.6, 0.95 * math.ceil(len(names) / _PATHS)]
-    host = page(axes, height_in=sum(heights) + 1.4)
+    paths_height = 1.1 * math.ceil(len(names) / _PATHS) + 0.4
+    parts = [min(height + 0.4, 3.0 * paths_height), paths_height]
+    page = page_of(figure, height_in=sum(parts) + 0.5)
+    upper, lower = page.subfigures(2, squeeze=False, height_ratios=parts)[:, 0]
+    panels = panels_in_columns(upper, instants, columns, x_label=f"x ({unit.length_name})")
+    paths, (lifted, least) = followed_nodes(nodes, structure), _clear_of_ground(step, robot)
+    for sample, ground, panel in zip(samples, grounds, panels, strict=True):
+        name_panel(panel, f"{float(step.time[sample]) - ends[0]:.2f} s")
+        panel.plot(ground[:, X], ground[:, Z] + shifts[Z], **_GROUND)
+        colours = [_LIFTED if up else _ON_GROUND for up in lifted[sample]]
+        for axis, shift in shifts.items():
+            path, points = paths[: sample + 1], nodes[sample][:, [X, axis]] + [0.0, shift]
+            panel.plot(path[..., X], path[..., axis] + shift, **_PATH)
+            _draw_struts(panel, points, structure, colours)
+        _to_scale(panel, wide, high)
+    for panel in panels[::columns]:
+        panel.set_yticks([np.mean(above), np.mean(side) + shifts[Z]], ["above", "side"])
+    if structure.is_row:
+        _name_ends(panels[0], nodes[samples[0]], structure)
+    else:
+        lifted = np.all(lifted, axis=1, keepdims=True)
+    _draw_paths(lower, names, paths[:, ::2], lifted, robot, unit)  # of the left nodes
     looks = {
         f"over {least / unit.length:.1g} {unit.length_name} off the ground": {"color": _LIFTED},
         "on the ground": {"color": _ON_GROUND},
         f"path of the {structure.followed}": _PATH,
     }
-    below = legend_below(host, looks)
-    above, paths = split(host, heights=heights, gap_y=18.0, below=below)[:, 0]
-    grid = _lapse_panels(above, rows, columns)
-    panels = grid if columns == 2 else grid.T
-    followed = followed_nodes(nodes, structure)
-    for sample, profile, row in zip(samples, profiles, panels, strict=True):
-        colours = [_LIFTED if up else _ON_GROUND for up in lifted[sample]]
-        row[1].plot(profile[:, X], profile[:, Z], **_GROUND)
-        for (view, limits), panel in zip(views.items(), row, strict=True):
-            panel.plot(followed[: sample + 1, :, X], followed[: sample + 1, :, view], **_PATH)
-            _draw_struts(panel, nodes[sample][:, [X, view]], structure, colours)
-            panel.set(xlim=limits[0], ylim=limits[1], aspect="equal")
-        name_panel(row[0], f"{float(step.time[sample]) - ends[0]:.2f} s")
-    for view, panel in zip(views, panels[0], strict=True):
-        _name_view(panel, view, beside=columns == 2)
-        _name_bodies(panel, nodes[samples[0]][:, [X, view]], structure, width_in=width)
-    for panel in grid[-1]:
-        panel.set_xlabel(f"x ({unit.length_name})")
-    if not structure.is_row:
-        lifted = np.all(lifted, axis=1, keepdims=True)
-    _draw_paths(paths, names, followed[:, ::2], lifted, robot, unit)  # of the left nodes
-    host.set_title(f"{title}, {ends[0]:.2f} to {ends[1]:.2f} s", loc="left")
-    return figure_of(host)
+    legend_below(page, looks)
+    set_title(page, f"{title}, {ends[0]:.2f} to {ends[1]:.2f} s")
+    return page
 
 
-def _name_view(panel: Axes, view: int, *, beside: bool) -> None:
-    """Names a view above a panel if the other one is beside it, else to its left."""
-    name = "from above" if view == OVERHEAD else "from the side"
-    if beside:
-        panel.set_title(name, loc="right", fontsize="medium", pad=3.0)
-    else:
-        panel.set_ylabel(name)
-
-
-def _views(
-    nodes: np.ndarray, with_ground: np.ndarray, unit: Units
-) -> dict[int, tuple[tuple[float, float], tuple[float, float]]]:
-    """Limits across and up the page of each view, all of one size."""
-    above, side = _extents(nodes, OVERHEAD, unit), _extents(with_ground, SIDE, unit)
-    tall = max(np.ptp(above[1]), np.ptp(side[1]))
-    views = {}
-    for view, (_, limits) in ((OVERHEAD, above), (SIDE, side)):
-        middle = sum(limits) / 2
-        views[view] = above[0], (float(middle - tall / 2), float(middle + tall / 2))
-    return views
+def _shown_step(
+    result: SimulationResult, time: tuple[float, float] | None
+) -> tuple[tuple[float, float], str]:
+    """Start and end (s) of the time shown, and what it is."""
+    ends = time or measures.last_step(result.trajectory)
+    if ends is not None:
+        return ends, "One step"
+    end = float(result.trajectory.time[-1])
+    return (0.75 * end, end), "The last quarter"
 
 
 def _clear_of_ground(trajectory: xarray.Dataset, robot: Robot) -> tuple[np.ndarray, float]:
@@ -349,7 +293,7 @@ def _profile(nodes: np.ndarray, sample: int, robot: Robot) -> np.ndarray:
 
 
 def _draw_paths(
-    host: Axes,
+    page: Page,
     names: Sequence[str],
     paths: np.ndarray,
     lifted: np.ndarray,
@@ -357,13 +301,9 @@ def _draw_paths(
     unit: Units,
 ) -> None:
     """Paths (samples, names, 3), enlarged, and where they are `lifted` (samples, names)."""
-    columns = min(len(names), _PATHS)
-    rows = math.ceil(len(names) / columns)
-    panels = split(host, heights=[1.0] * rows, widths=[1.0] * columns, gap_y=18.0, share_y=True)
-    for i, panel in enumerate(panels.ravel()):
-        if i >= len(names):
-            panel.remove()
-            continue
+    columns, x_label = min(len(names), _PATHS), f"forward ({unit.length_name})"
+    panels = panels_in_columns(page, len(names), columns, x_label=x_label, sharex=True, sharey=True)
+    for i, (name, panel) in enumerate(zip(names, panels, strict=True)):
         path = paths[:, i]
         x, z = path[:, X] - path[0, X], path[:, Z]
         if not robot.ground.flat:
@@ -376,13 +316,8 @@ def _draw_paths(
         panel.margins(0.08)
         least = _MARGIN / 6 / unit.length  # even if nothing moves
         panel.update_datalim([(-least, z.min()), (least, z.min() + least)])
-        panel.xaxis.set_major_locator(
-            MaxNLocator(nbins=4 if columns > 2 else 8, steps=[1, 2, 5, 10])
-        )
-        name_panel(panel, names[i])
-    for panel in panels[-1]:
-        panel.set_xlabel(f"forward ({unit.length_name})")
-    panels[0, 0].set_ylabel(f"height ({unit.length_name})")
+        name_panel(panel, name)
+    panels[0].set_ylabel(f"height ({unit.length_name})")
 
 
 def _distance_walked(result: SimulationResult, unit: Units) -> xarray.DataArray:
@@ -397,41 +332,41 @@ def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
     return np.abs(trajectory.time.values - times[:, np.newaxis]).argmin(axis=1)
 
 
-def _extents(
-    points: np.ndarray, view: int, unit: Units
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Range of points (..., 3) across and up the page, with a margin and room for names of bodies
-    above."""
+def _range(values: np.ndarray, unit: Units) -> tuple[float, float]:
+    """Range of coordinates, with a margin."""
     margin = _MARGIN / unit.length
-    ranges = []
-    for axis in (X, view):
-        values = points[..., axis]
-        ranges.append((float(values.min()) - margin, float(values.max()) + margin))
-    across, (low, high) = ranges
-    return across, (low, high + margin)
+    return float(values.min()) - margin, float(values.max()) + margin
 
 
-def _columns(count: int, *, wide: float, high: float, room: tuple[float, float]) -> int:
-    """Number of columns in which `count` pictures are drawn largest in a room on paper."""
-    scales = []
-    for columns in range(1, count + 1):
-        width, height = room[0] / columns - _GAP, room[1] / math.ceil(count / columns) - _TITLE
-        scales.append(min(width / wide, height / high))
-    return 1 + int(np.argmax(scales))
+def _fit(
+    count: int,
+    wide: tuple[float, float],
+    high: tuple[float, float],
+    figure: Page | None,
+    *,
+    height_in: float,
+) -> tuple[int, float]:
+    """Number of columns in which `count` pictures of these ranges are largest, in the caller's
+    figure or a page of this height; and the height (in) of all rows as wide as the page."""
+    room = (WIDTH_IN, height_in)
+    if figure is not None:
+        room = (figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi)
+    ratio = (high[1] - high[0]) / (wide[1] - wide[0])
+
+    def width(columns: int) -> float:
+        return min(room[0] / columns, room[1] / math.ceil(count / columns) / ratio)
+
+    columns = max(range(1, count + 1), key=width)
+    row = (room[0] / columns - _GAP) * ratio + _PANEL_NAME
+    return columns, row * math.ceil(count / columns)
 
 
-def _lapse_panels(host: Axes, rows: int, columns: int) -> np.ndarray:
-    """Panels of a time lapse, whose y axis has the scale of the x axis and no numbers."""
-    size: Any = {"heights": [1.0] * rows, "widths": [1.0] * columns}
-    gaps: Any = {"gap_x": 72.0 * _GAP, "gap_y": 72.0 * _TITLE}
-    panels = split(host, **size, **gaps, above=15.0, below=BELOW)
-    for panel in panels.ravel():
-        panel.tick_params(axis="y", left=False, labelleft=False)
-        panel.grid(visible=False, axis="y")
-        panel.spines[:].set_color("0.8")
-        nbins = min(7, 15 // columns)
-        panel.xaxis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 5, 10]))
-    return panels
+def _to_scale(panel: Axes, wide: tuple[float, float], high: tuple[float, float]) -> None:
+    """Shows ranges of x and up the page to one scale, without numbers on the y axis."""
+    panel.set(xlim=wide, ylim=high, aspect="equal", yticks=[])
+    panel.tick_params(axis="y", length=0.0)
+    panel.grid(visible=False, axis="y")
+    panel.spines[:].set_color("0.8")
 
 
 def _draw_struts(
@@ -445,19 +380,9 @@ def _draw_struts(
     panel.add_collection(lines, autolim=False)
 
 
-def _name_bodies(panel: Axes, nodes: np.ndarray, structure: Structure, *, width_in: float) -> None:
-    """Names bodies above the uppermost of their nodes (nodes, 2) in a panel that is `width_in`
-    inches wide, but those whose names would overlap with others'."""
-    left, right = panel.get_xlim()
-    per_paper_inch = (right - left) / width_in
-    longest = max(len(name) for name in structure.bodies)
-    width, height = longest * _LETTER * per_paper_inch, _NAME_HEIGHT * per_paper_inch
-    places: list[tuple[float, float]] = []
-    for body, name in enumerate(structure.bodies):
-        of_body = nodes[structure.carriers == body]
-        x, y = of_body[of_body[:, 1].argmax()].tolist()
-        x = min(max(x, left + width / 2), right - width / 2)
-        if all(abs(x - a) >= width or abs(y - b) >= height for a, b in places):
-            offset: Any = {"xytext": (0, 1), "textcoords": "offset points", "fontsize": 7.5}
-            panel.annotate(name, (x, y), ha="center", **offset)
-            places.append((x, y))
+def _name_ends(panel: Axes, nodes: np.ndarray, structure: Structure) -> None:
+    """Names the first and the last body in the middle of its nodes (nodes, 3), from above."""
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+    for body in (0, len(structure.bodies) - 1):
+        x, y, _ = nodes[structure.carriers == body].mean(axis=0)
+        panel.text(x, y, structure.bodies[body], ha="center", va="center", fontsize=7.5, bbox=box)

@@ -7,7 +7,6 @@ from typing import Any
 
 import pandas
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from tetra_drake.analysis.robustness import (
     LOSS,
@@ -21,13 +20,14 @@ from tetra_drake.figures.style import (
     OKABE_ITO,
     REFERENCE,
     SHADE,
+    Drawn,
+    Page,
     Units,
-    common_style,
-    figure_of,
+    figure_function,
     name_panel,
-    page,
+    page_of,
     save_findings,
-    split,
+    set_title,
     units_named,
     write_beside,
 )
@@ -55,7 +55,7 @@ _BOX: Any = {
 }
 _GREATEST: Any = {"color": "black", "linewidth": 1.0}
 
-_ROW = 0.22  # inches on paper
+_ROW = 0.22  # height of a row, in inches
 
 
 def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
@@ -69,8 +69,8 @@ def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
     return save_findings(figure, folder, "robustness", tables=tables, summary=summary)
 
 
-@common_style()
-def robustness(judgement: Judgement, *, axes: Axes | None = None, units: str = "in") -> Figure:
+@figure_function
+def robustness(judgement: Judgement, *, figure: Page | None = None, units: str = "in") -> Drawn:
     """Robustness of gaits. Above: distance in each disturbed draw over undisturbed distance, by
     gait, those that keep most draws on top. Boxes are quartiles, whiskers 5 to 95 %. A gait keeps a
     draw right of the dashed line; the share that it keeps is at the right.
@@ -81,15 +81,17 @@ def robustness(judgement: Judgement, *, axes: Axes | None = None, units: str = "
     unit = units_named(units)
     gaits = by_gait(judgement).sort_values("kept", kind="stable")
     changes, count = by_change(judgement).iloc[::-1], judgement.draws["draw"].nunique()
-    heights = [_ROW * max(len(gaits) + 1, 4), _ROW * max(len(changes) + 1, 4)]
-    host = page(axes, height_in=sum(heights) + 2.0)
-    rows = split(host, heights=heights, gap_y=52.0, above=16.0, share_x=False)[:, 0]
-    _draw_distances(rows[0], judgement, gaits)
-    alone, together = split(rows[1], widths=[1.0, 1.0], share_x=False, share_y=True)[0]
-    _draw_alone(alone, changes, unit)
-    _draw_correlations(together, changes, chance(count))
-    host.set_title(f"Robustness under {count} draws of disturbances", loc="left")
-    return figure_of(host)
+    rows = [max(len(gaits) + 1, 4), max(len(changes) + 1, 4)]
+    page = page_of(figure, height_in=_ROW * sum(rows) + 1.8)
+    panels = page.subplot_mosaic(
+        [["distances", "distances"], ["alone", "together"]], height_ratios=rows
+    )
+    _draw_distances(panels["distances"], judgement, gaits)
+    _draw_alone(panels["alone"], changes, unit)
+    _draw_correlations(panels["together"], changes, chance(count))
+    panels["together"].tick_params(labelleft=False)
+    set_title(page, f"Robustness under {count} draws of disturbances")
+    return page
 
 
 def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -> None:

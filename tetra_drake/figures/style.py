@@ -1,37 +1,43 @@
 """The common look of figures, and how they are written.
 
-A figure function is decorated with `@common_style()`. It draws on page(), which are the caller's
-axes or those of a new figure; split() divides them into panels. It returns the figure, which
-save_figure() writes. Neither a display nor pyplot is needed.
+A figure function is decorated with `@figure_function`. It draws on page_of(), which is the caller's
+figure or a new one, with matplotlib's constrained layout. save_figure() writes a figure. Neither a
+display nor pyplot is needed.
 """
 
 from __future__ import annotations
 
 import contextlib
-import itertools
+import functools
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeAlias
 
 import matplotlib.style
 import numpy as np
 import pandas
 import xarray
 from matplotlib import rcParams
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
-from matplotlib.transforms import Bbox
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file, write_whole
 from tetra_drake.formatting import listed
 from tetra_drake.scenario.units import INCH, POUND_FORCE
+
+Page: TypeAlias = Figure | SubFigure
+"""What figures are drawn on."""
+
+Drawn: TypeAlias = Figure | Any
+"""A new figure; or None if the caller gave one, which a notebook would otherwise show twice."""
+
+_P = ParamSpec("_P")
 
 OKABE_ITO = {
     "black": "#000000",
@@ -56,11 +62,6 @@ WIDTH_IN = 7.0
 
 SHADE = "0.9"
 """Grey behind marked intervals of time."""
-
-BELOW = 30.0
-"""Points that numbers and label of an x axis take."""
-
-_LETTER, _LINE_LETTERS = 0.062, 6  # inches per letter of a legend; of a line and its space
 
 REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 """Line style of values to compare with."""
@@ -120,100 +121,30 @@ def common_style() -> Iterator[None]:
         yield
 
 
-def page(axes: Axes | None, *, height_in: float) -> Axes:
-    """The axes to draw on: the caller's, or those of a new figure, `height_in` inches high."""
-    if axes is not None:
-        return axes
-    made = Figure(figsize=(WIDTH_IN, height_in)).add_subplot()
-    _keep_style(made)
-    return made
+def figure_function(draw: Callable[_P, Drawn]) -> Callable[_P, Drawn]:
+    """Gives a function that returns its page the common look. Nothing is returned if the caller
+    gave the page by the keyword `figure`."""
+
+    @functools.wraps(draw)
+    def drawn(*args: _P.args, **kwargs: _P.kwargs) -> Drawn:
+        with common_style():
+            page: Page = draw(*args, **kwargs)
+            for axes in page.findobj(Axes):
+                for axis in axes.xaxis, axes.yaxis:
+                    axis.get_major_ticks(1)  # now, in the common look; later ticks are copies
+        return page if kwargs.get("figure") is None else None
+
+    return drawn
 
 
-def figure_of(axes: Axes) -> Figure:
-    """The whole figure to which axes belong."""
-    figure = axes.get_figure(root=True)
-    assert figure is not None
+def page_of(figure: Page | None, *, height_in: float) -> Page:
+    """The caller's figure to draw on, or a new one, `height_in` inches high. Its layout is
+    constrained, unless the caller has chosen another."""
+    if figure is None:
+        return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    if figure.get_layout_engine() is None:
+        figure.figure.set_layout_engine("constrained")
     return figure
-
-
-def _keep_style(axes: Axes) -> None:
-    """Gives ticks, which are made when the figure is drawn, the style of now."""
-    grid_color, grid_linewidth = rcParams["grid.color"], rcParams["grid.linewidth"]
-    axes.tick_params(grid_color=grid_color, grid_linewidth=grid_linewidth)
-    axes.tick_params(axis="x", labelsize=rcParams["xtick.labelsize"])
-    axes.tick_params(axis="y", labelsize=rcParams["ytick.labelsize"])
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Place of a panel in its host: edges as shares of the host's size, and points beside these.
-    Matplotlib asks for it whenever it draws, so gaps keep their size on paper."""
-
-    host: Axes
-    shares: np.ndarray
-    """(2, 2): left and bottom, right and top."""
-    points: np.ndarray
-    """(2, 2)."""
-
-    def __call__(self, axes: object, renderer: object) -> Bbox:
-        """The place within the figure."""
-        figure, whole = self.host.get_figure(root=False), self.host.bbox
-        assert figure is not None
-        edges = whole.p0 + self.shares * whole.size + self.points * figure.dpi / 72.0
-        return Bbox(edges).transformed(figure.transSubfigure.inverted())
-
-
-def _edges(
-    sizes: Sequence[float], *, gap: float, before: float = 0.0, after: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Shares and points (panels, 2) of the edges of panels of relative sizes in one direction."""
-    ends = np.cumsum([0.0, *sizes]) / sum(sizes)
-    shares = np.column_stack([ends[:-1], ends[1:]])
-    places, room = np.arange(len(sizes)), gap * (len(sizes) - 1) + before + after
-    return shares, before + gap * places[:, np.newaxis] - room * shares
-
-
-def split(
-    host: Axes,
-    *,
-    heights: Sequence[float] = (1.0,),
-    widths: Sequence[float] = (1.0,),
-    gap_x: float = 12.0,
-    gap_y: float = 12.0,
-    above: float = 0.0,
-    below: float = 0.0,
-    share_x: bool = True,
-    share_y: bool = False,
-) -> np.ndarray:
-    """Panels (rows, columns) in place of axes, whose title stays, with relative heights and widths.
-
-    `gap_x` and `gap_y` are points between panels; `above` and `below` are points of the axes' place
-    that stay free. All panels share an x axis, or a y axis, if they shall.
-    """
-    host.set_axis_off()
-    x_shares, x_points = _edges(widths, gap=gap_x)
-    y_shares, y_points = _edges(heights[::-1], gap=gap_y, before=below, after=above)
-    rows, columns = len(heights), len(widths)
-    panels = np.empty((rows, columns), dtype=object)
-    first = None
-    for row, column in np.ndindex(rows, columns):
-        up = rows - 1 - row
-        shares = np.column_stack([x_shares[column], y_shares[up]])
-        points = np.column_stack([x_points[column], y_points[up]])
-        panel = host.inset_axes(
-            (0.0, 0.0, 1.0, 1.0),
-            sharex=first if share_x else None,
-            sharey=first if share_y else None,
-        )
-        panel.set_axes_locator(_Place(host, shares, points))
-        _keep_style(panel)
-        first = first or panel
-        if share_x and row < rows - 1:
-            panel.tick_params(labelbottom=False)
-        if share_y and column > 0:
-            panel.tick_params(labelleft=False)
-        panels[row, column] = panel
-    return panels
 
 
 def make_figure(
@@ -232,45 +163,47 @@ def own_words(names: Sequence[str]) -> list[str]:
     return [" ".join(word for word in of if word not in common) for of in words]
 
 
+def panels_in_columns(
+    page: Page, count: int, columns: int, *, x_label: str, **shared: Any
+) -> list[Axes]:
+    """Panels in columns, whose lowest panels have numbers and a label of x; `shared` for
+    subplots."""
+    grid = page.subplots(math.ceil(count / columns), columns, squeeze=False, **shared).ravel()
+    for unused in grid[count:]:
+        unused.remove()
+    for place, panel in enumerate(grid[:count]):
+        panel.tick_params(labelbottom=place >= count - columns)
+    for panel in grid[-columns:]:
+        panel.set_xlabel(x_label)
+    return list(grid[:count])
+
+
+def set_title(page: Page, title: str) -> None:
+    """Writes the title of a figure at the upper left."""
+    page.suptitle(title, x=0.01, ha="left")
+
+
 def name_panel(panel: Axes, name: str) -> None:
     """Writes the name of a panel above it, smaller than the title of the figure."""
     panel.set_title(name, loc="left", fontsize=rcParams["axes.labelsize"], pad=3.0)
 
 
-def write_beside(panel: Axes, height: float, text: str, *, color: str = "black") -> None:
+def write_beside(panel: Axes, height: float, text: str) -> None:
     """Writes a text to the right of a panel at a height of its data."""
     size, transform = rcParams["ytick.labelsize"], panel.get_yaxis_transform()
-    panel.text(1.01, height, text, transform=transform, va="center", fontsize=size, color=color)
+    panel.text(1.01, height, text, transform=transform, va="center", fontsize=size)
 
 
-def legend_below(host: Axes, lines: Mapping[str, Any], *others: Artist) -> float:
-    """Adds a legend of line styles, by label, and other artists at the lower edge of axes that are
-    split; returns the points that it and the label of an x axis take."""
+def legend_below(page: Page, lines: Mapping[str, Any], *others: Any) -> None:
+    """Adds a legend of line styles, by label, and of other artists below all panels, in as many
+    columns as the page has room for."""
     handles = [*(Line2D([], [], label=text, **style) for text, style in lines.items()), *others]
-    lengths = [_LETTER * (len(str(handle.get_label())) + _LINE_LETTERS) for handle in handles]
-    columns, width = len(handles), inches(host)[0]
-    if sum(lengths) > width:
-        columns = max(1, int(width / max(lengths)))
-    place: Any = {"loc": "lower center", "bbox_to_anchor": (0.5, 0.0), "borderaxespad": 0.0}
-    legend = host.legend(handles=handles, ncols=columns, frameon=False, **place)
-    for text in legend.get_texts():
-        text.set_parse_math(False)  # a name may hold a dollar sign
-    return BELOW + 15.0 * math.ceil(len(handles) / columns)
-
-
-def inches(axes: Axes) -> tuple[float, float]:
-    """Width and height of axes on paper, in inches, before the figure is laid out."""
-    dpi = figure_of(axes).dpi
-    return axes.bbox.width / dpi, axes.bbox.height / dpi
-
-
-def spread(values: np.ndarray, least: float) -> np.ndarray:
-    """Values moved as little upward as keeps them at least so far apart, in their order."""
-    moved = values.astype(float)
-    order = np.argsort(moved)
-    for lower, upper in itertools.pairwise(order):
-        moved[upper] = max(moved[upper], moved[lower] + least)
-    return moved - (moved - values).sum() / max(values.size, 1)
+    place: Any = {"handles": handles, "loc": "outside lower center", "frameon": False}
+    columns, legend = len(handles), page.legend(ncols=len(handles), **place)
+    while columns > 1 and legend.get_window_extent().width > page.bbox.width:
+        legend.remove()
+        columns -= 1
+        legend = page.legend(ncols=columns, **place)
 
 
 def save_findings(
