@@ -20,7 +20,8 @@ What there is, and what it offers:
     evolve, load_run    best_gait(), gaits(), scenario; evaluations, iterations (for pandas)
     load_command        a file of commands for actuators, for simulate(scenario, command=...)
     figures             from tetra_drake.figures.gait_diagram import gait_diagram, and then
-                        gait_diagram(result, axes=ax); other modules in tetra_drake.figures likewise
+                        gait_diagram(result), or gait_diagram(result, figure=own) with a Figure or a
+                        SubFigure of your own; other modules in tetra_drake.figures likewise
 
 print() shows the most important of a scenario, gait, run, result or result.metrics. Numbers are SI,
 unless the name says otherwise, as in result.metrics.distance_in. Input that cannot be used raises

@@ -5,12 +5,11 @@ import math
 
 import pandas
 import pytest
-from helpers.drawn import panels
 from helpers.synthetic_run import PER_DISTANCE, tiny_scenario, write_run
 
 from tetra_drake.analysis.comparison import compare
 from tetra_drake.cli import main
-from tetra_drake.figures.comparison import search
+from tetra_drake.figures.comparison import comparison
 from tetra_drake.report.analysis_text import comparison_text
 from tetra_drake.scenario.settings import Disturbances
 from tetra_drake.scenario.units import INCH
@@ -123,7 +122,7 @@ def test_different_objectives_and_runs_given_twice_are_refused(run, refused):
 def test_the_figure_has_a_line_and_a_band_for_each_run(run):
     fitnesses = [float(number) for number in range(30)]
     paths = [run("a", trial(*fitnesses), trial(*fitnesses[::2])), run("b", trial(4.0, 5.0))]
-    left, right = panels(search(compare(paths, reach=5.0 * INCH)))
+    left, right = comparison(compare(paths, reach=5.0 * INCH)).axes
     first, second = (line.get_xydata().tolist() for line in left.lines)
     assert first[-1] == [30.0, 28.5]
     assert second[-1] == [2.0, 5.0]
@@ -131,7 +130,7 @@ def test_the_figure_has_a_line_and_a_band_for_each_run(run):
     # 5 in are fitness 10: evaluations 11 and 6.
     assert right.lines[0].get_xydata().tolist()[1:] == [[6.0, 50.0], [11.0, 100.0], [30.0, 100.0]]
     assert right.lines[1].get_ydata().tolist() == [0.0, 0.0]
-    assert len(panels(search(compare(paths)))) == 1
+    assert len(comparison(compare(paths)).axes) == 1
 
 
 def test_the_command_prints_and_writes(run, tmp_path, capsys):
@@ -140,7 +139,7 @@ def test_the_command_prints_and_writes(run, tmp_path, capsys):
     assert main(["compare", *map(str, paths), *options]) == 0
     printed = capsys.readouterr().out
     assert all(text in printed for text in ("14.34 in", "never", "1 of 1", "0 of 1"))
-    files = ["curves.csv", "search.png", "search.svg", "summary.json", "trials.csv"]
+    files = ["comparison.png", "comparison.svg", "curves.csv", "summary.json", "trials.csv"]
     assert sorted(path.name for path in out.iterdir()) == files
     summary = json.loads((out / "summary.json").read_text())
     assert [row["run"] for row in summary["runs"]] == ["a", "b"]

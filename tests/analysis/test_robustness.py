@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pandas
 import pytest
+from helpers.judgements import judgement_by_hand
 from helpers.quantities import with_unit
 from helpers.synthetic_run import tiny_scenario
 
@@ -13,7 +14,6 @@ from tetra_drake.analysis.robustness import (
     SPREAD,
     START,
     TERRAIN,
-    Judgement,
     by_change,
     by_gait,
     default_disturbances,
@@ -151,33 +151,8 @@ def test_a_simulation_that_fails_has_a_reason_and_no_distance_and_keeps_nothing(
 
 
 @pytest.fixture
-def made(scenario):
-    """A judgement made by hand, of factors p and q; distances in m."""
-    undisturbed = pandas.DataFrame({"gait": ["a", "b"], "distance": [10.0, -10.0]})
-    draws = pandas.DataFrame(
-        {
-            "gait": ["a", "b"] * 4,
-            "draw": np.repeat(range(4), 2),
-            "p": np.repeat([0.9, 1.0, 1.1, 1.2], 2),
-            "q": np.repeat([1.2, 1.1, 1.0, 1.5], 2),
-            # Of a: 12, 9, 8.9 and a failure; of b: -11, -11.1, -9, 2.
-            "distance": [12.0, -11.0, 9.0, -11.1, 8.9, -9.0, np.nan, 2.0],
-            "failure": [None] * 6 + ["fell", None],
-            "missed": [""] * 7 + ["clearance"],
-        }
-    )
-    alone = pandas.DataFrame(
-        {
-            "gait": ["a", "a", "b", "b", "a", "b"],
-            "what": ["p"] * 4 + [START] * 2,
-            "distance": [9.0, 9.5, -10.25, np.nan, 4.0, -9.0],
-            "failure": [None, None, None, "fell", None, None],
-            "missed": "",
-        }
-    )
-    spread = Disturbances(draws=1, spreads={"p": 0.2, "q": 0.5})
-    judged = scenario.with_sections(disturbances=spread)
-    return Judgement(judged, seed=0, undisturbed=undisturbed, draws=draws, alone=alone)
+def made():
+    return judgement_by_hand()
 
 
 def test_a_draw_is_kept_if_a_tenth_of_the_distance_is_lost_at_most(made):

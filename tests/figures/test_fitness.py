@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from helpers.drawn import panels
 from helpers.synthetic_run import PER_DISTANCE, write_run
 from matplotlib.container import BarContainer
 
@@ -33,12 +32,12 @@ def with_means(*means):
 
 def lines(figure):
     """The points of the lines with a label of their own."""
-    points = {line.get_label(): line.get_xydata().tolist() for line in panels(figure)[0].lines}
+    points = {line.get_label(): line.get_xydata().tolist() for line in figure.axes[0].lines}
     return {label: xy for label, xy in points.items() if not label.startswith("_")}
 
 
 def bar_groups(figure):
-    return [c for c in panels(figure)[0].containers if isinstance(c, BarContainer)]
+    return [c for c in figure.axes[0].containers if isinstance(c, BarContainer)]
 
 
 def bars(figure):
@@ -53,7 +52,7 @@ def test_initial_distances_are_those_of_the_fittest_and_least_fit(run_of):
     best, worst = bars(figure)
     assert best == pytest.approx([4.0 / PER_DISTANCE, 3.0 / PER_DISTANCE])
     assert worst == pytest.approx([-6.0 / PER_DISTANCE, 2.0 / PER_DISTANCE])
-    assert panels(figure)[0].get_xticks().tolist() == [0, 2]
+    assert figure.axes[0].get_xticks().tolist() == [0, 2]
     in_metres = bars(initial_distances(run, units="SI"))
     assert in_metres[0] == pytest.approx([0.0254 * distance for distance in best])
 
@@ -69,7 +68,7 @@ def test_initial_fitness_counts_gaits_that_walk_forward_and_backward(run_of):
     assert forward == np.histogram(fitnesses[fitnesses >= 0.0], edges)[0].tolist()
     assert backward == np.histogram(fitnesses[fitnesses < 0.0], edges)[0].tolist()
     assert abs(min(edges, key=abs)) < 1e-12
-    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert [int(label.split()[0]) for label in labels] == [sum(forward), sum(backward)]
     assert sum(map(sum, bars(initial_fitness(run, 0)))) == 1
 
@@ -111,5 +110,5 @@ def test_the_median_over_trials_and_its_quartiles(run_of, unfinished, medians):
     at_start = at_start[at_start[:, 0] == 1, 1]
     quartiles = np.quantile([trial[0] for trial in MEANS], [0.25, 0.75])
     assert [at_start.min(), at_start.max()] == pytest.approx(quartiles)
-    named = [text.get_text().split(":")[0] for text in figure.axes[0].texts]
-    assert sorted(named) == ["median", "trial 0", "trial 3"]
+    named = [text.get_text().split(":")[0] for text in figure.legends[0].get_texts()]
+    assert named == ["trial 3", "trial 0", "median"]

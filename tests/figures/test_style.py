@@ -2,17 +2,18 @@
 
 import matplotlib
 
-from tetra_drake.figures.style import common_style, make_figure, save_figure
+from tetra_drake.figures.style import figure_function, page_of, save_figure
 
 
-@common_style()
+@figure_function
 def draw(value):
-    figure, [[panel]] = make_figure(width_in=4.0, height_in=3.0)
+    page = page_of(None, height_in=3.0)
+    panel = page.subplots()
     panel.plot([0.0, 1.0], [0.0, value], label="a line")
     panel.axvspan(0.2, 0.4)
     panel.set_title("title")
     panel.legend()
-    return figure
+    return page
 
 
 def saved(folder, value=1.0):
@@ -38,3 +39,14 @@ def test_a_figure_can_be_a_pdf(tmp_path):
     first, second = ((tmp_path / folder / "line.pdf").read_bytes() for folder in ("a", "b"))
     assert first == second and first.startswith(b"%PDF")
     assert len(list((tmp_path / "a").iterdir())) == 1
+
+
+def test_ticks_have_the_common_look_whoever_draws_them():
+    with matplotlib.rc_context({"xtick.labelsize": 20.0, "grid.color": "red"}):
+        figure = draw(1.0)
+        figure.draw_without_rendering()
+    ticks = figure.axes[0].xaxis.get_major_ticks()
+    assert len(ticks) > 1
+    assert {(tick.label1.get_fontsize(), tick.gridline.get_color()) for tick in ticks} == {
+        (8.5, "0.86")
+    }

@@ -6,12 +6,10 @@ import itertools
 import numpy as np
 import pytest
 from helpers import prism
-from helpers.drawn import every_axes, panels, result_of
+from helpers.drawn import result_of
 from helpers.made_up_walk import HEIGHT, LOAD, PERIOD, SPEED, make_row, make_walk
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
-from matplotlib.text import Text
 
 from tetra_drake.figures.forces import ground_forces, signals_and_tensions
 from tetra_drake.figures.gait_diagram import gait_diagram
@@ -22,7 +20,7 @@ from tetra_drake.figures.motion import (
     relative_distances,
     time_lapse,
 )
-from tetra_drake.figures.style import OKABE_ITO, WIDTH_IN, common_style
+from tetra_drake.figures.style import OKABE_ITO
 from tetra_drake.results.measures import last_step
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.robot.tetrahedra import STRUTS
@@ -30,15 +28,6 @@ from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.terrain_kinds import Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
-FIGURES = (
-    gait_diagram,
-    relative_distances,
-    time_lapse,
-    path_of_the_centre,
-    one_step,
-    signals_and_tensions,
-    ground_forces,
-)
 DOWNSTAIRS = {
     "robot.contacts": "all",
     "friction": Coulomb(),
@@ -65,73 +54,19 @@ def row(trajectory):
     return result_of(ROW, trajectory)
 
 
-def labels(figure):
-    """Places (labels, 4) on the page, in pixels, of all texts but the numbers at ticks."""
-    every = every_axes(figure)
-    axes = [axis for panel in every for axis in (panel.xaxis, panel.yaxis)]
-    ticks = {text for axis in axes for text in axis.get_ticklabels(which="both")}
-    ticks |= {axis.offsetText for axis in axes}
-    texts = [text for text in figure.findobj(Text) if text not in ticks and text.get_text()]
-    return np.array([text.get_window_extent().extents for text in texts if text.get_visible()])
-
-
-@pytest.mark.parametrize(
-    ("bodies", "duration"), [(3, 0.5), pytest.param(12, 9.0, marks=pytest.mark.slow)]
-)
-@pytest.mark.parametrize("draw", FIGURES)
-def test_a_walk_is_drawn_on_a_page_of_bearable_size_with_no_label_on_another(
-    draw, bodies, duration
-):
-    check_page(draw(result_of(make_row(bodies), walk_of(bodies, duration))))
-
-
-def check_page(figure):
-    """Checks that all is on a page of bearable size, and no label on another."""
-    with common_style():
-        figure.get_layout_engine().execute(figure)  # it settles in the second drawing
-        figure.draw_without_rendering()
-        (width, height), drawn = figure.get_size_inches(), figure.get_tightbbox()
-    assert width == WIDTH_IN and height <= 11.5
-    assert drawn.x0 >= 0.0 and drawn.y0 >= 0.0 and drawn.x1 <= width and drawn.y1 <= height
-    for a, b in itertools.combinations(labels(figure), 2):
-        overlap = np.minimum(a[2:], b[2:]) - np.maximum(a[:2], b[:2])
-        assert overlap.min() <= 0.0
-
-
-@pytest.mark.parametrize("layout", ["constrained", None])
-@pytest.mark.parametrize("draw", FIGURES)
-def test_a_figure_is_drawn_in_axes_of_ones_own(draw, layout, walk):
-    figure = Figure(figsize=(12.0, 5.0), layout=layout)
-    left, right = figure.subplots(1, 2)
-    assert draw(row(walk), axes=right) is figure
-    figure.draw_without_rendering()
-    assert figure.axes == [left, right]
-    assert not left.has_data()
-    for panel in panels(figure)[1:]:
-        assert panel.bbox.x0 >= right.bbox.x0 - 1.0 and panel.bbox.x1 <= right.bbox.x1 + 1.0
-        assert panel.bbox.y0 >= right.bbox.y0 - 1.0 and panel.bbox.y1 <= right.bbox.y1 + 1.0
-
-
-@pytest.mark.parametrize("draw", FIGURES)
-def test_time_and_units_are_known_or_refused(draw, walk, refused):
-    with refused("figure", "time", "20 to 30 s"):
-        draw(row(walk), time=(20.0, 30.0))
-    with refused("figure", "units", "furlong"):
-        draw(row(walk), units="furlong")
-
-
 def struts(panel):
-    """The lines that draw struts (struts, 2, 2), and their colours."""
-    [lines] = [each for each in panel.collections if isinstance(each, LineCollection)]
-    return np.array(lines.get_segments()), [to_hex(colour) for colour in lines.get_colors()]
+    """The lines that draw struts (views, struts, 2, 2), and their colours (views, struts)."""
+    views = [each for each in panel.collections if isinstance(each, LineCollection)]
+    colours = [[to_hex(colour) for colour in view.get_colors()] for view in views]
+    return np.array([view.get_segments() for view in views]), np.array(colours)
 
 
-def time_lapse_panels(figure):
-    return [panel for panel in panels(figure) if panel.get_aspect() == 1.0]
+def pictures(figure):
+    return [panel for panel in figure.axes if panel.get_aspect() == 1.0]
 
 
 def test_stance_bars_show_when_feet_bear_load(walk):
-    signals, stance, speed = panels(gait_diagram(row(walk)))
+    signals, stance, speed = gait_diagram(row(walk)).axes
     start, end = last_step(walk)
     shown = end - 3.0 * (end - start), end
     np.testing.assert_allclose(speed.get_xlim(), shown, atol=0.02)
@@ -158,7 +93,7 @@ def test_stance_bars_show_when_feet_bear_load(walk):
 
 def test_the_gait_diagram_has_the_forward_speed_and_its_mean(walk):
     for units, length in (("in", INCH), ("SI", 1.0)):
-        *_, panel = panels(gait_diagram(row(walk), units=units, time=(2.0, 5.0)))
+        *_, panel = gait_diagram(row(walk), units=units, time=(2.0, 5.0)).axes
         [speed] = [line for line in panel.lines if len(line.get_xdata()) > 2]
         velocity = walk.v_WN.sel(time=slice(2.0, 5.0), axis="x").values
         np.testing.assert_allclose(speed.get_ydata(), velocity.mean(axis=1) / length)
@@ -167,35 +102,35 @@ def test_the_gait_diagram_has_the_forward_speed_and_its_mean(walk):
 
 def test_feet_of_many_bodies_are_named_by_body():
     robot = make_row(12)
-    _, stance, _ = panels(gait_diagram(result_of(robot, walk_of(12, 4.5))))
+    _, stance, _ = gait_diagram(result_of(robot, walk_of(12, 4.5))).axes
     names = [label.get_text() for label in stance.get_yticklabels()]
     assert names == list(robot.structure.bodies)
 
 
 def test_relative_distances_are_in_inches(walk):
-    [panel] = panels(relative_distances(row(walk)))
+    [panel] = relative_distances(row(walk)).axes
     lines = {line.get_label(): line for line in panel.lines}
     assert "T1" not in lines
     for i, name in enumerate(walk.body.values[1:], start=1):
         np.testing.assert_allclose(lines[name].get_xdata(), walk.time)
         np.testing.assert_allclose(lines[name].get_ydata(), i * 2.94, rtol=1e-6, atol=1e-12)
-    [panel] = panels(relative_distances(row(walk), units="SI"))
+    [panel] = relative_distances(row(walk), units="SI").axes
     assert panel.get_ylim()[1] < 1.0
 
 
 def test_the_time_lapse_shows_instants_from_start_to_end(walk):
-    shown = time_lapse_panels(time_lapse(row(walk), instants=4))
+    shown = pictures(time_lapse(row(walk), instants=4))
     assert len(shown) == 4
     ways = []
     for panel in shown:
-        lines, colours = struts(panel)
+        [lines], [colours] = struts(panel)
         assert len(lines) == 5 * len(STRUTS) and len(set(colours)) == 5
         ways.append(lines[..., 0].min())
     np.testing.assert_allclose(ways, SPEED * np.array([0.0, 3.0, 6.0, 9.0]) / INCH, atol=1e-9)
     titles = [panel.get_title("left").split() for panel in shown]
     assert [float(title[0]) for title in titles] == [0.0, 3.0, 6.0, 9.0]
     assert [float(title[2]) for title in titles] == [0.0, 1.18, 2.36, 3.54]
-    part = time_lapse_panels(time_lapse(row(walk), instants=2, time=(3.0, 6.0), units="SI"))
+    part = pictures(time_lapse(row(walk), instants=2, time=(3.0, 6.0), units="SI"))
     assert [panel.get_title("left") for panel in part] == ["3 s: +0.030 m", "6 s: +0.060 m"]
 
 
@@ -210,7 +145,7 @@ def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):
     turned = walk.assign(q_WB=(walk.q_WB.dims, q_WB), p_WB=(walk.p_WB.dims, p_WB))
     figure = path_of_the_centre(row(turned), instants=4)
     figure.draw_without_rendering()
-    [panel] = panels(figure)
+    [panel] = figure.axes
     assert panel.get_aspect() == 1.0
     path, start, end = panel.lines
     np.testing.assert_allclose(path.get_xydata() * INCH, np.column_stack([x, y]), atol=1e-12)
@@ -225,17 +160,15 @@ def test_the_path_of_the_centre_is_to_scale_with_the_heading_along_it(walk):
 
 
 def test_of_a_straight_path_the_height_is_shown(walk):
-    [panel] = panels(path_of_the_centre(row(walk), units="SI"))
+    [panel] = path_of_the_centre(row(walk), units="SI").axes
     [path] = panel.lines
     centre = walk.p_WB.mean("body")
     np.testing.assert_allclose(path.get_xydata(), centre.sel(axis=["x", "z"]))
 
 
 def test_distances_before_and_after_are_those_of_both_gaits(walk):
-    slow = result_of(ROW, walk.assign(p_WN=0.5 * walk.p_WN), name=r"$\cost$ " + "long " * 100)
-    figure = before_and_after(slow, result_of(ROW, walk, name="$"))
-    check_page(figure)
-    [panel] = panels(figure)
+    slow = result_of(ROW, walk.assign(p_WN=0.5 * walk.p_WN))
+    [panel] = before_and_after(slow, row(walk)).axes
     for line, speed in zip(panel.lines, (0.5 * SPEED, SPEED), strict=True):
         np.testing.assert_allclose(line.get_ydata(), speed * walk.time / INCH, atol=1e-9)
 
@@ -248,17 +181,15 @@ def test_in_one_step_tetrahedra_well_off_the_ground_stand_out(walk):
     aloft = lowest > 0.02 * height
     assert aloft.any() and not aloft.all()
     figure = one_step(row(walk), instants=5)
-    title = figure.axes[0].get_title("left")
-    assert f"{start:.2f} to {end:.2f} s" in title
-    views = time_lapse_panels(figure)
-    for view in (views[::2], views[1::2]):
-        colours = np.array([struts(panel)[1] for panel in view])
-        of_bodies = colours[:, :: len(STRUTS)]
+    assert f"{start:.2f} to {end:.2f} s" in figure.get_suptitle()
+    colours = np.array([struts(panel)[1] for panel in pictures(figure)])
+    for view in (0, 1):
+        of_bodies = colours[:, view, :: len(STRUTS)]
         np.testing.assert_array_equal(of_bodies == OKABE_ITO["vermillion"], aloft)
 
 
 def paths_of(figure):
-    return [panel for panel in panels(figure) if panel.get_aspect() != 1.0]
+    return [panel for panel in figure.axes if panel.get_aspect() != 1.0]
 
 
 def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
@@ -279,7 +210,7 @@ def test_paths_of_one_step_are_those_of_the_bottom_nodes(walk):
 
 
 def test_tensions_are_those_of_the_driven_cables(walk):
-    shown = panels(signals_and_tensions(row(walk)))
+    shown = signals_and_tensions(row(walk)).axes
     end = walk.sel(time=slice(5.0, None))
     for panel, oscillator in zip(shown, walk.oscillator.values, strict=True):
         _, tension, signal = panel.lines
@@ -288,7 +219,7 @@ def test_tensions_are_those_of_the_driven_cables(walk):
         np.testing.assert_allclose(tension.get_ydata(), expected + 3.0 / POUND_FORCE)
         assert panel.get_title("left") == f"{oscillator} outer bottom left", "the cable"
         assert not panel.patches
-    first, *_ = panels(signals_and_tensions(row(walk), time=(0.0, 3.0), units="SI"))
+    first, *_ = signals_and_tensions(row(walk), time=(0.0, 3.0), units="SI").axes
     [start_up] = first.patches
     assert start_up.get_x() + start_up.get_width() == 1.25
     assert first.lines[2].get_ydata().max() == pytest.approx(2.0, rel=1e-3)
@@ -300,16 +231,16 @@ def test_a_column_shows_the_signals_of_the_same_cables():
     motion = make_walk(bodies=3, duration=1.0, changes=driven)
     figure = signals_and_tensions(result_of(make_row(3, driven), motion))
     figure.draw_without_rendering()
-    assert len(panels(figure)) == 6
+    assert len(figure.axes) == 6
     cables = {}
-    for panel in panels(figure):
+    for panel in figure.axes:
         _, name = panel.get_title("left").split(" ", 1)
         cables.setdefault(round(panel.get_position().x0, 3), set()).add(name)
     assert [len(names) for names in cables.values()] == [1, 1, 1]
 
 
 def test_ground_forces_are_those_of_the_time_shown(walk):
-    shown = panels(ground_forces(row(walk), time=(6.0, 9.0)))
+    shown = ground_forces(row(walk), time=(6.0, 9.0)).axes
     names = [f"T{i} left = right" for i in range(1, 6)]
     assert [panel.get_title("left") for panel in shown] == names
     end = walk.sel(time=slice(6.0, None))
@@ -324,7 +255,7 @@ def test_ground_forces_are_those_of_the_time_shown(walk):
 def test_stance_is_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk):
     four = walk.sel(time=slice(0.0, 4 * PERIOD)).copy(deep=True)
     four.normal_force[int(np.argmin(np.abs(four.time.values - 5.5))), 0] = 100.0 * LOAD
-    panel, *_ = panels(ground_forces(row(four)))
+    panel, *_ = ground_forces(row(four)).axes
     spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in panel.patches]
     np.testing.assert_allclose(spans[-2:], [(5.0, 6.0), (7.0, 8.0)], atol=0.011)
     assert panel.get_title(loc="right").split()[1] in ("49", "50", "51")
@@ -338,8 +269,7 @@ def test_stance_is_shaded_landings_marked_and_impacts_do_not_set_the_scale(walk)
 def test_one_step_shows_the_ground_in_side_views_if_it_is_not_flat(walk):
     robot = make_row(changes=DOWNSTAIRS)
     every = walk.drop_vars("contact_body").reindex(contact=walk.node.values, fill_value=0)
-    views = time_lapse_panels(one_step(result_of(robot, every), instants=3))
-    for side in views[1::2]:
+    for side in pictures(one_step(result_of(robot, every), instants=3)):
         [line] = [line for line in side.lines if len(line.get_xdata()) > 300]
         x, z = line.get_xdata(), line.get_ydata()
         expected = ground_heights(np.column_stack([x, 0.0 * x]) * INCH, robot.ground) / INCH
@@ -354,7 +284,7 @@ def test_ground_forces_show_all_that_touches_and_where_left_and_right_differ(wal
     every.normal_force.loc[{"contact": "T2 tip"}][-10:] = LOAD
     every.normal_force.loc[{"contact": "T3 tip"}][:10] = LOAD  # before the time shown
     every.normal_force.loc[{"contact": "T4 bottom_right"}] *= 0.5
-    shown = {panel.get_title("left") for panel in panels(ground_forces(row(every)))}
+    shown = {panel.get_title("left") for panel in ground_forces(row(every)).axes}
     alike = {f"T{i} left = right" for i in (1, 2, 3, 5)}
     assert shown == alike | {"T2 tip", "T4 left", "T4 right"}
 
@@ -366,23 +296,21 @@ def carried():
     return result_of(robot, prism.slide_prism(robot))
 
 
-@pytest.mark.parametrize("draw", FIGURES)
-def test_figures_of_any_structure_are_drawn_on_a_page(draw, carried):
-    check_page(draw(carried))
-
-
-def test_bars_are_named_where_they_end(carried):
-    panel = time_lapse_panels(time_lapse(carried))[0]
-    assert [text.get_text() for text in panel.texts] == ["n0 n4", "n1 n5", "n2 n3"]
-    upper = carried.trajectory.p_WN.sel(node=["n4", "n1", "n3"])[0, :, :2] / INCH
-    apart = np.array([text.xy for text in panel.texts]) - upper.values
-    np.testing.assert_allclose(apart[:, 1], 0.0, atol=1e-9)
-    assert np.abs(apart[:, 0]).max() < 1.0  # moved into the panel
+def test_a_legend_names_bars_and_the_ends_of_a_row_are_named_where_they_are(carried, walk):
+    figure = time_lapse(carried)
+    [legend] = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["n0 n4", "n1 n5", "n2 n3"]
+    shown = [to_hex(line.get_color()) for line in legend.get_lines()]
+    assert shown == struts(pictures(figure)[0])[1].ravel().tolist()
+    first, last = pictures(time_lapse(row(walk)))[0].texts
+    assert (first.get_text(), last.get_text()) == ("T1", "T5")
+    middle = walk.p_WN.sel(axis=["x", "y"])[0].values.reshape(5, 4, 2).mean(axis=1) / INCH
+    np.testing.assert_allclose([first.get_position(), last.get_position()], middle[[0, -1]])
 
 
 def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
     way = prism.SPEED * carried.trajectory.time / INCH
-    [panel] = panels(before_and_after(carried, carried))
+    [panel] = before_and_after(carried, carried).axes
     np.testing.assert_allclose(panel.lines[0].get_ydata(), way, atol=1e-9)
     [panel] = paths_of(one_step(carried))
     assert panel.get_title("left") == "centre"
@@ -391,16 +319,16 @@ def test_of_a_structure_that_is_no_row_the_centre_is_shown(carried):
 
 
 def test_bars_are_drawn_from_node_to_node(carried):
-    lines, _ = struts(time_lapse_panels(time_lapse(carried, instants=2))[0])
+    lines, _ = struts(pictures(time_lapse(carried, instants=2))[0])
     p_WN = carried.trajectory.p_WN.values[0, :, :2] / INCH
-    np.testing.assert_allclose(lines, p_WN.reshape(3, 2, 2), atol=1e-12)
+    np.testing.assert_allclose(lines[0], p_WN.reshape(3, 2, 2), atol=1e-12)
 
 
 def test_ground_forces_of_bars_are_those_of_nodes_below(carried):
-    shown = [panel.get_title("left") for panel in panels(ground_forces(carried))]
+    shown = [panel.get_title("left") for panel in ground_forces(carried).axes]
     assert shown == ["n0", "n1", "n2"]
     rolled = carried.trajectory.copy(deep=True)
     rolled.normal_force.loc[{"contact": ["n0", "n2"]}] = 0.0
     rolled.normal_force.loc[{"contact": "n4"}] = 0.2
     figure = ground_forces(result_of(carried.robot, rolled))
-    assert [panel.get_title("left") for panel in panels(figure)] == ["n4", "n1"]
+    assert [panel.get_title("left") for panel in figure.axes] == ["n4", "n1"]

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.evolution.entries import evaluation_entry
+from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH
 
@@ -69,6 +71,24 @@ def write_run(
                     "stop": "all evaluations done" if ends else None,
                 }
                 trial.complete(entries[begin:], line)
+    return directory
+
+
+def write_map(directory: Path, kept: Mapping[int, float]) -> Path:
+    """A run with a map of 3 by 2 cells: fitness 2, 4 and 3 in cells 0 0, 1 0 and 2 1. `kept`: share
+    of the draws that gaits keep, by index."""
+    measures = {"speed": [0.0, 3.0 * INCH], "lifted": [0.0, 1.0]}
+    kind = QualityDiversity(measures=measures, cells=[3, 2])
+    scenario = tiny_scenario().with_changes({"optimizer": kind})
+    places = {2.0: (0.5, 0.1), 4.0: (1.5, 0.1), 3.0: (2.5, 0.9)}
+    metrics = {f: {"speed": x * INCH, "lifted": y} for f, (x, y) in places.items()}
+    trial = [[(fitness, None) for fitness in places]]
+    if not directory.exists():
+        write_run(directory, [trial], scenario=scenario, metrics=metrics)
+    (directory / "elites.jsonl").unlink(missing_ok=True)
+    for index, share in kept.items():
+        line = {"trial": 0, "index": index, "kept": share, "mean_distance": 0.1}
+        load_run(directory).file("elites.jsonl").append([line])
     return directory
 
 

@@ -17,7 +17,6 @@ from tetra_drake.figures.style import (
     figure_function,
     legend_below,
     line_style,
-    name_panel,
     page_of,
     save_findings,
     set_title,
@@ -55,16 +54,16 @@ def comparison(compared: Compared, *, figure: Page | None = None, units: str = "
         if compared.reach is not None:
             _draw_reached(row[1], compared, label, ends[label], style)
             reached = f"{compared.reach / unit.length:.4g} {unit.length_name}"
-            name_panel(row[1], f"{reached} reached (% of trials)")
+            row[1].set_ylabel(f"{reached} reached (% of trials)")
     ticks = (1.0, 3.0) if ends.max() > 100 * first else (1.0, 2.0, 5.0)
     for panel in row:
         panel.set(xlabel="simulations", xscale="log", xlim=(first, 1.1 * ends.max()))
         panel.xaxis.set_major_locator(LogLocator(subs=ticks))
         panel.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         panel.xaxis.set_minor_formatter(NullFormatter())
-    name_panel(row[0], "best fitness so far: median and quartiles")
+    row[0].set_ylabel("best fitness so far")
     legend_below(page, {label: line_style(place) for place, label in enumerate(labels)})
-    set_title(page, "How well runs search")
+    set_title(page, "How well runs search: median and quartiles over trials")
     return page
 
 

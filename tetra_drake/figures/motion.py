@@ -81,7 +81,8 @@ def relative_distances(
         panel.axhline(float(line[0]), color="0.6", linewidth=0.7)
         panel.plot(line.time, line, label=name, **line_style(i))
     panel.set(xlabel="time (s)", ylabel=f"distance from {first} ({unit.length_name})")
-    page.legend(loc="outside right upper", reverse=True, frameon=False)
+    if names:
+        page.legend(loc="outside right upper", reverse=True, frameon=False)
     set_title(page, f"Distance of each body from {first}")
     return page
 

@@ -25,6 +25,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
+from matplotlib.ticker import MaxNLocator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import whole_file, write_whole
@@ -128,10 +129,7 @@ def figure_function(draw: Callable[_P, Drawn]) -> Callable[_P, Drawn]:
     @functools.wraps(draw)
     def drawn(*args: _P.args, **kwargs: _P.kwargs) -> Drawn:
         with common_style():
-            page: Page = draw(*args, **kwargs)
-            for axes in page.findobj(Axes):
-                for axis in axes.xaxis, axes.yaxis:
-                    axis.get_major_ticks(1)  # now, in the common look; later ticks are copies
+            page = draw(*args, **kwargs)
         return page if kwargs.get("figure") is None else None
 
     return drawn
@@ -166,15 +164,16 @@ def own_words(names: Sequence[str]) -> list[str]:
 def panels_in_columns(
     page: Page, count: int, columns: int, *, x_label: str, **shared: Any
 ) -> list[Axes]:
-    """Panels in columns, whose lowest panels have numbers and a label of x; `shared` for
-    subplots."""
-    grid = page.subplots(math.ceil(count / columns), columns, squeeze=False, **shared).ravel()
+    """Panels in columns with one label of x; `shared` for subplots."""
+    inner = page.subfigures(squeeze=False)[0, 0]  # so that the label is above a legend below
+    inner.supxlabel(x_label)
+    grid = inner.subplots(math.ceil(count / columns), columns, squeeze=False, **shared).ravel()
     for unused in grid[count:]:
         unused.remove()
     for place, panel in enumerate(grid[:count]):
         panel.tick_params(labelbottom=place >= count - columns)
-    for panel in grid[-columns:]:
-        panel.set_xlabel(x_label)
+        # If the number of ticks depended on the height, the layout might not settle.
+        panel.yaxis.set_major_locator(MaxNLocator(nbins=3, steps=[1, 2, 5, 10]))
     return list(grid[:count])
 
 
