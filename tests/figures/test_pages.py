@@ -122,6 +122,12 @@ def test_figures_of_analyses(check, tmp_path):
     check(robustness, judgement_by_hand())
 
 
+def test_one_body_has_no_distances_to_others(check):
+    alone = gait_of("five").trajectory
+    alone = alone.isel(body=slice(0, 1))
+    check(relative_distances, result_of(make_row(), alone))
+
+
 def test_two_figures_are_side_by_side(drawn_texts):
     figure = Figure(figsize=(12.0, 6.0))
     left, right = figure.subfigures(1, 2)
