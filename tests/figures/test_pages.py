@@ -123,8 +123,7 @@ def test_figures_of_analyses(check, tmp_path):
 
 
 def test_one_body_has_no_distances_to_others(check):
-    alone = gait_of("five").trajectory
-    alone = alone.isel(body=slice(0, 1))
+    alone = gait_of("five").trajectory.isel(body=slice(0, 1))
     check(relative_distances, result_of(make_row(), alone))
 
 

@@ -74,7 +74,7 @@ def relative_distances(
     unit, trajectory = units_named(units), shown_part(result.trajectory, time)
     distances = measures.relative_distances(trajectory) / unit.length
     first, *names = distances.body.values
-    page = page_of(figure, height_in=1.5 + min(0.6 * len(names), 5.0))
+    page = page_of(figure, height_in=np.clip(1.5 + 0.6 * len(names), 2.4, 6.5))
     panel = page.subplots()
     for i, name in enumerate(names):
         line = distances.sel(body=name)
