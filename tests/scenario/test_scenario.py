@@ -438,7 +438,7 @@ def test_a_fault_names_the_file_that_has_it(tmp_path, refused):
 
 @pytest.mark.parametrize("length", ["1e-15 m", "20 km"])
 def test_struts_of_no_size_that_can_be_computed_with_are_refused(scenario, length, refused):
-    with refused("scenario thesis", "robot.strut_length", "expected 0.0001 m to 10000 m"):
+    with refused("scenario thesis", "robot.strut_length", "expected 1e-06 m to 10000 m"):
         scenario.with_changes({"robot.strut_length": length, "robot.spacing": "3 in"})
 
 

@@ -57,7 +57,7 @@ def check_one_per_body(key: str, items: Sequence[object], bodies: int) -> None:
         refuse(key, f"found {len(items)} items, expected none or {bodies}, one for each body")
 
 
-LONGEST, SHORTEST = 1e4, 1e-4
+LONGEST, SHORTEST = 1e4, 1e-6
 """Limits of the length of a strut, in m; nodes are no farther from the origin."""
 
 THINNEST = 1e-5
