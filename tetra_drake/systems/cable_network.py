@@ -52,25 +52,24 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("tensions", count, self._calc_tensions, inputs)
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
 
-    def _compute(self, context: Context) -> None:
+    def _compute(self, context: Context, force: np.ndarray) -> None:
         """Writes the generalized force and the `cable_forces`."""
         if self._drives is not None:
             self._forces.drives[:, actuator.DRIVE] = self._drives.Eval(context)
         state, signals = self._state.Eval(context), self._signals.Eval(context)
-        self._compute_forces(self._parts, state, signals, self._force)
+        self._compute_forces(self._parts, state, signals, force)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._compute(context)
-        output.SetFromVector(self._force)
+        self._compute(context, output.get_mutable_value())
 
     def _calc_tensions(self, context: Context, output: BasicVector) -> None:
-        self._compute(context)
+        self._compute(context, self._force)
         output.SetFromVector(self._forces.cable_forces[:, cable.TENSION])
 
     def _calc_lengths(self, context: Context, output: BasicVector) -> None:
-        self._compute(context)
+        self._compute(context, self._force)
         output.SetFromVector(self._forces.cable_forces[:, cable.LENGTH])
 
     def _calc_rates(self, context: Context, output: BasicVector) -> None:
-        self._compute(context)
+        self._compute(context, self._force)
         output.SetFromVector(self._forces.drives[:, actuator.RATE])

@@ -110,21 +110,20 @@ class GroundContact(LeafSystem):
     def _margin(self, context: Context) -> float:
         return mode_margin(self._parts, self._state.Eval(context), self._modes(context))
 
-    def _compute(self, context: Context) -> None:
+    def _compute(self, context: Context, force: np.ndarray) -> None:
         """Writes the generalized force and the `ground_forces`."""
         state, modes = self._state.Eval(context), self._modes(context)
-        self._compute_forces(self._parts, state, modes, self._force)
+        self._compute_forces(self._parts, state, modes, force)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        self._compute(context)
-        output.SetFromVector(self._force)
+        self._compute(context, output.get_mutable_value())
 
     def _calc_normal(self, context: Context, output: BasicVector) -> None:
-        self._compute(context)
+        self._compute(context, self._force)
         output.SetFromVector(self._forces.ground_forces[:, contact.NORMAL])
 
     def _calc_friction(self, context: Context, output: BasicVector) -> None:
-        self._compute(context)
+        self._compute(context, self._force)
         output.SetFromVector(self._forces.ground_forces[:, : contact.NORMAL].ravel())
 
     def _calc_modes(self, context: Context, output: BasicVector) -> None:
