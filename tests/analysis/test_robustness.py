@@ -11,7 +11,6 @@ from helpers.synthetic_run import tiny_scenario
 
 from tetra_drake.analysis.robustness import (
     ALONE,
-    SPREAD,
     START,
     TERRAIN,
     by_change,
@@ -53,18 +52,23 @@ def judgement(scenario, gaits):
     return judge(scenario, gaits, draws=DRAWS, seed=5, workers=2)
 
 
-def test_the_default_disturbances_are_of_what_the_scenario_has(scenario):
-    thesis = default_disturbances(load_scenario("thesis"), 2.0)
-    ours = default_disturbances(scenario)
-    laws = {"friction.static, friction.kinetic", "friction.damping"}
-    cables = {"robot.cables.outer_stiffness", "robot.cables.inner_stiffness"}
-    assert set(thesis.spreads) - set(SPREAD) == cables
-    assert set(SPREAD) - set(thesis.spreads) == laws | {"robot.cables.*stiffness"}
-    assert {key for key in ours.spreads if key.startswith("friction")} == laws
-    assert set(thesis.spreads.values()) == {0.02} == {thesis.start}
-    assert set(ours.spreads.values()) == {0.05} == {ours.start}
-    groups = default_disturbances(load_scenario("prism")).spreads.keys() - ours.spreads.keys()
-    assert groups == {f"robot.cables.{name}.stiffness" for name in ("bottom", "top", "side")}
+GROUND = ["ground.damping", "ground.stiffness"]
+ROW = ["robot.cables.inner_stiffness", "robot.cables.outer_stiffness", "robot.spacing"]
+LAWS = {
+    "thesis": ["proportional_stiction", "stiction_damping", "stiction_range", "stiction_switch"],
+    "rough": ["damping", "static, friction.kinetic"],
+    "prism": ["damping", "static, friction.kinetic"],
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_default_disturbances_are_of_what_the_scenario_has(name):
+    groups = [f"robot.cables.{group}.stiffness" for group in ("bottom", "side", "top")]
+    expected = [f"friction.{law}" for law in LAWS[name]] + GROUND
+    expected += groups if name == "prism" else ROW
+    ours = default_disturbances(load_scenario(name), 2.0)
+    assert sorted(ours.spreads) == expected
+    assert {*ours.spreads.values(), ours.start} == {0.02}
 
 
 def test_every_gait_walks_under_the_same_draws_as_evolution_would_simulate_them(judgement, gaits):

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from tetra_drake.robot.robot import MakeStructure
+from tetra_drake.scenario.changes import Part, merged
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
+from tetra_drake.scenario.refusals import TAG
 from tetra_drake.scenario.schema import Scenario
 
 IN = 0.0254
@@ -81,7 +83,40 @@ def test_a_metric_joins_the_objective_where_a_mapping_replaces_it(scenario):
     assert joined == scenario.objective | {"lead": 2.0}
     replaced = scenario.with_changes({"objective": {"lead": "2 /m"}})
     assert replaced.objective == {"lead": 2.0}
-    assert "objective:\n  lead: 2 /m\n" in replaced.to_yaml(), "as it was written"
+    both = scenario.with_changes({"objective": {"lead": "2 /m"}, "objective.twist": "1 /m"})
+    assert both.objective == {"lead": 2.0, "twist": 1.0}
+
+
+BASE = {"objective": {"speed": 1, "twist": 2}, "friction": {TAG: "A", "x": 1, "y": 2}, "list": [1]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"friction": {"x": 3}}, {"friction": {TAG: "A", "x": 3, "y": 2}}),
+        ({"friction": {TAG: "A", "x": 3}}, {"friction": {TAG: "A", "x": 3, "y": 2}}),
+        ({"friction": {TAG: "B", "x": 3}}, {"friction": {TAG: "B", "x": 3}}),
+        ({"friction": None}, {"friction": None}),
+        ({"objective": {"speed": 3}}, {"objective": {"speed": 3}}),
+        ({"objective": Part(speed=3)}, {"objective": {"speed": 3, "twist": 2}}),
+        ({"list": [2, 3]}, {"list": [2, 3]}),
+        ({"new": {"key": 1}}, {"new": {"key": 1}}),
+        ({"list": {"key": 1}}, {"list": {"key": 1}}),
+    ],
+)
+def test_the_rules_of_merging(changes, expected):
+    assert merged(BASE, changes) == BASE | expected
+
+
+def test_a_robot_from_python_keeps_its_spacing(scenario):
+    robot = scenario.robot.model_copy(update={"strut_length": 0.2, "spacing": 0.05})
+    assert scenario.with_changes({"robot": robot}).robot == robot
+
+
+def test_a_copy_of_a_section_is_checked(scenario, refused):
+    bad = scenario.ground.model_copy(update={"stiffness": -1.0})
+    with refused("scenario thesis", "ground.stiffness", "found -1 N/m, expected more than 0 N/m"):
+        scenario.with_changes({"ground": bad})
 
 
 @pytest.mark.parametrize(

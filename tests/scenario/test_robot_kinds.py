@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tetra_drake.errors import InputError
+from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.robot_kinds import MOST_NODES, MOST_PAIRS, Member, Structure
-from tetra_drake.scenario.sections import Tree, merge, tree_of
+from tetra_drake.scenario.sections import Tree, written
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
@@ -42,7 +43,7 @@ contacts: [a, g]
 
 
 def structure(changes: str = "") -> Structure:
-    tree: Tree = merge(parse_yaml(FILE, "my.yaml"), parse_yaml(changes, "my.yaml") or {})
+    tree: Tree = merged(parse_yaml(FILE, "my.yaml"), parse_yaml(changes, "my.yaml") or {})
     return Structure.from_tree(tree, "my.yaml")
 
 
@@ -88,7 +89,7 @@ def test_contact_nodes() -> None:
 
 
 def test_a_written_structure_is_read_as_it_was(tmp_path: Path) -> None:
-    (tmp_path / "my.yaml").write_text(dump_yaml(tree_of(structure())))
+    (tmp_path / "my.yaml").write_text(dump_yaml(written(structure().model_dump())))
     again = read_structure(tmp_path / "my.yaml")
     assert again == structure()
     assert again.bodies == structure().bodies

@@ -182,6 +182,19 @@ def test_a_dumped_scenario_keeps_every_bit_and_needs_no_base(tmp_path, scenario)
     assert load_scenario(write(tmp_path, dump_scenario(scenario))) == scenario
 
 
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_yaml_in_round_numbers_loads_back_to_every_bit(tmp_path, name):
+    shipped = load_scenario(name)
+    odd = {"ground.stiffness": 1e4 / 3, "ground.damping": 0.0, "cpg.gain": 0.1 + 0.2}
+    for scenario in (shipped, shipped.with_numbers(odd)):
+        assert load_scenario(write(tmp_path, scenario.to_yaml())) == scenario
+
+
+def test_yaml_has_round_numbers(scenario):
+    lines = scenario.to_yaml().splitlines()
+    assert {"  strut_length: 6 in", "  start_up: 1.25 s", "  stiffness: 25 lbf/in"} <= {*lines}
+
+
 def test_differences_are_keys_and_readable_values(scenario):
     changes = {"robot.cables.slack": True, "cpg.signals": "live", "optimizer.stop_rise": 0.1 + 0.2}
     changes |= {"name": "other", "friction.stiction_damping": "0.3 lbf*s/in"}

@@ -7,13 +7,9 @@ import numpy as np
 import pytest
 from pydantic import Field, ValidationError
 
-from tetra_drake.scenario.sections import (
-    Kinds,
-    Section,
-    merge,
-    quantity,
-    tree_of,
-)
+from tetra_drake.scenario.changes import merged
+from tetra_drake.scenario.quantities import Angle, Length, UnitsByName
+from tetra_drake.scenario.sections import Kinds, Section, written
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 
@@ -22,7 +18,7 @@ class Flat(Section):
 
 
 class Incline(Section):
-    slope: float = quantity("rad", ge=0, le=4)
+    slope: Angle = Field(ge=0, le=4)
     surface: Literal["rough", "smooth"] = "rough"
 
 
@@ -30,22 +26,22 @@ Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class Cells(Section):
-    cells: list[Annotated[float, Field(gt=0)]] = quantity("m")
+    cells: list[Annotated[Length, Field(gt=0)]]
     grid: list[Pair] = Field(default=[])
 
 
 class Probe(Section):
-    at: list[float] = quantity("m", min_length=3, max_length=3)
+    at: list[Length] = Field(min_length=3, max_length=3)
     active: bool = True
 
 
 class Settings(Section):
     count: int = Field(ge=2)
     name: str = ""
-    size: float = quantity("m", default=1.0)
+    size: Length = 1.0
     terrain: Annotated[Flat | Incline | Cells, Kinds()] = Flat()
     weights: dict[str, float] = Field(default={"distance": 1.0})
-    limits: dict[str, float] = quantity({"a": "N", "share": ""}, default={})
+    limits: Annotated[dict[str, float], UnitsByName({"a": "N", "share": ""})] = Field(default={})
     probes: list[Probe] = Field(default=[])
     ramps: list[Annotated[Incline | Flat, Kinds()]] = Field(default=[])
     probe: Probe | None = None
@@ -54,11 +50,11 @@ class Settings(Section):
 
 def load(text: str) -> Settings:
     base = parse_yaml("{count: 2, inner: {slope: 0 rad}}", "file")
-    return Settings.from_tree(merge(base, parse_yaml(f"{{{text} }}", "file")), "file")
+    return Settings.from_tree(merged(base, parse_yaml(f"{{{text} }}", "file")), "file")
 
 
 def shown(settings: Settings) -> str:
-    return dump_yaml(tree_of(settings))
+    return dump_yaml(written(settings.model_dump()))
 
 
 GOOD: list[tuple[str, str, Any]] = [
@@ -90,11 +86,10 @@ def test_defaults_are_not_shared():
     assert load("").weights == {"distance": 1.0}
 
 
-def test_a_tree_is_full_unless_it_is_sparse():
+def test_a_tree_is_full():
     full = parse_yaml(shown(load("")), "file")
     assert full.keys() == Settings.model_fields.keys()
     assert full["inner"] == {"slope": "0.0 rad", "surface": "rough"}
-    assert tree_of(load(""), sparse=True) == {"count": 2, "inner": {"slope": "0.0 rad"}}
 
 
 def test_sections_of_the_same_values_are_equal_and_have_the_same_hash():

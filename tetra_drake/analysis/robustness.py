@@ -3,7 +3,6 @@ from the model."""
 
 from __future__ import annotations
 
-import fnmatch
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,8 +18,8 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import tree_of
-from tetra_drake.scenario.settings import Disturbances, separate
+from tetra_drake.scenario.sections import varied, written
+from tetra_drake.scenario.settings import Disturbances
 
 if TYPE_CHECKING:
     import pandas
@@ -28,14 +27,6 @@ if TYPE_CHECKING:
 NOTHING, ALL = "nothing", "all"
 START, TERRAIN = "displaced start", "terrain seed"
 """Names of changes beside the keys of the scenario's spreads."""
-
-SPREAD = (
-    *("robot.spacing", "friction.stiction_range", "friction.stiction_damping"),
-    *("friction.stiction_switch", "friction.proportional_stiction"),
-    *("friction.static, friction.kinetic", "friction.damping"),
-    *("robot.cables.*stiffness", "ground.stiffness", "ground.damping"),
-)
-"""The keys that the default disturbances spread, where the scenario has them; * is any text."""
 
 PERCENT, DRAWS = 5.0, 200
 ALONE = 8
@@ -80,15 +71,13 @@ class Judgement:
 
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
-    """Default disturbances: so many percent for keys of SPREAD in the scenario, and for starts."""
-    share, numbers = percent / 100.0, scenario.numbers()
-    keys: list[str] = []
-    for joined in SPREAD:
-        if separate(joined)[0] in numbers:
-            keys.append(joined)
-        else:
-            keys += fnmatch.filter(numbers, joined)
-    return Disturbances(draws=1, spreads=dict.fromkeys(keys, share), start=share)
+    """Default disturbances: so many percent for numbers marked as Varied, and for starts."""
+    share = percent / 100.0
+    together: dict[str, list[str]] = {}
+    for key, name in varied(scenario):
+        together.setdefault(name or key, []).append(key)
+    spreads = {", ".join(keys): share for keys in together.values()}
+    return Disturbances(draws=1, spreads=spreads, start=share)
 
 
 def judge(
@@ -247,7 +236,7 @@ def robustness_numbers(judgement: Judgement) -> dict[str, Any]:
     return {
         "versions": versions(),
         "scenario": judgement.scenario.name,
-        "disturbances": tree_of(judgement.scenario)["disturbances"],
+        "disturbances": written(judgement.scenario.model_dump()["disturbances"]),
         "draws": int(judgement.draws["draw"].nunique()),
         "seed": judgement.seed,
         "gaits": json_rows(by_gait(judgement)),

@@ -17,7 +17,7 @@ from tetra_drake.robot.gait import Gait, given_gait
 from tetra_drake.scenario.load import given_scenario
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import flattened, tree_of
+from tetra_drake.scenario.sections import flattened
 
 if TYPE_CHECKING:
     import xarray
@@ -94,8 +94,7 @@ def _labels(
     numbers = [flattened(changed.model_dump()).get(key) for changed in scenarios]
     if not all(isinstance(number, int | float) for number in numbers):
         return [str(value) for value in values], {}
-    unit = flattened(tree_of(scenarios[0], show=lambda _, unit: unit))[key]
-    return numbers, {"units": unit if isinstance(unit, str) else "1"}
+    return numbers, {"units": getattr(numbers[0], "unit", "1")}
 
 
 def _numbers(outcome: Outcome) -> dict[str, float]:

@@ -15,8 +15,8 @@ from tetra_drake.files import read_text
 from tetra_drake.physics.actuator import DIRECT, TENSION_MOTOR, WINCH
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.refusals import hint
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import hint
 
 TIME = "time_s"
 

@@ -29,7 +29,8 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.metric_units import METRICS, Metrics
-from tetra_drake.scenario.sections import Section, refuse
+from tetra_drake.scenario.refusals import refuse
+from tetra_drake.scenario.sections import Section
 
 if TYPE_CHECKING:
     import xarray

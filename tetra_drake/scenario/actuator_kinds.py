@@ -7,7 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from tetra_drake.scenario.sections import Kinds, Section, quantity
+from pydantic import Field
+
+from tetra_drake.scenario import quantities
+from tetra_drake.scenario.quantities import Length, Speed, Time
+from tetra_drake.scenario.sections import Kinds, Section
 
 if TYPE_CHECKING:
     from tetra_drake.physics.actuator import Actuator
@@ -36,9 +40,9 @@ class LimitedActuator(Section):
 
     lacking: ClassVar[tuple[str, ...]] = ()
 
-    max_force: float = quantity("N", gt=0)
-    max_speed: float = quantity("m/s", gt=0)
-    time_constant: float = quantity("s", gt=0)
+    max_force: quantities.Force = Field(gt=0)
+    max_speed: Speed = Field(gt=0)
+    time_constant: Time = Field(gt=0)
     """Time constant of the lag with which the actuator follows its command."""
 
 
@@ -48,10 +52,10 @@ class Winch(LimitedActuator):
     It winds at most at max_speed (1 - tension / max_force); above max_force it is driven backward.
     """
 
-    time_constant: float = quantity("s", default=0.02, gt=0)
+    time_constant: Time = Field(default=0.02, gt=0)
     """Time constant of the lag with which the free length follows its command. The default is the
     1 / (2 pi f) of a position loop with a bandwidth f of 8 Hz, as small geared motors have."""
-    least_length: float = quantity("m", default=0.0, ge=0)
+    least_length: Length = Field(default=0.0, ge=0)
     """Least free length of a cable."""
 
     def law(self) -> Actuator:

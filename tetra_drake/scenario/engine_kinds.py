@@ -5,7 +5,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from tetra_drake.scenario.friction_kinds import FrictionKind
-from tetra_drake.scenario.sections import Kinds, Section, quantity
+from tetra_drake.scenario.quantities import Speed, Time
+from tetra_drake.scenario.sections import Kinds, Section
 
 SHORTEST_STEP = 1e-9
 """Lower limit (s) of the steps of !Compiled."""
@@ -33,19 +34,19 @@ class Drake(EngineSettings):
     scheme: Literal["radau3", "runge_kutta3"] = "radau3"
     accuracy: float = Field(default=0.005, gt=0)
     """Target accuracy per step."""
-    max_step: float = quantity("s", default=0.008, gt=0)
+    max_step: Time = Field(default=0.008, gt=0)
     mode_changes: Literal["step_end", "witness"] = "step_end"
     """`witness` needs short steps, as of runge_kutta3."""
-    look_ahead: float = quantity("s", default=2e-5, ge=0)
+    look_ahead: Time = Field(default=2e-5, ge=0)
     """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none."""
 
 
 class Compiled(EngineSettings):
     """The compiled engine: a Rosenbrock method in machine code, many gaits side by side."""
 
-    tolerance: float = quantity("m/s", default=1e-4, gt=0)
+    tolerance: Speed = Field(default=1e-4, gt=0)
     """Error of a body's velocity, or of its strut tips' by rotation, allowed per step."""
-    max_step: float = quantity("s", default=0.003, gt=SHORTEST_STEP, le=1)
+    max_step: Time = Field(default=0.003, gt=SHORTEST_STEP, le=1)
 
     @property
     def look_ahead(self) -> float:
@@ -57,7 +58,7 @@ class Compiled(EngineSettings):
 class Mujoco(EngineSettings):
     """MuJoCo with its own contact, on planes."""
 
-    step: float = quantity("s", default=0.125e-3, ge=1e-7, le=1)
+    step: Time = Field(default=0.125e-3, ge=1e-7, le=1)
 
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)
 

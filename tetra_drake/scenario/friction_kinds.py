@@ -12,7 +12,9 @@ from pydantic import Field, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.kind_text import settings_text
-from tetra_drake.scenario.sections import Kinds, Section, quantity, refuse
+from tetra_drake.scenario.quantities import Damping, DampingPerLength, Length, Stiffness
+from tetra_drake.scenario.refusals import refuse
+from tetra_drake.scenario.sections import Kinds, Section, Varied
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 if TYPE_CHECKING:
@@ -64,13 +66,13 @@ class ResetIntegrator(FrictionKind):
     moving outward, and sticks again, with x = 0, where v changes sign.
     """
 
-    stiction_range: float = quantity("m", gt=0)
+    stiction_range: Annotated[Length, Varied()] = Field(gt=0)
     """p0: deflection at which a node breaks free."""
-    stiction_damping: float = quantity("N*s/m", ge=0)
+    stiction_damping: Annotated[Damping, Varied()] = Field(ge=0)
     """sigma_1."""
-    stiction_switch: float = Field(ge=0)
+    stiction_switch: Annotated[float, Varied()] = Field(ge=0)
     """a_c."""
-    proportional_stiction: float = quantity("N*s/m^2", ge=0)
+    proportional_stiction: Annotated[DampingPerLength, Varied()] = Field(ge=0)
     """sigma_0."""
 
     def law(self) -> FrictionLaw:
@@ -102,13 +104,13 @@ class Coulomb(FrictionKind):
     is MuJoCo's soft friction.
     """
 
-    static: float = Field(default=0.5, gt=0)
+    static: Annotated[float, Varied("coefficients")] = Field(default=0.5, gt=0)
     """mu in stick."""
-    kinetic: float = Field(default=0.5, gt=0)
+    kinetic: Annotated[float, Varied("coefficients")] = Field(default=0.5, gt=0)
     """mu in slip; at most `static`."""
-    stiffness: float = quantity("N/m", default=0.0, ge=0)
+    stiffness: Stiffness = Field(default=0.0, ge=0)
     """k."""
-    damping: float = quantity("N*s/m", default=0.4 * POUND_FORCE / INCH, gt=0)
+    damping: Annotated[Damping, Varied()] = Field(default=0.4 * POUND_FORCE / INCH, gt=0)
     """c."""
     forward: float = Field(default=1.0, gt=0)
     """Factor on mu for slip along the heading."""

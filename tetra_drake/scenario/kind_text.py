@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from tetra_drake.scenario.sections import Section, tree_of
+from tetra_drake.scenario.sections import Section, written
 from tetra_drake.scenario.units import shown
 
 
@@ -14,7 +14,8 @@ def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
 
     Lengths are in inches. Defaults are left out, but for the numbers that are `always` given.
     """
-    settings = {name: getattr(kind, name) for name in always} | tree_of(kind, show=shown)
+    given = written(kind.model_dump(exclude_defaults=True), shown)
+    settings = {name: getattr(kind, name) for name in always} | given
     texts = []
     for name, value in settings.items():
         if name == "file":

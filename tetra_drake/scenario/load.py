@@ -6,8 +6,9 @@ import os
 from pathlib import Path
 
 from tetra_drake.errors import InputError
+from tetra_drake.scenario.refusals import no_such
 from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import Tree, keys_of, no_such, tree_of
+from tetra_drake.scenario.sections import Tree, keys_of, written
 from tetra_drake.scenario.structure_files import structure_file
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 
@@ -46,7 +47,7 @@ def given_scenario(scenario: Scenario | str | Path) -> Scenario:
 def dump_scenario(scenario: Scenario) -> str:
     """The scenario as a scenario file that gives all values, in SI: it loads back to the same
     scenario, whatever the defaults."""
-    return dump_yaml(tree_of(scenario))
+    return dump_yaml(written(scenario.model_dump()))
 
 
 def _file(name: str, folder: Path) -> Path:

@@ -10,7 +10,17 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from tetra_drake.scenario.layout import Layout
-from tetra_drake.scenario.sections import Section, Tree, quantity, refuse
+from tetra_drake.scenario.quantities import (
+    Acceleration,
+    Damping,
+    Density,
+    Length,
+    Mass,
+    Position,
+    Stiffness,
+)
+from tetra_drake.scenario.refusals import refuse
+from tetra_drake.scenario.sections import Section, Tree, Varied
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
 """The nodes of a tetrahedron; the first three form the base triangle."""
@@ -29,8 +39,6 @@ Cable = Literal[
 name, inner ones join the tip to base nodes."""
 
 CABLES: tuple[str, ...] = get_args(Cable)
-
-Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 def tetrahedron_nodes(strut_length: float) -> np.ndarray:
@@ -83,10 +91,10 @@ def check_strut(key: str, *, length: float, diameter: float, density: float) -> 
 class RowCables(Section):
     """The cables of a row (Table 3). A slack cable has tension 0 where it would push."""
 
-    outer_stiffness: float = quantity("N/m", gt=0)
-    inner_stiffness: float = quantity("N/m", gt=0)
-    damping: float = quantity("N*s/m", ge=0)
-    free_length: float = quantity("m", ge=0)
+    outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
+    inner_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
+    damping: Damping = Field(ge=0)
+    free_length: Length = Field(ge=0)
     slack: bool
 
 
@@ -97,19 +105,19 @@ class Tetrahedra(Section):
     """Metrics that the robot does not have."""
 
     tetrahedra: int = Field(ge=2, le=200)
-    strut_length: float = quantity("m", gt=0)
-    strut_diameter: float = quantity("m", gt=0)
-    node_diameter: float = quantity("m", gt=0)
-    density: float = quantity("kg/m^3", gt=0)
+    strut_length: Length = Field(gt=0)
+    strut_diameter: Length = Field(gt=0)
+    node_diameter: Length = Field(gt=0)
+    density: Density = Field(gt=0)
     cables: RowCables
-    spacing: float = quantity("m", ge=0)
+    spacing: Annotated[Length, Varied()] = Field(ge=0)
     """Distance of base triangles at t = 0. `balanced`, or 0, is the one at which outer and inner
     cables balance. So is the spacing of a file that changes strut length or the cables' stiffness
     or free length of its base and gives no spacing."""
-    gravity: float = quantity("m/s^2", ge=0)
-    offsets: list[Point] = quantity("m", default=[])
+    gravity: Acceleration = Field(ge=0)
+    offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
-    payload: list[Annotated[float, Field(ge=0)]] = quantity("kg", default=[])
+    payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
     """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the

@@ -12,14 +12,14 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pydantic
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.scenario.nesting import Point
+from tetra_drake.scenario.refusals import hint, refuse
 from tetra_drake.scenario.robot_kinds import (
     MOST_NODES,
     MOST_PAIRS,
@@ -28,7 +28,7 @@ from tetra_drake.scenario.robot_kinds import (
     Structure,
     StrutGroup,
 )
-from tetra_drake.scenario.sections import Section, Tree, hint, keys_of, refuse, tree_of
+from tetra_drake.scenario.sections import Section, Tree, keys_of, written
 from tetra_drake.scenario.yaml_text import read_mapping
 
 MOST_BYTES = 2**20
@@ -43,6 +43,9 @@ UNUSED = (
     "moveCablePointAToEdge moveCablePointBToEdge"
 )
 """Parameters of NTRT's builders that are allowed and not used."""
+
+
+Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class Rotation(Section):
@@ -268,7 +271,7 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
                 damping=given.damping,
                 tension=given.pretension * unit,
             )
-    return tree_of(structure)
+    return Tree(written(structure.model_dump()))
 
 
 def _without_dots(name: str) -> str:

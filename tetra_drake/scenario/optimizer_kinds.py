@@ -5,7 +5,9 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.sections import Kinds, Section, quantity, refuse
+from tetra_drake.scenario.quantities import Time, UnitsByName
+from tetra_drake.scenario.refusals import refuse
+from tetra_drake.scenario.sections import Kinds, Section
 
 MOST_GAITS = 100_000
 """Upper limit of a population."""
@@ -26,7 +28,7 @@ class SteadyState(Section):
     """Largest change of a weight in one mutation."""
     tau_mutation: Literal["intended", "listing"] = "intended"
     """`listing`: as in the thesis's listing A.3.4, mutation never changes tau_A."""
-    tau_mutation_range: float = quantity("s", default=0.05, ge=0)
+    tau_mutation_range: Time = Field(default=0.05, ge=0)
     """Largest change of tau_A in one mutation."""
     stop_rise: float = Field(default=0.03, ge=0)
     stop_window: int = Field(default=100, ge=1)
@@ -67,8 +69,8 @@ class QualityDiversity(Section):
     gaits above the levels of cells. A level follows the fittest gait of its cell slowly.
     """
 
-    measures: dict[str, Range] = quantity(
-        METRICS, default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
+    measures: Annotated[dict[str, Range], UnitsByName(METRICS)] = Field(
+        default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
     )
     """Two metrics with their ranges on the map. Values outside count to the cells at the edge."""
     cells: list[Count] = Field(default=[20, 20], min_length=2, max_length=2)

@@ -17,17 +17,19 @@ from pydantic import Field
 
 from tetra_drake.scenario.layout import Layout
 from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
-from tetra_drake.scenario.nesting import LONGEST, Point, Tetrahedra, check_one_per_body, check_strut
-from tetra_drake.scenario.sections import (
-    Kinds,
-    Section,
-    Tree,
-    described,
-    each_number,
-    hint,
-    quantity,
-    refuse,
+from tetra_drake.scenario.nesting import LONGEST, Tetrahedra, check_one_per_body, check_strut
+from tetra_drake.scenario.quantities import (
+    Acceleration,
+    Damping,
+    Density,
+    Force,
+    Length,
+    Mass,
+    Position,
+    Stiffness,
 )
+from tetra_drake.scenario.refusals import described, hint, refuse
+from tetra_drake.scenario.sections import Kinds, Section, Tree, Varied
 from tetra_drake.scenario.units import quantity_to_si
 
 MOST_NODES, MOST_PAIRS = 1000, 2000
@@ -55,9 +57,9 @@ class StrutGroup(Section):
     """Struts of one make: solid cylinders with a sphere of the same density at each end."""
 
     pairs: Pairs
-    diameter: float = quantity("m", gt=0)
-    density: float = quantity("kg/m^3", gt=0)
-    node_diameter: float = quantity("m", ge=0)
+    diameter: Length = Field(gt=0)
+    density: Density = Field(gt=0)
+    node_diameter: Length = Field(ge=0)
     """Diameter of the spheres; 0 for none. A node has one, that of its first strut in the file."""
 
 
@@ -65,10 +67,10 @@ class CableGroup(Section):
     """Cables of one make, which never push."""
 
     pairs: Pairs
-    stiffness: float = quantity("N/m", gt=0)
-    damping: float = quantity("N*s/m", ge=0)
-    free_length: float | None = quantity("m", default=None, ge=0)
-    tension: float | None = quantity("N", default=None, ge=0)
+    stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
+    damping: Damping = Field(ge=0)
+    free_length: Length | None = Field(default=None, ge=0)
+    tension: Force | None = Field(default=None, ge=0)
     """Tension where the nodes are as given, instead of a free length."""
 
     @pydantic.model_validator(mode="after")
@@ -110,17 +112,17 @@ class Structure(Section):
     slack: ClassVar[bool] = True
     """Cables never push."""
 
-    nodes: dict[Name, Point] = quantity("m", max_length=MOST_NODES)
+    nodes: dict[Name, Position] = Field(max_length=MOST_NODES)
     struts: dict[Name, StrutGroup] = Field(min_length=1)
     cables: dict[Name, CableGroup] = Field(default={})
     actuated: dict[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
     """Names of the cables that each oscillator drives, their nodes in either order."""
-    masses: dict[str, Annotated[float, Field(gt=0)]] = quantity("kg", default={})
+    masses: dict[str, Annotated[Mass, Field(gt=0)]] = Field(default={})
     """Point masses at nodes, such as motors."""
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
-    gravity: float = quantity("m/s^2", default=9.80665, ge=0)
-    offsets: list[Point] = quantity("m", default=[])
+    gravity: Acceleration = Field(default=9.80665, ge=0)
+    offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty."""
 
     def __copy__(self) -> Self:
@@ -240,11 +242,15 @@ class Structure(Section):
         except ValueError:
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
 
-        def with_unit(number: Any, _unit: str, _key: str) -> Any:
-            return f"{number!r} {unit}" if type(number) in (int, float) else number
+        def with_unit(value: Any) -> Any:
+            if isinstance(value, dict):
+                return {name: with_unit(item) for name, item in value.items()}
+            if isinstance(value, list):
+                return [with_unit(item) for item in value]
+            return f"{value!r} {unit}" if type(value) in (int, float) else value
 
         tree = {key: value for key, value in tree.items() if key != "unit"}
-        return tree | {"nodes": each_number(tree.get("nodes"), "m", with_unit)}
+        return tree | {"nodes": with_unit(tree.get("nodes"))}
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Structure:

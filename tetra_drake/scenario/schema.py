@@ -5,33 +5,24 @@ from __future__ import annotations
 import functools
 import itertools
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
-from pydantic import PrivateAttr, model_validator
+from pydantic import Field, model_validator
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario.actuator_kinds import Actuation, Force
-from tetra_drake.scenario.changes import tree_of_changes
+from tetra_drake.scenario.changes import merged, tree_of_changes
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
 from tetra_drake.scenario.metric_units import METRICS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
+from tetra_drake.scenario.quantities import UnitsByName
+from tetra_drake.scenario.refusals import TAG, hint, refuse
 from tetra_drake.scenario.robot_kinds import Robot
-from tetra_drake.scenario.sections import (
-    TAG,
-    Section,
-    Tree,
-    Whole,
-    flattened,
-    hint,
-    merge,
-    quantity,
-    refuse,
-    tree_of,
-)
+from tetra_drake.scenario.sections import Section, Tree, flattened, written
 from tetra_drake.scenario.settings import (
     CpgSection,
     Disturbances,
@@ -41,9 +32,9 @@ from tetra_drake.scenario.settings import (
     SimulationSection,
     separate,
 )
-from tetra_drake.scenario.structure_files import with_structure
+from tetra_drake.scenario.structure_files import names_structure, with_structure
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
-from tetra_drake.scenario.units import plainest, rounded
+from tetra_drake.scenario.units import plainest, rounded, shortest
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
@@ -73,19 +64,16 @@ class Scenario(Section):
     gait_bounds: GaitBounds
     simulation: SimulationSection
     engine: Engine = Drake()
-    objective: dict[str, float] = quantity(
-        {name: inverse(unit) for name, unit in METRICS.items()}, min_length=1
-    )
+    objective: Annotated[
+        dict[str, float], UnitsByName({name: inverse(unit) for name, unit in METRICS.items()})
+    ] = Field(min_length=1)
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
-    require: dict[str, float] = quantity(METRICS, default={})
+    require: Annotated[dict[str, float], UnitsByName(METRICS)] = Field(default={})
     """Least values of metrics: a gait with less counts as failed. Replaced as a whole."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()
-
-    _tree: Tree | None = PrivateAttr(default=None)
-    """The scenario as its files have it, with the units of who wrote them."""
 
     def __str__(self) -> str:
         """A few lines: what is simulated, and by section what differs from the thesis."""
@@ -109,8 +97,8 @@ class Scenario(Section):
         return f"<Scenario {self.name}>"
 
     def to_yaml(self) -> str:
-        """All settings as a scenario file, in the units in which they were written."""
-        return dump_yaml(self.tree)
+        """All settings as a scenario file, in units in which they are round numbers."""
+        return dump_yaml(written(self.model_dump(), shortest))
 
     def differences(self, base: Scenario) -> list[tuple[str, str]]:
         """(key, value) of what differs from `base`, in units in which the number is round.
@@ -118,8 +106,7 @@ class Scenario(Section):
         A value that only `base` has is "none", and left out where kinds of other names explain it.
         There are no differences exactly if the scenarios are equal.
         """
-        ours, theirs = dict(self.content()), dict(base.content())
-        our_texts, their_texts = _texts(self), _texts(base)
+        ours, theirs = self.values(), base.values()
         kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs[key]]
         other_kinds = tuple(key.removesuffix(TAG) for key in kinds)
         found = []
@@ -127,21 +114,16 @@ class Scenario(Section):
             is_of_other_kind = key not in ours and key.startswith(other_kinds)
             if ours.get(key) == theirs.get(key) or is_of_other_kind:
                 continue
-            text = our_texts.get(key, _NONE)
-            if text == their_texts.get(key, _NONE):  # only the last digits differ
-                text = _texts(self, exact=True)[key]
+            text = _text(ours.get(key))
+            if text == _text(theirs.get(key)):  # only the last digits differ
+                text = _text(ours.get(key), exact=True)
             found.append((key.removesuffix(f".{TAG}"), text))
         return found + _differences_in_order(ours, theirs)
 
-    def content(self) -> tuple[tuple[str, Any], ...]:
-        """The values by their dotted keys, in order, without the name, which is only a label:
-        scenarios of the same values are equal."""
-        return tuple(item for item in super().content() if item[0] != "name")
-
-    @property
-    def tree(self) -> Tree:
-        """Content of a complete file of this scenario, in the units in which it was written."""
-        return self._tree or tree_of(self)
+    def values(self) -> dict[str, Any]:
+        """The values by their dotted keys, without the name, which is only a label: scenarios of
+        the same values are equal."""
+        return flattened(self.model_dump(exclude={"name"}))
 
     @property
     def oscillators(self) -> int:
@@ -167,10 +149,7 @@ class Scenario(Section):
     @classmethod
     def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
         """The scenario of a complete tree; raises InputError that names `source` and key."""
-        tree = merge({}, with_structure(_replacing(tree, tree), source))
-        scenario = super().from_tree(tree, source, key=key)
-        scenario._tree = _with_tags(tree, scenario)
-        return scenario
+        return super().from_tree(with_structure(tree, source), source, key=key)
 
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
         """A checked copy with other values: {"robot.tetrahedra": 7, "friction": "!Coulomb"}.
@@ -181,30 +160,29 @@ class Scenario(Section):
         they change as a whole: {"friction": Coulomb()}. Raises InputError, naming the key.
         """
         source = f"scenario {self.name}"
-        return self._merged(_replacing(tree_of_changes(changes, source), changes), source)
+        return self.with_file(tree_of_changes(changes, source), source)
 
-    def with_file(self, tree: Tree, source: object) -> Self:
-        """The scenario of a file's tree, of which this one is the base."""
-        return self._merged(_replacing(tree, tree), source)
-
-    def _merged(self, changes: Tree, source: object) -> Self:
+    def with_file(self, changes: Tree, source: object) -> Self:
+        """The scenario of a file's tree, of which this one is the base; see changes.merged()."""
+        base = self.model_dump()
+        if names_structure(changes):
+            del base["robot"]  # replaced as a whole
         changes = with_structure(changes, source)
-        tree = merge(self.tree, changes)
+        tree = merged(base, changes)
         changed = self.from_tree(tree, source)
-        following = changed.robot.following(self.robot, changes.get("robot", {}))
+        robot = changes.get("robot")
+        following = changed.robot.following(self.robot, robot) if isinstance(robot, dict) else {}
         if not following:
             return changed
-        return self.from_tree(merge(tree, {"robot": following}), source)
+        return self.from_tree(merged(tree, {"robot": following}), source)
 
     def with_sections(self, **sections: Any) -> Self:
         """A copy with other sections, which are not checked."""
-        changed = self.model_copy(update=sections)
-        changed._tree = None
-        return changed
+        return self.model_copy(update=sections)
 
     def with_numbers(self, numbers: Mapping[str, float]) -> Self:
         """A copy with other SI numbers by dotted keys, which are not checked."""
-        changed = self.with_sections()
+        changed = self
         for key, number in numbers.items():
             changed = _with_number(changed, key.split("."), number)
         return changed
@@ -212,7 +190,7 @@ class Scenario(Section):
     def numbers(self) -> dict[str, float]:
         """The SI numbers of the sections but `disturbances`, by their dotted keys."""
         tree = self.model_dump(exclude={"disturbances", "objective", "require"})
-        return {key: value for key, value in flattened(tree).items() if type(value) is float}
+        return {key: value for key, value in flattened(tree).items() if isinstance(value, float)}
 
     @model_validator(mode="after")
     def _check(self) -> Scenario:
@@ -290,7 +268,7 @@ class Scenario(Section):
             for factor in (1.0 - spread, 1.0 + spread):
                 changed = undisturbed.with_numbers({key: factor * numbers[key] for key in keys})
                 try:
-                    self.from_tree(changed.tree, place)
+                    self.from_tree(changed.model_dump(), place)
                 except InputError as error:
                     problem = f"{spread:g} leads to a wrong {error.key}: {error.problem}"
                     refuse(place, problem)
@@ -307,14 +285,12 @@ _NONE = "none"
 """Text of a value that a scenario does not have."""
 
 
-def _texts(scenario: Scenario, *, exact: bool = False) -> dict[str, str]:
-    """The values of a scenario as texts, by their keys; numbers have six digits unless `exact`."""
-    tree = tree_of(scenario) if exact else tree_of(scenario, show=plainest)
-    texts = {}
-    for key, value in flattened(tree).items():
-        text = json.dumps(value).replace('"', "") if value is not None else _NONE
-        texts[key] = text if exact else rounded(text)
-    return texts
+def _text(value: Any, *, exact: bool = False) -> str:
+    """A value of a tree as text; its numbers have six digits unless `exact`."""
+    if value is None:
+        return _NONE
+    text = json.dumps(written(value) if exact else written(value, plainest)).replace('"', "")
+    return text if exact else rounded(text)
 
 
 def _differences_in_order(
@@ -339,26 +315,3 @@ def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
     if isinstance(value, Section):
         return value.model_copy(update={name: _with_number(getattr(value, name), rest, number)})
     return {**value, name: _with_number(value[name], rest, number)}
-
-
-def _replacing(tree: Tree, keys: Iterable[str]) -> Tree:
-    """A tree whose objective, requirements and actuated cables replace those of a base, if they, or
-    the robot, are in `keys`."""
-    tree = dict(tree)
-    for name in ("objective", "require"):
-        if name in keys and isinstance(tree[name], dict):
-            tree[name] = Whole(tree[name])
-    robot = tree.get("robot")
-    is_given = "robot" in keys or "robot.actuated" in keys
-    if is_given and type(robot) is dict and isinstance(robot.get("actuated"), dict):
-        tree["robot"] = robot | {"actuated": Whole(robot["actuated"])}
-    return tree
-
-
-def _with_tags(tree: Tree, scenario: Scenario) -> Tree:
-    """The tree with the tags of all kinds, so that another kind does not merge with them."""
-    tagged = {}
-    for name in ("robot", "friction", "terrain", "actuation", "engine", "optimizer"):
-        if name in tree:
-            tagged[name] = {TAG: type(getattr(scenario, name)).__name__} | tree[name]
-    return tree | tagged

@@ -1,6 +1,7 @@
 """The sections of a scenario: what can be set, with units, limits and defaults.
 
-Numbers are SI. A field gives its SI unit, its limits and, if a file may leave it out, its default.
+The type of a number says its unit; numbers are SI. A field gives its limits and, if a file may
+leave it out, its default.
 """
 
 from __future__ import annotations
@@ -9,7 +10,9 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 
-from tetra_drake.scenario.sections import Section, quantity, refuse
+from tetra_drake.scenario.quantities import DampingPerLength, Force, Stiffness, Time
+from tetra_drake.scenario.refusals import refuse
+from tetra_drake.scenario.sections import Section, Varied
 
 Pathway = Literal["length", "load", "pitch"]
 """A signal that can be fed back to the oscillators; see physics.feedback."""
@@ -20,8 +23,8 @@ PATHWAYS: tuple[str, ...] = get_args(Pathway)
 class GroundSection(Section):
     """The normal force (Table 1)."""
 
-    stiffness: float = quantity("N/m", gt=0)
-    damping: float = quantity("N*s/m^2", ge=0)
+    stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
+    damping: Annotated[DampingPerLength, Varied()] = Field(ge=0)
     """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
     speed v: e = 1 - alpha v (Eq. 2)."""
 
@@ -37,14 +40,14 @@ class CpgSection(Section):
     """At t = 0: u of every neuron, v of extensors, v of flexors."""
     partner_weight: float = Field(ge=0)
     """Weight of the inhibition between extensor and flexor of an oscillator."""
-    gain: float = quantity("N")
+    gain: Force
     """Force per unit of y_extensor - y_flexor."""
-    start_up: float = quantity("s", ge=0)
+    start_up: Time = Field(ge=0)
     """Time until which the cables are not actuated."""
     signals: Literal["listing", "live"]
     """`listing`: forward Euler beforehand, as in the thesis's listing. `live`: the network is
     integrated with the robot. Feedback needs `live`."""
-    listing_step: float = quantity("s", ge=1e-6)
+    listing_step: Time = Field(ge=1e-6)
     reach: int | None = Field(default=None, ge=0)
     """Oscillators at most this far apart inhibit each other (see Layout.distances). The default is
     all."""
@@ -63,8 +66,8 @@ class GaitBounds(Section):
 
     weight_min: float = Field(ge=0)
     weight_max: float = Field(ge=0)
-    tau_a_min: float = quantity("s", gt=0)
-    tau_a_max: float = quantity("s", gt=0)
+    tau_a_min: Time = Field(gt=0)
+    tau_a_max: Time = Field(gt=0)
     turn: float = Field(default=0.0, ge=-1, le=1)
     """The turn of all gaits that are drawn or evolved."""
     mirrored: bool = False
@@ -86,12 +89,12 @@ class GaitBounds(Section):
 class SimulationSection(Section):
     """Duration of a simulation, and when to give up."""
 
-    duration: float = quantity("s", gt=0, le=1e5)
-    steady_from: float = quantity("s", ge=0)
+    duration: Time = Field(gt=0, le=1e5)
+    steady_from: Time = Field(ge=0)
     """Time from which the fitness counts (section 2.3)."""
     max_evaluations: int = Field(ge=1)
     """Evaluations of the derivatives in one simulation."""
-    sample_period: float = quantity("s", gt=0)
+    sample_period: Time = Field(gt=0)
     """Time between samples of a recorded trajectory."""
 
     @model_validator(mode="after")
@@ -109,7 +112,7 @@ class EvolutionSection(Section):
     evaluations: int = Field(ge=1)
     """Gaits of a trial that does not end early. !SteadyState evaluates its population, then two in
     each iteration."""
-    time_budget: float = quantity("s", gt=0)
+    time_budget: Time = Field(gt=0)
     """Wall time of a simulation; a longer one counts as failed."""
 
 

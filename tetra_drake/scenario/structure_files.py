@@ -7,13 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from tetra_drake.errors import InputError
+from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.ntrt import MOST_BYTES, NtrtFile, ntrt_tree
+from tetra_drake.scenario.refusals import TAG, described, no_such
 from tetra_drake.scenario.robot_kinds import Structure
-from tetra_drake.scenario.sections import TAG, Tree, Whole, described, keys_of, merge, no_such
+from tetra_drake.scenario.sections import Tree, keys_of
 from tetra_drake.scenario.units import quantity_to_si
 from tetra_drake.scenario.yaml_text import read_mapping
 
 FOLDER = Path(__file__).parent / "structures"
+
+_KIND = Structure.__name__
 
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 """Keys that only files of NTRT have."""
@@ -41,17 +45,22 @@ def structure_file(name: str, folder: Path) -> Path:
     return FOLDER / f"{name}.yaml" if name in shipped_structures() else folder / name
 
 
+def names_structure(tree: Tree) -> bool:
+    """True if the robot of a scenario's tree is that of a structure file."""
+    robot = tree.get("robot")
+    is_structure = isinstance(robot, dict) and robot.get(TAG, _KIND) == _KIND
+    return is_structure and "file" in tree["robot"]
+
+
 def with_structure(tree: Tree, source: object) -> Tree:
     """The tree of a scenario with the content of the structure file that its robot may name.
 
     The file must be a structure by itself. What stands beside `file` overrides its content;
     `actuated` is replaced as a whole. Raises InputError that names file, or `source`, and key.
     """
-    robot = tree.get("robot")
-    if not isinstance(robot, dict) or "file" not in robot:
+    if not names_structure(tree):
         return tree
-    if robot.get(TAG, Structure.__name__) != Structure.__name__:
-        return tree  # which has an unknown key
+    robot = tree["robot"]
     changes = {key: value for key, value in robot.items() if key not in (TAG, "file")}
     name = robot["file"]
     if not isinstance(name, str) or not os.path.exists(structure_file(name, Path())):
@@ -60,7 +69,7 @@ def with_structure(tree: Tree, source: object) -> Tree:
     file = structure_file(name, Path())
     content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
     Structure.from_tree(content, file)
-    return tree | {"robot": Whole({TAG: Structure.__name__} | merge(content, changes))}
+    return tree | {"robot": {TAG: _KIND} | merged(content, changes, "robot")}
 
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:

@@ -19,7 +19,8 @@ from pydantic import Field
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes
 from tetra_drake.scenario.kind_text import settings_text
-from tetra_drake.scenario.sections import Kinds, Section, quantity
+from tetra_drake.scenario.quantities import Angle, Length
+from tetra_drake.scenario.sections import Kinds, Section
 from tetra_drake.scenario.units import INCH
 
 BEHIND, AHEAD, ASIDE = 24.0 * INCH, 120.0 * INCH, 30.0 * INCH
@@ -80,7 +81,7 @@ class Incline(Relief):
     The robot starts on it, turned with it.
     """
 
-    slope: float = quantity("rad", ge=-STEEPEST, le=STEEPEST)  # 60 deg either way
+    slope: Angle = Field(ge=-STEEPEST, le=STEEPEST)  # 60 deg either way
 
     @property
     def plane_slope(self) -> float:
@@ -100,10 +101,10 @@ class Steps(Relief):
     its depth if that is less.
     """
 
-    height: float = quantity("m")  # of each step above the one before
-    depth: float = quantity("m", gt=0)  # of each step along x
+    height: Length  # of each step above the one before
+    depth: Length = Field(gt=0)  # of each step along x
     count: int = Field(ge=1)
-    start: float | None = quantity("m", default=None)
+    start: Length | None = None
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         start = ahead if self.start is None else self.start
@@ -123,8 +124,8 @@ class Rough(Relief):
     seed is the same ground.
     """
 
-    amplitude: float = quantity("m", ge=0)
-    wavelength: float = quantity("m", gt=0)
+    amplitude: Length = Field(ge=0)
+    wavelength: Length = Field(gt=0)
     seed: int = Field(ge=0, default=0)
 
     def grid(self, *, ahead: float, source: object) -> Grid:
@@ -144,11 +145,11 @@ class Obstacles(Relief):
     is the same ground.
     """
 
-    height: float = quantity("m", gt=0)
-    radius: float = quantity("m", gt=0)
-    spacing: float = quantity("m", gt=0)
+    height: Length = Field(gt=0)
+    radius: Length = Field(gt=0)
+    spacing: Length = Field(gt=0)
     seed: int = Field(ge=0, default=0)
-    start: float | None = quantity("m", default=None)
+    start: Length | None = None
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         cell, spacing = 0.5 * self.radius, self.spacing
@@ -181,7 +182,7 @@ class HeightField(Relief):
     """
 
     file: str
-    cell: float = quantity("m", gt=0)  # between neighbours, along x and y
+    cell: Length = Field(gt=0)  # between neighbours, along x and y
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         heights = _read_heights(self.file, source)

@@ -91,3 +91,10 @@ def plainest(number: float, unit: str) -> str:
 
     size, name = min(candidates, key=digits)
     return f"{number / size:.6g} {name}".rstrip()
+
+
+def shortest(number: float, unit: str) -> str:
+    """The shortest of the texts that plainest() chooses from which reads as exactly this number."""
+    exact = f"{number!r} {unit}"
+    text = plainest(number, unit)
+    return text if " " in text and quantity_to_si(text, unit) == number else exact

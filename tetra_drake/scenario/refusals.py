@@ -1,0 +1,51 @@
+"""Words for what is wrong with a value of a tree."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+from collections.abc import Iterable, Sequence
+from typing import Any, NoReturn
+
+from pydantic_core import PydanticCustomError
+
+TAG = "_tag"
+"""Key of the name of a tagged kind in a tree."""
+
+_MOST_NAMES, _LONGEST_NAME = 2000, 100
+"""Upper limits of what is compared with a misspelt name, which takes a while."""
+
+
+def refuse(key: str, problem: str) -> NoReturn:
+    """Ends a validation with a problem at a key, relative to what is validated."""
+    raise PydanticCustomError("refused", "{key}: {problem}", {"key": key, "problem": problem})
+
+
+def described(value: Any) -> str:
+    """A value of a tree in words, for a message."""
+    if isinstance(value, dict):
+        return f"!{value[TAG]}" if TAG in value else "a mapping"
+    if value is None:
+        return "nothing"
+    if isinstance(value, list):
+        return "a list"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"'{value}'" if isinstance(value, str) else str(value)[:40]
+
+
+def hint(name: Any, names: Iterable[str]) -> str:
+    """Advice on a misspelt name."""
+    names = list(itertools.islice(names, _MOST_NAMES))
+    close = difflib.get_close_matches(str(name)[:_LONGEST_NAME], names, n=1)
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return f"expected one of {', '.join(names)}" if names else "expected none"
+
+
+def no_such(what: str, name: str, shipped: Sequence[str]) -> str:
+    """The problem with a name, or a path, of what is neither shipped nor a file."""
+    last = name.rpartition("/")[2][:_LONGEST_NAME]
+    if close := difflib.get_close_matches(last, shipped, n=1):
+        return f"no such {what}; did you mean '{close[0]}'?"
+    return f"no such {what} (shipped: {', '.join(shipped)})"
