@@ -52,7 +52,7 @@ LAWS = {"reset integrator": "thesis", "Coulomb": "coulomb"}
 UNSEEN = range(1001, 1021)
 """Seeds of random ground on which no gait was evolved."""
 
-WAYS, DISPLACEMENT = 10, 1e-9
+WAYS, DISPLACEMENT = 30, 1e-9
 """Number of displaced starts of a gait, and displacement of each body there (m)."""
 
 SHOWN = ("cost_of_transport", "tension", "clearance")

@@ -20,16 +20,16 @@ from tetra_drake.robot.gait import ParameterSpace, load_gait
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.units import INCH
 
-ROUNDINGS = 2.0
+ROUNDINGS = 3.0
 """Tolerance of a distance, in multiples of the gait's own sensitivity: the largest change of the
-distance in ten starts that are displaced by 1 nm.
+distance in thirty starts that are displaced by 1 nm.
 
 Processors, versions of packages and changes of the code round differently, in the sixteenth digit;
 1 nm is in the eighth digit of a position. Some gaits enlarge both by the same factor: the change
 by rounding is then a ten-millionth of the sensitivity. In the others, the lengths of steps soon
 have nothing in common, and the distance differs by the integration error, the same for 1 nm and
-for rounding. Rounding is then an eleventh draw: one gait in eleven exceeds the largest of ten
-draws, but hardly by half. (Without fused products, 2 of 120 gaits did, at most by a fifth.)
+for rounding. Rounding is then a draw like those thirty. Of sixty draws for each of the 120 gaits,
+one in two thousand exceeds three times the largest of thirty others.
 """
 
 FOLDERS = [name for name in record.EXPERIMENTS if (tables.HERE / name / "manifest.json").exists()]
