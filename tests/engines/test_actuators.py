@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import xarray
+from helpers.actuations import LIMITED
 from helpers.quantities import with_unit
 from helpers.states import body_velocities
 
@@ -194,13 +195,6 @@ def test_a_winch_without_limits_and_lag_is_the_force_law():
     assert apart[1] / apart[2] == pytest.approx(2.0, abs=0.05)
 
 
-AGAINST_LIMITS = {
-    "winch": Winch(max_force=6.0, max_speed=0.1, time_constant=0.02),
-    "motor": TensionMotor(max_force=4.0, max_speed=0.1, time_constant=0.02),
-}
-"""Which actuators of the thesis's robot meet as it walks."""
-
-
 @pytest.mark.parametrize("engine", ["drake", "compiled"])
 def test_a_robot_in_the_air_gains_the_work_of_its_winches(scenario, engine):
     # Without damping: kinetic and elastic energy, k (l - x)² / 2 of a taut cable, grow by the
@@ -214,7 +208,7 @@ def test_a_robot_in_the_air_gains_the_work_of_its_winches(scenario, engine):
         "simulation.steady_from": "0.1 s",
         "simulation.sample_period": "0.1 ms",
         "cpg.start_up": 0.0,
-        "actuation": AGAINST_LIMITS["winch"],
+        "actuation": LIMITED["winch"],
     }
     robot = Robot.of(scenario.with_changes({**floating, "engine": FINE[engine]}))
     structure, bodies, motion = robot.structure, robot.model.bodies, trajectory_of(robot)
@@ -231,49 +225,12 @@ def test_a_robot_in_the_air_gains_the_work_of_its_winches(scenario, engine):
     np.testing.assert_allclose(energy - energy[0], work, atol=1e-4 * np.ptp(work))
 
 
-def distance_in(scenario: Scenario, engine: Compiled | Drake, seed: int) -> float:
-    on_engine = scenario.with_changes({"engine": engine})
-    return simulate(scenario=on_engine, gait=seeded_gait(scenario, seed)).metrics.distance_in
-
-
-CONVERGED = {
-    "compiled": Compiled(tolerance=1e-6, max_step=5e-4),
-    "drake": Drake(scheme="radau3", accuracy=1e-5, max_step=1e-3, look_ahead=1e-6),
-}
-
-STRENGTH = {"prism": 12.0, "six_bar": 6.0, "coulomb": 4.0}
-"""Force (N) of actuators that hold a robot up, so that it walks."""
-
-
-@pytest.mark.parametrize(
-    ("name", "seed", "kind"),
-    [
-        pytest.param("prism", 2, "winch", marks=pytest.mark.slow),
-        ("prism", 2, "motor"),
-        *(pytest.param("six_bar", seed, "winch", marks=pytest.mark.slow) for seed in (2, 3)),
-        *(pytest.param("coulomb", seed, "winch", marks=pytest.mark.slow) for seed in (1, 2, 3)),
-        *(pytest.param("coulomb", seed, "motor", marks=pytest.mark.slow) for seed in (1, 2, 3)),
-    ],
-)
-def test_robots_with_actuators_walk_as_far_on_the_diagram_as_on_the_compiled_engine(
-    name, seed, kind
-):
-    times = {"simulation.duration": "2.5 s", "simulation.steady_from": "1 s"}
-    actuators = AGAINST_LIMITS[kind].model_copy(update={"max_force": STRENGTH[name]})
-    changes = {"cpg.start_up": "0.25 s", "actuation": actuators}
-    scenario = load_scenario(name).with_changes(times | changes)
-    ours, drakes = (distance_in(scenario, CONVERGED[e], seed) for e in ("compiled", "drake"))
-    # Seen: 1e-5; 6e-4 of the prism with motors, whose software damping shakes it.
-    assert ours == pytest.approx(drakes, abs=1e-3)
-    assert abs(ours) > 0.02
-
-
-@pytest.mark.parametrize("kind", AGAINST_LIMITS)
+@pytest.mark.parametrize("kind", LIMITED)
 @pytest.mark.parametrize("engine", ["drake", "compiled"])
 def test_recording_a_robot_with_actuators_changes_nothing(engine, kind):
     short = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.2 s"}
     short |= {"cpg.start_up": "0.1 s", "engine": f"!{engine.capitalize()}"}
-    scenario = load_scenario("six_bar").with_changes({**short, "actuation": AGAINST_LIMITS[kind]})
+    scenario = load_scenario("six_bar").with_changes({**short, "actuation": LIMITED[kind]})
     gait = seeded_gait(scenario)
     plain = simulate(scenario=scenario, gait=gait)
     recorded = simulate(scenario=scenario, gait=gait, record=True)
@@ -283,11 +240,11 @@ def test_recording_a_robot_with_actuators_changes_nothing(engine, kind):
     assert wound.any() == (kind == "winch")
 
 
-@pytest.mark.parametrize("kind", AGAINST_LIMITS)
+@pytest.mark.parametrize("kind", LIMITED)
 def test_mujoco_refuses_actuators(kind, refused):
     scenario = load_scenario("coulomb").with_changes({"engine": "!Mujoco"})
-    with refused("coulomb", "actuation", AGAINST_LIMITS[kind].__class__.__name__):
+    with refused("coulomb", "actuation", LIMITED[kind].__class__.__name__):
         simulate(
-            scenario=scenario.with_sections(actuation=AGAINST_LIMITS[kind]),
+            scenario=scenario.with_sections(actuation=LIMITED[kind]),
             gait=seeded_gait(scenario),
         )

@@ -4,24 +4,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.actuations import MOTOR, WINCH
 
-from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.prototype.command_file import load_command
 from tetra_drake.prototype.export import COMMAND, export
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 
 RECORDED = Path(__file__).parents[2] / "runs/coulomb/trial_00/best_gait.json"
 
 DRIVEN = 8
-
-ACCURATE = Drake(accuracy=1e-3)
-"""Engine whose error is 0.002 in; by default it is 0.016 in with motors."""
 
 
 @pytest.fixture(scope="module")
@@ -41,38 +35,6 @@ def waves(mean: float, amplitude: float, *, rate: float = 100.0) -> Command:
 
 def distance(scenario, command) -> float:
     return simulate(scenario=scenario, command=command).metrics.distance_in
-
-
-def test_all_engines_walk_by_the_same_forces(brief):
-    command = waves(0.0, 1.5)
-    compiled = distance(brief, command)
-    assert compiled > 0.5
-    drake = distance(brief.with_changes({"engine": ACCURATE}), command)
-    assert drake == pytest.approx(compiled, abs=0.01)
-
-
-@pytest.mark.skipif(not installed(), reason=INSTALL)
-def test_mujoco_walks_by_the_same_forces(brief):
-    # MuJoCo's errors are proportional to its step: two steps tell where they lead.
-    brief = brief.with_changes({"friction.stiffness": "0 N/m"})
-    command, mujoco = waves(0.0, 1.5), brief.with_changes({"engine": "!Mujoco"})
-    step = mujoco.engine.step
-    coarse = distance(mujoco, command)
-    fine = distance(mujoco.with_numbers({"engine.step": step / 2}), command)
-    assert 2.0 * fine - coarse == pytest.approx(distance(brief, command), abs=0.02)
-
-
-@pytest.mark.parametrize(
-    ("actuation", "command"),
-    [(MOTOR, waves(2.6, 1.2)), (WINCH, waves(0.085, 0.01))],
-    ids=["motor", "winch"],
-)
-def test_the_diagram_and_the_compiled_engine_play_actuators_alike(brief, actuation, command):
-    driven = brief.with_changes(actuation)
-    compiled = distance(driven, command)
-    assert abs(compiled) > 0.1
-    drake = distance(driven.with_changes({"engine": ACCURATE}), command)
-    assert drake == pytest.approx(compiled, abs=0.01)
 
 
 @pytest.mark.parametrize("engine", ["drake", "compiled"])

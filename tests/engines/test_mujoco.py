@@ -14,7 +14,7 @@ from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudg
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.engine_kinds import Compiled, Mujoco
+from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.friction_kinds import MUJOCO_FRICTION, Coulomb
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Steps
@@ -43,26 +43,6 @@ def trajectory_of(scenario: Scenario) -> xarray.Dataset:
 def weight_of(scenario: Scenario) -> float:
     """Of the robot, in N."""
     return Robot.of(scenario).weight
-
-
-@needs_mujoco
-@pytest.mark.parametrize("tetrahedra", [2, 5, 8])
-def test_a_driven_robot_that_floats_moves_as_on_the_compiled_engine(short, tetrahedra):
-    # Bodies, cables and motors are the same; only the ground differs. MuJoCo's error is of first
-    # order in the step, so that two steps give the limit.
-    floating = {"robot.tetrahedra": tetrahedra, "robot.gravity": 0.0}
-    floating |= {"robot.offsets": [[0.0, 0.0, "1 m"]] * tetrahedra}
-    fine = {"engine": Compiled(tolerance=1e-6, max_step=5e-4)}
-    ours, coarse, halved = (
-        trajectory_of(short.with_changes(floating | changes))
-        for changes in (fine, {"engine.step": "4e-5 s"}, {"engine.step": "2e-5 s"})
-    )
-    limit = 2.0 * halved - coarse
-    assert np.ptp(ours["q_WB"].sel(quaternion="y").values) > 0.01
-    tolerances = {"p_WN": 2e-5, "v_WN": 2e-4, "p_WB": 2e-5, "q_WB": 1e-4}
-    tolerances |= {"length": 1e-6, "tension": 1e-3, "signal": 1e-9}
-    for name in ours:
-        assert float(abs(limit[name] - ours[name]).max()) <= tolerances.get(name, 0.0), name
 
 
 @needs_mujoco
@@ -170,17 +150,6 @@ def test_nodes_that_do_not_touch_the_ground_change_nothing(short):
 
 
 @needs_mujoco
-def test_walks_on_an_incline_as_the_compiled_engine_does(short):
-    # The damping of the normal force differs, so that the robot lands a little differently.
-    slope = {"terrain": Incline(slope=math.radians(5.0)), "friction": Coulomb()}
-    walk = short.with_changes(slope | {"simulation.duration": "1.0 s"})
-    ours = trajectory_of(walk.with_changes({"engine": "!Compiled"}))
-    theirs = trajectory_of(walk)
-    assert np.ptp(ours["p_WB"].sel(axis="x").values, axis=0).max() > 3e-3
-    assert float(abs(theirs["p_WN"] - ours["p_WN"]).max()) < 2e-4  # 0.2 mm
-
-
-@needs_mujoco
 def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure):
     angle, times = math.radians(3.0), {"simulation.duration": "1.2 s", "cpg.start_up": "1.25 s"}
     creeping = {"terrain": Incline(slope=angle), "friction": Coulomb(), **times}
@@ -211,7 +180,8 @@ def test_cables_that_cannot_push_are_simulated_while_they_are_taut(short):
 
 @needs_mujoco
 def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
-    light = short.with_changes({"robot.density": "1e-200 kg/m^3"})
+    tiny = {"robot.strut_length": "5 mm", "robot.spacing": "2.5 mm"}
+    light = short.with_changes(tiny | {"robot.density": "1e-4 kg/m^3"})
     with refused("thesis", "robot", "mjMINVAL"):
         simulate(scenario=light, gait=seeded_gait(light))
 

@@ -18,7 +18,6 @@ from pydrake.systems.primitives import Adder, Sine
 from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.rosenbrock import take_step
 from tetra_drake.engines.drake import MakeSimulator
-from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import MODE_COLUMNS
@@ -29,10 +28,9 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.robot.tensegrity import MakeTensegrity
-from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
+from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_kinds import Structure as Kind
-from tetra_drake.scenario.schema import Scenario
 from tetra_drake.simd.packed import Packed
 from tetra_drake.systems import CableNetwork, GroundContact
 
@@ -194,52 +192,3 @@ def test_opposite_turns_of_a_mirrored_gait_lead_to_mirror_images():
     left, right = (path.centre for path in paths)
     np.testing.assert_allclose(left * [1.0, -1.0, 1.0], right, atol=1e-5)
     assert np.ptp(left[:, 1]) > 1e-3, "it turns"
-
-
-FINE = {
-    "compiled": Compiled(tolerance=1e-6, max_step=5e-4),
-    "drake": Drake(scheme="radau3", accuracy=1e-5, max_step=1e-3, look_ahead=1e-6),
-}
-
-
-def distance_in(scenario: Scenario, engine: Compiled | Drake | Mujoco, seed: int) -> float:
-    on_engine = scenario.with_changes({"engine": engine})
-    return simulate(scenario=on_engine, gait=seeded_gait(scenario, seed)).metrics.distance_in
-
-
-@pytest.mark.parametrize("name", ["prism", "six_bar"])
-@pytest.mark.parametrize("seed", [2, 3, 4])
-def test_structures_walk_as_far_on_the_diagram_as_on_the_compiled_engine(name, seed):
-    times = {"simulation.duration": "2.5 s", "simulation.steady_from": "1 s"}
-    scenario = load_scenario(name).with_changes({"cpg.start_up": "0.25 s", **times})
-    ours, drakes = (distance_in(scenario, FINE[engine], seed) for engine in ("compiled", "drake"))
-    assert ours == pytest.approx(drakes, abs=1e-4)  # seen: 1e-5
-    assert abs(ours) > 0.02
-
-
-@pytest.mark.skipif(not installed(), reason=INSTALL)
-@pytest.mark.parametrize("name", ["prism", "six_bar", "coulomb"])
-@pytest.mark.parametrize("seed", [1, 2])
-def test_robots_walk_as_far_on_mujoco_as_on_the_compiled_engine(name, seed):
-    # MuJoCo's error is of first order in the step, so that two steps give the limit.
-    times = {"simulation.duration": "2.5 s", "simulation.steady_from": "1 s"}
-    scenario = load_scenario(name).with_changes({"cpg.start_up": "0.25 s", **times})
-    scenario = scenario.with_changes(NO_BRISTLES)
-    coarse, halved = (distance_in(scenario, Mujoco(step=step), seed) for step in (1e-4, 5e-5))
-    ours = distance_in(scenario, FINE["compiled"], seed)
-    assert 2.0 * halved - coarse == pytest.approx(ours, abs=2e-3)  # 0.01 with impratio 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["prism", "six_bar"])
-def test_random_gaits_of_structures_end_where_the_diagrams_do(name):
-    scenario = load_scenario(name)
-    apart = [
-        abs(
-            distance_in(scenario, FINE["compiled"], seed)
-            - distance_in(scenario, FINE["drake"], seed)
-        )
-        for seed in range(20)
-    ]
-    assert np.median(apart) < 1e-4
-    assert np.quantile(apart, 0.9, method="lower") < 1e-3, "nine of ten"

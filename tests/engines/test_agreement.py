@@ -1,0 +1,298 @@
+"""Agreement of the engines: a table of walks, and one of sets of random gaits.
+
+A row has a scenario, what drives the robot, two engines, and how far each compared quantity may be
+apart: a variable of the trajectory at all times, or a metric.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.actuations import LIMITED, MOTOR, WINCH
+from helpers.converged import CONVERGED, shortly
+from helpers.quantities import with_unit
+
+from tetra_drake.engines.mujoco import INSTALL, installed
+from tetra_drake.engines.simulate import simulate, simulate_many
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.robot.command import Command
+from tetra_drake.robot.gait import WALKING_SEED, Gains, Gait, seeded_gait
+from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import PATHWAYS
+from tetra_drake.scenario.terrain_kinds import Flat, HeightField, Incline, Obstacles, Rough, Steps
+
+Changes = Mapping[str, Any]
+Engine = Compiled | Drake | Mujoco
+INCH = 0.0254
+
+
+@dataclasses.dataclass(frozen=True)
+class Limit:
+    """MuJoCo with ever shorter steps: its error is of first order, so two steps tell."""
+
+    step: float
+    """The longer step (s)."""
+
+
+FINE = (
+    Compiled(tolerance=1e-6, max_step=5e-4),
+    Drake(scheme="radau3", accuracy=1e-5, max_step=1e-3, look_ahead=1e-6),
+)
+CONVERGE = (CONVERGED["compiled"], CONVERGED["drake"])
+ACCURATE = (Compiled(), Drake(accuracy=1e-3))
+"""The diagram's error of 0.002 in; by default it is 0.016 in with motors."""
+DEFAULT = (Compiled(), Drake())
+NO_BRISTLES = {"friction.stiffness": "0 N/m"}
+"""Coulomb friction as in MuJoCo."""
+
+COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
+FIELD = HeightField(file="waves.npy", cell=0.02)
+"""Stands for waves of 8 in, 0.1 in high, that lie across the way at an angle."""
+TERRAINS = {
+    "incline": Incline(slope=np.radians(5.0)),
+    # Steps are where the robot meets them at once.
+    "steps": Steps(height=-0.25 * INCH, depth=4.0 * INCH, count=4, start=2.0 * INCH),
+    "rough": Rough(amplitude=0.1 * INCH, wavelength=6.0 * INCH),
+    "obstacles": Obstacles(
+        height=0.25 * INCH, radius=1.0 * INCH, spacing=2.5 * INCH, start=14.0 * INCH
+    ),
+    "field": FIELD,
+}
+
+
+def gait(seed: int = WALKING_SEED, **changes: Any) -> Callable[[Scenario], Changes]:
+    """A seeded gait that drives the robot, with some fields changed."""
+    return lambda scenario: {"gait": dataclasses.replace(seeded_gait(scenario, seed), **changes)}
+
+
+def steered(scenario: Scenario) -> Changes:
+    """A gait that turns from 0.2 s on, ever more."""
+    return gait()(scenario) | {"steering": lambda time: max(0.0, 5.0 * (time - 0.2))}
+
+
+def waves(mean: float, amplitude: float) -> Callable[[Scenario], Changes]:
+    """Sines of 1 Hz that run along the robot, left and right alike, after half a second."""
+    times = np.arange(0.0, 3.0, 0.01)[:, np.newaxis]
+    phases = 2.0 * np.pi * (times - 0.2 * (np.arange(8) // 2))
+    samples = mean + amplitude * np.clip(times - 0.5, 0.0, 1.0) * np.sin(phases)
+    return lambda scenario: {"command": Command("waves", 0.01, samples)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """A walk on two engines."""
+
+    scenario: str
+    """A shipped one."""
+    duration: float
+    changes: Changes
+    engines: tuple[Engine, Engine | Limit]
+    within: Mapping[str, float]
+    """Largest difference by the name of a quantity, in SI units; distance_in in inches."""
+    drive: Callable[[Scenario], Changes]
+    moves: float = 0.0
+    """Least size of the first quantity's change in the walk."""
+
+
+def rows() -> Iterable[Any]:
+    """The table."""
+
+    def row(name: str, *cells: Any, slow: bool = False, **more: Any) -> Any:
+        walk = Row(*cells, **more)
+        needs = [pytest.mark.slow] if slow else []
+        if isinstance(walk.engines[1], Mujoco | Limit):
+            needs.append(pytest.mark.skipif(not installed(), reason=INSTALL))
+        return pytest.param(walk, id=name, marks=needs)
+
+    # Each engine places a mode change to 1e-8 s. There friction jumps by up to sigma_1 v, that is
+    # 70 N s/m * 0.05 m/s = 3.5 N on a body of 0.02 kg: a velocity error of 1.75e-6 m/s, and
+    # 0.9e-6 m after 0.5 s. Some such changes add up. Coulomb friction hardly jumps.
+    for count, seed, duration in ((5, 2, 0.5), (2, 3, 0.5), (3, 1, 0.3), (8, 1, 0.2)):
+        changes = {"robot.tetrahedra": count}
+        name = f"{count} tetrahedra"
+        yield row(name, "thesis", duration, changes, CONVERGE, {"p_WN": 5e-6}, gait(seed), 1e-3)
+    for terrain, surface in TERRAINS.items():
+        for law, friction in (("reset", None), ("coulomb", COULOMB), ("firm", FIRM)):
+            changes = {"robot.tetrahedra": 3, "robot.contacts": "all", "terrain": surface}
+            changes |= {"friction": friction} if friction else {}
+            within = {"p_WN": 1e-6 if friction else 1e-5}  # some forty mode changes
+            name = f"{terrain}, {law}"
+            yield row(name, "thesis", 0.1, changes, CONVERGE, within, gait(2), 5e-4)
+    for pathway in PATHWAYS:
+        # The reset integrator's modes change 1e5 times while a robot with feedback lands.
+        changes = {"cpg.signals": "live", "cpg.feedback": [pathway], "friction": COULOMB}
+        drive, within = gait(gains=Gains(**{pathway: 1.0})), {"p_WN": 1e-6, "signal": 2e-5}
+        yield row(f"feedback {pathway}", "thesis", 0.3, changes, CONVERGE, within, drive)
+    for signals in ("listing", "live"):
+        changes = {"cpg.signals": signals, "cpg.listing_step": "1e-4 s", "gait_bounds.turn": 0.0}
+        name = f"steering, {signals}"
+        yield row(name, "turning", 0.4, changes, CONVERGE, {"signal": 2e-4}, steered)
+
+    begin = {"cpg.start_up": "0.25 s", "simulation.steady_from": "1 s"}
+    for scenario in ("prism", "six_bar"):
+        for seed in (2, 3, 4):
+            name = f"{scenario} {seed}"  # seen: 1e-5
+            within = {"distance_in": 1e-4}
+            yield row(name, scenario, 2.5, begin, FINE, within, gait(seed), 0.02)
+    cases = [("prism", 2, kind, 12.0) for kind in LIMITED]
+    cases += [("six_bar", seed, "winch", 6.0) for seed in (2, 3)]
+    cases += [("coulomb", seed, kind, 4.0) for kind in LIMITED for seed in (1, 2, 3)]
+    for scenario, seed, kind, force in cases:  # forces that hold the robot up
+        changes = begin | {"actuation": LIMITED[kind].model_copy(update={"max_force": force})}
+        name, slow = f"{scenario} {seed}, {kind}", (scenario, kind) != ("prism", "motor")
+        within = {"distance_in": 1e-3}  # seen: 1e-5; 6e-4 where software damping shakes the prism
+        yield row(name, scenario, 2.5, changes, FINE, within, gait(seed), 0.02, slow=slow)
+    for scenario, force in (("motors", 0.04), ("winch", 0.5)):
+        changes = {"cpg.start_up": "1.25 s", "simulation.steady_from": "2 s"}
+        within = {"distance_in": 0.05, "peak_actuator_force": force, "actuator_limited": 0.01}
+        yield row(scenario, scenario, 4.0, changes, DEFAULT, within, gait(3))
+
+    begin = {"simulation.steady_from": "1 s"}
+    commands = {"force": ({}, waves(0.0, 1.5))}
+    commands |= {"motor": (MOTOR, waves(2.6, 1.2)), "winch": (WINCH, waves(0.085, 0.01))}
+    for kind, (actuation, command) in commands.items():
+        changes, name = begin | actuation, f"command, {kind}"
+        yield row(name, "coulomb", 3.0, changes, ACCURATE, {"distance_in": 0.01}, command, 0.1)
+
+    changes, engines = begin | NO_BRISTLES, (Compiled(), Limit(1e-4))
+    command = commands["force"][1]
+    yield row("command, MuJoCo", "coulomb", 3.0, changes, engines, {"distance_in": 0.02}, command)
+    begin |= {"cpg.start_up": "0.25 s"}
+    for scenario in ("prism", "six_bar", "coulomb"):
+        for seed in (1, 2):
+            changes, engines = begin | NO_BRISTLES, (FINE[0], Limit(1e-4))
+            name, within = f"{scenario} {seed}, MuJoCo", {"distance_in": 2e-3}
+            yield row(name, scenario, 2.5, changes, engines, within, gait(seed))
+    # Bodies, cables and motors are the same; only the ground differs.
+    within = {"p_WN": 2e-5, "v_WN": 2e-4, "p_WB": 2e-5, "q_WB": 1e-4}
+    within |= {"length": 1e-6, "tension": 1e-3, "signal": 1e-9}
+    for count in (2, 5, 8):
+        changes = {"robot.tetrahedra": count, "robot.gravity": 0.0, "cpg.start_up": "0.105 s"}
+        changes |= {"robot.offsets": [[0.0, 0.0, "1 m"]] * count}
+        engines, name = (FINE[0], Limit(4e-5)), f"{count} tetrahedra in the air, MuJoCo"
+        yield row(name, "thesis", 0.4, changes, engines, within, gait(), 1e-3)
+    # The damping of the normal force differs, so that the robot lands a little differently.
+    changes = {"terrain": TERRAINS["incline"], "friction": COULOMB, "cpg.start_up": "0.105 s"}
+    engines = Compiled(), Mujoco()
+    yield row("incline, MuJoCo", "thesis", 1.0, changes, engines, {"p_WN": 2e-4}, gait(), 3e-3)
+
+
+@pytest.fixture
+def changed(tmp_path) -> Callable[[Changes], Changes]:
+    """Changes with the file of the height field in the place of FIELD."""
+    x, y = np.meshgrid(0.02 * np.arange(100), 0.02 * np.arange(50), indexing="ij")
+    np.save(tmp_path / "waves.npy", 0.0012 * (np.sin(30.0 * x + 10.0 * y) - 1.0))
+    field = HeightField(file=str(tmp_path / "waves.npy"), cell=FIELD.cell)
+    return lambda changes: {k: field if v is FIELD else v for k, v in changes.items()}
+
+
+def quantities(
+    scenario: Scenario, engine: Engine | Limit, row: Row, names: Iterable[str]
+) -> dict[str, np.ndarray]:
+    """The compared quantities of a walk, by their names. The first sample of a trajectory is left
+    out: the listing's first signal is not zero, which is kept as zero."""
+    if isinstance(engine, Limit):
+        steps = (engine.step, 0.5 * engine.step)
+        coarse, fine = (quantities(scenario, Mujoco(step=h), row, names) for h in steps)
+        return {name: 2.0 * fine[name] - coarse[name] for name in names}
+    on_engine = scenario.with_changes({"engine": engine})
+    result = simulate(on_engine, record=True, **row.drive(on_engine))
+    trajectory, metrics = result.trajectory, result.metrics
+    return {
+        name: trajectory[name].values[1:]
+        if name in trajectory
+        else np.array(getattr(metrics, name))
+        for name in names
+    }
+
+
+@pytest.mark.parametrize("row", list(rows()))
+def test_a_robot_walks_alike_on_two_engines(row, changed):
+    scenario = shortly(load_scenario(row.scenario), row.duration).with_changes(changed(row.changes))
+    ours, theirs = (quantities(scenario, engine, row, row.within) for engine in row.engines)
+    for name, tolerance in row.within.items():
+        assert np.abs(ours[name] - theirs[name]).max() <= tolerance, name
+    first = ours[next(iter(row.within))]
+    motion = np.ptp(first, axis=0).max() if first.ndim else abs(first)
+    assert motion > row.moves
+
+
+@dataclasses.dataclass(frozen=True)
+class Set:
+    """Random gaits on two engines."""
+
+    scenario: str
+    changes: Changes
+    engines: tuple[Engine, Engine]
+    median: float
+    """Largest median of the difference, in."""
+    nine_of_ten: float
+    """Largest difference of nine gaits of ten, in."""
+    seeds: Iterable[int] = range(20)
+    stable: int | None = None
+    """Number of gaits, the first whose distance a displacement by nanometres hardly changes. Under
+    the reset integrator, distances hang on whether a foot just slips."""
+
+
+def sets() -> Iterable[Any]:
+    """The table."""
+    slowly = {
+        # At which errors are below 0.001 in (Coulomb), 0.005 in (reset integrator). With longer
+        # steps a witness misses nodes that leave uneven ground and land again within a step.
+        "coulomb": Drake(accuracy=1e-4, max_step=2e-3),
+        "reset": Drake(scheme="runge_kutta3", accuracy=1e-4, max_step=3e-4, mode_changes="witness"),
+    }
+    for law, diagram in slowly.items():
+        for terrain, surface in {"flat": Flat(), **TERRAINS}.items():
+            changes = {"terrain": surface, "simulation.max_evaluations": 10**8}
+            changes |= {"robot.contacts": "all"} if terrain != "flat" else {}
+            changes |= {"friction": COULOMB} if law == "coulomb" else {}
+            walks = Set("thesis", changes, (FINE[0], diagram), 0.05, 0.2, range(80), 20)
+            yield pytest.param(walks, id=f"{terrain}, {law}")
+    live = {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)}
+    # Within 0.03 in of converged distances.
+    witnessed = Drake(scheme="runge_kutta3", accuracy=1e-3, max_step=2e-3, mode_changes="witness")
+    engines = Compiled(tolerance=1e-6, max_step=3e-4), witnessed
+    yield pytest.param(Set("thesis", live, engines, 0.05, 0.2), id="feedback")
+    for name in ("prism", "six_bar"):
+        yield pytest.param(Set(name, {}, FINE, 1e-4, 1e-3), id=name)
+    # The default settings. A late mode change costs these gaits 0.1 in or more on the diagram.
+    late = (7, 10, 14, 22, 24, 26, 30, 31)
+    walks = Set("thesis", {}, (FINE[0], Drake()), 0.05, np.inf, late)
+    yield pytest.param(walks, id="the diagram's defaults")
+    fine = Drake(scheme="runge_kutta3", accuracy=1e-5, max_step=5e-5, look_ahead=0.0)
+    walks = Set("thesis", {}, (Compiled(), fine), np.inf, 0.15, range(200, 230), 10)
+    yield pytest.param(walks, id="the compiled engine's defaults")
+
+
+def distances(scenario: Scenario, engine: Engine, gaits: list[Gait]) -> np.ndarray:
+    """How far (in) gaits walk."""
+    results = simulate_many(scenario.with_changes({"engine": engine}), gaits)
+    assert all(isinstance(result, SimulationResult) for result in results)
+    return np.array([result.metrics.distance_in for result in results])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", list(sets()))
+def test_random_gaits_walk_as_far_on_two_engines(row, changed):
+    scenario = load_scenario(row.scenario).with_changes(changed(row.changes))
+    gaits = [seeded_gait(scenario, seed) for seed in row.seeds]
+    if row.stable:
+        moved = with_unit([[i * 1e-8, -(i**2) * 1e-8, 0.0] for i in range(5)], "m")
+        nudged = scenario.with_changes({"robot.offsets": moved})
+        finer = FINE[0].model_copy(update={"tolerance": 5e-7})
+        spread = np.abs(distances(scenario, FINE[0], gaits) - distances(nudged, finer, gaits))
+        stable = [gait for gait, each in zip(gaits, spread, strict=True) if each < 0.02]
+        gaits = stable[: row.stable]
+        assert len(gaits) == row.stable
+    ours, theirs = (distances(scenario, engine, gaits) for engine in row.engines)
+    apart = np.abs(ours - theirs)
+    assert np.median(apart) < row.median
+    assert np.quantile(apart, 0.9, method="lower") < row.nine_of_ten
