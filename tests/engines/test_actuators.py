@@ -226,21 +226,6 @@ def test_a_robot_in_the_air_gains_the_work_of_its_winches(scenario, engine):
 
 
 @pytest.mark.parametrize("kind", LIMITED)
-@pytest.mark.parametrize("engine", ["drake", "compiled"])
-def test_recording_a_robot_with_actuators_changes_nothing(engine, kind):
-    short = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.2 s"}
-    short |= {"cpg.start_up": "0.1 s", "engine": f"!{engine.capitalize()}"}
-    scenario = load_scenario("six_bar").with_changes({**short, "actuation": LIMITED[kind]})
-    gait = seeded_gait(scenario)
-    plain = simulate(scenario=scenario, gait=gait)
-    recorded = simulate(scenario=scenario, gait=gait, record=True)
-    assert recorded.metrics.to_json() == plain.metrics.to_json(), "bit for bit"
-    assert recorded.integrator == plain.integrator
-    wound = np.ptp(recorded.trajectory.free_length.values, axis=0) > 0.0
-    assert wound.any() == (kind == "winch")
-
-
-@pytest.mark.parametrize("kind", LIMITED)
 def test_mujoco_refuses_actuators(kind, refused):
     scenario = load_scenario("coulomb").with_changes({"engine": "!Mujoco"})
     with refused("coulomb", "actuation", LIMITED[kind].__class__.__name__):

@@ -49,12 +49,6 @@ def test_a_command_acts_from_the_start_and_is_held(brief, engine):
     assert signal.sel(time=[0.11, 0.2, 0.3], method="nearest").values == pytest.approx(2.0)
 
 
-def test_recording_a_command_changes_nothing(brief):
-    plain = simulate(scenario=brief, command=waves(0.0, 1.5))
-    recorded = simulate(scenario=brief, command=waves(0.0, 1.5), record=True)
-    assert recorded.metrics == plain.metrics, "bit for bit"
-
-
 def test_dense_samples_of_the_signals_are_the_gait(brief):
     gait, robot = seeded_gait(brief), Robot.of(brief)
     finely = brief.with_changes({"simulation.sample_period": "0.5 ms"})

@@ -1,4 +1,4 @@
-"""What holds on every engine: recording changes nothing, and failures are reported."""
+"""What holds on every engine: recording and watching change nothing, failures are reported."""
 
 import pickle
 import typing
@@ -8,6 +8,8 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import xarray
+from helpers.actuations import LIMITED
 
 from tetra_drake.engines import ENGINES
 from tetra_drake.engines.interface import engine_of
@@ -15,15 +17,20 @@ from tetra_drake.engines.mujoco import INSTALL, installed
 from tetra_drake.engines.simulate import prepare, simulate, simulate_many
 from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.results.measures import path_of_centre
+from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import MakeStructure
 from tetra_drake.scenario import engine_kinds
+from tetra_drake.scenario.engine_kinds import Drake
+from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.settings import PATHWAYS
+from tetra_drake.scenario.terrain_kinds import Rough
 from tetra_drake.scenario.units import INCH
 
 NEEDS_MUJOCO = pytest.mark.skipif(not installed(), reason=INSTALL)
 MUJOCO = pytest.param("mujoco", marks=NEEDS_MUJOCO)
-MUJOCO_DEFAULT = pytest.param("mujoco", {}, marks=NEEDS_MUJOCO)
 
 
 def shortly(scenario: Scenario, engine: str, **settings: Any) -> Scenario:
@@ -34,24 +41,67 @@ def shortly(scenario: Scenario, engine: str, **settings: Any) -> Scenario:
     return scenario.with_changes({"cpg.start_up": "0.2 s", "engine": kind, **changes})
 
 
+class Viewer:
+    """Looks at every step."""
+
+    def __init__(self) -> None:
+        self.frames = 0
+
+    def wants(self, time: float) -> bool:
+        return True
+
+    def show(self, frame: xarray.Dataset) -> None:
+        self.frames += 1
+
+
+WAVES = Command("waves", 0.1, 1.5 * np.sin(np.arange(10.0)[:, np.newaxis] + np.arange(8)))
+ROUGH = {"terrain": Rough(amplitude=2e-3, wavelength=0.1), "friction": Coulomb()}
+FEELS = {"cpg.signals": "live", "cpg.feedback": list(PATHWAYS)}
+WALKS = {
+    "thesis": ("thesis", {}, ENGINES),
+    "witnessed": ("thesis", {"engine": Drake(mode_changes="witness")}, ["drake"]),
+    "rough": ("thesis", ROUGH, ["compiled"]),
+    "feedback": ("thesis", FEELS, ["drake", "compiled"]),
+    "winch": ("six_bar", {"actuation": LIMITED["winch"]}, ["drake", "compiled"]),
+    "motor": ("six_bar", {"actuation": LIMITED["motor"]}, ["drake", "compiled"]),
+    "command": ("coulomb", {}, ["drake", "compiled"]),
+}
+"""A shipped scenario, its changes, and engines that simulate it."""
+
+
 @pytest.mark.parametrize(
-    ("engine", "settings"),
-    [("drake", {}), ("drake", {"mode_changes": "witness"}), ("compiled", {}), MUJOCO_DEFAULT],
+    ("walk", "engine"),
+    [
+        pytest.param(walk, engine, marks=NEEDS_MUJOCO if engine == "mujoco" else ())
+        for walk, (_, _, engines) in WALKS.items()
+        for engine in engines
+    ],
 )
-def test_recording_changes_nothing(scenario, engine, settings):
-    changes = {f"engine.{key}": value for key, value in settings.items()}
-    short = shortly(scenario, engine).with_changes(changes)
-    gait = seeded_gait(short)
-    plain = simulate(scenario=short, gait=gait)
-    recorded = simulate(scenario=short, gait=gait, record=True)
+def test_recording_and_watching_change_nothing(walk, engine):
+    name, changes, _ = WALKS[walk]
+    short = shortly(load_scenario(name), engine).with_changes(changes)
+    drive = {"command": WAVES} if walk == "command" else {"gait": seeded_gait(short)}
+    plain = simulate(short, **drive)
+    recorded = simulate(short, **drive, record=True)
     assert plain.engine == engine
-    assert recorded.metrics == plain.metrics, "bit for bit"
-    assert recorded.integrator == plain.integrator
-    for name, column in vars(plain.path).items():
-        np.testing.assert_array_equal(getattr(recorded.path, name), column)
     assert plain.recorded is None and recorded.recorded is not None
-    x1 = recorded.trajectory.p_WN.sel(node="T1 bottom_left", axis="x")
-    assert float(x1[-1] - x1[0]) / INCH == recorded.metrics.distance_in
+    results = [recorded]
+    if engine == "drake":
+        viewer = Viewer()
+        results += [simulate(short, **drive, record=True, viewer=viewer)]
+        assert viewer.frames > 100
+        xarray.testing.assert_identical(results[1].trajectory, recorded.trajectory)
+    for result in results:
+        # NaN, too, of a robot that has no front.
+        assert repr(result.metrics) == repr(plain.metrics), "bit for bit"
+        assert result.integrator == plain.integrator
+        for column, values in vars(plain.path).items():
+            np.testing.assert_array_equal(getattr(result.path, column), values)
+    if walk == "thesis":
+        x1 = recorded.trajectory.p_WN.sel(node="T1 bottom_left", axis="x")
+        assert float(x1[-1] - x1[0]) / INCH == recorded.metrics.distance_in
+    wound = np.ptp(recorded.trajectory.free_length.values, axis=0) > 0.0
+    assert wound.any() == (walk == "winch")
 
 
 @pytest.mark.parametrize("engine", ["drake", "compiled", MUJOCO])
