@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from helpers.analytic import Bowl, read_record, small_scenario
+from helpers.analytic import read_record, small_scenario
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import evaluation_entry
@@ -30,19 +30,6 @@ def create(directory, scenario=None):
     record = RunRecord.create(directory, scenario=scenario or small_scenario(), seed=5)
     record.begin()
     return record
-
-
-class Counted:
-    """Bowl, which is interrupted after `most` evaluations."""
-
-    def __init__(self, most=math.inf):
-        self.most, self.asked = most, 0
-
-    def __call__(self, genome):
-        self.asked += 1
-        if self.asked > self.most:
-            raise InterruptedError
-        return Bowl()(genome)
 
 
 # What a run is, and what is refused
@@ -397,22 +384,6 @@ def test_a_run_stays_if_that_which_replaces_it_cannot_begin(run_small, monkeypat
 
 
 # Resuming
-
-
-@pytest.mark.parametrize("count", [1, 12, 25, 84])
-def test_an_interrupted_run_ends_like_one_that_was_not_and_makes_no_evaluation_again(
-    run_small, count
-):
-    whole = read_record(run_small("whole"))
-    interrupted, rest = Counted(count), Counted()
-    if count < 84:
-        with pytest.raises(InterruptedError):
-            run_small(evaluate=interrupted, workers=1)
-    else:
-        run_small(evaluate=interrupted)
-    run = run_small(evaluate=rest, resume=True)
-    assert read_record(run) == whole
-    assert rest.asked == 2 * 42 - count
 
 
 def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, refused):

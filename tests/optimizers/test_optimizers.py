@@ -1,14 +1,13 @@
 """The optimisers: what all have in common, then each but the thesis's by itself."""
 
 import dataclasses
-import json
 import math
 import sys
 import zlib
 
 import numpy as np
 import pytest
-from helpers.analytic import measures, optimise, read_record, small_scenario
+from helpers.analytic import measures, optimise, small_scenario
 
 from tetra_drake.optimizers import cma_es, optimizer_of, quality_diversity
 from tetra_drake.optimizers.base import Evaluation
@@ -147,21 +146,6 @@ def test_batches_that_fail_as_a_whole_teach_nothing_and_stop_nothing(kind):
     batches, _ = optimise(optimizer, bowl, 1200 - spoilt)
     if kind in LEARNING:
         assert fitnesses(batches).max() > -1.5
-
-
-@pytest.mark.parametrize("kind", BUDGETED)
-def test_a_run_killed_after_any_iteration_ends_like_one_that_was_not(kind, run_small):
-    changes = {"optimizer": kind, "evolution.evaluations": 90}
-    whole = run_small("whole", trials=1, changes=changes)
-    reference = read_record(whole)
-    files = [whole / "trial_00" / f"{name}.jsonl" for name in ("evaluations", "iterations")]
-    evaluations, iterations = (file.read_text().splitlines(keepends=True) for file in files)
-    for complete, line in enumerate(iterations):
-        kept = json.loads(line)["evaluations"]
-        files[0].write_text("".join(evaluations[:kept]))
-        files[1].write_text("".join(iterations[:complete]))
-        run_small("whole", resume=True)
-        assert read_record(whole) == reference
 
 
 # CMA-ES
