@@ -27,8 +27,7 @@ from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import Structure, moved_nodes
-from tetra_drake.robot.tetrahedra import STRUTS
-from tetra_drake.scenario.nesting import BOTTOM_LEFT, BOTTOM_RIGHT, TOP
+from tetra_drake.scenario.nesting import BOTTOM_LEFT, BOTTOM_RIGHT, STRUTS, TOP
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems import GroundContact
 
@@ -60,27 +59,35 @@ def make_standing_tetrahedron(scenario: Scenario) -> Robot:
 
     Its body frame is turned with it, which its inertia, the same about all axes, allows.
     """
-    row = MakeStructure(scenario)
-    count = row.first_node[1]  # of its nodes
-    p_BN = row.p_BN[:count] @ R_WB.T
-    tetrahedron = dataclasses.replace(
+    row = scenario.robot.blueprint()
+    nodes, struts = row.first_node[1], len(STRUTS)
+    p_FN = row.p_FN[:nodes] @ R_WB.T
+    blueprint = dataclasses.replace(
         row,
         bodies=row.bodies[:1],
-        node_names=row.node_names[:count],
+        node_names=row.node_names[:nodes],
         first_node=row.first_node[:2],
-        p_BN=p_BN,
-        struts=np.array(STRUTS),
-        strut_radius=row.strut_radius[: len(STRUTS)],
-        node_radius=row.node_radius[:count],
-        mass=row.mass[:1],
-        unit_inertia=row.unit_inertia[:1],
-        p_WB=-p_BN[TRAILING, 2] * start_axes(row)[None, 2],
-        q_WB=row.q_WB[:1],
-        cables=row.cables[:0],
+        p_WF=row.p_WF[:1],
+        p_FN=p_FN,
+        struts=row.struts[:struts],
+        strut_radius=row.strut_radius[:struts],
+        strut_density=row.strut_density[:struts],
+        node_radius=row.node_radius[:nodes],
+        node_density=row.node_density[:nodes],
+        node_mass=row.node_mass[:nodes],
+        payload=row.payload[:1],
+        cable_names=(),
         cable_groups=(),
+        cable_ends=row.cable_ends[:0],
+        cable_laws=(),
+        oscillators=(),
+        groups=(),
         contacts=np.array(BASE),
         markers=row.markers[:2],
     )
+    start = MakeStructure(scenario)
+    p_WB, q_WB = -p_FN[TRAILING, 2] * start_axes(start)[None, 2], start.q_WB[:1]
+    tetrahedron = dataclasses.replace(Structure.of(blueprint), p_WB=p_WB, q_WB=q_WB)
     return Robot.of(scenario, tetrahedron)
 
 

@@ -20,9 +20,9 @@ from one_tetrahedron import BASE, LEADING, TRAILING, Samples, let_go, weight
 
 from tetra_drake.figures.style import SHADE, common_style, make_figure, save_figure
 from tetra_drake.results.measures import intervals
-from tetra_drake.robot.tetrahedra import NODES
 from tetra_drake.scenario.friction_kinds import ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.nesting import NODES
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 

@@ -11,9 +11,9 @@ from helpers.converged import CONVERGED, shortly
 from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.errors import InputError
-from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal
+from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
@@ -48,7 +48,7 @@ def mirrored(trajectory: xarray.Dataset) -> np.ndarray:
 
 def image(gait: Gait, scenario: Scenario) -> Gait:
     """The gait whose oscillators have changed sides."""
-    images = Actuation.of(scenario).images
+    images = Weights.of(scenario).images
     weights = tuple(np.array(gait.weights)[images].tolist())
     return dataclasses.replace(gait, weights=weights, turn=-gait.turn)
 
@@ -59,8 +59,8 @@ def test_two_alike_oscillators_per_junction_walk_as_the_thesis_s_one(scenario, e
     # and not by the other of its own: then both sum to what the thesis's oscillator gets.
     thesis = shortly(scenario, 2.0, cpg__signals="listing")
     pairs = thesis.with_changes(SIDES)
-    gait, sides = seeded_gait(thesis), Actuation.of(pairs)
-    weight = dict(zip(map(tuple, Actuation.of(thesis).couplings), gait.weights, strict=True))
+    gait, sides = seeded_gait(thesis), Weights.of(pairs)
+    weight = dict(zip(map(tuple, Weights.of(thesis).couplings), gait.weights, strict=True))
     neurons = 2 * (sides.couplings // 4) + sides.couplings % 2  # of the thesis's network
     halves = [0.5 * weight.get((i, j), 0.0) for i, j in neurons.tolist()]
     split = dataclasses.replace(gait, weights=tuple(halves))

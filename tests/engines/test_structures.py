@@ -25,9 +25,8 @@ from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.mode_change import modes_after_step
 from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.structure import node_positions
-from tetra_drake.robot.tensegrity import MakeTensegrity
+from tetra_drake.robot.robot import MakeStructure, Robot
+from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_kinds import Structure as Kind
@@ -125,7 +124,7 @@ def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_na
     row = Robot.of(scenario)
     kind = row_as_kind(row)
     written = scenario.with_sections(robot=kind)
-    structure = MakeTensegrity(written, kind)  # at rest; the row starts where it is balanced
+    structure = MakeStructure(written)  # at rest; the row starts where it is balanced
     start = {"p_WB": row.structure.p_WB, "q_WB": row.structure.q_WB}
     alike = Robot.of(written, dataclasses.replace(structure, **start))
     assert alike.model.isotropic
@@ -135,6 +134,24 @@ def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_na
     for robot in (alike, general):
         poses = poses_of(course_of(robot).motion.states)
         np.testing.assert_allclose(poses[..., 4:], expected[..., 4:], rtol=0, atol=allowed)
+
+
+def test_a_row_written_as_a_structure_has_the_blueprint_of_the_row():
+    row = Robot.of(load_scenario("thesis"))
+    ours, theirs = row.scenario.robot.blueprint(), row_as_kind(row).blueprint()
+    names = {"bodies", "node_names", "cable_names", "oscillators"}
+    of_the_kind = {"slack", "markers", "followed", "points_ahead", "feet", "settles"}
+    for field in dataclasses.fields(ours):
+        if field.name in {"p_WF", "p_FN", *names, *of_the_kind}:
+            continue
+        here, there = getattr(ours, field.name), getattr(theirs, field.name)
+        assert np.array_equal(here, there), field.name
+    np.testing.assert_allclose(ours.p_WN, theirs.p_WN, atol=1e-16)
+    structures = Structure.of(ours), Structure.of(theirs)
+    for name in ("p_WB", "p_BN", "mass", "unit_inertia"):
+        here, there = (getattr(structure, name) for structure in structures)
+        np.testing.assert_allclose(here, there, rtol=1e-12, atol=1e-16, err_msg=name)
+    assert (structures[0].cables == structures[1].cables).all()
 
 
 def row_as_kind(row: Robot) -> Kind:
@@ -149,7 +166,7 @@ def row_as_kind(row: Robot) -> Kind:
     }
     cables["outer"]["stiffness"] = law.cables.outer_stiffness
     cables["inner"]["stiffness"] = law.cables.inner_stiffness
-    oscillators = [name.replace(" ", "_") for name in structure.actuation.names]
+    oscillators = [name.replace(" ", "_") for name in structure.oscillators]
     actuated: dict[str, list[str]] = {name: [] for name in oscillators}
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
         group = name.split()[1]

@@ -1,16 +1,17 @@
 """A prism of three bars that nine cables tie together, built by hand: no row of tetrahedra."""
 
+import dataclasses
+
 import numpy as np
 import xarray
 
-from tetra_drake.physics.cable import CABLE, PASSIVE
+from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
-from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.layout import Layout
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.robot_kinds import Structure as StructureKind
 
 SPEED = 0.01  # m/s
 PERIOD = 2.0  # s, of the signals
@@ -35,6 +36,10 @@ CABLES = {
 """The oscillator that drives each cable, pair by pair of bars."""
 
 
+BAR = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.0}
+CABLE = {"stiffness": 100.0, "damping": 0.5, "free_length": 0.1}
+
+
 def make_prism() -> Robot:
     """The prism on flat ground, 0.2 m wide and 0.16 m high, with twisted ends."""
     lower, upper = np.radians([0.0, 120.0, 240.0]), np.radians([150.0, 270.0, 30.0])
@@ -42,39 +47,24 @@ def make_prism() -> Robot:
     p_WN[::2, :2] = 0.1 * np.column_stack([np.cos(lower), np.sin(lower)])
     p_WN[1::2, :2] = 0.1 * np.column_stack([np.cos(upper), np.sin(upper)])
     p_WN[1::2, 2] = 0.16
-    p_WB = (p_WN[::2] + p_WN[1::2]) / 2
-    rows, groups = [], []
-    for name, driver in CABLES.items():
-        group, a, b = name.split()
-        rows.append((NODES.index(a), NODES.index(b), driver, 100.0, 0.5, 0.1))
-        groups.append(group)
-    ends = np.array([row[:2] for row in rows])
-    layout = Layout(
-        cable_names=tuple(CABLES),
-        ends=p_WN[ends],
-        bodies=ends // 2,
-        oscillators=OSCILLATORS,
-        groups=tuple((list(CABLES.values()).index(k),) for k in range(3)),
+    kind = StructureKind.model_validate(
+        {
+            "nodes": dict(zip(NODES, p_WN.tolist(), strict=True)),
+            "struts": {"bar": BAR | {"pairs": [NODES[:2], NODES[2:4], NODES[4:]]}},
+            "cables": {
+                group: CABLE | {"pairs": [name.split()[1:] for name in CABLES if group in name]}
+                for group in ("bottom", "top", "side")
+            },
+            "actuated": {
+                oscillator: [name for name, driver in CABLES.items() if driver == number]
+                for number, oscillator in enumerate(OSCILLATORS)
+            },
+        }
     )
-    structure = Structure(
-        bodies=("n0 n4", "n1 n5", "n2 n3"),
-        node_names=NODES,
-        first_node=np.array([0, 2, 4, 6]),
-        p_BN=p_WN - np.repeat(p_WB, 2, axis=0),
-        struts=np.array([[0, 1], [2, 3], [4, 5]]),
-        strut_radius=np.full(3, 0.004),
-        node_radius=np.array(RADII),
-        mass=np.full(3, 0.02),
-        unit_inertia=np.tile([0.004, 0.004, 0.004, 0.0, 0.0, 0.0], (3, 1)),
-        p_WB=p_WB,
-        q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)),
-        cables=np.array(rows, dtype=CABLE),
-        cable_groups=tuple(groups),
-        actuation=Actuation(layout, reach=None),
-        contacts=np.arange(6),
-        markers=np.zeros(0, dtype=int),
-    )
-    return Robot.of(load_scenario("coulomb"), structure)
+    # Spheres without mass, so that the middle of a bar is its centre of mass.
+    spheres = {"node_radius": np.array(RADII), "node_density": np.full(6, 1e-9)}
+    blueprint = dataclasses.replace(kind.blueprint(), **spheres)
+    return Robot.of(load_scenario("coulomb"), Structure.of(blueprint))
 
 
 def slide_prism(robot: Robot, *, duration: float = 8.0) -> xarray.Dataset:

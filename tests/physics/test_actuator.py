@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tetra_drake.physics.actuator import ActuatorForce, CableLaw, Limits, motor_force, winch_force
+from tetra_drake.physics.actuator import ActuatorForce, Limits, motor_force, winch_force
+from tetra_drake.physics.cable import CableLaw
 
 CABLE = CableLaw(stiffness=100.0, damping=5.0, free_length=0.2)
 """In N/m, N s/m and m."""

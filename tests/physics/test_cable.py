@@ -6,8 +6,7 @@ from helpers.states import disturbed
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import LinearSpringDamper
 
-from tetra_drake.physics.actuator import CableLaw
-from tetra_drake.physics.cable import TENSION, cable_tension
+from tetra_drake.physics.cable import TENSION, CableLaw, cable_tension
 from tetra_drake.physics.forces import Forces, compute_cable_forces
 from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.physics.model import Model

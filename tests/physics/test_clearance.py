@@ -17,8 +17,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from tetra_drake.physics.clearance import Struts, least_strut_distance, strut_distance
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN
 from tetra_drake.physics.model import Model
-from tetra_drake.robot.laws import make_model
-from tetra_drake.robot.robot import MakeStructure
+from tetra_drake.robot.robot import MakeStructure, make_model
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.actuations import MOTOR, WINCH
 
+from tetra_drake.physics.cable import CableLaw
 from tetra_drake.robot.command import Command, commanded_robot, held_samples
 from tetra_drake.robot.robot import Robot
 
@@ -34,7 +35,7 @@ def test_each_driven_cable_has_a_signal_of_its_own(scenario):
     plain, robot = Robot.of(scenario), commanded_robot(scenario, counting())
     assert robot.structure.cables["signal"][plain.driven].tolist() == list(range(8))
     names = np.array(plain.structure.cable_names)[plain.driven].tolist()
-    assert list(robot.actuation.names) == names
+    assert list(robot.structure.oscillators) == names
     assert robot.structure.signals == 8
     assert robot.commanded[0].tolist() == list(range(8)), "no start-up gate"
 
@@ -50,7 +51,9 @@ def test_a_free_length_is_the_signal_that_shortens_the_cable_to_it(scenario):
 def test_a_tension_motor_plays_no_spring_and_starts_at_its_first_tension(scenario):
     robot = commanded_robot(scenario.with_changes(MOTOR), counting())
     law = robot.structure.cables[robot.driven]
-    assert not law["stiffness"].any() and not law["damping"].any()
+    assert not any(law[name].any() for name in CableLaw._fields)
+    passive = np.delete(robot.structure.cables, robot.driven)
+    assert all(passive[name].all() for name in CableLaw._fields)
     assert robot.starting_drives().tolist() == list(range(8))
 
 

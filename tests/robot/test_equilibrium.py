@@ -10,11 +10,10 @@ from helpers.quantities import with_unit
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.laws import rest_of
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import Robot, rest_of
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.robot.tetrahedra import BOTTOM_LEFT, TIP
 from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.nesting import BOTTOM_LEFT, TIP
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 

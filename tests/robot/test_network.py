@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tetra_drake.errors import InputError
-from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import raw_output
+from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.load import load_scenario
 
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
@@ -42,14 +42,14 @@ def test_two_oscillators_silence_each_other_with_weights_above_two(scenario, low
 
 def test_oscillators_out_of_reach_do_not_inhibit_each_other(scenario):
     near = scenario.with_changes(SIDES | {"cpg.reach": 1})
-    actuation = Actuation.of(near)
+    weights = Weights.of(near)
     # Each junction's pair within (2 weights per kind of neuron), and to each neighbouring pair.
-    assert len(actuation.couplings) == 2 * (4 * 2 + 3 * 2 * 4)
-    junction = actuation.ahead[actuation.couplings // 2]
+    assert len(weights.couplings) == 2 * (4 * 2 + 3 * 2 * 4)
+    junction = weights.blueprint.ahead[weights.couplings // 2]
     assert (np.abs(np.diff(junction, axis=1)) <= 1).all()
     gait = seeded_gait(near)
     matrix = Robot.of(near).network(gait).inhibition
-    assert np.count_nonzero(matrix) == len(actuation.couplings) + 16  # and the partners
+    assert np.count_nonzero(matrix) == len(weights.couplings) + 16  # and the partners
     alone = scenario.with_changes({"cpg.reach": 0})
     assert seeded_gait(alone).weights == ()
 

@@ -12,8 +12,7 @@ from pydrake.multibody.tree import RotationalInertia
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.robot.equilibrium import Resting, force_at_rest, stiffness_at_rest
-from tetra_drake.robot.laws import rest_of
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import Robot, rest_of
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import node_positions
 

@@ -64,7 +64,7 @@ class DrakeEngine(Engine):
             aimer.aim(context, velocities)
             sampler.after_step(context)
             observer.add(now, bodies, signals.Eval(context), drives_at(context))
-            if now == start_up and len(robot.actuation.names):  # its event comes after this step
+            if now == start_up and robot.structure.signals:  # its event comes after this step
                 cpg = diagram.GetSubsystemByName("cpg")
                 begun = cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context))
                 observer.add(now, bodies, begun, drives_at(context))

@@ -328,10 +328,8 @@ def _contact(robot: Robot, mass: float) -> dict:
 
 
 def _feet(robot: Robot) -> int:
-    """The nodes that bear the weight: at rest, or the bottom nodes and the foremost tip of a row,
-    where the thesis has them."""
-    structure = robot.structure
-    return len(structure.markers) + 1 if structure.is_row else max(1, robot.rest.feet)
+    """The nodes that bear the weight: by the blueprint, or at rest."""
+    return robot.structure.feet or max(1, robot.rest.feet)
 
 
 def _add_cables(model: Element, structure: Structure) -> None:

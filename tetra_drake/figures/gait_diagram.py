@@ -167,7 +167,7 @@ def _draw_stance(panel: Axes, stands: xarray.DataArray, rows: Mapping[str, float
 def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, unit: Units) -> None:
     velocity = np.einsum("tna,n->ta", trajectory.v_WN.values, structure.node_shares)
     speed, name = velocity[:, 0], "speed along x"
-    if structure.is_row:
+    if structure.points_ahead:
         heading = measures.path_of_centre(trajectory, structure).heading
         speed = velocity[:, 0] * np.cos(heading) + velocity[:, 1] * np.sin(heading)
         name = "forward speed"

@@ -147,7 +147,7 @@ def time_lapse(
         way = signed(float(walked.sel(time=now)), unit.digits)
         name_panel(panel, f"{now:.4g} s: {way} {unit.length_name}")
         _to_scale(panel, wide, high)
-    if structure.is_row:
+    if structure.points_ahead:
         _name_ends(panels[0], nodes[samples[0]], structure)
     elif len(looks) <= len(LINE_COLOURS):
         legend_below(page, dict(zip(structure.bodies, looks, strict=True)))
@@ -177,7 +177,7 @@ def path_of_the_centre(
     panel = page.subplots()
     looks = {"start": _START, f"after {path.times[-1]:.4g} s": _END}
     panel.plot(points[:, X], points[:, Y], **_PATH)
-    if structure.is_row:
+    if structure.points_ahead:
         looks["heading"] = _HEADING_MARK
         samples = _nearest(trajectory, np.linspace(path.times[0], path.times[-1], instants))
         heading, arrows = path.heading[samples], points[samples]
@@ -231,7 +231,7 @@ def one_step(
     shifts = {Y: 0.0, Z: above[0] - side[1]}  # of the views up the page: the second is below
     high = side[0] + shifts[Z], above[1]
     columns, height = _fit(instants, wide, high, figure, height_in=3.6)
-    names = structure.bodies if structure.is_row else (structure.followed,)
+    names = structure.bodies if structure.markers.size else (structure.followed,)
     paths_height = 1.1 * math.ceil(len(names) / _PATHS) + 0.4
     parts = [min(height + 0.4, 3.0 * paths_height), paths_height]
     page = page_of(figure, height_in=sum(parts) + 0.5)
@@ -249,7 +249,7 @@ def one_step(
         _to_scale(panel, wide, high)
     for panel in panels[::columns]:
         panel.set_yticks([np.mean(above), np.mean(side) + shifts[Z]], ["above", "side"])
-    if structure.is_row:
+    if structure.markers.size:
         _name_ends(panels[0], nodes[samples[0]], structure)
     else:
         lifted = np.all(lifted, axis=1, keepdims=True)

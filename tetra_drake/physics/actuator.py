@@ -15,6 +15,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from tetra_drake.physics.cable import CableLaw, cable_tension, elastic_tension
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table, maximum, minimum, named, select
 
@@ -46,14 +47,6 @@ class Actuator(NamedTuple):
     def of(cls, kind: int, **limits: float) -> Self:
         """Actuators of a kind, with values of Limits by name."""
         return cls(kind, np.array(Limits(**limits)))
-
-
-class CableLaw(NamedTuple):
-    """Constants of a cable, or of all cables, (cables,) each; SI units."""
-
-    stiffness: Real
-    damping: Real
-    free_length: Real
 
 
 class ActuatorForce(NamedTuple):
@@ -93,7 +86,7 @@ def winch_force(
     least_length. So the winch slows down before that; a sudden stop there would be a jump of the
     tension, which no step of an integrator is short enough for.
     """
-    elastic = law.stiffness * (length - drive)
+    elastic = elastic_tension(length - drive, law)
     wanted = (law.free_length - signal / law.stiffness - drive) / limits.time_constant
     allowed = maximum(wanted, (limits.least_length - drive) / limits.time_constant)
     allowed = minimum(allowed, limits.max_speed)
@@ -124,7 +117,7 @@ def motor_force(
     left = minimum(maximum(1.0 + rate / limits.max_speed, 0.0), 1.0)
     most = limits.max_force * left
     on_line = (drive > most) & (left > 0.0) & (left < 1.0)
-    command = law.stiffness * (length - law.free_length) + law.damping * rate + signal
+    command = cable_tension(length, rate, signal, law)
     target = minimum(maximum(command, 0.0), limits.max_force)
     limited = (drive > most) | (command > limits.max_force)
     return ActuatorForce(

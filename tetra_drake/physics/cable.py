@@ -6,12 +6,20 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from tetra_drake.physics.actuator import CableLaw
 from tetra_drake.simd.compiling import inlined
 from tetra_drake.simd.lanes import Real, Table
 
 PASSIVE = -1
 """The `signal` of a cable that no signal drives."""
+
+
+class CableLaw(NamedTuple):
+    """Constants of a cable, or of all cables, (cables,) each; SI units."""
+
+    stiffness: Real
+    damping: Real
+    free_length: Real
+
 
 CABLE = np.dtype(
     [
@@ -52,9 +60,15 @@ number."""
 
 
 @inlined
+def elastic_tension(stretch: Real, law: CableLaw) -> Real:
+    """Tension (N) of a cable at rest that is longer by `stretch` (m) than its free length."""
+    return law.stiffness * stretch
+
+
+@inlined
 def cable_tension(length: Real, rate: Real, signal: Real, law: CableLaw) -> Real:
     """Tension (N) of a cable of `length` (m) that lengthens at `rate` (m/s).
 
     Eq. 6, with the actuation `signal` (N) superimposed.
     """
-    return law.stiffness * (length - law.free_length) + law.damping * rate + signal
+    return elastic_tension(length - law.free_length, law) + law.damping * rate + signal

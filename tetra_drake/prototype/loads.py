@@ -13,11 +13,10 @@ from tetra_drake.physics.actuator import (
     DIRECT,
     WINCH,
     ActuatorForce,
-    CableLaw,
     Limits,
     actuator_force,
 )
-from tetra_drake.physics.cable import cable_tension
+from tetra_drake.physics.cable import CableLaw, cable_tension
 from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
 

@@ -22,8 +22,8 @@ from tetra_drake.report.book import Study, draw_run, draw_trajectory, simulate_a
 from tetra_drake.report.result_folder import RESULT, load_result
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
-from tetra_drake.robot.actuation import KINDS, Actuation
 from tetra_drake.robot.gait import Gait, save_gait
+from tetra_drake.robot.weights import KINDS
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metric_units import METRICS, inverse
 from tetra_drake.scenario.schema import Scenario
@@ -149,7 +149,7 @@ def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) ->
         map_metrics=_metrics(on_map, scenario) if on_map else None,
         parameters=_parameters(gait),
         weights=_weight_matrices(gait),
-        oscillators=Actuation.of(scenario).names,
+        oscillators=scenario.robot.blueprint().oscillators,
         pictures=_pictures(captions, folder),
         gait=best_gait,
         files={

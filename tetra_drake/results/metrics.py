@@ -62,7 +62,7 @@ def compute_metrics(
     structure, steady_from = robot.structure, robot.scenario.simulation.steady_from
     first, middle, last = (followed_nodes(nodes, structure) for nodes in (start, steady, end))
     way, twist, lead = last[0] - middle[0], math.nan, math.nan
-    if structure.is_row:
+    if structure.markers.size:
         way = end.mean(axis=0) - steady.mean(axis=0)  # of the centre, as recorded
         twist = float(abs(last[0, 0] - last[1, 0]))
         lead = float(end[-1, 0] - last[0, 0])  # of the foremost tip, the last node

@@ -146,7 +146,7 @@ def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
     """Dimension and values of each coordinate but the time."""
-    oscillators, cables = structure.actuation.names, structure.cables
+    oscillators, cables = structure.oscillators, structure.cables
     driving = ["" if i == PASSIVE else oscillators[i] for i in cables["signal"]]
     body_of_node = [structure.bodies[body] for body in structure.carriers]
     joined = [f"{body_of_node[a]}-{body_of_node[b]}" for a, b in cables[["node_a", "node_b"]]]
@@ -162,7 +162,7 @@ def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
         "cable_group": ("cable", list(structure.cable_groups)),
         "cable_signal": ("cable", driving),
         "oscillator": ("oscillator", list(oscillators)),
-        "oscillator_side": ("oscillator", list(structure.actuation.sides)),
+        "oscillator_side": ("oscillator", list(structure.sides)),
         "axis": ("axis", ["x", "y", "z"]),
         "horizontal": ("horizontal", ["x", "y"]),
         "quaternion": ("quaternion", ["w", "x", "y", "z"]),

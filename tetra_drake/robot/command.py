@@ -10,7 +10,6 @@ import numpy as np
 
 from tetra_drake.errors import InputError
 from tetra_drake.physics.actuator import TENSION_MOTOR, WINCH
-from tetra_drake.robot.actuation import Actuation
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.schema import Scenario
@@ -62,19 +61,10 @@ def robot_without_network(scenario: Scenario) -> Robot:
     which are in its command.
     """
     plain = Robot.of(scenario)
-    driven, cables = plain.driven, plain.structure.cables.copy()
-    cables["signal"][driven] = np.arange(driven.size)
-    if plain.model.actuator.kind == TENSION_MOTOR:
-        cables["stiffness"][driven] = cables["damping"][driven] = 0.0
-    layout = dataclasses.replace(
-        plain.actuation.layout,
-        oscillators=tuple(plain.structure.cable_names[cable] for cable in driven),
-        groups=tuple((cable,) for cable in driven.tolist()),
-    )
-    actuation = Actuation(layout, _NONE_COUPLED)
-    structure = dataclasses.replace(plain.structure, cables=cables, actuation=actuation)
+    is_motor = plain.model.actuator.kind == TENSION_MOTOR
+    structure = plain.structure.with_oscillator_per_cable(without_law=is_motor)
     without_network = {"signals": "listing", "feedback": [], "start_up": 0.0}
-    cpg = scenario.cpg.model_copy(update=without_network)
+    cpg = scenario.cpg.model_copy(update=without_network | {"reach": _NONE_COUPLED})
     return Robot.of(scenario.with_sections(cpg=cpg), structure)
 
 

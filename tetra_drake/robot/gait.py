@@ -14,7 +14,7 @@ from pydantic import Field
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_json, write_whole
 from tetra_drake.formatting import Table
-from tetra_drake.robot.actuation import KINDS, Actuation
+from tetra_drake.robot.weights import KINDS, Weights
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import Section
 
@@ -49,7 +49,7 @@ class Gait:
 
     name: str
     weights: tuple[float, ...]
-    """Weights in the order of Actuation.couplings, which is the listing's (B.2)."""
+    """Weights in the order of robot.weights.Weights.couplings, which is the listing's (B.2)."""
     tau_a: float
     tau_b: float
     """Time constant of self-inhibition, in s."""
@@ -87,7 +87,7 @@ class Gait:
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
         """The content of a gait file; `scenario` is one that the gait fits, and was made for unless
         it says another."""
-        names = Actuation.of(scenario).weight_names
+        names = Weights.of(scenario).names
         content: dict[str, Any] = {"schema": 2, "name": self.name}
         content["scenario"] = self.scenario or scenario.name
         content["weights"] = dict(zip(names, self.weights, strict=True))
@@ -131,12 +131,12 @@ class ParameterSpace:
 
         Equal bounds fix a parameter. The bounds of tau_B are twice those of tau_A.
         """
-        actuation, bounds = Actuation.of(scenario), scenario.gait_bounds
-        images = np.arange(len(actuation.images))
+        weights, bounds = Weights.of(scenario), scenario.gait_bounds
+        images = np.arange(len(weights.images))
         if bounds.mirrored:
-            images = np.minimum(images, actuation.images)
+            images = np.minimum(images, weights.images)
         chosen, parameters = np.unique(images, return_inverse=True)
-        weight_names, pathways = actuation.weight_names, tuple(scenario.cpg.feedback)
+        weight_names, pathways = weights.names, tuple(scenario.cpg.feedback)
         names = [f"weight {weight_names[i]}" for i in chosen]
         names += [f"gain {name}" for name in pathways]
 
@@ -219,8 +219,8 @@ class GaitFile(Section):
     name: str = ""
     scenario: str = ""
     weights: dict[str, Weight] | list[Weight]
-    """Weights by Actuation.weight_names, in any order, or, as in schema 1 and the thesis, a list in
-    the order of Actuation.couplings."""
+    """Weights by Weights.names, in any order, or, as in schema 1 and the thesis, a list in
+    the order of Weights.couplings."""
     tau_a_s: float = Field(gt=0)
     tau_b_s: float | None = Field(default=None, gt=0)
     turn: float = Field(default=0.0, ge=-1, le=1)
@@ -235,8 +235,8 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     Raises InputError, naming file and key, for whatever is wrong in the file or does not fit.
     """
     file = _read_file(path, key)
-    actuation = Actuation.of(scenario)
-    names, weights = actuation.weight_names, file.weights
+    own, weights = Weights.of(scenario), file.weights
+    names = own.names
     if isinstance(weights, dict):
         _check_names(weights, names, path, f"{key}.weights".strip("."))
         weights = [weights[name] for name in names]
@@ -250,7 +250,7 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
         scenario=file.scenario,
         weight_names=names,
     )
-    check_gait(gait, scenario, actuation, source=path, key=key)
+    check_gait(gait, scenario, own, source=path, key=key)
     return gait
 
 
@@ -268,20 +268,20 @@ def _read_file(path: str | Path, key: str) -> GaitFile:
 
 
 def check_gait(
-    gait: Gait, scenario: Scenario, actuation: Actuation, *, source: object, key: str = ""
+    gait: Gait, scenario: Scenario, weights: Weights, *, source: object, key: str = ""
 ) -> None:
     """Raises InputError, naming source and key, for what does not fit the scenario."""
     prefix = f"{key}." if key else ""
-    count, expected = len(gait.weights), len(actuation.couplings)
+    count, expected = len(gait.weights), len(weights.couplings)
     if count != expected:
         problem = f"found {count} numbers, expected {expected}"
-        problem += f" for {len(actuation.names)} oscillators"
+        problem += f" for {weights.blueprint.signals} oscillators"
         raise InputError(source, f"{prefix}weights", problem)
     for name, gain in gait.gains:
         if gain and name not in scenario.cpg.feedback:
             problem = f"found {gain}, expected 0, as cpg.feedback is {scenario.cpg.feedback}"
             raise InputError(source, f"{prefix}gains.{name}", problem)
-    if gait.turn and not actuation.sides.any():
+    if gait.turn and not weights.blueprint.sides.any():
         problem = f"found {gait.turn}, expected 0, as no oscillator has a side"
         raise InputError(source, f"{prefix}turn", problem)
 

@@ -38,7 +38,7 @@ def follow(times: np.ndarray, poses: np.ndarray, structure: Structure) -> Centre
     Other structures have none: they may roll over, and bars do not turn about their axes with them.
     """
     centre = centre_of_mass(poses[..., 4:], structure)
-    if not structure.is_row:
+    if not structure.points_ahead:
         return CentrePath(times, centre, np.full(len(times), math.nan))
     w, x, y, z = np.ascontiguousarray(poses.T)[:4]
     ahead, left = (w * w + x * x - y * y - z * z).sum(axis=0), 2.0 * (x * y + w * z).sum(axis=0)

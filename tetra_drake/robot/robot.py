@@ -12,30 +12,32 @@ from typing import Any, Self
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.actuator import DIRECT, WINCH, CableLaw
-from tetra_drake.physics.cable import PASSIVE, cable_tension
+from tetra_drake.physics.actuator import DIRECT, WINCH
+from tetra_drake.physics.cable import PASSIVE, CableLaw, Cables, cable_tension
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground
 from tetra_drake.physics.feedback import Senses
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.mode_change import modes_after_step
-from tetra_drake.physics.model import Model
+from tetra_drake.physics.model import Bodies, Model
 from tetra_drake.physics.oscillator import Network, steered_input
-from tetra_drake.robot.actuation import Actuation
-from tetra_drake.robot.equilibrium import Rest
+from tetra_drake.robot.equilibrium import Rest, find_rest
 from tetra_drake.robot.gait import Gait, check_gait
-from tetra_drake.robot.laws import make_model, rest_of
+from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure, node_positions, turn_with_slope
-from tetra_drake.robot.tensegrity import MakeTensegrity
-from tetra_drake.robot.tetrahedra import MakeTetrahedra
-from tetra_drake.scenario import robot_kinds
+from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import CpgSection
+from tetra_drake.scenario.terrain_kinds import Flat
 
 AMPLITUDE = 0.5
 """Amplitude of y_extensor - y_flexor, as a share of u0: 0.44 to 0.53 in random gaits."""
 
 LEAST_MOTION = 0.01
 """Share of a cable's length by which signals should be able to move it."""
+
+DEEPEST = 1e-3
+"""Depth in the ground, as a share of a structure's height, from which on a node counts as placed
+there by mistake."""
 
 SteeringSignal = Callable[[float], float]
 """The turn, from -1 to 1, at a time in s."""
@@ -64,9 +66,9 @@ class Robot:
         return cls(scenario, structure, model, commanded=no_command)
 
     @property
-    def actuation(self) -> Actuation:
-        """The oscillators and what they drive."""
-        return self.structure.actuation
+    def weights(self) -> Weights:
+        """The weights between the oscillators."""
+        return Weights(self.structure, self.scenario.cpg.reach)
 
     @property
     def driven(self) -> np.ndarray:
@@ -87,18 +89,18 @@ class Robot:
     def rest(self) -> Rest:
         """Rest of the robot on flat ground without actuation, whatever the scenario's terrain and
         offsets; raises InputError if it finds no rest."""
-        return self.structure.rest or rest_of(self.scenario, _undisturbed(self.scenario))
+        return self.structure.rest or rest_of(self.scenario, undisturbed_structure(self.scenario))
 
     @functools.cached_property
     def senses(self) -> Senses:
         """Constants of what the oscillators sense; raises InputError if the robot finds no rest."""
-        drivers, pathways = self.actuation.drivers, self.scenario.cpg.feedback
+        drivers, pathways = self.structure.drivers, self.scenario.cpg.feedback
         sizes = np.bincount(drivers - PASSIVE)[drivers - PASSIVE]  # cables of each cable's group
         settled = self.rest.lengths if "length" in pathways else np.ones(len(drivers))
         per_load = 1.0 / self.weight if "load" in pathways else 0.0
         return Senses(
             drivers=drivers,
-            ahead=self.actuation.ahead,
+            ahead=self.structure.ahead,
             carriers=self.ground.carriers,
             settled=settled,
             per_length=1.0 / (settled * sizes),
@@ -107,12 +109,12 @@ class Robot:
 
     def network(self, gait: Gait) -> Network:
         """The network of a gait; raises InputError where the gait does not fit the scenario."""
-        cpg, actuation = self.scenario.cpg, self.actuation
-        check_gait(gait, self.scenario, actuation, source=f"gait {gait.name}")
-        neurons = np.arange(2 * len(actuation.names))
+        cpg, weights = self.scenario.cpg, self.weights
+        check_gait(gait, self.scenario, weights, source=f"gait {gait.name}")
+        neurons = np.arange(2 * self.structure.signals)
         inhibition = np.zeros((neurons.size, neurons.size))
         inhibition[neurons, neurons ^ 1] = cpg.partner_weight
-        inhibition[tuple(actuation.couplings.T)] = gait.weights
+        inhibition[tuple(weights.couplings.T)] = gait.weights
         return Network.of(
             inhibition,
             tau_a=gait.tau_a,
@@ -127,7 +129,7 @@ class Robot:
         """
         if steering is None:
             return np.array([gait.turn])
-        if not self.actuation.sides.any():
+        if not self.structure.sides.any():
             raise InputError("steering", "", "no oscillator is on one side of the robot")
         step = self.scenario.cpg.listing_step
         times = step * np.arange(round(self.scenario.simulation.duration / step) + 1)
@@ -135,7 +137,7 @@ class Robot:
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
         """(..., 2m): u0 by neuron for turns (...); see physics.oscillator.steered_input."""
-        sides = np.repeat(self.actuation.sides, 2)
+        sides = np.repeat(self.structure.sides, 2)
         u0 = self.scenario.cpg.external_input
         steered: np.ndarray = steered_input(u0, turns[..., np.newaxis], sides)
         return steered
@@ -185,7 +187,7 @@ class Robot:
 def MakeStructure(scenario: Scenario) -> Structure:
     """The structure of a scenario's robot where it starts, displaced by `robot.offsets` and turned
     with an incline. Raises InputError if it cannot start."""
-    structure = _undisturbed(scenario)
+    structure = undisturbed_structure(scenario)
     p_WB, slope = structure.p_WB, scenario.terrain.plane_slope or 0.0
     if scenario.robot.offsets:
         p_WB = p_WB + np.array(scenario.robot.offsets)
@@ -193,11 +195,58 @@ def MakeStructure(scenario: Scenario) -> Structure:
     return dataclasses.replace(structure, p_WB=p_WB, q_WB=q_WB)
 
 
-def _undisturbed(scenario: Scenario) -> Structure:
-    """The structure of a scenario's robot, of any kind, as it starts on flat ground."""
-    if isinstance(scenario.robot, robot_kinds.Structure):
-        return MakeTensegrity(scenario, scenario.robot)
-    return MakeTetrahedra(scenario, scenario.robot)
+def undisturbed_structure(scenario: Scenario) -> Structure:
+    """The structure of a scenario's robot as it starts on flat ground."""
+    blueprint = scenario.robot.blueprint()
+    placed = Structure.of(blueprint)
+    if not blueprint.settles:
+        return placed
+    up = np.array([0.0, 0.0, _lift(scenario, placed)])
+    rest = rest_of(scenario, dataclasses.replace(placed, p_WB=placed.p_WB + up))
+    poses = rest.state[: 7 * len(placed.bodies)].reshape(-1, 7)
+    return dataclasses.replace(placed, q_WB=poses[:, :4], p_WB=poses[:, 4:], rest=rest)
+
+
+def _lift(scenario: Scenario, placed: Structure) -> float:
+    """How far (m) a structure is moved up to stand on the ground; InputError if it is in it."""
+    heights = placed.p_WN[:, 2]
+    lowest = placed.contacts[heights[placed.contacts].argmin()]
+    depth = -heights[lowest]
+    if depth > DEEPEST * np.ptp(heights):
+        key = f"robot.nodes.{placed.node_names[lowest]}"
+        problem = f"starts {depth:.3g} m below the ground, expected on it or above"
+        raise InputError(scenario.name, key, problem)
+    return float(depth)
+
+
+def rest_of(scenario: Scenario, structure: Structure, start: np.ndarray | None = None) -> Rest:
+    """Rest of a structure on flat ground without actuation, let go at `start` (13 bodies,), or else
+    where it starts; raises InputError if there is none."""
+    model = make_model(scenario.with_sections(terrain=Flat()), structure)
+    start = structure.initial_state if start is None else start
+    return find_rest(model, start, bodies=structure.bodies, source=scenario.name)
+
+
+def make_model(scenario: Scenario, structure: Structure) -> Model:
+    """A structure and its laws as the kernels of every engine take them."""
+    distances = np.linalg.norm(structure.p_BN, axis=1)
+    return Model(
+        p_BN=structure.p_BN,
+        first_node=structure.first_node,
+        cables=Cables.of(structure.cables),
+        actuator=scenario.actuation.law(),
+        couplings=structure.couplings,
+        ground=make_ground(scenario, structure),
+        bodies=Bodies(
+            mass=structure.mass,
+            inertia=structure.mass[:, np.newaxis] * structure.unit_inertia,
+            radius=np.maximum.reduceat(distances, structure.first_node[:-1]),
+            weight=structure.mass * scenario.robot.gravity,
+        ),
+        struts=structure.strut_table,
+        isotropic=structure.isotropic,
+        slack=structure.slack,
+    )
 
 
 def constant_steering(turn: float) -> SteeringSignal:

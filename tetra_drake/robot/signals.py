@@ -104,7 +104,7 @@ def save_signals(
     times = period * np.arange(math.floor(duration / period + 1e-9) + 1)
     signals = signals_at(robot, gait, times) / UNITS[unit]
     names = [f"signal_{i + 1}" for i in range(robot.structure.signals)]
-    cables = zip(names, robot.actuation.cables, strict=True)
+    cables = zip(names, robot.structure.driven_cables, strict=True)
     header = [
         f"# {gait.name} on scenario {scenario.name}, signals: {cpg.signals}",
         f"# time_s: time in s; signal_i: force in {unit} that shortens the cables",

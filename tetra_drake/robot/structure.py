@@ -1,39 +1,30 @@
-"""The robot's structure as data: nodes, struts, cables, contacts."""
+"""The structure of a robot: its blueprint with inertia, and where its bodies are at t = 0."""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from tetra_drake.physics.cable import CABLE, PASSIVE, CableLaw
+from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, move_nodes
-from tetra_drake.robot.actuation import Actuation
+from tetra_drake.physics.model import Couplings
+from tetra_drake.robot.bodies import body_inertias
 from tetra_drake.robot.equilibrium import Rest
+from tetra_drake.scenario.blueprint import Blueprint
 
 
 @dataclass(frozen=True)
-class Structure:
-    """Rigid bodies, each of struts that meet in nodes, tied together by cables.
+class Structure(Blueprint):
+    """Rigid bodies, each of struts that meet in nodes, tied together by cables; SI units."""
 
-    Nodes run body by body. SI units.
-    """
-
-    bodies: tuple[str, ...]
-    """The names of the bodies, such as "T1"."""
-    node_names: tuple[str, ...]
-    """Such as "T1 tip"."""
-    first_node: np.ndarray
-    """(bodies + 1,): the index of each body's first node, and the number of nodes."""
     p_BN: np.ndarray
     """(nodes, 3): the nodes in the frames of their bodies, whose origins are centres of mass."""
-    struts: np.ndarray
-    """(struts, 2): the indices of the nodes that each joins, body by body."""
-    strut_radius: np.ndarray
-    """(struts,)."""
-    node_radius: np.ndarray
-    """(nodes,)."""
     mass: np.ndarray
     """(bodies,)."""
     unit_inertia: np.ndarray
@@ -43,45 +34,58 @@ class Structure:
     """(bodies, 3): the bodies at t = 0."""
     q_WB: np.ndarray
     """(bodies, 4): their quaternions then, w first."""
-    cables: np.ndarray
-    """(cables,) of dtype CABLE: pair by pair of bodies, from the lower index to the higher one."""
-    cable_groups: tuple[str, ...]
-    """The group of each cable, such as "outer"."""
-    actuation: Actuation
-    contacts: np.ndarray
-    """(contacts,): the indices of the nodes that the ground can touch, ascending."""
-    markers: np.ndarray
-    """(markers,): the indices of the nodes that are followed, body by body: the bottom left and
-    bottom right ones of a row of tetrahedra. None for other structures, whose centre is followed.
-    """
     rest: Rest | None = None
-    """The rest at which it starts, but for offsets and slope; None for a row of tetrahedra, which
-    starts as placed."""
+    """The rest at which it starts, but for offsets and slope; None if it starts as placed."""
+
+    @classmethod
+    def of(cls, blueprint: Blueprint) -> Self:
+        """The structure where its blueprint places it; its bodies' frames have World's axes."""
+        mass, p_FB, unit_inertia = body_inertias(blueprint)
+        given = {one.name: getattr(blueprint, one.name) for one in dataclasses.fields(Blueprint)}
+        return cls(
+            **given,
+            p_BN=blueprint.p_FN - p_FB[blueprint.carriers],
+            mass=mass,
+            unit_inertia=unit_inertia,
+            p_WB=blueprint.p_WF + p_FB,
+            q_WB=np.tile([1.0, 0.0, 0.0, 0.0], (len(mass), 1)),
+        )
+
+    @functools.cached_property
+    def drivers(self) -> np.ndarray:
+        """(cables,): the oscillator that drives each cable, PASSIVE if none does."""
+        drivers = np.full(len(self.cable_names), PASSIVE)
+        for oscillator, cables in enumerate(self.groups):
+            drivers[list(cables)] = oscillator
+        return drivers
+
+    @functools.cached_property
+    def cables(self) -> np.ndarray:
+        """(cables,) of dtype CABLE."""
+        cables = np.zeros(len(self.cable_names), dtype=CABLE)
+        cables["node_a"], cables["node_b"] = self.cable_ends.T
+        cables["signal"] = self.drivers
+        for name in CableLaw._fields:
+            cables[name] = [law[name] for law in self.cable_laws]
+        return cables
 
     @property
-    def cable_names(self) -> tuple[str, ...]:
-        """Such as "T1-T2 outer bottom_left"."""
-        return self.actuation.layout.cable_names
+    def strut_table(self) -> Struts:
+        """The struts as kernels take them."""
+        node_a, node_b = self.struts.T
+        first = np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1))
+        along = self.p_BN[node_b] - self.p_BN[node_a]
+        return Struts(node_a.copy(), node_b.copy(), first, length=np.linalg.norm(along, axis=1))
 
     @property
-    def signals(self) -> int:
-        """Actuation signals: one per oscillator."""
-        return len(self.actuation.names)
-
-    @property
-    def is_row(self) -> bool:
-        """True for a row of tetrahedra."""
-        return len(self.markers) > 0
-
-    @property
-    def followed(self) -> str:
-        """The name of what is followed."""
-        return "bottom nodes" if self.is_row else "centre"
-
-    @property
-    def carriers(self) -> np.ndarray:
-        """(nodes,): the index of each node's body."""
-        return np.repeat(np.arange(len(self.bodies)), np.diff(self.first_node))
+    def couplings(self) -> Couplings:
+        """The pairs of bodies in the order of the cables; ValueError if these are in no order."""
+        pairs = self.carriers[self.cable_ends]
+        begins = np.flatnonzero(np.any(np.diff(pairs, axis=0, prepend=-1), axis=1))
+        first, second = pairs[begins].T
+        if (first >= second).any() or len(np.unique(pairs, axis=0)) < len(begins):
+            raise ValueError("the cables are not in the order of the bodies that they join")
+        return Couplings(first.copy(), second.copy(), np.append(begins, len(pairs)))
 
     @functools.cached_property
     def node_shares(self) -> np.ndarray:
@@ -127,7 +131,7 @@ def turn_with_slope(
 def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
     """Positions (..., markers, 3) of the markers among nodes p_WN (..., nodes, 3), or (..., 1, 3)
     of the centre of mass."""
-    if structure.is_row:
+    if structure.markers.size:
         return p_WN[..., structure.markers, :]
     return (structure.node_shares @ p_WN)[..., np.newaxis, :]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal, get_args
@@ -9,7 +10,7 @@ from typing import Annotated, ClassVar, Literal, get_args
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from tetra_drake.scenario.layout import Layout
+from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.quantities import (
     Acceleration,
     Damping,
@@ -26,6 +27,9 @@ NODES = ("bottom_left", "bottom_right", "top", "tip")
 """The nodes of a tetrahedron; the first three form the base triangle."""
 
 BOTTOM_LEFT, BOTTOM_RIGHT, TOP, TIP = range(4)
+
+STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
+"""The nodes that the struts of a tetrahedron join."""
 
 Cable = Literal[
     "outer bottom_left",
@@ -88,14 +92,28 @@ def check_strut(key: str, *, length: float, diameter: float, density: float) -> 
         refuse(key, f"has a mass of {mass:.3g} kg, expected at least {LIGHTEST:g} kg")
 
 
-class RowCables(Section):
+class CableConstants(Section):
+    """Constants of the cable law that any robot's cables have."""
+
+    damping: Damping = Field(ge=0)
+
+    def constants(self, **others: float) -> dict[str, float]:
+        """These constants and others, by the names of physics.cable.CableLaw."""
+        return {name: getattr(self, name) for name in CableConstants.model_fields} | others
+
+
+class RowCables(CableConstants):
     """The cables of a row (Table 3). A slack cable has tension 0 where it would push."""
 
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
     inner_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
-    damping: Damping = Field(ge=0)
     free_length: Length = Field(ge=0)
     slack: bool
+
+    def law(self, cable: str) -> dict[str, float]:
+        """The constants of a cable of a junction."""
+        stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
+        return self.constants(stiffness=stiffness, free_length=self.free_length)
 
 
 class Tetrahedra(Section):
@@ -147,28 +165,61 @@ class Tetrahedra(Section):
         """Length in m of which `disturbances.start` is a share."""
         return self.spacing
 
-    def layout(self) -> Layout:
-        """Cables and oscillators of the robot on flat ground."""
-        forward = self.spacing * np.arange(self.tetrahedra)[:, np.newaxis, np.newaxis]
-        p_WN = forward * [1.0, 0.0, 0.0] + tetrahedron_nodes(self.strut_length)
-        names: list[str] = []
-        nodes: list[tuple[int, int]] = []
-        oscillators, groups = [], []
-        for junction in range(self.tetrahedra - 1):
-            name = f"T{junction + 1}-T{junction + 2}"
+    def blueprint(self) -> Blueprint:
+        """The robot on flat ground.
+
+        Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0. The tips
+        point forward (+x) into the next tetrahedron.
+        """
+        n, junctions = self.tetrahedra, self.tetrahedra - 1
+        bodies = tuple(f"T{i + 1}" for i in range(n))
+        p_FN = tetrahedron_nodes(self.strut_length)
+        x, _, z = p_FN[BOTTOM_LEFT]
+        bottom = [4 * i + node for i in range(n) for node in (BOTTOM_LEFT, BOTTOM_RIGHT)]
+        thesis = [*bottom, 4 * (n - 1) + TIP]
+        struts = [(4 * i + a, 4 * i + b) for i in range(n) for a, b in STRUTS]
+        names = [f"{rear}-{front}" for rear, front in itertools.pairwise(bodies)]
+        ends = [cable_nodes(junction, cable) for junction in range(junctions) for cable in CABLES]
+        oscillators, groups = self._oscillators(names)
+        return Blueprint(
+            bodies=bodies,
+            node_names=tuple(f"{body} {node}" for body in bodies for node in NODES),
+            first_node=4 * np.arange(n + 1),
+            p_WF=np.array([[i * self.spacing - x, 0.0, -z] for i in range(n)]),
+            p_FN=np.tile(p_FN, (n, 1)),
+            struts=np.array(struts),
+            strut_radius=np.full(len(struts), self.strut_diameter / 2),
+            strut_density=np.full(len(struts), self.density),
+            node_radius=np.full(4 * n, self.node_diameter / 2),
+            node_density=np.full(4 * n, self.density),
+            node_mass=np.zeros(4 * n),
+            payload=np.array(self.payload or [0.0] * n),
+            cable_names=tuple(f"{name} {cable}" for name in names for cable in CABLES),
+            cable_groups=tuple(cable.split()[0] for cable in CABLES) * junctions,
+            cable_ends=np.array(ends),
+            cable_laws=tuple(self.cables.law(cable) for cable in CABLES) * junctions,
+            slack=self.slack,
+            oscillators=oscillators,
+            groups=groups,
+            contacts=np.array(thesis if self.contacts == "thesis" else range(4 * n)),
+            markers=np.array(bottom),
+            followed="bottom nodes",
+            points_ahead=True,
+            feet=len(thesis),
+            settles=False,
+        )
+
+    def _oscillators(
+        self, junctions: Sequence[str]
+    ) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
+        """The names of the oscillators, and the cables that each drives."""
+        names, groups = [], []
+        for i, junction in enumerate(junctions):
             for group in self.actuation:
                 several = len(self.actuation) > 1
-                oscillators.append(f"{name} {' + '.join(group)}" if several else name)
-                groups.append(tuple(len(names) + CABLES.index(cable) for cable in group))
-            names += [f"{name} {cable}" for cable in CABLES]
-            nodes += [cable_nodes(junction, cable) for cable in CABLES]
-        return Layout(
-            cable_names=tuple(names),
-            ends=p_WN.reshape(-1, 3)[np.array(nodes)],
-            bodies=np.array(nodes) // len(NODES),
-            oscillators=tuple(oscillators),
-            groups=tuple(groups),
-        )
+                names.append(f"{junction} {' + '.join(group)}" if several else junction)
+                groups.append(tuple(len(CABLES) * i + CABLES.index(cable) for cable in group))
+        return tuple(names), tuple(groups)
 
     def following(self, base: Section, changes: Tree) -> Tree:
         """What changes, too, where `changes` made this robot of a base: the spacing, unless it is

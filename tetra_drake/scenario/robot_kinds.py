@@ -15,12 +15,17 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from tetra_drake.scenario.layout import Layout
+from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
-from tetra_drake.scenario.nesting import LONGEST, Tetrahedra, check_one_per_body, check_strut
+from tetra_drake.scenario.nesting import (
+    LONGEST,
+    CableConstants,
+    Tetrahedra,
+    check_one_per_body,
+    check_strut,
+)
 from tetra_drake.scenario.quantities import (
     Acceleration,
-    Damping,
     Density,
     Force,
     Length,
@@ -63,12 +68,11 @@ class StrutGroup(Section):
     """Diameter of the spheres; 0 for none. A node has one, that of its first strut in the file."""
 
 
-class CableGroup(Section):
+class CableGroup(CableConstants):
     """Cables of one make, which never push."""
 
     pairs: Pairs
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
-    damping: Damping = Field(ge=0)
     free_length: Length | None = Field(default=None, ge=0)
     tension: Force | None = Field(default=None, ge=0)
     """Tension where the nodes are as given, instead of a free length."""
@@ -79,6 +83,10 @@ class CableGroup(Section):
             found = "neither" if self.tension is None else "both"
             refuse("free_length", f"found {found}, expected one of free_length and tension")
         return self
+
+    def law(self, free_length: float) -> dict[str, float]:
+        """The constants of a cable."""
+        return self.constants(stiffness=self.stiffness, free_length=free_length)
 
     def free_length_at(self, length: float) -> float:
         """Free length in m of a cable whose nodes are given `length` apart."""
@@ -144,16 +152,43 @@ class Structure(Section):
         """What changes, too, where `changes` made this robot of a base: nothing."""
         return {}
 
-    def layout(self) -> Layout:
-        """Cables and oscillators of the robot."""
-        ends = [[self.nodes[node] for node in cable.nodes] for cable in self.all_cables]
-        bodies = [self._bodies_joined(cable) for cable in self.all_cables]
-        return Layout(
-            cable_names=tuple(cable.name for cable in self.all_cables),
-            ends=np.array(ends).reshape(-1, 2, 3),
-            bodies=np.array(bodies).reshape(-1, 2),
+    def blueprint(self) -> Blueprint:
+        """The robot with its nodes where the file has them."""
+        number = {node: place for place, node in enumerate(self.body_of_node)}
+        struts = sorted(self.all_struts, key=lambda strut: self.body_of_node[strut.nodes[0]])
+        groups = [self.struts[strut.group] for strut in struts]
+        spheres = [self.sphere_of_node[node] for node in number]
+        cables = self.all_cables
+        ends = [sorted(cable.nodes, key=self.body_of_node.__getitem__) for cable in cables]
+        laws = zip(cables, self.free_lengths, strict=True)
+        return Blueprint(
+            bodies=self.body_names,
+            node_names=tuple(number),
+            first_node=np.append(0, np.cumsum([len(body) for body in self.bodies])),
+            p_WF=np.zeros((self.body_count, 3)),
+            p_FN=np.array([self.nodes[node] for node in number]),
+            struts=np.array([[number[node] for node in strut.nodes] for strut in struts]),
+            strut_radius=np.array([group.diameter / 2 for group in groups]),
+            strut_density=np.array([group.density for group in groups]),
+            node_radius=np.array([sphere.node_diameter / 2 for sphere in spheres]),
+            node_density=np.array([sphere.density for sphere in spheres]),
+            node_mass=np.array([self.masses.get(node, 0.0) for node in number]),
+            payload=np.zeros(self.body_count),
+            cable_names=tuple(cable.name for cable in cables),
+            cable_groups=tuple(cable.group for cable in cables),
+            cable_ends=np.array(
+                [[number[node] for node in pair] for pair in ends], dtype=int
+            ).reshape(-1, 2),
+            cable_laws=tuple(self.cables[cable.group].law(length) for cable, length in laws),
+            slack=self.slack,
             oscillators=tuple(self.actuated),
             groups=tuple(self.cables_of_oscillator.values()),
+            contacts=np.array(sorted(number[node] for node in self.contact_nodes)),
+            markers=np.array([], dtype=int),
+            followed="centre",
+            points_ahead=False,
+            feet=None,
+            settles=True,
         )
 
     @cached_property
@@ -342,7 +377,7 @@ Robot = Annotated[Tetrahedra | Structure, Kinds()]
 """The tagged kinds of robots; without a tag it is the first.
 
 All have `gravity`, `offsets` (one for each body), `body_count`, `slack`, `size`, `lacking`
-(metrics), `layout()` and `following()`.
+(metrics), `blueprint()` and `following()`.
 """
 
 

@@ -128,7 +128,7 @@ class Scenario(Section):
     @property
     def oscillators(self) -> int:
         """The number of neural oscillators."""
-        return len(self.robot.layout().oscillators)
+        return len(self.robot.blueprint().oscillators)
 
     @property
     def engine_name(self) -> str:
@@ -246,12 +246,12 @@ class Scenario(Section):
 
     def _check_sides(self) -> None:
         """Refuses gaits that turn, or are mirrored, where groups of cables have no sides."""
-        layout, bounds = self.robot.layout(), self.gait_bounds
-        if bounds.turn != 0.0 and not layout.sides.any():
+        blueprint, bounds = self.robot.blueprint(), self.gait_bounds
+        if bounds.turn != 0.0 and not blueprint.sides.any():
             expected = "expected 0, as no group is on one side"
             refuse("gait_bounds.turn", f"found {bounds.turn}, {expected}")
-        if bounds.mirrored and None in layout.images:
-            oscillator = layout.oscillators[layout.images.index(None)]
+        if bounds.mirrored and None in blueprint.images:
+            oscillator = blueprint.oscillators[blueprint.images.index(None)]
             expected = f"expected false, as '{oscillator}' has no mirror image"
             refuse("gait_bounds.mirrored", f"found true, {expected}")
 

@@ -49,8 +49,8 @@ class CpgSection(Section):
     integrated with the robot. Feedback needs `live`."""
     listing_step: Time = Field(ge=1e-6)
     reach: int | None = Field(default=None, ge=0)
-    """Oscillators at most this far apart inhibit each other (see Layout.distances). The default is
-    all."""
+    """Oscillators at most this far apart inhibit each other (see Blueprint.distances); all if not
+    given."""
     feedback: list[Pathway] = Field(default=[])
     """Pathways of feedback; their gains are parameters of the gait."""
 

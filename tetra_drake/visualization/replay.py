@@ -134,7 +134,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
         "legend": {
             "tension": f"{greatest / POUND_FORCE:.2g} lbf",
             "force": f"{inch_of_arrow / POUND_FORCE:.2g} lbf",
-            "trace": "rear feet" if structure.is_row else "centre",
+            "trace": "rear feet" if structure.markers.size else "centre",
         },
     }
 
@@ -162,7 +162,8 @@ def round_force(force: float) -> float:
 def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
     """What the robot has reached in each frame: its distance, or its turn where that counts."""
     structure, objective = robot.structure, robot.scenario.objective
-    if structure.is_row and "heading_change" in objective and not looks_for_distance(objective):
+    turns = "heading_change" in objective and not looks_for_distance(objective)
+    if structure.points_ahead and turns:
         poses = np.concatenate([frames["q_WB"].values, frames["p_WB"].values], axis=-1)
         heading = np.rad2deg(follow(frames["time"].values, poses, structure).heading)
         values, what, unit, digits = heading - heading[0], "turned", "°", 0

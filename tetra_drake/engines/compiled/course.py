@@ -125,7 +125,7 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
         solver=solver,
         network=robot.network(gait),
         senses=robot.senses,
-        sides=np.repeat(robot.actuation.sides, 2).astype(float),
+        sides=np.repeat(robot.structure.sides, 2).astype(float),
         external_input=np.array([cpg.external_input]),
         gains=np.array([gain for _, gain in gait.gains]),
         gain=np.array([cpg.gain]),

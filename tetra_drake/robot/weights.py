@@ -1,0 +1,55 @@
+"""The weights of a network: which oscillators inhibit each other, and the names of the weights."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from tetra_drake.scenario.blueprint import Blueprint
+from tetra_drake.scenario.schema import Scenario
+
+KINDS = "extensor", "flexor"
+"""Kinds of neurons, by their number modulo 2."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The weights between the oscillators of a robot."""
+
+    blueprint: Blueprint
+    reach: int | None
+    """The greatest distance between oscillators that inhibit each other; None for any."""
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """The weights of a scenario's gaits."""
+        return cls(scenario.robot.blueprint(), scenario.cpg.reach)
+
+    @functools.cached_property
+    def couplings(self) -> np.ndarray:
+        """(weights, 2): the neurons, inhibited and inhibiting, of each weight, in the order of
+        listing B.2: onto each neuron in turn, from the neurons of its own kind in turn."""
+        kind = np.arange(2 * self.blueprint.signals) % 2
+        coupled = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
+        if self.reach is not None:
+            coupled &= np.kron(self.blueprint.distances, np.ones((2, 2))) <= self.reach
+        return np.argwhere(coupled)
+
+    @functools.cached_property
+    def images(self) -> np.ndarray:
+        """(weights,): the weight that is the mirror image of each; itself where there is none."""
+        images = self.blueprint.images
+        opposite = [k if image is None else image for k, image in enumerate(images)]
+        neurons = (2 * np.array(opposite, dtype=int)[:, np.newaxis] + [0, 1]).ravel()
+        place = {(i, j): weight for weight, (i, j) in enumerate(self.couplings.tolist())}
+        pairs = neurons[self.couplings].tolist()
+        return np.array([place.get((i, j), w) for w, (i, j) in enumerate(pairs)], dtype=int)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of `couplings`: "3->1 extensor" is from oscillator 3 onto 1, counting from 1."""
+        pairs = self.couplings.tolist()
+        return tuple(f"{j // 2 + 1}->{i // 2 + 1} {KINDS[i % 2]}" for i, j in pairs)
