@@ -92,7 +92,7 @@ def test_a_robot_knows_the_rest_at_which_it_starts():
 
 def test_nodes_placed_in_the_ground_are_refused(refused):
     scenario = load_scenario("prism")
-    sunk = scenario.with_changes({"robot.nodes.n1": [-0.05, 0.0866, "-1 mm"]})
+    sunk = scenario.with_changes({"robot.nodes.n1": ["-5 cm", "8.66 cm", "-1 mm"]})
     with refused("prism", "robot.nodes.n1", "0.001 m below"):
         MakeStructure(sunk)
 
