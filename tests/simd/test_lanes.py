@@ -4,7 +4,6 @@ import itertools
 import math
 from collections.abc import Callable
 from decimal import Decimal
-from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -22,7 +21,6 @@ from tetra_drake.simd.lanes import (
     lane_table,
     maximum,
     minimum,
-    named,
     not_,
     select,
 )
@@ -113,25 +111,18 @@ def comparisons(x, y):
     return x < y, x <= y, x > y, x >= y, x == y, x != y
 
 
-def test_arithmetic_is_that_of_doubles(width):
-    check(lambda x, y: (*arithmetic(x, y), -x, abs(x), 2 - x, x * 3), width)
+@pytest.mark.parametrize("scalar", [-3.7, 3])
+def test_arithmetic_and_comparisons_are_those_of_doubles(width, scalar):
+    def arithmetic_of_all(x, y, a):
+        of_two = (*arithmetic(x, y), *arithmetic(x, a), *arithmetic(a, x))
+        return (*of_two, -x, abs(x))
 
+    def comparisons_of_all(x, y, a):
+        return *comparisons(x, y), *comparisons(x, a), *comparisons(a, x)
 
-def test_comparisons_are_those_of_doubles(width):
-    check(comparisons, width, gives_masks=True)
-
-
-@pytest.mark.parametrize("scalar", [-3.7, 3, np.float32(0.1), np.int32(-7)])
-def test_a_scalar_on_either_side_is_the_same_number_in_every_lane(width, scalar):
-    check(lambda x, y, a: (*arithmetic(x, a), *arithmetic(a, x)), width, scalar)
-
-
-@pytest.mark.parametrize("scalar", [0.1, -1])
-def test_a_scalar_is_compared_with_every_lane(width, scalar):
-    def both_ways(x, y, a):
-        return *comparisons(x, a), *comparisons(a, x)
-
-    check(both_ways, width, scalar, gives_masks=True)
+    check(arithmetic_of_all, width, scalar)
+    check(comparisons_of_all, width, scalar, gives_masks=True)
+    check(lambda x, y: (math.sqrt(x),), width, expected=lambda x, y: (np.sqrt(x),))
 
 
 def test_masks_combine_lane_by_lane(width):
@@ -194,10 +185,6 @@ def test_functions_of_plain_numbers_are_the_same_in_python():
         assert_same(np.array([row[k] for row in found], float), expected, f"result {k}")
 
 
-def test_square_root(width):
-    check(lambda x, y: (math.sqrt(x),), width, expected=lambda x, y: (np.sqrt(x),))
-
-
 def test_not_is_the_opposite_in_every_lane(width):
     def opposite(x, y):
         return (not_(x > 0.0),)
@@ -258,25 +245,6 @@ def test_any_lane_is_true_where_one_is(width):
     assert (any_lane(True), any_lane(False)) == (True, False)
 
 
-class Line(NamedTuple):
-    """Numbers with names."""
-
-    slope: float
-    offset: float
-
-
-def test_the_numbers_of_a_table_have_the_names_of_a_tuple(width):
-    @jit
-    def values(table, x, results):
-        line = named(Line, table)
-        results[0] = line.slope * x + line.offset
-
-    numbers, results = np.arange(2.0 * width), lane_table((1,), width)
-    values(in_lanes(numbers, width), 3.0, results)
-    assert_same(results.array[0], 3.0 * numbers[:width] + numbers[width:])
-    assert named(Line, np.array([1.0, 2.0])) == Line(slope=1.0, offset=2.0)
-
-
 # Variables.
 
 
@@ -330,18 +298,6 @@ def test_fields_of_one_two_and_three_dimensions(width, any_size):
     assert_same(cube.array, 1000.0 * lane + i + 10 * j + 100 * k)
 
 
-def test_a_field_has_a_shape_and_a_size_without_its_lanes(width):
-    @jit
-    def shapes_and_sizes(line, plane, cube, any_cube):
-        shapes = (line.shape, plane.shape, cube.shape, any_cube.shape)
-        return shapes, (line.size, plane.size, cube.size, any_cube.size)
-
-    shapes = ((5,), (2, 3), (4, 1, 6), (3, 2, 5))
-    tables = [lane_table(shape, width, any_size=n == 3) for n, shape in enumerate(shapes)]
-    assert tuple(table.shape for table in tables) == shapes
-    assert shapes_and_sizes(*tables) == (shapes, (5, 6, 24, 30))
-
-
 @pytest.mark.parametrize(("any_size", "compilations"), [(False, 2), (True, 1)])
 def test_a_kernel_is_compiled_once_for_all_lengths_that_the_type_does_not_know(
     any_size, compilations
@@ -372,24 +328,7 @@ def test_a_field_of_integers_counts_exactly_and_gives_indices(width):
     assert_same(results.array, x.array[places])
 
 
-def test_the_memory_of_a_lane_table_as_plain_numbers(width):
-    @jit
-    def number_all(view, table):
-        for i in range(view.shape[0]):
-            for j in range(view.shape[1]):
-                for lane in range(view.shape[2]):
-                    view[i, j, lane] = 100 * i + 10 * j + lane
-                table[i, j] = -table[i, j]
-
-    table = lane_table((2, 3), width)
-    view = FieldArray(table.array)
-    assert view.shape == (2, 3, width)
-    number_all(view, table)
-    i, j, lane = np.ogrid[:2, :3, :width]
-    assert_same(table.array, -(100.0 * i + 10.0 * j + lane))
-
-
-@pytest.mark.parametrize("shape", [(1,), (3,), (5, 7), (2, 3, 5)])
+@pytest.mark.parametrize("shape", [(3,), (2, 3, 5)])
 def test_a_lane_table_is_zeros_that_begin_where_a_register_may_load_them(width, shape):
     tables = [lane_table(shape, width) for _ in range(9)]  # in different places
     for table in tables:
@@ -404,7 +343,7 @@ def swap(x):
     x[0], x[1] = x[1], x[0]
 
 
-@pytest.mark.parametrize("first", range(8))
+@pytest.mark.parametrize("first", [0, 3])
 def test_lanes_may_begin_at_any_double(width, first):
     memory = lane_table((3,), 8).array.ravel()  # begins where a register does
     numbers = memory[first : first + 2 * width].reshape(2, width)
@@ -421,23 +360,8 @@ def one_index_too_few(line, plane):
     return plane[1] > 0.0
 
 
-def one_index_too_many_to_store(line, plane):
-    plane[1, 2, 0] = 1.0
-
-
-def index_not_an_integer(line, plane):
-    return line[1.0] > 0.0
-
-
 def mask_plus_number(line, plane):
     (line[0] > 0.0) + 1.0
-
-
-def lanes_now_and_a_truth_later(line, plane):
-    x = line[0]
-    if line.size > 1:
-        x = True
-    line[1] = x
 
 
 def branch_on_a_mask(line, plane):
@@ -457,10 +381,7 @@ def chained_comparison(line, plane):
     "kernel",
     [
         one_index_too_few,
-        one_index_too_many_to_store,
-        index_not_an_integer,
         mask_plus_number,
-        lanes_now_and_a_truth_later,
         branch_on_a_mask,
         python_and_of_masks,
         chained_comparison,
