@@ -41,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder, before = tmp_path_factory.mktemp("api"), Path.cwd()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(td, "load_scenario", load_short, raising=False)
-        patch.setattr("tetra_drake.experiment._reevaluate", lambda *_: None)
+        patch.setattr("tetra_drake.evolution.reevaluation.reevaluate", lambda *_, **__: None)
         patch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
         os.chdir(folder)
         scenario = load_short("quick")

@@ -11,6 +11,7 @@ import record
 import tables
 from analyse import load_analysis
 
+from tetra_drake.analysis.elites import elites
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.run import load_run
@@ -18,6 +19,7 @@ from tetra_drake.optimizers import optimizer_of
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.robot.gait import ParameterSpace, load_gait
 from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.units import INCH
 
 ROUNDINGS = 3.0
@@ -70,6 +72,14 @@ def test_the_diagram_walks_as_recorded():
     walked = simulate(scenario=run.scenario, gait=run.best_gait()).metrics.distance_in
     recorded = run.fittest()["distance"] / INCH
     assert walked == pytest.approx(recorded, rel=0, abs=ROUNDINGS * 0.0022)
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_all_lines_of_a_run_are_its_own(name):
+    run = load_run(tables.HERE / name)
+    assert len(run.evaluations) and len(run.iterations)
+    is_map = isinstance(run.scenario.optimizer, QualityDiversity)
+    assert len(elites(run)) > 0 if is_map else elites(run).empty
 
 
 @pytest.mark.parametrize("name", FOLDERS)
