@@ -87,13 +87,11 @@ BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
     ({"robot.spacing.x": "1 m"}, "robot.spacing", "a mapping"),
     ({"robot.offsets": np.ones((5, 3))}, "robot.offsets[0][0]", "1.0 without a unit"),
     ({"robot.payload": ["35 g"]}, "robot.payload", "1 items"),
-    ({"robot.payload": ["-1 g"] * 5}, "robot.payload[0]", "-1 g"),
     ({"accuracy": 0.1}, "accuracy", "'engine.accuracy'"),
     ({"engine": "compiled"}, "engine", "!Compiled"),
     ({"robot": {"tetrahedra": 7}, "robot.tetrahedra": 7}, "robot.tetrahedra", "twice"),
     ({"simulation.duration": "2.0 s"}, "simulation.steady_from", "3.0 s"),
     # Networks that cannot be
-    ({"robot.actuation": []}, "robot.actuation", "at least 1"),
     ({"robot.actuation": [LEFT, LEFT]}, "robot.actuation", "'outer bottom_left' twice"),
     ({"robot.actuation": [["outer left"]]}, "robot.actuation[0][0]", "'outer left'"),
     ({"robot.actuation": [LEFT], "gait_bounds.mirrored": True}, "gait_bounds.mirrored", "true"),
@@ -102,12 +100,9 @@ BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
     ({"cpg.listing_step": "16 s"}, "cpg.listing_step", "16.0 s"),
     ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
     # What no memory holds
-    ({"robot.tetrahedra": 100_000}, "robot.tetrahedra", "100000"),
     ({"cpg.listing_step": "1e-6 s", "simulation.duration": "100 s"}, "cpg.listing_step", "1e-06 s"),
     ({"simulation.sample_period": "1e-9 s"}, "simulation.sample_period", "1e-09 s"),
     ({"engine.step": "1e-7 s", "engine": "!Mujoco"}, "engine.step", "1e-07 s"),
-    ({"optimizer.population": 10**9}, "optimizer.population", "1000000000"),
-    ({"disturbances": {"draws": 10**9}}, "disturbances.draws", "1000000000"),
 ]
 
 

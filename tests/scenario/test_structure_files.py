@@ -166,11 +166,6 @@ def test_a_file_of_ntrt_needs_a_unit(folder: Path) -> None:
         ("!Structure {file: ntrt.yaml, unit: kg}", "robot.unit", "kg"),
         ("!Structure {file: bar.yaml, tetrahedra: 3}", "robot.tetrahedra", "!Tetrahedra"),
         ("!Structure {nodes: {a: [0, 0, 0]}}", "robot.struts", "`base`"),
-        (
-            "!Structure {file: bar.yaml, cables: {side: {stiffness: 0 N/m}}}",
-            "robot.cables.side.stiffness",
-            "more than 0",
-        ),
         ("!Structure {file: bar.yaml, offsets: [[0, 0, 0]]}", "robot.offsets", "3"),
         ("{masses: {b: 1 g}}", "robot.masses", "!Structure"),
     ],
