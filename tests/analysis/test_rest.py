@@ -13,7 +13,7 @@ from tetra_drake.report.structure_page import (
     structure_text,
 )
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.robot_kinds import StructureFile
 
 SHIPPED = {"prism": (1, 1), "six_bar": (1, 1), "mast": (6, 0), "pair": (2, 0)}
 """Self-stress states and mechanisms. 24 cables on four bodies are 18 equations, 8 on two are 6."""
@@ -57,7 +57,7 @@ def test_two_bars_side_by_side_bounce_as_masses_on_springs():
     }
     group = {"diameter": 0.004, "density": 1e4, "node_diameter": 0.0}
     cable = {"stiffness": 1e-6, "damping": 0.0, "free_length": 0.05}
-    structure = Structure.model_validate(
+    structure = StructureFile.model_validate(
         {
             "nodes": nodes,
             "struts": {"bar": group | {"pairs": list(bars.values())}},
@@ -77,7 +77,7 @@ def test_one_rigid_body_without_cables_rests_and_is_shown(tmp_path):
     bar["struts"] = {"bar": {"pairs": [["a", "b"]], "diameter": 0.004, "density": 1e4}}
     bar["struts"]["bar"]["node_diameter"] = 0.0
     scenario = robot_of_file("prism").scenario
-    study = study_rest(Robot.of(scenario.with_sections(robot=Structure.model_validate(bar))))
+    study = study_rest(Robot.of(scenario.with_sections(robot=StructureFile.model_validate(bar))))
     assert study.nodes["load"].tolist() == pytest.approx([study.robot.weight / 2] * 2)
     assert (study.statics.self_stresses.shape, study.statics.mechanisms) == ((0, 0), 0)
     assert len(study.cables) == 0

@@ -25,7 +25,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.actuator_kinds import Actuation, Force, TensionMotor, Winch
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import Structure as Kind
+from tetra_drake.scenario.robot_kinds import StructureFile
 from tetra_drake.scenario.schema import Scenario
 
 LENGTH, FREE_LENGTH, STIFFNESS, DAMPING = 0.2, 0.1, 100.0, 0.4  # L, l0, k, c in SI units
@@ -54,7 +54,7 @@ def swaying(actuation: Actuation, *, damping: float, gain: float = 0.0) -> Scena
     make = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.016}
     law = {"stiffness": STIFFNESS, "damping": damping, "free_length": FREE_LENGTH}
     along = {"a": 0.0, "b": LENGTH, "c": 2.0 * LENGTH, "d": 3.0 * LENGTH}
-    kind = Kind(
+    kind = StructureFile(
         nodes={name: [x, 0.0, 0.5] for name, x in along.items()},
         struts={"frame": {"pairs": [["a", "d"]], **make}, "bar": {"pairs": [["b", "c"]], **make}},
         cables={

@@ -15,7 +15,7 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
-from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.robot_kinds import StructureFile
 from tetra_drake.scenario.schema import Scenario
 
 STRUCTURES = ("prism", "six_bar", "mast", "pair")
@@ -118,7 +118,7 @@ def undriven(name: str) -> Scenario:
     prism = briefly("prism")
     if name == "prism":
         return prism.with_changes({"robot.actuated": {}})
-    return prism.with_sections(name="body", robot=Structure.from_tree(BODY, "body"))
+    return prism.with_sections(name="body", robot=StructureFile.from_tree(BODY, "body"))
 
 
 @pytest.mark.parametrize("name", ["prism", "body"])

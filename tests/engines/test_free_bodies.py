@@ -12,7 +12,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import Structure as Kind
+from tetra_drake.scenario.robot_kinds import StructureFile
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
@@ -27,7 +27,7 @@ FLYING = {
 def bent_body_and_bar() -> Scenario:
     """Two bodies, one of three different moments, and a cable that hangs loose between them."""
     make = {"diameter": 0.008, "density": 1200.0, "node_diameter": 0.016}
-    kind = Kind(
+    kind = StructureFile(
         nodes={
             "a": [0.0, 0.0, 0.5],
             "b": [0.1, 0.0, 0.5],

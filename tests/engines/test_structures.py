@@ -29,7 +29,7 @@ from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import Structure as Kind
+from tetra_drake.scenario.robot_kinds import StructureFile
 from tetra_drake.simd.packed import Packed
 from tetra_drake.systems import CableNetwork, GroundContact
 
@@ -154,7 +154,7 @@ def test_a_row_written_as_a_structure_has_the_blueprint_of_the_row():
     assert (structures[0].cables == structures[1].cables).all()
 
 
-def row_as_kind(row: Robot) -> Kind:
+def row_as_kind(row: Robot) -> StructureFile:
     """The row of tetrahedra as a structure file has it."""
     law, structure = row.scenario.robot, row.structure
     names = [name.replace(" ", "_") for name in structure.node_names]
@@ -174,7 +174,7 @@ def row_as_kind(row: Robot) -> Kind:
         cables[group]["pairs"].append(pair)
         if cable["signal"] != PASSIVE:
             actuated[oscillators[cable["signal"]]].append(" ".join([group, *pair]))
-    return Kind(
+    return StructureFile(
         nodes=dict(zip(names, p_WN, strict=True)),
         struts={
             "strut": {

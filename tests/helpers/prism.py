@@ -11,7 +11,7 @@ from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import Structure as StructureKind
+from tetra_drake.scenario.robot_kinds import StructureFile
 
 SPEED = 0.01  # m/s
 PERIOD = 2.0  # s, of the signals
@@ -47,7 +47,7 @@ def make_prism() -> Robot:
     p_WN[::2, :2] = 0.1 * np.column_stack([np.cos(lower), np.sin(lower)])
     p_WN[1::2, :2] = 0.1 * np.column_stack([np.cos(upper), np.sin(upper)])
     p_WN[1::2, 2] = 0.16
-    kind = StructureKind.model_validate(
+    kind = StructureFile.model_validate(
         {
             "nodes": dict(zip(NODES, p_WN.tolist(), strict=True)),
             "struts": {"bar": BAR | {"pairs": [NODES[:2], NODES[2:4], NODES[4:]]}},

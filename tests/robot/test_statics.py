@@ -11,13 +11,13 @@ from helpers.structures import joined_nodes, statics_of
 import tetra_drake
 from tetra_drake.robot.statics import cable_wrenches
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.robot_kinds import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 
 SHIPPED = Path(tetra_drake.__file__).parent / "scenario" / "structures"
 
 
-def structure(nodes, struts, cables) -> Structure:
+def structure(nodes, struts, cables) -> StructureFile:
     """A structure of one make of struts and one of cables, its nodes numbered."""
     make = {"diameter": 0.01, "density": 1000.0, "node_diameter": 0.02}
     spring = {"stiffness": 100.0, "damping": 1.0, "free_length": 0.0}
@@ -25,14 +25,14 @@ def structure(nodes, struts, cables) -> Structure:
     def names(pairs):
         return [[f"n{a}", f"n{b}"] for a, b in pairs]
 
-    return Structure(
+    return StructureFile(
         nodes={f"n{i}": list(map(float, p)) for i, p in enumerate(nodes)},
         struts={"strut": {"pairs": names(struts), **make}},
         cables={"cable": {"pairs": names(cables), **spring}},
     )
 
 
-def prism(n: int, twist: float, *, radius=1.0, height=1.5) -> Structure:
+def prism(n: int, twist: float, *, radius=1.0, height=1.5) -> StructureFile:
     """Bottom cables, then top ones, then sides, which the twist (deg) makes slant."""
     angles = np.radians(10.0 + 360.0 / n * np.arange(n))
     tops = angles + math.radians(twist)
@@ -45,7 +45,7 @@ def prism(n: int, twist: float, *, radius=1.0, height=1.5) -> Structure:
     return structure([*bottom, *top], struts, horizontal + [(i, n + i) for i in range(n)])
 
 
-def six_bar(apart: float) -> Structure:
+def six_bar(apart: float) -> StructureFile:
     """Struts of length 1 along x, y and z, parallel ones so far apart, in a shell of 24 cables."""
     nodes, half = [], 0.5 * apart
     for axis in range(3):
@@ -60,7 +60,7 @@ PAIRS = [pair for pair in combinations(range(12), 2) if pair[0] // 4 != pair[1] 
 """Nodes of struts that are not parallel."""
 
 
-def nested_tetrahedra(spacing: float) -> Structure:
+def nested_tetrahedra(spacing: float) -> StructureFile:
     """Two tetrahedra of the thesis and the six cables between them."""
     edge = 6 * 0.0254
     around = np.radians([120.0, 240.0, 0.0])
@@ -107,7 +107,7 @@ def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
     ],
 )
 def test_self_stress_states_and_mechanisms(
-    given: Structure, self_stress_states: int, mechanisms: int
+    given: StructureFile, self_stress_states: int, mechanisms: int
 ) -> None:
     statics = statics_of(given)
     assert statics.mechanisms == mechanisms
@@ -135,7 +135,7 @@ def test_tensions_and_cables_of_a_six_bar() -> None:
     assert tensions == pytest.approx(tensions[0], rel=1e-9)
 
 
-def forces_on_bodies(given: Structure, tensions: np.ndarray) -> np.ndarray:
+def forces_on_bodies(given: StructureFile, tensions: np.ndarray) -> np.ndarray:
     """(6 B,) about the nodes' centre, torques in N times the size of the structure."""
     nodes = joined_nodes(given)
     p_WN = nodes["p_WN"]

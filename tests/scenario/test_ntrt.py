@@ -9,7 +9,7 @@ from helpers.structures import statics_of
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.ntrt import ntrt_tree
-from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.robot_kinds import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 
 # Height 2, radius 1, the upper triangle twisted by 30 deg about the vertical, which is y.
@@ -91,8 +91,8 @@ def write(folder: Path, text: str, name: str = "my.yaml") -> Path:
     return folder / name
 
 
-def read(file: Path, unit: float = 0.1) -> Structure:
-    return Structure.from_tree(ntrt_tree(file, unit=unit), file)
+def read(file: Path, unit: float = 0.1) -> StructureFile:
+    return StructureFile.from_tree(ntrt_tree(file, unit=unit), file)
 
 
 def test_a_prism_in_decimetres(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.changes import merged
-from tetra_drake.scenario.robot_kinds import MOST_NODES, MOST_PAIRS, Member, Structure
+from tetra_drake.scenario.robot_kinds import MOST_NODES, MOST_PAIRS, Member, StructureFile
 from tetra_drake.scenario.sections import Tree, written
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
@@ -42,9 +42,9 @@ contacts: [a, g]
 """
 
 
-def structure(changes: str = "") -> Structure:
+def structure(changes: str = "") -> StructureFile:
     tree: Tree = merged(parse_yaml(FILE, "my.yaml"), parse_yaml(changes, "my.yaml") or {})
-    return Structure.from_tree(tree, "my.yaml")
+    return StructureFile.from_tree(tree, "my.yaml")
 
 
 def test_numbers_are_si() -> None:
@@ -98,7 +98,7 @@ def test_a_written_structure_is_read_as_it_was(tmp_path: Path) -> None:
 def test_one_rigid_body_needs_no_cables() -> None:
     tree = parse_yaml(FILE, "my.yaml")
     bar = {"unit": "m", "nodes": {"f": [0, 0, 0], "g": [0, 0, 1]}}
-    given = Structure.from_tree(bar | {"struts": {"bar": tree["struts"]["bar"]}}, "my.yaml")
+    given = StructureFile.from_tree(bar | {"struts": {"bar": tree["struts"]["bar"]}}, "my.yaml")
     assert given.body_names == ("bar",)
     assert given.free_lengths == ()
 

@@ -18,7 +18,7 @@ from tetra_drake.scenario.load import (
 )
 from tetra_drake.scenario.nesting import Tetrahedra
 from tetra_drake.scenario.optimizer_kinds import CmaEs, SteadyState
-from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.robot_kinds import StructureFile
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import Section
 from tetra_drake.scenario.settings import CpgSection, Disturbances
@@ -323,7 +323,7 @@ DEFAULTS = [
     (Compiled, "tolerance", 7.0),
     (CpgSection, "reach", 1),
     (Tetrahedra, "contacts", "all"),
-    (Structure, "gravity", 7.0),
+    (StructureFile, "gravity", 7.0),
     (Scenario, "engine", Compiled()),
     (Scenario, "optimizer", CmaEs()),
     (Scenario, "require", {"clearance": 1.0}),

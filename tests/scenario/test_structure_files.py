@@ -9,7 +9,7 @@ from pytest import approx
 
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.robot_kinds import StructureFile
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.structure_files import read_structure, shipped_structures
 
@@ -77,7 +77,7 @@ def test_what_stands_beside_the_file_overrides_it(folder: Path) -> None:
       offsets: [[0, 0, 1 mm], [0, 0, 0], [0, 0, 0]]
     """
     given = load(folder, robot).robot
-    assert isinstance(given, Structure)
+    assert isinstance(given, StructureFile)
     assert given.nodes["d"] == approx([0.11, 0.1, 0.0])
     side, rise = given.cables["side"], given.cables["rise"]
     assert (side.stiffness, side.damping, rise.free_length) == (50.0, 3.0, 0.05)
@@ -148,7 +148,7 @@ def test_a_draw_changes_groups_and_moves_every_body(folder: Path) -> None:
 def test_a_file_of_ntrt_needs_a_unit(folder: Path) -> None:
     robot = "!Structure {file: ntrt.yaml, unit: dm, actuated: {one: [fast/string b d]}}"
     given = load(folder, robot).robot
-    assert isinstance(given, Structure)
+    assert isinstance(given, StructureFile)
     assert given.nodes["d"] == approx([0.1, 0.1, 0.0])
     assert given.cables_of_oscillator == {"one": (1,)}
     again = read_structure(folder / "ntrt.yaml", unit="dm")

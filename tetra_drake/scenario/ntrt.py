@@ -25,7 +25,7 @@ from tetra_drake.scenario.robot_kinds import (
     MOST_PAIRS,
     CableGroup,
     Pair,
-    Structure,
+    StructureFile,
     StrutGroup,
 )
 from tetra_drake.scenario.sections import Section, Tree, keys_of, written
@@ -249,7 +249,7 @@ def ntrt_tree(file: Path, *, unit: float) -> Tree:
     """
     whole = Assembly()
     whole.add_file(file)
-    structure = Structure.model_construct(nodes={}, struts={}, cables={})
+    structure = StructureFile.model_construct(nodes={}, struts={}, cables={})
     for name, p_W in whole.nodes.items():
         structure.nodes[_without_dots(name)] = (unit * p_W[[2, 0, 1]]).tolist()
     for tags, pairs in whole.pairs.items():

@@ -109,12 +109,13 @@ class Member(NamedTuple):
         return " ".join((self.group, *self.nodes))
 
 
-class Structure(Section):
+class StructureFile(Section):
     """A tensegrity: nodes, struts and cables between them, and what actuates the cables.
 
     A file may give the `unit` of coordinates that are bare numbers; once read, they are in m.
     """
 
+    tag: ClassVar[str] = "Structure"
     lacking: ClassVar[tuple[str, ...]] = METRICS_OF_A_ROW
     """Metrics that the robot does not have."""
     slack: ClassVar[bool] = True
@@ -288,7 +289,7 @@ class Structure(Section):
         return tree | {"nodes": with_unit(tree.get("nodes"))}
 
     @pydantic.model_validator(mode="after")
-    def _check(self) -> Structure:
+    def _check(self) -> StructureFile:
         self._check_pairs()
         self._check_sizes()
         self._check_places()
@@ -373,7 +374,7 @@ class Structure(Section):
                 oscillators[cable] = oscillator
 
 
-Robot = Annotated[Tetrahedra | Structure, Kinds()]
+Robot = Annotated[Tetrahedra | StructureFile, Kinds()]
 """The tagged kinds of robots; without a tag it is the first.
 
 All have `gravity`, `offsets` (one for each body), `body_count`, `slack`, `size`, `lacking`

@@ -222,7 +222,7 @@ class Scenario(Section):
             for name in metrics:
                 for section in (self.robot, self.actuation):
                     if name in section.lacking:
-                        kind = f"!{type(section).__name__}"
+                        kind = f"!{section.tag}"
                         problem = f"{kind} does not have this metric; give `{key}` without it"
                         refuse(f"{key}.{name}", problem)
 

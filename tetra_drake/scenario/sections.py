@@ -33,6 +33,13 @@ class Section(BaseModel):
     has_base: ClassVar[bool] = False
     """True if a file may give what another file, its `base`, does not."""
 
+    tag: ClassVar[str] = ""
+    """Name of the kind in files; the name of the class if not given."""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        cls.tag = cls.__dict__.get("tag", cls.__name__)
+
     @pydantic.model_validator(mode="wrap")
     @classmethod
     def _explain(
@@ -57,7 +64,7 @@ class Section(BaseModel):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _check_keys(cls, tree: Any) -> Any:
-        if not isinstance(tree, dict) or tree.get(TAG, cls.__name__) != cls.__name__:
+        if not isinstance(tree, dict) or tree.get(TAG, cls.tag) != cls.tag:
             refuse("", f"found {described(tree)}, expected a mapping of keys")
         for name in tree:
             if name != TAG and name not in keys_of(cls):
@@ -123,7 +130,7 @@ class Kinds:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
     ) -> CoreSchema:
-        kinds = {kind.__name__: kind for kind in _union(source)}
+        kinds = {kind.tag: kind for kind in _union(source)}
 
         def read(value: Any, info: core_schema.ValidationInfo) -> Section:
             if type(value) in kinds.values():
@@ -131,7 +138,7 @@ class Kinds:
             return _kind(value, kinds).model_validate(value, context=info.context)
 
         def write(section: Section) -> Tree:
-            return {TAG: type(section).__name__} | section.model_dump()
+            return {TAG: section.tag} | section.model_dump()
 
         serializer = core_schema.plain_serializer_function_ser_schema(write)
         return core_schema.with_info_plain_validator_function(read, serialization=serializer)

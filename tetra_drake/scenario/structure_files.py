@@ -10,14 +10,14 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.ntrt import MOST_BYTES, NtrtFile, ntrt_tree
 from tetra_drake.scenario.refusals import TAG, described, no_such
-from tetra_drake.scenario.robot_kinds import Structure
+from tetra_drake.scenario.robot_kinds import StructureFile
 from tetra_drake.scenario.sections import Tree, keys_of
 from tetra_drake.scenario.units import quantity_to_si
 from tetra_drake.scenario.yaml_text import read_mapping
 
 FOLDER = Path(__file__).parent / "structures"
 
-_KIND = Structure.__name__
+_KIND = StructureFile.tag
 
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 """Keys that only files of NTRT have."""
@@ -28,7 +28,7 @@ def shipped_structures() -> list[str]:
     return sorted(file.stem for file in FOLDER.glob("*.yaml"))
 
 
-def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Structure:
+def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
     """A shipped structure by its name, or that of a structure file or a file of NTRT by its path.
 
     unit: length of NTRT's unit, such as "dm". Raises InputError that names file and key.
@@ -37,7 +37,7 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
     if not os.path.exists(file):
         problem = no_such("structure file", str(name_or_file), shipped_structures())
         raise InputError(name_or_file, "", problem)
-    return Structure.from_tree(_tree_of_file(file, unit, source=file, key="unit"), file)
+    return StructureFile.from_tree(_tree_of_file(file, unit, source=file, key="unit"), file)
 
 
 def structure_file(name: str, folder: Path) -> Path:
@@ -68,13 +68,13 @@ def with_structure(tree: Tree, source: object) -> Tree:
         raise InputError(source, "robot.file", f"{described(name)}: {problem}")
     file = structure_file(name, Path())
     content = _tree_of_file(file, changes.get("unit"), source=source, key="robot.unit")
-    Structure.from_tree(content, file)
+    StructureFile.from_tree(content, file)
     return tree | {"robot": {TAG: _KIND} | merged(content, changes, "robot")}
 
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
     """Content of a structure file, or of a file of NTRT by the unit that `source` has at `key`."""
-    keys = keys_of(Structure) | keys_of(NtrtFile)
+    keys = keys_of(StructureFile) | keys_of(NtrtFile)
     content = read_mapping(file, "structure file", keys=keys, most=MOST_BYTES)
     if not KEYS_OF_NTRT & content.keys():
         return content
