@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import tetra_drake as td
+from tetra_drake.errors import InputError
 from tetra_drake.prototype.export import export
 from tetra_drake.report.result_folder import save_result_folder
 from tetra_drake.robot.gait import save_gait
@@ -115,3 +116,41 @@ def test_a_failure_among_many_says_of_which_gait_and_scenario() -> None:
     assert (walked.name, walked.scenario) == ("random gait 1", scenario)
     assert (failed.name, failed.gait, failed.scenario) == ("random gait 2", gaits[1], failing)
     assert "random gait 2 on scenario failing" in repr(failed)
+
+
+def test_a_run_stands_for_its_scenario_and_its_best_gait():
+    run = td.load_run("runs/demo")
+    result = td.simulate(run.scenario, run.best_gait())
+    assert td.simulate("runs/demo", run).metrics == result.metrics
+    assert td.simulate(run, run).metrics == td.simulate(result, run).metrics == result.metrics
+    assert td.seeded_gait(run, 3) == td.seeded_gait(run.scenario, 3)
+
+
+def test_sweep_takes_a_single_value_and_a_run():
+    run = td.load_run("runs/demo")
+    swept = td.sweep(run, run, {"robot.cables.outer_stiffness": "35 N/m"})
+    assert dict(swept.distance.sizes) == {"outer_stiffness": 1, "gait": 1}
+    assert swept.outer_stiffness.values.tolist() == [35.0]
+
+
+@pytest.mark.parametrize(
+    ("call", "named"),
+    [
+        (lambda: td.seeded_gait("quick", -1), ("seeded_gait", "seed")),
+        (lambda: td.simulate(td.seeded_gait("quick"), "quick"), ("scenario", "")),
+        (lambda: td.simulate("quick", 5), ("gait", "")),
+        (
+            lambda: td.sweep("quick", td.seeded_gait("quick"), {"cpg.gain": []}),
+            ("sweep", "cpg.gain"),
+        ),
+        (lambda: td.load_run(5), ("load_run", "path")),
+        (lambda: td.load_result(None), ("load_result", "folder")),
+        (lambda: td.load_gait(5, td.load_scenario("quick")), ("load_gait", "path")),
+        (lambda: td.evolve("quick", 5), ("evolve", "out")),
+    ],
+)
+def test_an_argument_that_stands_for_nothing_is_named(call, named):
+    with pytest.raises(InputError) as caught:
+        call()
+    assert (caught.value.source, caught.value.key) == named
+    assert "\n" not in str(caught.value)

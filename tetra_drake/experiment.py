@@ -27,6 +27,7 @@ from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import Trial, check_fitness, open_trials, run_trials
+from tetra_drake.files import given_path
 from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import MakeOptimizer
@@ -85,7 +86,7 @@ def evolve(
     if not isinstance(progress, Progress | None):
         problem = f"found {progress!r}, expected an evolution.progress.Progress"
         raise InputError("evolve", "progress", problem)
-    out, progress = Path(out), progress or Progress()
+    out, progress = given_path(out, "evolve", "out"), progress or Progress()
     workers = getattr(executor, "workers", None) or workers or available_cores()
     given = None if scenario is None else given_scenario(scenario)
     scenario = read_manifest(out).scenario if resume else given

@@ -74,6 +74,13 @@ def _is_alive(process: int) -> bool:
     return True
 
 
+def given_path(path: str | Path, source: str, what: str) -> Path:
+    """A path from Python; InputError of `source` and the argument `what` for anything else."""
+    if not isinstance(path, (str, Path)):
+        raise InputError(source, what, f"found {path!r:.60}, expected a path")
+    return Path(path)
+
+
 def make_folder(folder: Path, *, source: Path | None = None) -> None:
     """Makes a folder unless it exists; InputError, of `source` if that is given, if it cannot."""
     source = source or folder

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,8 +12,8 @@ import numpy as np
 from tetra_drake.engines.interface import Outcome
 from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
-from tetra_drake.robot.gait import Gait, given_gait
-from tetra_drake.scenario.load import given_scenario
+from tetra_drake.robot.gait import GivenGait, given_gait
+from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.metric_units import METRICS
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import flattened
@@ -24,9 +23,9 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    scenario: Scenario | str | Path,
-    gaits: Gait | str | Path | Iterable[Gait | str | Path],
-    changes: Mapping[str, Sequence[Any]],
+    scenario: GivenScenario,
+    gaits: GivenGait | Iterable[GivenGait],
+    changes: Mapping[str, Any],
     *,
     workers: int | None = None,
 ) -> xarray.Dataset:
@@ -39,23 +38,22 @@ def sweep(
         {'outer_stiffness': 3, 'gait': 1}
         >>> mean = metrics.distance.mean("gait").sel(outer_stiffness=35)
 
-    `changes` are lists of values by scenario keys; the same rules hold as in with_changes(), so
-    quantities have units. Each key is a dimension, named by its last part where that is unique; its
-    coordinate is in SI. The dimension `gait` has the names of the gaits. A simulation that fails is
-    NaN. All are simulated at once by simulate_many(), on so many `workers`.
+    `changes` are values, or lists of values, by scenario keys; the same rules hold as in
+    with_changes(), so quantities have units. Each key is a dimension, named by its last part where
+    that is unique; its coordinate is in SI. The dimension `gait` has the names of the gaits. A
+    simulation that fails is NaN. All are simulated at once by simulate_many(), on so many
+    `workers`.
 
     Raises InputError, naming the key, for what cannot be used.
     """
     import xarray
 
     base = given_scenario(scenario)
-    given = [gaits] if isinstance(gaits, (Gait, str, Path)) else gaits
+    given = gaits if isinstance(gaits, Iterable) and not isinstance(gaits, str) else [gaits]
     walkers = [given_gait(gait, base) for gait in given]
     if not walkers:
         raise InputError("sweep", "gaits", "found none, expected one at least")
-    for key, values in changes.items():
-        if isinstance(values, str) or not len(values):
-            raise InputError("sweep", key, f"found {values!r}, expected a list of values")
+    changes = {key: _values(key, values) for key, values in changes.items()}
     combinations = list(itertools.product(*changes.values()))
     scenarios = [base.with_changes(dict(zip(changes, each, strict=True))) for each in combinations]
     outcomes = simulate_many(
@@ -77,6 +75,15 @@ def sweep(
         variables[name] = list(labels), numbers, {"units": unit or "1"}
     coordinates = {name: (name, *given) for name, given in labels.items()}
     return xarray.Dataset(variables, coordinates, {"scenario": base.name})
+
+
+def _values(key: str, given: Any) -> list[Any]:
+    """The values of a key, of which a single one may be given."""
+    is_single = isinstance(given, (str, Mapping)) or not isinstance(given, Iterable)
+    values = [given] if is_single else list(given)
+    if not values:
+        raise InputError("sweep", key, "found no value, expected one at least")
+    return values
 
 
 def _dimension(key: str, changes: Iterable[str]) -> str:

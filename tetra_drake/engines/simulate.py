@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from pathlib import Path
 
 from tetra_drake.engines.interface import Outcome, Viewer, check_can_be_watched, engine_of
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command, commanded_robot
-from tetra_drake.robot.gait import Gait, given_gait, seeded_gait
+from tetra_drake.robot.gait import GivenGait, given_gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, constant_steering
-from tetra_drake.scenario.load import given_scenario
+from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.schema import Scenario
 
 
 def simulate(
-    scenario: Scenario | str | Path,
-    gait: Gait | str | Path | None = None,
+    scenario: GivenScenario,
+    gait: GivenGait | None = None,
     *,
     command: Command | None = None,
     record: bool = False,
@@ -33,7 +32,8 @@ def simulate(
         >>> result = td.simulate(scenario, td.seeded_gait(scenario, 80), record=True)
         >>> inches, tension = result.metrics.distance_in, result.trajectory.tension
 
-    `scenario` may be the name of a shipped one or a file, `gait` a gait file. Either a gait or a
+    `scenario` may be the name of a shipped one, a file or a run, `gait` a gait file or a run, which
+    stands for its best gait. Either a gait or a
     command is given; of a command see load_command(). `steering`, the turn from -1 to 1, or a
     function of the time in s that gives it, acts in place of the gait's turn.
 
@@ -62,8 +62,8 @@ def simulate(
 
 
 def simulate_many(
-    scenario: Scenario | str | Path | Sequence[Scenario],
-    gaits: Sequence[Gait | str | Path],
+    scenario: GivenScenario | Sequence[GivenScenario],
+    gaits: Sequence[GivenGait],
     *,
     record: bool = False,
     workers: int | None = None,
@@ -88,10 +88,10 @@ def simulate_many(
 
     Raises InputError if there is not one scenario or as many as gaits, or if a gait does not fit.
     """
-    if isinstance(scenario, (str, Path, Scenario)):
-        scenarios = [given_scenario(scenario)] * len(gaits)
+    if isinstance(scenario, Sequence) and not isinstance(scenario, str):
+        scenarios = [given_scenario(each) for each in scenario]
     else:
-        scenarios = list(scenario)
+        scenarios = [given_scenario(scenario)] * len(gaits)
     if len(scenarios) != len(gaits):
         problem = f"found {len(scenarios)}, expected one, or one for each of {len(gaits)} gaits"
         raise InputError("simulate_many", "scenario", problem)

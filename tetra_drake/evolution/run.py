@@ -21,6 +21,7 @@ from tetra_drake.evolution.entries import (
 from tetra_drake.evolution.json_lines import REMEDY
 from tetra_drake.evolution.manifest import Manifest, read_manifest
 from tetra_drake.evolution.trials import TrialStatus
+from tetra_drake.files import given_path
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.metric_units import METRICS
@@ -184,7 +185,7 @@ def load_run(path: str | Path) -> Run:
 
     Raises InputError if `path` holds no run or the record is damaged.
     """
-    directory = Path(path)
+    directory = given_path(path, "load_run", "path")
     manifest = read_manifest(directory)
     # Iterations first: a run at work writes them last, so each has its evaluations.
     iterations = _table(directory, manifest, ITERATIONS)

@@ -71,7 +71,13 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
         "limit_of_length_mm": 1e3 * limits.least_length,
         "peak_power_W": power.max(axis=0),
         "limit_of_power_W": 0.25 * limits.max_force * limits.max_speed,  # half of both
-        "mean_power_W": np.maximum(power, 0.0)[steady].mean(axis=0),
-        "time_at_a_limit_percent": 100.0 * limited[steady].mean(axis=0),
+        "mean_power_W": _mean(np.maximum(power, 0.0)[steady]),
+        "time_at_a_limit_percent": 100.0 * _mean(limited[steady]),
     }
     return Loads(commands, limited, pandas.DataFrame(columns, index=walk.cable.to_index()))
+
+
+def _mean(samples: np.ndarray) -> np.ndarray:
+    """The mean of each column; NaN without samples, as in a simulation that ends before it is
+    steady."""
+    return samples.mean(axis=0) if len(samples) else np.full(samples.shape[1], math.nan)

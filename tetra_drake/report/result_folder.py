@@ -19,7 +19,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.files import check_folder, read_json, write_whole
+from tetra_drake.files import check_folder, given_path, read_json, write_whole
 from tetra_drake.results.result import IntegratorWork, SimulationResult, save_result
 from tetra_drake.results.trajectory import DIMENSIONS, labels, with_indexes
 from tetra_drake.robot.command import robot_without_network
@@ -69,7 +69,7 @@ def load_result(folder: str | Path) -> SimulationResult:
 
     Raises InputError, naming the file, if one is missing, damaged, or not of this scenario.
     """
-    folder = Path(folder)
+    folder = given_path(folder, "load_result", "folder")
     for name in (RESULT, SCENARIO, TRAJECTORY):
         if not os.path.isfile(folder / name):
             problem = f"holds no {name}, so it was not written by `simulate`"

@@ -4,17 +4,19 @@ import json
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from numbers import Integral
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_json, write_whole
+from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import Table
 from tetra_drake.robot.weights import KINDS, Weights
+from tetra_drake.scenario.load import GivenScenario, given_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.sections import Section
 
@@ -194,13 +196,18 @@ WALKING_SEED = 80
 """Seed of a random gait that walks forward on the thesis's scenario: the default gait."""
 
 
-def seeded_gait(scenario: Scenario, seed: int = WALKING_SEED) -> Gait:
+def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
     """The random gait of a seed, drawn uniformly from the scenario's bounds (Table 5).
 
-    >>> td.seeded_gait(td.load_scenario("thesis"), 80)
+    >>> td.seeded_gait("thesis", 80)
     <Gait random gait 80>
+
+    `scenario` may be a name, a file or a run. Raises InputError for what stands for no scenario,
+    and for a negative seed.
     """
-    space = ParameterSpace.of(scenario)
+    if not isinstance(seed, Integral) or seed < 0:
+        raise InputError("seeded_gait", "seed", f"found {seed!r}, expected an integer, 0 or more")
+    space = ParameterSpace.of(given_scenario(scenario))
     return space.gait(space.random(np.random.default_rng(seed)), name=f"random gait {seed}")
 
 
@@ -234,7 +241,7 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
 
     Raises InputError, naming file and key, for whatever is wrong in the file or does not fit.
     """
-    file = _read_file(path, key)
+    file = _read_file(given_path(path, "load_gait", "path"), key)
     own, weights = Weights.of(scenario), file.weights
     names = own.names
     if isinstance(weights, dict):
@@ -254,9 +261,25 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
     return gait
 
 
-def given_gait(gait: Gait | str | Path, scenario: Scenario) -> Gait:
-    """A gait, read from its file if that is given."""
-    return gait if isinstance(gait, Gait) else load_gait(gait, scenario)
+class HasBestGait(Protocol):
+    """A run."""
+
+    def best_gait(self) -> Gait: ...
+
+
+GivenGait = Gait | HasBestGait | str | Path
+"""A gait, its file, or a run, which stands for its best gait."""
+
+
+def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
+    """The gait that an argument stands for; InputError for what stands for none."""
+    if isinstance(gait, Gait):
+        return gait
+    if isinstance(gait, (str, Path)):
+        return load_gait(gait, scenario)
+    if hasattr(gait, "best_gait"):
+        return gait.best_gait()
+    raise InputError("gait", "", f"found {gait!r:.60}, expected a gait, its file or a run")
 
 
 def _read_file(path: str | Path, key: str) -> GaitFile:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Protocol
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.refusals import no_such
@@ -39,9 +40,28 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
     return scenario
 
 
-def given_scenario(scenario: Scenario | str | Path) -> Scenario:
-    """A scenario, loaded if its name or file is given."""
-    return scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+class HasScenario(Protocol):
+    """A run, or the result of a simulation."""
+
+    @property
+    def scenario(self) -> Scenario: ...
+
+
+GivenScenario = Scenario | HasScenario | str | Path
+"""A scenario; its name, file, or the folder of a command that holds it; a run or a result."""
+
+
+def given_scenario(scenario: GivenScenario) -> Scenario:
+    """The scenario that an argument stands for; InputError for what stands for none."""
+    if isinstance(scenario, (str, Path)):
+        in_folder = Path(scenario) / "scenario.yaml"
+        is_folder = str(scenario) not in shipped_scenarios() and os.path.isfile(in_folder)
+        return load_scenario(in_folder if is_folder else scenario)
+    own = getattr(scenario, "scenario", scenario)
+    if isinstance(own, Scenario):
+        return own
+    problem = f"found {scenario!r:.60}, expected a scenario, its name, file or run"
+    raise InputError("scenario", "", problem)
 
 
 def dump_scenario(scenario: Scenario) -> str:
