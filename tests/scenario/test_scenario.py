@@ -374,6 +374,8 @@ BAD = [
     ("robot: {contacts: some}", "robot.contacts", "'thesis' or 'all'"),
     ("robot: {cables: {free_length: 1 km}}", "robot.spacing", "balance"),
     ("terrain: !HeightField {file: none.csv, cell: 1 in}", "terrain.file", "none.csv"),
+    ("robot: {spacing: &own [*own]}", "", "alias of what holds it"),
+    ("robot: &own {cables: *own}", "", "alias of what holds it"),
     ("terrain: !Rough {amplitude: 1 in, wavelength: 1 um}", "terrain.wavelength", "5e-07 m"),
     ("objective: {}", "objective", "at least 1"),
     ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
