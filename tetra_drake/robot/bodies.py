@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,25 +46,55 @@ def node_inertia(p_BN: np.ndarray, *, radius: float, density: float) -> SpatialI
 
 def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Masses (bodies,), centres of mass in the frames F (bodies, 3), and unit inertias (bodies, 6)
-    as in Structure, of struts, and of spheres and point masses at nodes."""
-    nodes = blueprint.p_FN
-    totals = [SpatialInertia.Zero() for _ in blueprint.bodies]
-    for (a, b), radius, density in zip(
-        blueprint.struts, blueprint.strut_radius, blueprint.strut_density, strict=True
-    ):
-        body = blueprint.carriers[a]
-        totals[body] += strut_inertia(nodes[a], nodes[b], radius=radius, density=density)
-    for node, (body, p_FN) in enumerate(zip(blueprint.carriers, nodes, strict=True)):
-        radius, mass = blueprint.node_radius[node], blueprint.node_mass[node]
-        if radius > 0.0:
-            density = blueprint.node_density[node]
-            totals[body] += node_inertia(p_FN, radius=radius, density=density)
-        if mass > 0.0:
-            totals[body] += SpatialInertia(mass, p_FN, UnitInertia.PointMass(p_FN))
-    empty = np.array([total.get_mass() for total in totals])
+    as in Structure."""
+    made: dict[tuple[bytes, ...], SpatialInertia] = {}  # of bodies that are alike, one
+    inertias = []
+    for first, end in itertools.pairwise(blueprint.first_node.tolist()):
+        parts = _parts(blueprint, first, end)
+        key = tuple(part.tobytes() for part in parts)
+        if key not in made:
+            made[key] = _body_inertia(*parts)
+        inertias.append(made[key])
+    empty = np.array([inertia.get_mass() for inertia in inertias])
     mass = empty + blueprint.payload  # which adds no inertia about the centre of mass
-    centres, units = zip(*map(_central, totals), strict=True)
+    centres, units = zip(*map(_central, inertias), strict=True)
     return mass, np.array(centres), (empty / mass)[:, np.newaxis] * np.array(units)
+
+
+def _parts(blueprint: Blueprint, first: int, end: int) -> tuple[np.ndarray, ...]:
+    """The arguments of _body_inertia() for the body with the nodes from `first` to before `end`."""
+    nodes, node_a = slice(first, end), blueprint.struts[:, 0]
+    struts = (first <= node_a) & (node_a < end)
+    return (
+        blueprint.p_FN[nodes],
+        blueprint.struts[struts] - first,
+        blueprint.strut_radius[struts],
+        blueprint.strut_density[struts],
+        blueprint.node_radius[nodes],
+        blueprint.node_density[nodes],
+        blueprint.node_mass[nodes],
+    )
+
+
+def _body_inertia(
+    p_FN: np.ndarray,
+    struts: np.ndarray,
+    strut_radius: np.ndarray,
+    strut_density: np.ndarray,
+    node_radius: np.ndarray,
+    node_density: np.ndarray,
+    node_mass: np.ndarray,
+) -> SpatialInertia:
+    """M_BFo_F of a body of struts, and of spheres and point masses at nodes."""
+    total = SpatialInertia.Zero()
+    for (a, b), radius, density in zip(struts, strut_radius, strut_density, strict=True):
+        total += strut_inertia(p_FN[a], p_FN[b], radius=radius, density=density)
+    for p, radius, density, mass in zip(p_FN, node_radius, node_density, node_mass, strict=True):
+        if radius > 0.0:
+            total += node_inertia(p, radius=radius, density=density)
+        if mass > 0.0:
+            total += SpatialInertia(mass, p, UnitInertia.PointMass(p))
+    return total
 
 
 def _central(M_BFo_F: SpatialInertia) -> tuple[np.ndarray, np.ndarray]:
