@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from tetra_drake.engines.compiled.course import Course, PreparedGait
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
+from tetra_drake.engines.compiled.lane_io import Finished, Prepared
 from tetra_drake.engines.compiled.loop import DONE
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
@@ -39,9 +39,9 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
     return dataclasses.replace(robot, structure=Thrown(**fields, v_WB=v_WB))
 
 
-def course_of(robot: Robot, *, seed: int = 1) -> Course:
+def course_of(robot: Robot, *, seed: int = 1) -> Finished:
     """How a seeded gait goes on the compiled engine, without what results make of it."""
-    prepared = PreparedGait.of(robot, seeded_gait(robot.scenario, seed), record=True)
+    prepared = Prepared.of(robot, seeded_gait(robot.scenario, seed), record=True)
     engine = LaneEngine(prepared, width=1)
     engine.load(0, prepared)
     while not (ended := engine.advance(100_000)):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Self, TypeAlias
+from typing import Annotated, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
-from tetra_drake.physics import actuator, cable, contact, inertia, kinematics, terrain
+from tetra_drake.physics import actuator, cable, contact, kinematics, terrain
 from tetra_drake.physics.friction import friction_force
+from tetra_drake.physics.inertia import INERTIA_COLUMNS, gyroscopic_torque, turn_inertia
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.vectors import (
     add_vector,
@@ -18,6 +19,7 @@ from tetra_drake.physics.vectors import (
     subtract_vector,
     vector_at,
 )
+from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import compiled, inlined
 from tetra_drake.simd.lanes import Table, any_lane, inverse_sqrt, maximum, select
 from tetra_drake.simd.packed import Packed, unpacked
@@ -26,34 +28,34 @@ from tetra_drake.simd.packed import Packed, unpacked
 class Forces(NamedTuple):
     """The forces at a state, as in `physics`, which kernels write."""
 
-    nodes: Table
-    """(nodes, NODE_COLUMNS)."""
-    frames: Table
-    """(contacts, FRAME_COLUMNS): where the nodes meet the ground."""
-    cable_forces: Table
-    """(cables, CABLE_FORCE_COLUMNS)."""
-    ground_forces: Table
-    """(contacts, GROUND_FORCE_COLUMNS)."""
-    inertia: Table
-    """(bodies, INERTIA_COLUMNS): of the bodies along World's axes, unless they are isotropic."""
-    drives: Table
-    """(drives, DRIVE_COLUMNS): of winches or tension motors, in the order of their cables. What
-    forces are computed from is given; the rest is written."""
+    nodes: Annotated[Table, "nodes", kinematics.NODE_COLUMNS]
+    frames: Annotated[Table, "contacts", terrain.FRAME_COLUMNS]
+    """Where the nodes meet the ground."""
+    cable_forces: Annotated[Table, "cables", cable.CABLE_FORCE_COLUMNS]
+    ground_forces: Annotated[Table, "contacts", contact.GROUND_FORCE_COLUMNS]
+    inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
+    """Of the bodies along World's axes, unless they are isotropic."""
+    drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
+    """Of winches or tension motors, in the order of their cables. What forces are computed from is
+    given; the rest is written."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
         """Room for the forces on a robot."""
-        drivers, contacts = robot.cables.signal, robot.ground.contacts.size
-        driven = np.count_nonzero(drivers != cable.PASSIVE)
-        drives = 0 if robot.actuator.kind == actuator.DIRECT else driven
-        return cls(
-            nodes=np.zeros((len(robot.p_BN), kinematics.NODE_COLUMNS)),
-            frames=np.zeros((contacts, terrain.FRAME_COLUMNS)),
-            cable_forces=np.zeros((drivers.size, cable.CABLE_FORCE_COLUMNS)),
-            ground_forces=np.zeros((contacts, contact.GROUND_FORCE_COLUMNS)),
-            inertia=np.zeros((len(robot.bodies.mass), inertia.INERTIA_COLUMNS)),
-            drives=np.zeros((drives, actuator.DRIVE_COLUMNS)),
-        )
+        return allocate(cls, sizes_of(robot))
+
+
+def sizes_of(robot: Model) -> dict[str, int]:
+    """The numbers of a robot's parts, for allocate()."""
+    drivers = robot.cables.signal
+    driven = np.count_nonzero(drivers != cable.PASSIVE)
+    return {
+        "bodies": len(robot.bodies.mass),
+        "nodes": len(robot.p_BN),
+        "contacts": robot.ground.contacts.size,
+        "cables": drivers.size,
+        "drives": 0 if robot.actuator.kind == actuator.DIRECT else driven,
+    }
 
 
 Parts: TypeAlias = Packed[tuple[Model, Forces]] | tuple[Model, Forces]
@@ -65,7 +67,7 @@ def move_robot(robot: Model, state: Table, forces: Forces) -> None:
     """Moves the nodes to where a state (13 bodies,) has them; no forces act on them yet."""
     move_contacts(robot, state, forces)
     if not robot.isotropic:
-        inertia.turn_inertia(state, robot.bodies.inertia, forces.inertia)
+        turn_inertia(state, robot.bodies.inertia, forces.inertia)
 
 
 @inlined
@@ -170,7 +172,7 @@ def compute_forces(
     for body in range(bodies):
         t, v = 6 * body, 7 * bodies + 6 * body
         w_WB = state[v], state[v + 1], state[v + 2]
-        t_x, t_y, t_z = inertia.gyroscopic_torque(forces.inertia, body, w_WB)
+        t_x, t_y, t_z = gyroscopic_torque(forces.inertia, body, w_WB)
         generalized[t] += t_x
         generalized[t + 1] += t_y
         generalized[t + 2] += t_z

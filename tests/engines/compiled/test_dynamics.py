@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers.forces import forces_at
 from helpers.states import disturbed, mass_matrix
-from helpers.steps import make_lines, make_rows
+from helpers.steps import make_step
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate, implicit_matrix
@@ -42,8 +42,10 @@ def implicit_matrix_of(
 ) -> np.ndarray:
     """The implicit matrix written out, (6 n, 6 n)."""
     solver, forces = Solver.of(robot), forces_of(robot, state, modes)[0]
-    rows = np.full_like(make_rows(robot), np.nan)  # what is not written must not be read
-    implicit_matrix(robot, solver, modes, forces, time, make_lines(), rows)
+    room = make_step(robot)
+    rows, lines = room.rows, room.lines
+    rows[:] = lines[:] = np.nan  # what is not written must not be read
+    implicit_matrix(robot, solver, modes, forces, time, lines, rows)
     bodies, schedule = len(rows), solver.schedule
     matrix = np.zeros((bodies, BLOCK, bodies, BLOCK))
     for i, row in enumerate(rows):

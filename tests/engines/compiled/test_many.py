@@ -10,8 +10,8 @@ import pytest
 import xarray
 from helpers.widths import WIDTHS
 
-from tetra_drake.engines.compiled.course import Course, PreparedGait
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
+from tetra_drake.engines.compiled.lane_io import Finished, Prepared
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.compiled.loop import DONE, ROUND, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS
 from tetra_drake.engines.simulate import simulate, simulate_many
@@ -52,10 +52,10 @@ def short(scenario: Scenario) -> Scenario:
     return scenario.with_changes({"engine": "!Compiled", **times})
 
 
-def courses(walks: list[PreparedGait], width: int) -> list[Course]:
+def courses(walks: list[Prepared], width: int) -> list[Finished]:
     """How walks go in an engine whose lanes take the next walk when one has ended."""
     engine = LaneEngine(walks[0], width=width)
-    waiting, found = list(enumerate(walks)), dict[int, Course]()
+    waiting, found = list(enumerate(walks)), dict[int, Finished]()
     in_lane = dict[int, int]()
     while waiting or in_lane:
         for lane in engine.idle[: len(waiting)]:
@@ -66,12 +66,12 @@ def courses(walks: list[PreparedGait], width: int) -> list[Course]:
     return [found[i] for i in range(len(walks))]
 
 
-def prepared(scenario: Scenario, seed: int = 0) -> PreparedGait:
+def prepared(scenario: Scenario, seed: int = 0) -> Prepared:
     """A seeded gait to be recorded."""
-    return PreparedGait.of(Robot.of(scenario), seeded_gait(scenario, seed), record=True)
+    return Prepared.of(Robot.of(scenario), seeded_gait(scenario, seed), record=True)
 
 
-def same(a: Course, b: Course) -> bool:
+def same(a: Finished, b: Finished) -> bool:
     """Whether two courses agree to the last bit, cost aside."""
     pairs = [(a.status, b.status), (a.time, b.time), (a.evaluations, b.evaluations)]
     for name in ("times", "states", "signals", "modes", "drives"):
@@ -85,8 +85,7 @@ def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short
     kinds = [short, short.with_changes(FAR_TOO_STRONG), short, short.with_changes(TOO_STRONG)]
     scenarios = [kinds[i % 4] for i in range(11)]
     walks = [
-        PreparedGait.of(Robot.of(s), seeded_gait(s, i), record=True)
-        for i, s in enumerate(scenarios)
+        Prepared.of(Robot.of(s), seeded_gait(s, i), record=True) for i, s in enumerate(scenarios)
     ]
     alone = [courses([walk], 1)[0] for walk in walks]
     statuses = [course.status for course in alone[:4]]
@@ -108,8 +107,7 @@ def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short, wid
     finer = rough | {"terrain": Rough(amplitude=3e-3, wavelength=0.05, seed=1), "friction": firm}
     kinds = [short.with_changes(changes) for changes in (finer, rough, rough | FAR_TOO_STRONG)]
     walks = [
-        PreparedGait.of(Robot.of(s), seeded_gait(s, i), record=True)
-        for i, s in enumerate(kinds * 3)
+        Prepared.of(Robot.of(s), seeded_gait(s, i), record=True) for i, s in enumerate(kinds * 3)
     ]
     alone = [courses([walk], 1)[0] for walk in walks]
     assert [course.status for course in alone[:3]] == [DONE, DONE, STEP_TOO_SMALL]
@@ -127,7 +125,7 @@ def test_actuators_of_different_limits_pull_alike_beside_each_other(short, width
     ]
     robots = [Robot.of(scenarios[i % 3]) for i in range(9)]
     walks = [
-        PreparedGait.of(robot, seeded_gait(short, i), record=True) for i, robot in enumerate(robots)
+        Prepared.of(robot, seeded_gait(short, i), record=True) for i, robot in enumerate(robots)
     ]
     alone = [courses([walk], 1)[0] for walk in walks]
     assert [course.status for course in alone] == [DONE] * 9

@@ -245,7 +245,10 @@ def add_cables(
 
 @inlined
 def put(value: Real, adds: bool, body: int, r: int, c: int, rows: Table) -> None:
-    """Writes a value into the rows, or adds it."""
+    """Writes a value into the rows, or adds it.
+
+    To zero all blocks first and always add takes 2 to 5 % more time for a step.
+    """
     if adds:
         rows[body, r, c] += value
     else:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from tetra_drake.engines.compiled.course import PreparedGait, make_outcome
 from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
+from tetra_drake.engines.compiled.lane_io import Prepared, make_outcome
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.interface import Engine, Outcome, Viewer
 from tetra_drake.engines.time_limit import check_time
@@ -26,7 +26,7 @@ class CompiledEngine(Engine):
     lane_pool = LanePool
 
     def prepare(self, scenario: Scenario, *, many: bool) -> None:
-        prepared = PreparedGait.of(Robot.of(scenario), seeded_gait(scenario), record=False)
+        prepared = Prepared.of(Robot.of(scenario), seeded_gait(scenario), record=False)
         widths = {1, lanes_for(math.inf)} if many else {1}
         for width in widths:
             LaneEngine(prepared, width=width)
@@ -40,7 +40,7 @@ class CompiledEngine(Engine):
         viewer: Viewer | None = None,
         steering: SteeringSignal | None = None,
     ) -> SimulationResult:
-        prepared = PreparedGait.of(robot, gait, record=record, steering=steering)
+        prepared = Prepared.of(robot, gait, record=record, steering=steering)
         engine = LaneEngine(prepared, width=1)
         engine.load(0, prepared)
         while not (ended := engine.advance(_BODY_STEPS)):

@@ -1,4 +1,4 @@
-"""The compiled engine's memory: loads a gait into a SIMD lane, runs it, and reads its course."""
+"""The compiled engine's memory: loads a gait into a SIMD lane, runs it, and reads its result."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ import time
 from typing import Any
 
 import numpy as np
-from numba import typeof
 from numba.core import registry
 
-from tetra_drake.engines.compiled.course import Course, PreparedGait
+from tetra_drake.engines.compiled.lane_io import Finished, Prepared
 from tetra_drake.engines.compiled.loop import (
     DUE,
     EVALUATIONS,
@@ -24,15 +23,17 @@ from tetra_drake.engines.compiled.loop import (
     TIME,
     TRIED,
     WALKING,
+    Constants,
     Log,
     advance,
 )
 from tetra_drake.physics.actuator import DRIVE
-from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.tally import Tally
 from tetra_drake.physics.terrain import SurfaceGrid
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.scenario.engine_kinds import Compiled
+from tetra_drake.simd.allocation import allocate
+from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
 FIRST = SurfaceGrid._fields.index("first")
@@ -42,46 +43,23 @@ FIRST = SurfaceGrid._fields.index("first")
 class LaneEngine:
     """Simulates gaits of one kind in `width` lanes."""
 
-    def __init__(self, first: PreparedGait, *, width: int) -> None:
+    def __init__(self, first: Prepared, *, width: int) -> None:
         """Engine for gaits like the first; see `accepts`. Compiles it if that is not done."""
-        self._kind = first.kind
-        structure, points = first.robot.structure, first.robot.ground.heights.size
-        self._bodies = len(structure.bodies)
-        self._heights = np.zeros((width, points))
-        constants = in_lanes(first.constants, width)
-        ground = constants.robot.ground._replace(heights=FieldArray(self._heights.ravel()))
-        shape = constants.network.inhibition.shape
-        inhibition = lane_table(shape, width, any_size=True)  # compiled once for robots of any size
-        self._constants = constants._replace(
-            robot=constants.robot._replace(ground=ground),
-            network=constants.network._replace(inhibition=inhibition),
-        )
-        self._walk = in_lanes(first.start, width)
-        shape, signals = (width, len(first.times)), structure.signals
-        self._log = Log(
-            marks=np.full((width, len(first.marks) + 5), math.inf),
-            passed=np.zeros(width, dtype=np.int64),
-            times=np.full((width, len(first.times) + 1), math.inf),
-            kept=np.zeros(width, dtype=np.int64),
-            states=np.zeros((*shape, structure.initial_state.size)),
-            modes=np.zeros((*shape, len(structure.contacts), MODE_COLUMNS)),
-            signals=np.zeros((*shape, signals)),
-            drives=np.zeros((*shape, len(first.start.drives))),
-            recent=np.zeros((width, first.recent_signals, signals)),
-            turns=np.zeros((width, len(first.turns))),
-        )
+        self._kind, self._bodies = first.kind, len(first.robot.structure.bodies)
+        self._heights = np.zeros((width, first.robot.ground.heights.size))
+        self._constants = _constants_in_lanes(first.constants, self._heights)
+        self._lanes = in_lanes(first.start, width)
+        self._log = allocate(Log, first.log_sizes | {"lanes": width})
         log = Log(*(FieldArray(array, any_size=True) for array in self._log))
-        self._arguments = self._constants, self._walk, log, first.live
-        # Called without looking for the types of all these tables each time.
-        kinds = tuple(typeof(argument) for argument in (*self._arguments, 0))
-        self._advance = advance.compile(kinds)  # type: ignore[attr-defined]
-        self._in_lane: list[PreparedGait | None] = [None] * width
+        self._arguments = self._constants, self._lanes, log, first.live
+        self._advance = machine_code(advance, *self._arguments, 0)
+        self._in_lane: list[Prepared | None] = [None] * width
         self._wall_times = [0.0] * width
         for lane in range(width):  # so that idle lanes compute with proper numbers
             self.load(lane, first)
             self.stop(lane)
 
-    def accepts(self, prepared: PreparedGait) -> bool:
+    def accepts(self, prepared: Prepared) -> bool:
         """True if a gait can be simulated: one like the first in structure and kind of signals,
         and with no more to keep."""
         log = self._log
@@ -99,11 +77,11 @@ class LaneEngine:
         """The lanes without a gait."""
         return [lane for lane, prepared in enumerate(self._in_lane) if prepared is None]
 
-    def load(self, lane: int, prepared: PreparedGait) -> None:
+    def load(self, lane: int, prepared: Prepared) -> None:
         """Starts a gait in a lane; raises InputError if it does not fit its scenario."""
-        constants, walk = prepared.constants, prepared.start
+        constants, start = prepared.constants, prepared.start
         fill_lane(self._constants, constants, lane)
-        fill_lane(self._walk, walk, lane)
+        fill_lane(self._lanes, start, lane)
         network, given = self._constants.network, constants.network
         # So that they hold for all lanes.
         network.first.array[:] = np.minimum(network.first.array, given.first)
@@ -112,17 +90,17 @@ class LaneEngine:
         self._heights[lane, : heights.size] = heights
         self._constants.robot.ground.grid.array[FIRST, lane] = lane * self._heights.shape[1]
 
-        log, clock = self._log, self._walk.clock.array
+        log, clock = self._log, self._lanes.clock.array
         turns, commanded = prepared.turns, prepared.robot.commanded
         log.times[lane] = log.marks[lane] = math.inf
         log.times[lane, : len(prepared.times)] = prepared.times
         log.marks[lane, : len(prepared.marks)] = prepared.marks
         log.turns[lane], log.turns[lane, : len(turns)] = turns[-1], turns
-        log.states[lane, 0], log.modes[lane, 0] = walk.step.state, walk.modes
-        log.signals[lane, 0] = walk.signals
+        log.states[lane, 0], log.modes[lane, 0] = start.step.state, start.modes
+        log.signals[lane, 0] = start.signals
         log.recent[lane, : len(commanded)] = commanded
         clock[SAMPLES, lane] = len(commanded)
-        log.drives[lane, 0] = walk.drives[:, DRIVE]
+        log.drives[lane, 0] = start.drives[:, DRIVE]
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)
         clock[STATUS, lane] = WALKING
@@ -133,10 +111,10 @@ class LaneEngine:
     def stop(self, lane: int) -> float:
         """Takes the gait out of a lane, wherever it is; returns what it cost, in s."""
         self._in_lane[lane] = None
-        self._walk.clock.array[STATUS, lane] = IDLE
+        self._lanes.clock.array[STATUS, lane] = IDLE
         return self._wall_times[lane]
 
-    def advance(self, body_steps: int) -> list[tuple[int, PreparedGait, Course]]:
+    def advance(self, body_steps: int) -> list[tuple[int, Prepared, Finished]]:
         """Simulates until one of the lanes ends, or for about so many iterations times bodies;
         returns lanes and gaits that have ended, which are idle then. Other threads run meanwhile.
         """
@@ -147,15 +125,15 @@ class LaneEngine:
         ended = []
         for lane, prepared in busy:
             self._wall_times[lane] += share
-            if self._walk.clock.array[STATUS, lane] != WALKING:
-                ended.append((lane, prepared, self._course(lane)))
+            if self._lanes.clock.array[STATUS, lane] != WALKING:
+                ended.append((lane, prepared, self._finished(lane)))
                 self.stop(lane)
         return ended
 
-    def _course(self, lane: int) -> Course:
-        clock, log = self._walk.clock.array[:, lane], self._log
+    def _finished(self, lane: int) -> Finished:
+        clock, log = self._lanes.clock.array[:, lane], self._log
         kept = slice(log.kept[lane])
-        return Course(
+        return Finished(
             status=int(clock[STATUS]),
             time=float(clock[TIME]),
             steps=int(clock[TAKEN]),
@@ -167,7 +145,7 @@ class LaneEngine:
                 modes=log.modes[lane, kept].copy(),
                 drives=log.drives[lane, kept].copy(),
             ),
-            totals=Tally(*(table.array[..., lane].copy() for table in self._walk.tally)),
+            totals=Tally(*(table.array[..., lane].copy() for table in self._lanes.tally)),
             wall_time=self._wall_times[lane],
         )
 
@@ -187,6 +165,17 @@ def lanes_for(gaits: float) -> int:
 def processor_features() -> str:
     """The instructions that numba compiles for, such as +avx2: its settings', or the machine's."""
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
+
+
+def _constants_in_lanes(constants: Constants, heights: np.ndarray) -> Constants:
+    """Tables for constants such as these, for a row of `heights` per lane."""
+    width = len(heights)
+    lanes = in_lanes(constants, width)
+    # Compiled once for robots of any size.
+    inhibition = lane_table(constants.network.inhibition.shape, width, any_size=True)
+    ground = lanes.robot.ground._replace(heights=FieldArray(heights.ravel()))
+    robot, network = lanes.robot._replace(ground=ground), lanes.network
+    return lanes._replace(robot=robot, network=network._replace(inhibition=inhibition))
 
 
 def in_lanes(values: Any, width: int) -> Any:

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
-from tetra_drake.engines.compiled.course import Course, PreparedGait, make_outcome
 from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
+from tetra_drake.engines.compiled.lane_io import Finished, Prepared, make_outcome
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
@@ -35,7 +35,7 @@ class _Job:
     gait: Gait
     record: bool
     time_budget: float
-    future: Future[tuple[PreparedGait, Course]] = field(default_factory=Future)
+    future: Future[tuple[Prepared, Finished]] = field(default_factory=Future)
     deadline: float = math.inf
 
 
@@ -78,7 +78,7 @@ class LanePool:
             job.future.set_exception(CancelledError())
 
     @staticmethod
-    def result(future: Future[tuple[PreparedGait, Course]]) -> SimulationResult:
+    def result(future: Future[tuple[Prepared, Finished]]) -> SimulationResult:
         """Waits for a gait of submit(); raises as simulate() does."""
         return make_outcome(*future.result())
 
@@ -88,7 +88,7 @@ class LanePool:
         *,
         record: bool = False,
         time_budget: float = math.inf,
-    ) -> list[Future[tuple[PreparedGait, Course]]]:
+    ) -> list[Future[tuple[Prepared, Finished]]]:
         """Puts gaits, each with its scenario, in the queue; result() waits for one.
 
         A gait that is not done after `time_budget` (s) fails with TimeBudgetExceeded.
@@ -169,7 +169,7 @@ class _Crew:
         """
         try:
             robot = self._robots(job.scenario)
-            prepared = PreparedGait.of(robot, job.gait, record=job.record)
+            prepared = Prepared.of(robot, job.gait, record=job.record)
             engine = self._engine if self.jobs else self._engine_for(prepared, lanes_for(among))
             if engine is None or not engine.accepts(prepared):
                 return False
@@ -202,7 +202,7 @@ class _Crew:
             job.future.set_exception(error)
         self.jobs, self._engine, self._engines = {}, None, {}
 
-    def _engine_for(self, prepared: PreparedGait, width: int) -> LaneEngine:
+    def _engine_for(self, prepared: Prepared, width: int) -> LaneEngine:
         engine = self._engines.get(width)
         if engine is None or not engine.accepts(prepared):
             engine = self._engines[width] = LaneEngine(prepared, width=width)

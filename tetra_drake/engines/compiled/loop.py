@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate
 from tetra_drake.engines.compiled.rosenbrock import Step, larger, take_step
 from tetra_drake.errors import MAX_SPEED
-from tetra_drake.physics.actuator import DRIVE, RATE
+from tetra_drake.physics.actuator import DRIVE, DRIVE_COLUMNS, RATE
 from tetra_drake.physics.cable import LENGTH
 from tetra_drake.physics.contact import MODE_COLUMNS, NORMAL, update_modes
 from tetra_drake.physics.feedback import Senses, sense
@@ -31,6 +31,7 @@ from tetra_drake.physics.kinematics import interpolate_state
 from tetra_drake.physics.mode_change import time_to_mode_change
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.oscillator import (
+    NEURON_COLUMNS,
     Network,
     correct_neurons,
     euler_step,
@@ -69,11 +70,11 @@ of samples of the signals that exist, steps tried, steps taken."""
 
 CLOCK_ROWS = 11
 
-ACCEPTED, GOES, PLACE = range(3)
-"""Rows of `asked`: whether the step is accepted, whether the network takes a step (0 or 1), and a
+ACCEPTED, STEPS_NETWORK, TURN_INDEX = range(3)
+"""Rows of `scratch`: whether the step is accepted, whether the network takes a step (0 or 1), and a
 place among the turns."""
 
-ASKED_ROWS = 3
+SCRATCH_ROWS = 3
 
 
 class Constants(NamedTuple):
@@ -103,67 +104,61 @@ class Constants(NamedTuple):
     max_evaluations: Table
 
 
-class Walk(NamedTuple):
+class LaneState(NamedTuple):
     """The state of several simulations, in lanes, and what is computed on the way."""
 
-    clock: Table
-    """(CLOCK_ROWS,)."""
-    asked: Table
-    """(ASKED_ROWS,): what has just been computed for all lanes, and is then read lane by lane."""
+    clock: Annotated[Table, CLOCK_ROWS]
+    scratch: Annotated[Table, SCRATCH_ROWS]
+    """What has just been computed for all lanes, and is then read lane by lane."""
     step: Step
     forces: Forces
-    modes: Table
-    """(contacts, MODE_COLUMNS)."""
-    acceleration: Table
-    """(6 bodies,)."""
-    signals: Table
-    """(n,), at the lane's time; `end_signals` at the end of its step."""
-    end_signals: Table
-    drives: Table
-    """(drives, DRIVE_COLUMNS), at the lane's time."""
-    end_drives: Table
-    """(drives,): free lengths or tensions at the end of the lane's step."""
-    neurons: Table
-    """(2n, NEURON_COLUMNS)."""
-    output: Table
-    """(n,): the oscillators' latest outputs."""
-    tonic: Table
-    """(2n,): the input without feedback; `inputs` with it."""
-    inputs: Table
-    lengths: Table
-    """(cables,): what is sensed, as are `normal_forces`, (contacts,)."""
-    normal_forces: Table
+    modes: Annotated[Table, "contacts", MODE_COLUMNS]
+    acceleration: Annotated[Table, "6 * bodies"]
+    signals: Annotated[Table, "signals"]
+    """At the lane's time; `end_signals` at the end of its step."""
+    end_signals: Annotated[Table, "signals"]
+    drives: Annotated[Table, "drives", DRIVE_COLUMNS]
+    """At the lane's time."""
+    end_drives: Annotated[Table, "drives"]
+    """Free lengths or tensions at the end of the lane's step."""
+    neurons: Annotated[Table, "2 * signals", NEURON_COLUMNS]
+    output: Annotated[Table, "signals"]
+    """The oscillators' latest outputs."""
+    tonic: Annotated[Table, "2 * signals"]
+    """The input without feedback; `inputs` with it."""
+    inputs: Annotated[Table, "2 * signals"]
+    lengths: Annotated[Table, "cables"]
+    """What is sensed, as are `normal_forces`."""
+    normal_forces: Annotated[Table, "contacts"]
     tally: Tally
 
 
 class Log(NamedTuple):
-    """The course of each simulation, a row a lane."""
+    """What is given to each simulation, and what is kept of it, a row a lane."""
 
-    marks: Table
-    """(W, marks): times (s) at which steps end, ascending; infinite after the last."""
-    passed: Table
-    """(W,): how many marks there are behind."""
-    times: Table
-    """(W, samples): times (s) of the samples to keep, likewise."""
-    kept: Table
-    """(W,): how many samples there are already."""
-    states: Table
-    """(W, samples, 13 bodies)."""
-    modes: Table
-    """(W, samples, contacts, MODE_COLUMNS): those of the step."""
-    signals: Table
-    """(W, samples, n), in N."""
-    drives: Table
-    """(W, samples, drives)."""
-    recent: Table
-    """(W, RECENT, n): the latest samples of the listing's signals; see row_of."""
-    turns: Table
-    """(W, turns): at 0, one `period` ..., linear between them; the last one lasts. One alone is in
-    `tonic` already."""
+    marks: Annotated[Table, "lanes", "marks"]
+    """Times (s) at which steps end, ascending; infinite after the last."""
+    passed: Annotated[Table, "lanes", int]
+    """How many marks there are behind."""
+    times: Annotated[Table, "lanes", "times"]
+    """Times (s) of the samples to keep, likewise."""
+    kept: Annotated[Table, "lanes", int]
+    """How many samples there are already."""
+    states: Annotated[Table, "lanes", "samples", "13 * bodies"]
+    modes: Annotated[Table, "lanes", "samples", "contacts", MODE_COLUMNS]
+    """Those of the step."""
+    signals: Annotated[Table, "lanes", "samples", "signals"]
+    """N."""
+    drives: Annotated[Table, "lanes", "samples", "drives"]
+    recent: Annotated[Table, "lanes", "recent", "signals"]
+    """The latest samples of the listing's signals; see row_of."""
+    turns: Annotated[Table, "lanes", "turns"]
+    """At 0, one `period` ..., linear between them; the last one lasts. One alone is in `tonic`
+    already."""
 
 
 @functools.partial(compiled, nogil=True)
-def advance(constants: Constants, walk: Walk, log: Log, live: bool, rounds: int) -> None:
+def advance(constants: Constants, lanes: LaneState, log: Log, live: bool, rounds: int) -> None:
     """Simulates to the end of the round in which one of the lanes ends, or for a number of rounds:
     so each simulation's begin with its own, and lanes may be filled again in between.
 
@@ -172,128 +167,128 @@ def advance(constants: Constants, walk: Walk, log: Log, live: bool, rounds: int)
     for _ in range(rounds):
         ended = False
         for _ in range(ROUND):
-            ended |= iterate(constants, walk, log, live)
-        robot, state = constants.robot, walk.step.state
-        move_robot(robot, state, walk.forces)
-        look(walk.tally, robot, state, walk.forces.nodes)
+            ended |= iterate(constants, lanes, log, live)
+        robot, state = constants.robot, lanes.step.state
+        move_robot(robot, state, lanes.forces)
+        look(lanes.tally, robot, state, lanes.forces.nodes)
         if ended:
             return
 
 
 @merged
-def iterate(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
+def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
     """Tries a step in all lanes; whether a simulation has ended."""
-    clock, ended = walk.clock, False
+    clock, ended = lanes.clock, False
     if any_lane((clock[STATUS] == WALKING) & (clock[TIME] >= clock[MARK])):
         if not live:
-            run_ahead(constants, walk, log, clock[TIME])
-        ended = pass_marks(constants, walk, log, live)
-    walks = clock[STATUS] == WALKING
+            run_ahead(constants, lanes, log, clock[TIME])
+        ended = pass_marks(constants, lanes, log, live)
+    is_walking = clock[STATUS] == WALKING
 
-    arrive(constants, walk)
-    step = select(walks, aim(constants, walk), 0.0)
+    arrive(constants, lanes)
+    step = select(is_walking, aim(constants, lanes), 0.0)
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
-    foresee_signals(constants, walk, log, live)
-    foresee_drives(walk)
+    foresee_signals(constants, lanes, log, live)
+    foresee_drives(lanes)
     error = take_step(
         constants.robot,
         constants.solver,
-        walk.step,
-        walk.modes,
-        walk.forces,
-        walk.end_signals,
+        lanes.step,
+        lanes.modes,
+        lanes.forces,
+        lanes.end_signals,
         step,
         live,
     )
-    correct_drives(walk)
+    correct_drives(lanes)
 
-    accepted = walks & (error <= constants.tolerance[0])
+    accepted = is_walking & (error <= constants.tolerance[0])
     if live:
-        feel(constants, walk, log, step_end, walk.step.end)
-        correct_neurons(constants.network, walk.inputs, step, accepted, walk.neurons)
-        drive(constants, walk)
+        feel(constants, lanes, log, step_end, lanes.step.end)
+        correct_neurons(constants.network, lanes.inputs, step, accepted, lanes.neurons)
+        drive(constants, lanes)
     if any_lane(accepted & (clock[DUE] <= step_end)):
-        walk.asked[ACCEPTED] = select(accepted, 1.0, 0.0)
-        keep_samples(constants, walk, log, live)
-    move_on(walk, walks, accepted)
+        lanes.scratch[ACCEPTED] = select(accepted, 1.0, 0.0)
+        keep_samples(constants, lanes, log, live)
+    move_on(lanes, is_walking, accepted)
     clock[PLANNED] = next_step(error, step, constants.tolerance[0], constants.max_step[0])
 
-    status = select(walks, fate(constants, walk), clock[STATUS])
+    status = select(is_walking, fate(constants, lanes), clock[STATUS])
     ended |= any_lane(status != clock[STATUS])
     clock[STATUS] = status
     return ended
 
 
 @inlined
-def arrive(constants: Constants, walk: Walk) -> None:
+def arrive(constants: Constants, lanes: LaneState) -> None:
     """Brings the modes up to date with the state, computes its forces and tallies them."""
-    robot, forces, state = constants.robot, walk.forces, walk.step.state
+    robot, forces, state = constants.robot, lanes.forces, lanes.step.state
     move_robot(robot, state, forces)
-    for i in range(walk.drives.shape[0]):
-        forces.drives[i, DRIVE] = walk.drives[i, DRIVE]
-    update_modes(state, forces.nodes, robot.ground, forces.frames, walk.modes)
-    compute_forces(robot, state, walk.modes, walk.signals, True, forces, walk.step.force)
-    observe(walk.tally, robot, walk.clock[TIME], walk.signals, forces)
+    for i in range(lanes.drives.shape[0]):
+        forces.drives[i, DRIVE] = lanes.drives[i, DRIVE]
+    update_modes(state, forces.nodes, robot.ground, forces.frames, lanes.modes)
+    compute_forces(robot, state, lanes.modes, lanes.signals, True, forces, lanes.step.force)
+    observe(lanes.tally, robot, lanes.clock[TIME], lanes.signals, forces)
 
 
 @inlined
-def foresee_signals(constants: Constants, walk: Walk, log: Log, live: bool) -> None:
+def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
     """Writes the signals at the end of the step: the listing's, or a prediction of a live
     network's."""
-    clock = walk.clock
+    clock = lanes.clock
     if live:
-        feel(constants, walk, log, clock[TIME], walk.step.state)
-        predict_neurons(constants.network, walk.inputs, clock[STEP], walk.neurons)
-        drive(constants, walk)
+        feel(constants, lanes, log, clock[TIME], lanes.step.state)
+        predict_neurons(constants.network, lanes.inputs, clock[STEP], lanes.neurons)
+        drive(constants, lanes)
         return
-    run_ahead(constants, walk, log, clock[END])
+    run_ahead(constants, lanes, log, clock[END])
     for lane in range(log.kept.size):
         end = by_lane(clock)[END, lane]
-        interpolate(constants, walk, log, lane, end, by_lane(walk.end_signals))
+        interpolate(constants, lanes, log, lane, end, by_lane(lanes.end_signals))
 
 
 @inlined
-def foresee_drives(walk: Walk) -> None:
+def foresee_drives(lanes: LaneState) -> None:
     """Notes the drives and their rates at the state, and moves them to the end of the step."""
-    drives = walk.forces.drives
+    drives = lanes.forces.drives
     for i in range(drives.shape[0]):
-        walk.drives[i, RATE] = drives[i, RATE]
-        drives[i, DRIVE] = walk.drives[i, DRIVE] + walk.clock[STEP] * drives[i, RATE]
+        lanes.drives[i, RATE] = drives[i, RATE]
+        drives[i, DRIVE] = lanes.drives[i, DRIVE] + lanes.clock[STEP] * drives[i, RATE]
 
 
 @inlined
-def correct_drives(walk: Walk) -> None:
+def correct_drives(lanes: LaneState) -> None:
     """Writes the drives at the end of the step, by the mean of the rates at both ends."""
-    for i in range(walk.drives.shape[0]):
-        rate = 0.5 * (walk.drives[i, RATE] + walk.forces.drives[i, RATE])
-        walk.end_drives[i] = walk.drives[i, DRIVE] + walk.clock[STEP] * rate
+    for i in range(lanes.drives.shape[0]):
+        rate = 0.5 * (lanes.drives[i, RATE] + lanes.forces.drives[i, RATE])
+        lanes.end_drives[i] = lanes.drives[i, DRIVE] + lanes.clock[STEP] * rate
 
 
 @inlined
-def move_on(walk: Walk, walks: Truth, accepted: Truth) -> None:
+def move_on(lanes: LaneState, is_walking: Truth, accepted: Truth) -> None:
     """Makes the end of the step the state where it is accepted."""
-    clock, state = walk.clock, walk.step.state
+    clock, state = lanes.clock, lanes.step.state
     for i in range(state.size):
-        state[i] = select(accepted, walk.step.end[i], state[i])
-    for k in range(walk.signals.size):
-        walk.signals[k] = select(accepted, walk.end_signals[k], walk.signals[k])
-    for i in range(walk.drives.shape[0]):
-        walk.drives[i, DRIVE] = select(accepted, walk.end_drives[i], walk.drives[i, DRIVE])
+        state[i] = select(accepted, lanes.step.end[i], state[i])
+    for k in range(lanes.signals.size):
+        lanes.signals[k] = select(accepted, lanes.end_signals[k], lanes.signals[k])
+    for i in range(lanes.drives.shape[0]):
+        lanes.drives[i, DRIVE] = select(accepted, lanes.end_drives[i], lanes.drives[i, DRIVE])
     clock[TIME] = select(accepted, clock[END], clock[TIME])
-    clock[TRIED] += select(walks, 1.0, 0.0)
+    clock[TRIED] += select(is_walking, 1.0, 0.0)
     clock[TAKEN] += select(accepted, 1.0, 0.0)
 
 
 @merged
-def aim(constants: Constants, walk: Walk) -> Real:
+def aim(constants: Constants, lanes: LaneState) -> Real:
     """The step (s) to try: at most the planned one, to just after the next mode change if that is
     nearer, and to the next mark or half the way to it if that is near."""
-    robot, clock = constants.robot, walk.clock
-    accelerate(robot, walk.forces.inertia, walk.step.force, walk.acceleration)
+    robot, clock = constants.robot, lanes.clock
+    accelerate(robot, lanes.forces.inertia, lanes.step.force, lanes.acceleration)
     planned = clock[PLANNED]
     change = time_to_mode_change(
-        robot, walk.step.state, walk.acceleration, walk.modes, walk.forces, planned
+        robot, lanes.step.state, lanes.acceleration, lanes.modes, lanes.forces, planned
     )
     step = minimum(planned, AIM_FACTOR * change + constants.look_ahead[0])
     remaining = clock[MARK] - clock[TIME]
@@ -311,90 +306,91 @@ def next_step(error: Real, step: Real, tolerance: Real, max_step: Real) -> Real:
 
 
 @inlined
-def fate(constants: Constants, walk: Walk) -> Real:
+def fate(constants: Constants, lanes: LaneState) -> Real:
     """The status of each lane after a step, as if all were walking."""
-    state, speed = walk.step.state, 0.0
+    state, speed = lanes.step.state, 0.0
     bodies = state.size // 13
     for body in range(bodies):
         for k in range(3):
             speed = larger(speed, abs(state[7 * bodies + BLOCK * body + 3 + k]))
     too_fast = (speed > MAX_SPEED) | (speed != speed)
-    too_many = EVALUATIONS * walk.clock[TRIED] > constants.max_evaluations[0]
+    too_many = EVALUATIONS * lanes.clock[TRIED] > constants.max_evaluations[0]
     status = select(too_fast, 1.0 * TOO_FAST, 1.0 * WALKING)
-    status = select(walk.clock[PLANNED] <= LEAST_STEP, 1.0 * STEP_TOO_SMALL, status)
+    status = select(lanes.clock[PLANNED] <= LEAST_STEP, 1.0 * STEP_TOO_SMALL, status)
     return select(too_many, 1.0 * TOO_MANY_EVALUATIONS, status)
 
 
 @inlined
-def run_ahead(constants: Constants, walk: Walk, log: Log, until: Real) -> None:
+def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> None:
     """Lets the listing's networks run until every walking lane has the samples around a time (s).
 
     Others go along as far as there is room, so that few steps are taken for one lane alone.
     """
-    clock, period = walk.clock, constants.period[0]
-    gain, output, asked = by_lane(constants.gain), by_lane(walk.output), by_lane(walk.asked)
+    clock, period = lanes.clock, constants.period[0]
+    gain, output, scratch = by_lane(constants.gain), by_lane(lanes.output), by_lane(lanes.scratch)
     needed, room = until / period + 1.0, clock[TIME] / period + (log.recent.shape[1] - 1.0)
     grows = clock[STATUS] == WALKING
     while any_lane(grows & (clock[SAMPLES] < constants.samples[0]) & (clock[SAMPLES] <= needed)):
         goes = grows & (clock[SAMPLES] < constants.samples[0]) & (clock[SAMPLES] < room)
         step = select(goes, period, 0.0)
-        steer(constants, walk, log, clock[SAMPLES] + 0.5)
-        euler_step(constants.network, walk.tonic, step, walk.neurons)
-        oscillator_output(walk.neurons, walk.output)
-        walk.asked[GOES] = select(goes, 1.0, 0.0)
+        steer(constants, lanes, log, clock[SAMPLES] + 0.5)
+        euler_step(constants.network, lanes.tonic, step, lanes.neurons)
+        oscillator_output(lanes.neurons, lanes.output)
+        lanes.scratch[STEPS_NETWORK] = select(goes, 1.0, 0.0)
         for lane in range(log.kept.size):
-            if asked[GOES, lane] != 0.0:
+            if scratch[STEPS_NETWORK, lane] != 0.0:
                 row = row_of(int(by_lane(clock)[SAMPLES, lane]), log)
-                for k in range(walk.output.size):
+                for k in range(lanes.output.size):
                     log.recent[lane, row, k] = gain[0, lane] * output[k, lane]
-        clock[SAMPLES] += walk.asked[GOES]
+        clock[SAMPLES] += lanes.scratch[STEPS_NETWORK]
 
 
 @inlined
-def feel(constants: Constants, walk: Walk, log: Log, time: Real, state: Table) -> None:
+def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
     """Writes the inputs of a live network at a time (s), for a state and its forces."""
-    steer(constants, walk, log, time / constants.period[0])
-    for i in range(walk.lengths.size):
-        walk.lengths[i] = walk.forces.cable_forces[i, LENGTH]
-    for i in range(walk.normal_forces.size):
-        walk.normal_forces[i] = walk.forces.ground_forces[i, NORMAL]
-    sense(constants.senses, constants.gains, state, walk.lengths, walk.normal_forces, walk.inputs)
-    for i in range(walk.inputs.size):
-        walk.inputs[i] += walk.tonic[i]
+    steer(constants, lanes, log, time / constants.period[0])
+    for i in range(lanes.lengths.size):
+        lanes.lengths[i] = lanes.forces.cable_forces[i, LENGTH]
+    for i in range(lanes.normal_forces.size):
+        lanes.normal_forces[i] = lanes.forces.ground_forces[i, NORMAL]
+    lengths, loads = lanes.lengths, lanes.normal_forces
+    sense(constants.senses, constants.gains, state, lengths, loads, lanes.inputs)
+    for i in range(lanes.inputs.size):
+        lanes.inputs[i] += lanes.tonic[i]
 
 
 @inlined
-def steer(constants: Constants, walk: Walk, log: Log, sample: Real) -> None:
+def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> None:
     """Writes the tonic input where the turns change; `sample` is a place between two of them."""
     turns = log.turns.shape[1]
     if turns == 1:
         return
-    walk.asked[PLACE] = sample
-    places, sides, tonic = by_lane(walk.asked), by_lane(constants.sides), by_lane(walk.tonic)
+    lanes.scratch[TURN_INDEX] = sample
+    places, sides, tonic = by_lane(lanes.scratch), by_lane(constants.sides), by_lane(lanes.tonic)
     for lane in range(log.kept.size):
-        place, external = places[PLACE, lane], by_lane(constants.external_input)[0, lane]
+        place, external = places[TURN_INDEX, lane], by_lane(constants.external_input)[0, lane]
         i = max(0, min(int(place), turns - 2))
         before, after = log.turns[lane, i], log.turns[lane, i + 1]
         turn = before + (min(place, turns - 1.0) - i) * (after - before)
-        for k in range(walk.tonic.size):
+        for k in range(lanes.tonic.size):
             tonic[k, lane] = steered_input(external, turn, sides[k, lane])
 
 
 @inlined
-def drive(constants: Constants, walk: Walk) -> None:
+def drive(constants: Constants, lanes: LaneState) -> None:
     """Writes the signals at the end of the step, N, from a live network."""
-    oscillator_output(walk.neurons, walk.output)
-    active, gain = walk.clock[ACTIVE] != 0.0, constants.gain[0]
-    for k in range(walk.output.size):
-        walk.end_signals[k] = select(active, gain * walk.output[k], 0.0)
+    oscillator_output(lanes.neurons, lanes.output)
+    active, gain = lanes.clock[ACTIVE] != 0.0, constants.gain[0]
+    for k in range(lanes.output.size):
+        lanes.end_signals[k] = select(active, gain * lanes.output[k], 0.0)
 
 
 @inlined
 def interpolate(
-    constants: Constants, walk: Walk, log: Log, lane: int, time: float, signals: Table
+    constants: Constants, lanes: LaneState, log: Log, lane: int, time: float, signals: Table
 ) -> None:
     """Writes a lane's `signals`, (n, W) in N, at a time (s)."""
-    if by_lane(walk.clock)[ACTIVE, lane] == 0.0:
+    if by_lane(lanes.clock)[ACTIVE, lane] == 0.0:
         for k in range(signals.shape[0]):
             signals[k, lane] = 0.0
         return
@@ -414,11 +410,11 @@ def row_of(sample: int, log: Log) -> int:
 
 
 @merged
-def pass_marks(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
+def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
     """Sets the next mark where one is reached, and the signals there; whether a simulation
     is done."""
-    clock, signals, done = by_lane(walk.clock), by_lane(walk.signals), False
-    oscillator_output(walk.neurons, walk.output)
+    clock, signals, done = by_lane(lanes.clock), by_lane(lanes.signals), False
+    oscillator_output(lanes.neurons, lanes.output)
     for lane in range(log.kept.size):
         if clock[STATUS, lane] != WALKING or clock[TIME, lane] < clock[MARK, lane]:
             continue
@@ -430,25 +426,25 @@ def pass_marks(constants: Constants, walk: Walk, log: Log, live: bool) -> bool:
         start_up = by_lane(constants.start_up)[0, lane]
         clock[ACTIVE, lane] = 1.0 if clock[TIME, lane] >= start_up else 0.0
         if not live:
-            interpolate(constants, walk, log, lane, clock[TIME, lane], signals)
+            interpolate(constants, lanes, log, lane, clock[TIME, lane], signals)
             continue
-        for k in range(walk.output.size):
-            force = by_lane(constants.gain)[0, lane] * by_lane(walk.output)[k, lane]
+        for k in range(lanes.output.size):
+            force = by_lane(constants.gain)[0, lane] * by_lane(lanes.output)[k, lane]
             signals[k, lane] = clock[ACTIVE, lane] * force
     return done
 
 
 @merged
-def keep_samples(constants: Constants, walk: Walk, log: Log, live: bool) -> None:
+def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
     """Keeps the samples that are due in the accepted step of each lane that has one."""
-    clock, modes, accepted = by_lane(walk.clock), by_lane(walk.modes), by_lane(walk.asked)
-    signals = np.empty((walk.signals.size, log.kept.size))
+    clock, modes, accepted = by_lane(lanes.clock), by_lane(lanes.modes), by_lane(lanes.scratch)
+    signals = np.empty((lanes.signals.size, log.kept.size))
     for lane in range(log.kept.size):
         while accepted[ACCEPTED, lane] != 0.0 and clock[DUE, lane] <= clock[END, lane]:
             i, due, step = log.kept[lane], clock[DUE, lane], clock[STEP, lane]
             part = 1.0 if due == clock[END, lane] else (due - clock[TIME, lane]) / step
-            before = column(by_lane(walk.step.state), lane)
-            after = column(by_lane(walk.step.end), lane)
+            before = column(by_lane(lanes.step.state), lane)
+            after = column(by_lane(lanes.step.end), lane)
             state = interpolate_state(before, after, step, part)
             for k in range(state.size):
                 log.states[lane, i, k] = state[k]
@@ -456,13 +452,13 @@ def keep_samples(constants: Constants, walk: Walk, log: Log, live: bool) -> None
                 for c in range(MODE_COLUMNS):
                     log.modes[lane, i, k, c] = modes[k, c, lane]
             if not live:
-                interpolate(constants, walk, log, lane, due, signals)
+                interpolate(constants, lanes, log, lane, due, signals)
             for k in range(signals.shape[0]):
-                first, last = by_lane(walk.signals)[k, lane], by_lane(walk.end_signals)[k, lane]
+                first, last = by_lane(lanes.signals)[k, lane], by_lane(lanes.end_signals)[k, lane]
                 between = first + part * (last - first)
                 log.signals[lane, i, k] = between if live else signals[k, lane]
-            drives, end_drives = by_lane(walk.drives), by_lane(walk.end_drives)
-            for k in range(walk.drives.shape[0]):
+            drives, end_drives = by_lane(lanes.drives), by_lane(lanes.end_drives)
+            for k in range(lanes.drives.shape[0]):
                 first, last = drives[k, DRIVE, lane], end_drives[k, lane]
                 log.drives[lane, i, k] = first + part * (last - first)
             log.kept[lane] = i + 1

@@ -8,11 +8,19 @@ A an approximation of the Jacobian of y' = f(t, y):
     (1 - γ h A) k2 = f(t + h, y + h k1) - 2 k1 - γ h df/dt
     y(t + h) = y + 3/2 h k1 + 1/2 h k2
 
-It is of order 2 whatever A is, and stable at any step with the exact one. Here A holds the
-dampings (a symmetric matrix with blocks for pairs of bodies that cables join) and the
-stiffness of contacts. How forces change with positions otherwise, and with the signals, is not
-stiff, but where damping dominates it decides the motion: left out, the method falls to order 1.
-It enters by its product with the velocities, a difference of forces along the motion.
+It is of order 2 whatever A is, and stable at any step with the exact one. Here k1 and k2 are the
+rates of velocities v. Those of positions need no solution:
+
+    q1 = v + γ h k1
+    q2 = v + h k1 - 2 q1 + γ h k2
+
+A holds what is stiff: dampings (a symmetric matrix with blocks for pairs of bodies that cables
+join) and the stiffness of contacts. A law that adds stiffness needs no Jacobian; one that adds
+damping returns dT/d(dl/dt).
+
+How forces change with positions otherwise, and with the signals, is df/dt, the change along the
+motion, a difference of forces. The method needs it: where damping dominates, it would be of order 1
+without.
 
 The equations are multiplied by the mass matrix at the beginning of the step. Where bodies are not
 isotropic, it turns with them, and later torques are referred to it.
@@ -21,10 +29,17 @@ isotropic, it turns with them, and later torques are referred to it.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK, factorise, solve
-from tetra_drake.engines.compiled.dynamics import Solver, implicit_matrix, momentum, refer_torques
+from tetra_drake.engines.compiled.dynamics import (
+    CABLES_AT_ONCE,
+    LINE_COLUMNS,
+    Solver,
+    implicit_matrix,
+    momentum,
+    refer_torques,
+)
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.inertia import INERTIA_COLUMNS
 from tetra_drake.physics.kinematics import P_BN_W, move_bodies
@@ -39,21 +54,25 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 class Step(NamedTuple):
     """A step from `state` to `end`, (13 bodies,), and what is computed on the way."""
 
-    state: Table
-    end: Table
-    force: Table
-    """(6 bodies,), at the state; so are the following."""
-    end_force: Table
-    change: Table
-    stage: Table
-    k1: Table
-    k2: Table
-    rows: Table
-    """(bodies, 6, the schedule's width)."""
-    lines: Table
-    """(CABLES_AT_ONCE, LINE_COLUMNS)."""
-    inertia: Table
-    """(bodies, INERTIA_COLUMNS): at the state."""
+    state: Annotated[Table, "13 * bodies"]
+    end: Annotated[Table, "13 * bodies"]
+    force: Annotated[Table, "6 * bodies"]
+    """At the state."""
+    end_force: Annotated[Table, "6 * bodies"]
+    change: Annotated[Table, "6 * bodies"]
+    """γ h df/dt."""
+    k1: Annotated[Table, "6 * bodies"]
+    k2: Annotated[Table, "6 * bodies"]
+    velocity: Annotated[Table, "6 * bodies"]
+    """v, at the state."""
+    q1: Annotated[Table, "6 * bodies"]
+    mean_rate: Annotated[Table, "6 * bodies"]
+    """3/2 q1 + 1/2 q2."""
+    rows: Annotated[Table, "bodies", BLOCK, "width"]
+    """The implicit matrix; `width` is its schedule's."""
+    lines: Annotated[Table, CABLES_AT_ONCE, LINE_COLUMNS]
+    inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
+    """At the state."""
 
 
 @merged
@@ -67,14 +86,16 @@ def take_step(
     step: Real,
     write_parts: bool,
 ) -> Real:
-    """Writes the end of a step (s); `signals` are the end's. What is given of the state: `forces`,
-    whose nodes and frames are overwritten, and work.force. With `write_parts`, all `forces` become
-    those of the second stage, at the end of the step to order 1.
+    """Writes the end of a step (s); `signals` are the end's.
+
+    Input: `work.state`, and `work.force` and `forces` there. `forces` is overwritten: with
+    `write_parts`, all of it becomes that of stage 2, at the end of the step to order 1.
 
     Returns the difference to the first-order solution within: the largest of any body's
     velocity (m/s), of rotation that of its nodes; NaN if one is.
     """
-    state, end, k1, k2, stage = work.state, work.end, work.k1, work.k2, work.stage
+    state, end, k1, k2 = work.state, work.end, work.k1, work.k2
+    velocity, q1, mean_rate = work.velocity, work.q1, work.mean_rate
     size, scaled = work.force.size, GAMMA * step
     bodies = size // BLOCK
     first = state.size - size
@@ -86,8 +107,8 @@ def take_step(
                 work.inertia[body, c] = forces.inertia[body, c]
 
     for i in range(size):
-        stage[i] = end[first + i] = state[first + i]
-    move_bodies(state, stage, step, end)
+        velocity[i] = end[first + i] = state[first + i]
+    move_bodies(state, velocity, step, end)
     compute_end_forces(robot, work, modes, forces, signals, False)
     for i in range(size):
         work.change[i] = GAMMA * (work.end_force[i] - work.force[i])
@@ -95,9 +116,9 @@ def take_step(
     solve(work.rows, solver.schedule, k1)
 
     for i in range(size):
-        stage[i] = state[first + i] + scaled * k1[i]
-        end[first + i] = state[first + i] + step * k1[i]
-    move_bodies(state, stage, step, end)
+        q1[i] = velocity[i] + scaled * k1[i]
+        end[first + i] = velocity[i] + step * k1[i]
+    move_bodies(state, q1, step, end)
     compute_end_forces(robot, work, modes, forces, signals, write_parts)
     for body in range(bodies):
         gained = momentum(robot, work.inertia, k1, body)
@@ -107,12 +128,10 @@ def take_step(
     solve(work.rows, solver.schedule, k2)
 
     for i in range(size):
-        velocity = state[first + i]
-        # The position's second stage is stage 2's velocity - 2 (stage 1's rate) + γ h k2.
-        stage_2 = velocity + step * k1[i] - 2.0 * stage[i] + scaled * k2[i]
-        stage[i] = 1.5 * stage[i] + 0.5 * stage_2
-        end[first + i] = velocity + step * (1.5 * k1[i] + 0.5 * k2[i])
-    move_bodies(state, stage, step, end)
+        q2 = velocity[i] + step * k1[i] - 2.0 * q1[i] + scaled * k2[i]
+        mean_rate[i] = 1.5 * q1[i] + 0.5 * q2
+        end[first + i] = velocity[i] + step * (1.5 * k1[i] + 0.5 * k2[i])
+    move_bodies(state, mean_rate, step, end)
     return 0.5 * step * largest_difference(robot, forces.nodes, k1, k2)
 
 

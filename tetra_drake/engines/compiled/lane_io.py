@@ -1,4 +1,4 @@
-"""Input and output of a lane of the compiled engine: a prepared gait, and its course."""
+"""Input and output of a lane of the compiled engine: a prepared gait, a finished simulation."""
 
 from __future__ import annotations
 
@@ -8,23 +8,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tetra_drake.engines.compiled.block_sparse import BLOCK
-from tetra_drake.engines.compiled.dynamics import CABLES_AT_ONCE, LINE_COLUMNS, Solver
+from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.loop import (
-    ASKED_ROWS,
-    CLOCK_ROWS,
     DONE,
     STEP_TOO_SMALL,
     TOO_FAST,
     TOO_MANY_EVALUATIONS,
     Constants,
-    Walk,
+    LaneState,
 )
-from tetra_drake.engines.compiled.rosenbrock import Step
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE, Limits
-from tetra_drake.physics.forces import Forces
-from tetra_drake.physics.inertia import INERTIA_COLUMNS
+from tetra_drake.physics.forces import sizes_of
 from tetra_drake.physics.oscillator import make_neurons
 from tetra_drake.physics.tally import Tally
 from tetra_drake.results.metrics import empty_tally
@@ -35,10 +30,14 @@ from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import sample_count
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.schema import Scenario
+from tetra_drake.simd.allocation import allocate
+
+_SPARE_MARKS = 4
+"""Marks that another gait on the same engine may have more than the first one."""
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedGait:
+class Prepared:
     """A gait on a scenario, prepared for a lane: arrays without lanes."""
 
     robot: Robot
@@ -52,7 +51,7 @@ class PreparedGait:
     """The turns that Robot.turns() gives."""
     constants: Constants
     """Constants of all laws; those of the ground are without heights."""
-    start: Walk
+    start: LaneState
     """State at t = 0, and room for what is computed on the way."""
 
     @classmethod
@@ -63,7 +62,7 @@ class PreparedGait:
         *,
         record: bool,
         steering: SteeringSignal | None = None,
-    ) -> PreparedGait:
+    ) -> Prepared:
         """Prepares a gait; raises InputError if it or the steering does not fit the scenario."""
         simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
         instants = [0.0, simulation.steady_from, simulation.duration, start_up]
@@ -113,6 +112,17 @@ class PreparedGait:
         least = max(2.0 * within + 32.0, len(self.robot.commanded))
         return 1 << math.ceil(math.log2(least))
 
+    @property
+    def log_sizes(self) -> dict[str, int]:
+        """Sizes of an engine's log for this gait and such ones with a few more marks."""
+        return sizes_in_lanes(self.robot, Solver.of(self.robot.model)) | {
+            "marks": len(self.marks) + 1 + _SPARE_MARKS,
+            "times": len(self.times) + 1,
+            "samples": len(self.times),
+            "recent": self.recent_signals,
+            "turns": len(self.turns),
+        }
+
 
 def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
     scenario, model = robot.scenario, robot.model
@@ -146,47 +156,27 @@ def _jumps(robot: Robot) -> np.ndarray:
     return robot.scenario.cpg.listing_step * np.flatnonzero(ends)
 
 
-def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> Walk:
-    scenario, structure, commanded = robot.scenario, robot.structure, robot.commanded
-    bodies, signals = len(structure.bodies), structure.signals
-    contacts, cables = len(structure.contacts), len(structure.cables)
-    velocities, forces = np.zeros(BLOCK * bodies), Forces.of(robot.model)
-    forces.drives[:, DRIVE] = robot.starting_drives()
-    return Walk(
-        clock=np.zeros(CLOCK_ROWS),
-        asked=np.zeros(ASKED_ROWS),
-        step=Step(
-            state=structure.initial_state,
-            end=np.zeros(13 * bodies),
-            force=velocities,
-            end_force=velocities,
-            change=velocities,
-            stage=velocities,
-            k1=velocities,
-            k2=velocities,
-            rows=np.zeros((bodies, BLOCK, solver.schedule.width)),
-            lines=np.zeros((CABLES_AT_ONCE, LINE_COLUMNS)),
-            inertia=np.zeros((bodies, INERTIA_COLUMNS)),
-        ),
-        forces=forces,
-        modes=robot.starting_modes(),
-        acceleration=velocities,
-        signals=commanded[0] if len(commanded) else np.zeros(signals),
-        end_signals=np.zeros(signals),
-        drives=forces.drives,
-        end_drives=forces.drives[:, DRIVE],
-        neurons=make_neurons(initial_neurons(scenario.cpg, signals)),
-        output=np.zeros(signals),
-        tonic=robot.tonic_input(turns)[0],
-        inputs=np.zeros(2 * signals),
-        lengths=np.zeros(cables),
-        normal_forces=np.zeros(contacts),
-        tally=empty_tally(robot),
-    )
+def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> LaneState:
+    start = allocate(LaneState, sizes_in_lanes(robot, solver), tally=empty_tally(robot))
+    signals = robot.structure.signals
+    start.step.state[:] = robot.structure.initial_state
+    start.modes[:] = robot.starting_modes()
+    if len(robot.commanded):
+        start.signals[:] = robot.commanded[0]
+    start.drives[:, DRIVE] = robot.starting_drives()
+    start.neurons[:] = make_neurons(initial_neurons(robot.scenario.cpg, signals))
+    start.tonic[:] = robot.tonic_input(turns)[0]
+    return start
 
 
-class Course(NamedTuple):
-    """The course of a simulation."""
+def sizes_in_lanes(robot: Robot, solver: Solver) -> dict[str, int]:
+    """Sizes of the tables of a robot in lanes, for allocate()."""
+    signals, width = robot.structure.signals, solver.schedule.width
+    return sizes_of(robot.model) | {"signals": signals, "width": width}
+
+
+class Finished(NamedTuple):
+    """A finished simulation."""
 
     status: int
     time: float
@@ -199,36 +189,36 @@ class Course(NamedTuple):
     """Wall time in s, shared with the other lanes of the same core."""
 
 
-def make_outcome(prepared: PreparedGait, course: Course) -> SimulationResult:
+def make_outcome(prepared: Prepared, finished: Finished) -> SimulationResult:
     """The result of a simulation; raises Diverged or StepBudgetExceeded if it failed."""
     scenario = prepared.robot.scenario
-    if course.status != DONE:
-        raise _failure(course, scenario)
+    if finished.status != DONE:
+        raise _failure(finished, scenario)
     tolerance = scenario.settings_of(Compiled).tolerance
     return make_result(
         prepared.robot,
         prepared.gait,
-        course.motion,
-        totals=course.totals,
+        finished.motion,
+        totals=finished.totals,
         work=IntegratorWork(
             scheme="ros2",
             accuracy=tolerance,
-            steps=course.steps,
-            derivative_evaluations=course.evaluations,
+            steps=finished.steps,
+            derivative_evaluations=finished.evaluations,
         ),
-        wall_time=course.wall_time,
+        wall_time=finished.wall_time,
         record=prepared.record,
     )
 
 
-def _failure(course: Course, scenario: Scenario) -> SimulationFailure:
+def _failure(finished: Finished, scenario: Scenario) -> SimulationFailure:
     settings = scenario.simulation
     reasons = {
         TOO_FAST: f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s",
         STEP_TOO_SMALL: "no step is small enough for the tolerance",
         TOO_MANY_EVALUATIONS: f"force evaluations exceed the budget of {settings.max_evaluations}",
     }
-    kind = StepBudgetExceeded if course.status == TOO_MANY_EVALUATIONS else Diverged
-    failure = kind(time=course.time, reason=reasons[course.status])
-    failure.wall_time = course.wall_time
+    kind = StepBudgetExceeded if finished.status == TOO_MANY_EVALUATIONS else Diverged
+    failure = kind(time=finished.time, reason=reasons[finished.status])
+    failure.wall_time = finished.wall_time
     return failure

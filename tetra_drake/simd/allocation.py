@@ -1,0 +1,56 @@
+"""Tables whose shapes stand in the annotations of a NamedTuple.
+
+class Motion(NamedTuple):
+    state: Annotated[Table, "13 * bodies"]
+    rows: Annotated[Table, "bodies", 6, "width"]
+    passed: Annotated[Table, "bodies", int]
+
+motion = allocate(Motion, {"bodies": 5, "width": 12})
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
+
+import numpy as np
+
+Record = TypeVar("Record", bound=tuple)
+
+
+def allocate(kind: type[Record], sizes: Mapping[str, int], **given: object) -> Record:
+    """A NamedTuple of tables of zeros.
+
+    Args:
+        kind: The NamedTuple. An annotated table has the lengths of its dimensions: numbers, names
+            of sizes, or their products. With `int`, its numbers are whole. Any other field is a
+            NamedTuple of tables.
+        sizes: The sizes by name.
+        given: Fields that exist already.
+    """
+    fields: dict[str, Any] = {}
+    for name, hint in _hints(kind).items():
+        if name in given:
+            fields[name] = given[name]
+        elif get_origin(hint) is Annotated:
+            lengths = [length for length in hint.__metadata__ if length is not int]
+            whole = len(lengths) < len(hint.__metadata__)
+            shape = [_length(length, sizes) for length in lengths]
+            fields[name] = np.zeros(shape, dtype=np.int64 if whole else np.float64)
+        else:
+            fields[name] = allocate(hint, sizes)
+    return kind(**fields)
+
+
+@functools.cache
+def _hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
+
+def _length(length: int | str, sizes: Mapping[str, int]) -> int:
+    if isinstance(length, int):
+        return length
+    factors = (factor.strip() for factor in length.split("*"))
+    return math.prod(int(factor) if factor.isdigit() else sizes[factor] for factor in factors)
