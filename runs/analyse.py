@@ -11,8 +11,7 @@ import contextlib
 import json
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,10 +24,11 @@ from tetra_drake.analysis.statistics import json_rows
 from tetra_drake.engines.simulate import check_scenario, simulate_many
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.executors import evaluate_all, process_executor
+from tetra_drake.evolution.evaluators import MakeExecutor, evaluate_all, evaluator_of
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import json_number, write_whole
 from tetra_drake.machine import available_cores, versions
+from tetra_drake.optimizers.base import Task
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
@@ -125,9 +125,7 @@ def load_analysis(directory: Path) -> Analysis:
         raise InputError(path, "", problem) from error
 
 
-def analyse(
-    directory: Path, *, workers: int, executor: Callable[[int], Executor] = process_executor
-) -> None:
+def analyse(directory: Path, *, workers: int, executor: MakeExecutor | None = None) -> None:
     """Simulates what Analysis holds for a run's best gaits and writes analysis.json.
 
     `executor` is for all but the draws of disturbances.
@@ -192,19 +190,19 @@ def resimulate(
     scenario: Scenario,
     gaits: Mapping[int, Gait],
     workers: int,
-    executor: Callable[[int], Executor],
+    executor: MakeExecutor | None,
 ) -> list[dict[str, Any]]:
     """The gaits with every setting, as in Analysis."""
     space = ParameterSpace.of(scenario)
-    vectors = [space.vector(gait) for gait in gaits.values()]
+    tasks = [Task(space.vector(gait), trial) for trial, gait in gaits.items()]
     rows = []
     for name, changed in settings_of(scenario).items():
-        evaluations = dict(
-            evaluate_all(GaitEvaluation(changed), vectors, workers=workers, executor=executor)
-        )
-        for i, trial in enumerate(gaits):
-            distance = json_number(evaluations[i].metrics.get("distance", math.nan) / INCH)
-            outcome = {"distance_in": distance, "failure": evaluations[i].failure}
+        evaluate = GaitEvaluation(changed)
+        with evaluator_of(evaluate, workers=workers, executor=executor, warn=print) as evaluator:
+            evaluations = {t.trial: evaluation for t, evaluation in evaluate_all(evaluator, tasks)}
+        for trial in gaits:
+            distance = json_number(evaluations[trial].metrics.get("distance", math.nan) / INCH)
+            outcome = {"distance_in": distance, "failure": evaluations[trial].failure}
             rows.append({"trial": trial, "setting": name} | outcome)
     return rows
 

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import pandas
 import pytest
-from helpers.analytic import Bowl, RandomSearch, read_record, small_scenario
+from helpers.analytic import Bowl, RandomSearch, in_threads, read_record, small_scenario
 from helpers.meshcat_page import commands, read_page
 
 import tetra_drake
 from tetra_drake import cli
 from tetra_drake.analysis.elites import elites
 from tetra_drake.errors import InputError
+from tetra_drake.evolution.evaluators import OnExecutor
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
@@ -56,10 +57,10 @@ class Heaviest:
 
 @pytest.fixture
 def interrupting():
-    """An executor that ends a run by Ctrl-C after three tasks, of one or more evaluations."""
+    """An executor that ends a run by Ctrl-C after five tasks."""
 
     class Interrupting(ThreadPoolExecutor):
-        left = 3
+        left = 5
 
         def submit(self, *arguments):
             Interrupting.left -= 1
@@ -99,12 +100,11 @@ def test_a_run_is_evolved_checked_on_the_diagram_and_reported(tiny, tmp_path, re
     # What is missing is evaluated again on the diagram, by the fitness of the scenario.
     path = tmp_path / "run" / "trial_00" / "reevaluations.jsonl"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
-    again = reevaluate(tmp_path / "run", executor=ThreadPoolExecutor).reevaluations
+    again = reevaluate(tmp_path / "run", workers=1).reevaluations
     assert again["fitness"].equals(run.reevaluations["fitness"])
     assert again["engine"].tolist() == ["drake"] * 5
     # A run that is complete is resumed without an engine.
-    for name in ("GaitEvaluation.__call__", "prepare"):
-        monkeypatch.delattr(f"tetra_drake.experiment.{name}")
+    monkeypatch.delattr("tetra_drake.experiment.evaluator_of")
     again = tetra_drake.evolve(None, tmp_path / "run", resume=True, progress=progress)
     assert again.evaluations.equals(run.evaluations)
 
@@ -125,7 +125,7 @@ def test_candidates_side_by_side_have_the_records_of_candidates_one_by_one(
     tiny, tmp_path, reports, monkeypatch
 ):
     prepared = []
-    monkeypatch.setattr("tetra_drake.experiment.prepare", lambda given, **_: prepared.append(given))
+    monkeypatch.setattr("tetra_drake.engines.simulate.prepare", prepared.append)
     several = tiny.with_changes({"evolution.trials": 3})
     ways = {"lanes": {"workers": 1}, "threads": {"workers": 3}, "executor": {"executor": OneByOne}}
     records = {}
@@ -149,7 +149,6 @@ def test_what_cannot_be_evolved_begins_no_run(tiny, tmp_path):
     for scenario, objective, problem in (
         (on_diagram.with_changes({"terrain": step}), None, "below the ground"),
         (None, None, "is needed"),
-        (on_diagram, lambda result: 1.0, "lambda"),
     ):
         with pytest.raises(InputError, match=problem):
             tetra_drake.evolve(scenario, tmp_path / "run", objective=objective)
@@ -325,7 +324,7 @@ def test_what_cannot_be_evaluated_again_is_named_and_the_report_is_written(
     tiny, tmp_path, reports, monkeypatch
 ):
     compiled_alone = tiny.with_changes({"simulation.duration": "3000 s"})
-    monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda *_: Bowl())
+    monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: in_threads())
     progress = Told()
     run = tetra_drake.evolve(compiled_alone, tmp_path / "run", progress=progress)
     assert reports == [run.directory] and run.reevaluations.empty
@@ -364,9 +363,8 @@ SMALL = ("--trials", "1", "--evaluations", "18", "--workers", "1")
 @pytest.fixture
 def evolve(monkeypatch, reports):
     """evolve("--out", ...): the command's exit status, on a cheap fitness and without a report."""
-    monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda *_: Bowl())
-    monkeypatch.setattr("tetra_drake.experiment.prepare", lambda scenario, **_: None)
-    monkeypatch.setattr("tetra_drake.experiment.process_executor", ThreadPoolExecutor)
+    for module in ("experiment", "evolution.reevaluation"):
+        monkeypatch.setattr(f"tetra_drake.{module}.evaluator_of", lambda *_, **__: in_threads())
     return lambda *options: cli.main(["evolve", *map(str, options)])
 
 
@@ -419,7 +417,11 @@ def test_an_interrupted_run_says_how_to_continue_once_there_is_one(
     evolve, tmp_path, capsys, monkeypatch, interrupting
 ):
     out = tmp_path / "my run"
-    monkeypatch.setattr("tetra_drake.experiment.process_executor", interrupting)
+    broken = {"evaluate": Bowl(), "make": interrupting, "workers": 1}
+    interrupting.left = 17
+    monkeypatch.setattr(
+        "tetra_drake.experiment.evaluator_of", lambda *_, **__: OnExecutor(**broken)
+    )
     assert evolve(*SMALL, "--out", out) == 130
     printed = capsys.readouterr()
     assert f"tetra-drake evolve --out '{out}' --resume" in printed.err

@@ -84,7 +84,7 @@ HEAVY = {"pydrake", "numba", "scipy", "cma", "ribs", "pandas", "xarray", "matplo
     [
         ("tetra_drake", HEAVY | {"numpy"}),
         ("tetra_drake.cli", HEAVY),
-        ("tetra_drake.evolution.trials", HEAVY),  # and so executors, which every worker imports
+        ("tetra_drake.evolution.trials", HEAVY),  # and so evaluators, which every worker imports
     ],
 )
 def test_an_import_is_light(module: str, absent: set[str]) -> None:

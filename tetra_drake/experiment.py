@@ -4,39 +4,27 @@ from __future__ import annotations
 
 import contextlib
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from numbers import Integral
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tetra_drake.analysis.elites import judge_elites
-from tetra_drake.engines.interface import engine_of
-from tetra_drake.engines.simulate import check_scenario, prepare
+from tetra_drake.engines.simulate import check_scenario
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.evolution import reevaluation
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
-from tetra_drake.evolution.executors import (
-    MakeExecutor,
-    check_guard,
-    check_sendable,
-    process_executor,
-    thread_executor,
-)
+from tetra_drake.evolution.evaluators import MakeExecutor, check_guard, evaluator_of
 from tetra_drake.evolution.manifest import Manifest, Method, read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.evolution.trials import Trial, check_fitness, open_trials, run_trials
+from tetra_drake.evolution.trials import check_fitness, open_trials, run_trials
 from tetra_drake.files import given_path
 from tetra_drake.machine import available_cores, versions
-from tetra_drake.optimizers import optimizer_of
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import given_scenario
 from tetra_drake.scenario.schema import Scenario
-
-if TYPE_CHECKING:
-    from tetra_drake.engines.compiled.lane_pool import LanePool
 
 
 def evolve(
@@ -69,16 +57,16 @@ def evolve(
         (see optimizers.base); by default the scenario's.
     objective: objective(result) -> float, to be maximised; by default the scenario's fitness. One
         that reads result.trajectory has the attribute `needs_trajectory = True`.
-    executor: executor(workers) makes a concurrent.futures.Executor; by default worker processes,
-        for which an objective must be defined in a module. On the compiled engine, by default,
-        threads simulate the candidates of all trials side by side; see simulate_many. Others:
-        evolution.cluster.dask_cluster(), mpi4py.futures.MPIPoolExecutor.
+    executor: executor(workers) makes a concurrent.futures.Executor, such as mpi4py's
+        MPIPoolExecutor; see also evolution.cluster.dask_cluster(). By default the compiled engine
+        simulates candidates of all trials side by side, as simulate_many() does; others do in
+        worker processes, or one by one where these cannot get an objective, as in a notebook.
     progress: shown none by default; see evolution.progress.
     reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another,
         and simulates those of a map on disturbed robots.
     report: in the end, writes report.html, replay.html, figures/, elites/ (of a map).
 
-    Raises InputError for what cannot be used, EvaluationImpossible if no evaluation can run.
+    Raises InputError for what cannot be used, or if a gait ends its worker twice: then resume.
     """
     check_guard()
     _check_counts(seed=(seed, 0), workers=(workers, 1))
@@ -86,56 +74,42 @@ def evolve(
     if not isinstance(progress, Progress | None):
         problem = f"found {progress!r}, expected an evolution.progress.Progress"
         raise InputError("evolve", "progress", problem)
-    out, progress = given_path(out, "evolve", "out"), progress or Progress()
-    workers = getattr(executor, "workers", None) or workers or available_cores()
-    given = None if scenario is None else given_scenario(scenario)
-    scenario = read_manifest(out).scenario if resume else given
     if resume and overwrite:
         raise InputError("evolve", "overwrite", "excludes resume")
+    out, progress = given_path(out, "evolve", "out"), progress or Progress()
+    given = None if scenario is None else given_scenario(scenario)
+    scenario = read_manifest(out).scenario if resume else given
     if scenario is None:
         raise InputError("scenario", "", "is needed to begin a run")
-    check_scenario(scenario)  # before there is a directory
-    make_optimizer = optimizer or optimizer_of(scenario.optimizer)
+    check_scenario(scenario)
     method = Method.of(scenario, objective=objective, optimizer=optimizer)
-    lane_pool = engine_of(scenario).lane_pool if executor is None else None
-    where = thread_executor if lane_pool else executor or process_executor
     if resume:
         record = RunRecord.resume(out, scenario=given, seed=seed, method=method)
     else:
-        check_sendable(GaitEvaluation(scenario, objective), where)
         record = RunRecord.create(
             out, scenario=scenario, seed=int(seed or 0), method=method, overwrite=overwrite
         )
     with record, progress:
-        progress.say(_introduction(out, record.manifest, workers, report=report))
+        cores = getattr(executor, "workers", None) or workers or available_cores()
+        progress.say(_introduction(out, record.manifest, cores, report=report))
         _warn_of_versions(record.manifest, progress)
         if not resume and (remark := Robot.of(scenario).gain_remark()):
             progress.warn(remark)
-        trials = open_trials(record, optimizer=make_optimizer)
-        if resume and (objective is not None or any(trial.unevaluated for trial in trials)):
-            alone = GaitEvaluation(scenario, objective)
-            check_fitness(trials, out, evaluate=alone, executor=where)
-        if lane_pool:
-            with lane_pool(workers) as lanes:
-                _run_in_lanes(trials, scenario, objective, lanes, progress)
-        else:
-            _run(trials, scenario, objective, workers, where, progress)
-        if reevaluate and scenario.engine_name != "drake":
-            with _completing(progress, "the best gaits were not evaluated on the Drake diagram"):
-                reevaluation.reevaluate(
-                    out,
-                    objective,
-                    workers=workers,
-                    executor=executor or process_executor,
-                    progress=progress,
-                )
+        trials = open_trials(record, optimizer=optimizer)
+        progress.show([trial.status for trial in trials])
+        unfinished = any(trial.unevaluated for trial in trials)
+        if unfinished or (resume and objective is not None):
+            evaluate = GaitEvaluation(scenario, objective)
+            with evaluator_of(
+                evaluate, workers=workers, executor=executor, warn=progress.warn
+            ) as evaluator:
+                if resume:
+                    check_fitness(trials, out, evaluator)
+                run_trials(trials, evaluator, show=progress.show)
         if reevaluate:
-            with _completing(progress, "gaits of the map were not simulated on disturbed robots"):
-                judge_elites(out, workers=None if executor else workers)
+            _simulate_again(record, objective, workers, executor, progress)
         if report:
-            again = f"try again with: {_draw_again(out)}"
-            with _completing(progress, f"the report was not written; {again}"):
-                _write_report(out, progress)
+            _report(out, progress)
     return load_run(out)
 
 
@@ -154,36 +128,23 @@ def _check_functions(**given: object) -> None:
             raise InputError("evolve", name, f"found {value!r}, expected a function")
 
 
-def _run_in_lanes(
-    trials: Sequence[Trial],
-    scenario: Scenario,
+def _simulate_again(
+    record: RunRecord,
     objective: Objective | None,
-    lanes: LanePool,
+    workers: int | None,
+    executor: MakeExecutor | None,
     progress: Progress,
 ) -> None:
-    """Runs the trials to their ends, the gaits of all of them side by side on each core."""
-    run_trials(
-        trials,
-        evaluate=GaitEvaluation(scenario, objective, lanes),
-        workers=lanes.capacity,
-        executor=thread_executor,
-        show=progress.show,
-    )
-
-
-def _run(
-    trials: Sequence[Trial],
-    scenario: Scenario,
-    objective: Objective | None,
-    workers: int,
-    executor: MakeExecutor,
-    progress: Progress,
-) -> None:
-    """Runs the trials to their ends on an executor's workers."""
-    if any(trial.unevaluated for trial in trials):
-        prepare(scenario, many=True)
-    evaluate = GaitEvaluation(scenario, objective)
-    run_trials(trials, evaluate=evaluate, workers=workers, executor=executor, show=progress.show)
+    """Evaluates the best gaits on the Drake diagram, unless that was the engine, and simulates
+    those of a map on disturbed robots."""
+    directory = record.directory
+    if record.manifest.scenario.engine_name != "drake":
+        with _completing(progress, "the best gaits were not evaluated on the Drake diagram"):
+            reevaluation.reevaluate(
+                directory, objective, workers=workers, executor=executor, progress=progress
+            )
+    with _completing(progress, "gaits of the map were not simulated on disturbed robots"):
+        judge_elites(directory, workers=None if executor else workers)
 
 
 @contextlib.contextmanager
@@ -224,8 +185,11 @@ def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
         )
 
 
-def _write_report(directory: Path, progress: Progress) -> None:
+def _report(directory: Path, progress: Progress) -> None:
+    """Writes the report."""
     from tetra_drake.report.run_page import write_report
 
-    progress.say("drawing figures and the report")
-    write_report(directory)
+    again = f"try again with: {_draw_again(directory)}"
+    with _completing(progress, f"the report was not written; {again}"):
+        progress.say("drawing figures and the report")
+        write_report(directory)

@@ -13,18 +13,19 @@ import numpy as np
 import pytest
 from helpers.analytic import (
     Bowl,
-    Chunked,
     Deadly,
     DrawnBowl,
     drawn_scenario,
+    in_threads,
     is_deadly,
     read_record,
     record_run,
+    tasks_of,
 )
 
 from tetra_drake import cli
 from tetra_drake.evolution.cluster import dask_cluster, local_cluster
-from tetra_drake.evolution.executors import evaluate_all
+from tetra_drake.evolution.evaluators import OnExecutor, evaluate_all
 from tetra_drake.robot.gait import ParameterSpace
 
 dask, distributed = pytest.importorskip("dask"), pytest.importorskip("distributed")
@@ -45,19 +46,28 @@ def cluster(one_cluster):
 
 
 @pytest.fixture
-def vectors(scenario):
+def tasks(scenario):
     generator, space = np.random.default_rng(2), ParameterSpace.of(scenario)
-    return [space.random(generator) for _ in range(40)]
+    return tasks_of(space.random(generator) for _ in range(40))
 
 
-def test_only_what_ends_its_worker_fails_and_its_chunk_does_not(cluster, vectors, monkeypatch):
-    monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
-    tasks = [vector for vector in vectors if not is_deadly(vector.tolist())][:14]
-    tasks.insert(12, next(vector for vector in vectors if is_deadly(vector.tolist())))
-    with dask_cluster(cluster) as executor:
-        evaluations = dict(evaluate_all(Chunked(Deadly()), tasks, executor=executor))
-    assert evaluations.pop(12).failure == "its process died"
-    assert evaluations == {i: Bowl()(task) for i, task in enumerate(tasks) if i != 12}
+def test_what_ends_its_worker_is_named_and_the_others_are_evaluated(
+    cluster, tasks, monkeypatch, refused
+):
+    monkeypatch.setattr(cluster.scheduler, "allowed_failures", 1)
+    chosen = [task for task in tasks if not is_deadly(task.vector)][:14]
+    deadly = next(task for task in tasks if is_deadly(task.vector))
+    chosen.insert(12, deadly)
+    others = {}
+    with (
+        refused(deadly, "", "died"),
+        dask_cluster(cluster) as make,
+        OnExecutor(Deadly(), make, 2) as evaluator,
+    ):
+        for task, evaluation in evaluate_all(evaluator, chosen):
+            others[task.index] = evaluation
+    assert others == {i: Bowl()(tasks[i]) for i in others}
+    assert deadly.index not in others
 
 
 def test_only_this_machine_can_reach_the_cluster(cluster):
@@ -81,25 +91,31 @@ class Killer:
             self.killed += 1
 
 
-def record_on(executor, directory, **options):
-    """The record of two trials of 28 evaluations among draws, in chunks."""
-    evaluate = Chunked(DrawnBowl(delay=0.05))
-    scenario = drawn_scenario(iterations=8)
-    record_run(directory, scenario, evaluate=evaluate, executor=executor, **options)
+DRAWN = DrawnBowl(delay=0.05)
+
+
+def record_on(evaluator, directory, **options):
+    """The record of two trials of 28 evaluations among draws."""
+    record_run(directory, drawn_scenario(iterations=8), evaluator=evaluator, **options)
     return read_record(directory)
 
 
 def test_killed_workers_leave_no_trace(cluster, tmp_path):
     killer = Killer(cluster)
-    whole = record_on(ThreadPoolExecutor, tmp_path / "whole")
-    with dask_cluster(cluster) as executor:
-        assert record_on(executor, tmp_path / "disturbed", show=killer) == whole
+    whole = record_on(in_threads(DRAWN), tmp_path / "whole")
+    with dask_cluster(cluster) as make:
+        disturbed = OnExecutor(DRAWN, make, 2)
+        assert record_on(disturbed, tmp_path / "disturbed", show=killer) == whole
     assert killer.killed >= 1
 
 
-def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, vectors):
-    with dask_cluster(cluster) as executor, pytest.raises(KeyboardInterrupt):
-        for _ in evaluate_all(Bowl(delay=1.0), vectors[:8], executor=executor):
+def test_an_interrupted_run_leaves_nothing_in_the_queue(cluster, tasks):
+    with (
+        pytest.raises(KeyboardInterrupt),
+        dask_cluster(cluster) as make,
+        OnExecutor(Bowl(delay=1.0), make, 2) as evaluator,
+    ):
+        for _ in evaluate_all(evaluator, tasks[:8]):
             assert cluster.scheduler.tasks
             raise KeyboardInterrupt
     deadline = time.monotonic() + 10.0
@@ -119,10 +135,12 @@ def test_workers_with_other_versions_are_refused(cluster, refused):
 
 
 def test_the_command_starts_a_cluster_or_says_what_it_cannot_use(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("tetra_drake.experiment.GaitEvaluation", lambda scenario, objective: Bowl())
+    def evaluator_of(evaluate, *, executor, **_):
+        return OnExecutor(Bowl(), executor or ThreadPoolExecutor, 1)
+
+    for module in ("experiment", "evolution.reevaluation"):
+        monkeypatch.setattr(f"tetra_drake.{module}.evaluator_of", evaluator_of)
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda directory: None)
-    monkeypatch.setattr("tetra_drake.experiment.process_executor", ThreadPoolExecutor)
-    monkeypatch.setattr("tetra_drake.experiment.prepare", lambda scenario, **_: None)
     command = ["evolve", "--scenario", "quick", "--evaluations", "16", "--workers", "1"]
     for name, executor in (("dask", ("--dask",)), ("local", ())):
         assert cli.main([*command, "--out", str(tmp_path / name), *executor]) == 0

@@ -4,7 +4,6 @@ import dataclasses
 import json
 import math
 import re
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -12,18 +11,23 @@ from helpers.analytic import (
     TAIL,
     DrawnBowl,
     drawn_scenario,
+    evaluated,
+    in_threads,
     record_run,
     small_scenario,
+    tasks_of,
 )
 from helpers.quantities import with_unit
 from pytest import approx
 
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.evolution.draws import SeededVector, combine_metrics, worst_mean
+from tetra_drake.evolution.draws import combine_metrics, worst_mean
 from tetra_drake.evolution.evaluation import GaitEvaluation
+from tetra_drake.evolution.evaluators import InLanes
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run import load_run
+from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
@@ -68,18 +72,18 @@ def test_a_gait_is_simulated_in_each_of_its_draws(tiny, vector):
     results = by_hand(tiny, vector)
     fitnesses = [result.fitness for result in results]
     twists = [result.metrics.twist for result in results]
-    combined = GaitEvaluation(tiny)(SeededVector(vector, SEED))
+    combined = GaitEvaluation(tiny)(Task(vector, seed=SEED))
     assert len(set(fitnesses)) == 3
     assert combined.draws["fitness"] == fitnesses
     assert combined.draws["distance"] == [result.metrics.distance for result in results]
     assert combined.fitness == approx(np.mean(fitnesses), rel=1e-14)
     assert combined.metrics["twist"] == approx(np.mean(twists), rel=1e-14)
-    other = GaitEvaluation(tiny)(SeededVector(vector, (5, 0, 4)))
+    other = GaitEvaluation(tiny)(Task(vector, seed=(5, 0, 4)))
     assert other.draws["fitness"] != fitnesses
     # Another objective, and the worst half of the draws.
     half = tiny.with_changes({"disturbances.tail": 0.5})
     far = GaitEvaluation(half, lambda result: -abs(result.metrics.distance))
-    combined = far(SeededVector(vector, SEED))
+    combined = far(Task(vector, seed=SEED))
     assert combined.draws["fitness"] == [-abs(distance) for distance in combined.draws["distance"]]
     least, second, _ = sorted(combined.draws["fitness"])
     assert combined.fitness == approx((least + second / 2) / 1.5, rel=1e-14)
@@ -94,12 +98,10 @@ def test_in_lanes_each_draw_has_one_robot_for_all_gaits_of_an_iteration(tiny, mo
 
     monkeypatch.setattr(Robot, "of", counted)
     generator, space = np.random.default_rng(2), ParameterSpace.of(tiny)
-    tasks = [SeededVector(space.random(generator), SEED) for _ in range(6)]
-    with LanePool(2) as lanes:
-        evaluate = GaitEvaluation(tiny, None, lanes)
-        first = evaluate(tasks[0])
-        with ThreadPoolExecutor(5) as executor:
-            rest = list(executor.map(evaluate, tasks[1:]))
+    tasks = tasks_of((space.random(generator) for _ in range(6)), SEED)
+    with InLanes(GaitEvaluation(tiny), LanePool(2)) as lanes:
+        first = lanes.submit(tasks[0]).result()
+        rest = evaluated(lanes, tasks[1:]).values()
     assert len({gait.fitness for gait in (first, *rest)}) == 6
     assert len(made) == 3
 
@@ -127,9 +129,9 @@ def test_metrics_are_means_but_for_the_least_clearance_and_tension():
 
 def test_a_gait_that_misses_a_requirement_has_failed_with_its_metrics(tiny, vector):
     still = tiny.with_changes({"disturbances": None})
-    walked = GaitEvaluation(still)(vector)
+    walked = GaitEvaluation(still)(Task(vector))
     demanding = {"require": {"lead": "3 ft", "distance": "-9 in"}}
-    failed = GaitEvaluation(still.with_changes(demanding))(vector)
+    failed = GaitEvaluation(still.with_changes(demanding))(Task(vector))
     assert (failed.fitness, failed.metrics) == (-math.inf, walked.metrics)
     assert failed.failure.startswith("requirement: lead is ")
     assert failed.failure.endswith(" 36 in") and "distance" not in failed.failure
@@ -140,7 +142,7 @@ def test_a_requirement_missed_in_one_draw_is_missed(tiny, vector):
     least = sorted(distances)[1]
     missed = distances.index(min(distances))
     strict = tiny.with_changes({"require": {"distance": with_unit(least, "m")}})
-    failed = GaitEvaluation(strict)(SeededVector(vector, SEED))
+    failed = GaitEvaluation(strict)(Task(vector, seed=SEED))
     assert failed.failure.startswith(f"draw {missed}: requirement: distance is ")
     assert (failed.fitness, failed.draws) == (-math.inf, None)
     assert failed.metrics["distance"] == approx(np.mean(distances), rel=1e-14)
@@ -164,13 +166,13 @@ def test_a_draw_that_fails_or_cannot_start_fails_its_gait_with_and_without_lanes
     tiny, vector, change, kind
 ):
     scenario = change(tiny)
-    tasks = [SeededVector(vector, (1, 0, iteration)) for iteration in range(4)]
-    with LanePool(1) as lanes:
-        alone, beside = (
-            [dataclasses.replace(evaluate(task), wall_time=0.0) for task in tasks]
-            for evaluate in (GaitEvaluation(scenario), GaitEvaluation(scenario, None, lanes))
-        )
-    assert alone == beside
+    tasks = [Task(vector, index=i, seed=(1, 0, i)) for i in range(4)]
+    evaluate = GaitEvaluation(scenario)
+    alone = [dataclasses.replace(evaluate(task), wall_time=0.0) for task in tasks]
+    with InLanes(evaluate, LanePool(1)) as lanes:
+        beside = evaluated(lanes, tasks)
+    for i, evaluation in enumerate(alone):
+        assert dataclasses.replace(beside[i], wall_time=0.0) == evaluation
     failed = [gait for gait in alone if gait.failure]
     assert failed
     for gait in failed:
@@ -222,8 +224,9 @@ def test_the_record_has_each_draw_and_its_tables_the_worst(run_drawn):
 
 
 def test_a_gait_is_evaluated_once_more_among_the_draws_that_it_had(run_drawn, monkeypatch):
-    monkeypatch.setattr("tetra_drake.evolution.reevaluation.GaitEvaluation", lambda *_: BOWL)
-    run = reevaluate(run_drawn(), workers=1, executor=ThreadPoolExecutor)
+    name = "tetra_drake.evolution.reevaluation.evaluator_of"
+    monkeypatch.setattr(name, lambda *_, **__: in_threads(BOWL))
+    run = reevaluate(run_drawn())
     again = run.reevaluations.set_index(["trial", "index"])
     first = run.evaluations.set_index(["trial", "index"]).loc[again.index]
     assert len(again) == 2, "the best of each trial: 5 gaits would be 15 simulations"

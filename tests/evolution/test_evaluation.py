@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.analytic import small_scenario
+from helpers.analytic import evaluated, small_scenario, tasks_of
 
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import check_time
-from tetra_drake.evolution.draws import SeededVector
 from tetra_drake.evolution.evaluation import GaitEvaluation
-from tetra_drake.evolution.executors import evaluate_all
+from tetra_drake.evolution.evaluators import InLanes, InProcesses
+from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.settings import Disturbances
 
@@ -33,8 +33,10 @@ def vectors(tiny):
 
 
 def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vectors):
-    here = [GaitEvaluation(tiny)(vector) for vector in vectors]
-    there = dict(evaluate_all(GaitEvaluation(tiny), vectors, workers=1))
+    tasks = tasks_of(vectors)
+    here = [GaitEvaluation(tiny)(task) for task in tasks]
+    with InProcesses(GaitEvaluation(tiny), 1) as processes:
+        there = evaluated(processes, tasks)
     for index, vector in enumerate(vectors):
         gait = ParameterSpace.of(tiny).gait(vector, name="any")
         result = simulate(scenario=tiny, gait=gait, record=True)
@@ -43,7 +45,7 @@ def test_an_evaluation_is_that_of_its_gait_bit_for_bit_in_any_process(tiny, vect
         assert there[index].engine == "drake"
         assert there[index].wall_time > 0.0
     assert here[0].fitness != here[1].fitness
-    twisting = GaitEvaluation(tiny, lambda result: -result.metrics.twist - 1.0)(vectors[0])
+    twisting = GaitEvaluation(tiny, lambda result: -result.metrics.twist - 1.0)(tasks[0])
     assert twisting.fitness == -here[0].metrics["twist"] - 1.0
     assert twisting.metrics == here[0].metrics
 
@@ -59,9 +61,9 @@ def test_an_objective_that_reads_the_trajectory_says_so(
 ):
     scenario = tiny.with_changes({"engine": engine})
     with refused("objective", "", "needs_trajectory"):
-        GaitEvaluation(scenario, highest)(vectors[0])
+        GaitEvaluation(scenario, highest)(Task(vectors[0]))
     monkeypatch.setattr(highest, "needs_trajectory", True, raising=False)
-    evaluation = GaitEvaluation(scenario, highest)(vectors[0])
+    evaluation = GaitEvaluation(scenario, highest)(Task(vectors[0]))
     gait = ParameterSpace.of(scenario).gait(vectors[0], name="any")
     result = simulate(scenario, gait, record=True)
     assert evaluation.fitness == highest(result) > 0.05
@@ -77,7 +79,7 @@ def test_an_objective_that_reads_the_trajectory_says_so(
     ],
 )
 def test_failures_say_why_and_have_the_worst_fitness(tiny, vectors, changes, objective, kind):
-    failed = GaitEvaluation(tiny.with_changes(changes), objective)(vectors[0])
+    failed = GaitEvaluation(tiny.with_changes(changes), objective)(Task(vectors[0]))
     assert failed.failure.startswith(kind)
     assert (failed.fitness, failed.metrics) == (-math.inf, {})
 
@@ -85,15 +87,16 @@ def test_failures_say_why_and_have_the_worst_fitness(tiny, vectors, changes, obj
 def test_evaluations_in_lanes_keep_their_budgets(tiny, vectors):
     compiled = tiny.with_changes({"engine": "!Compiled"})
     endless = {"simulation.duration": "1 h", "evolution.time_budget": "0.05 s"}
-    with LanePool(1) as lanes:
-        for changes, kind in (
-            ({"simulation.max_evaluations": 50}, "step budget: "),
-            ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, "diverged: "),
-            (endless, "time budget: "),
-        ):
-            failed = GaitEvaluation(compiled.with_changes(changes), None, lanes)(vectors[0])
-            assert failed.failure.startswith(kind)
-            assert failed.wall_time > 0.0
+    for changes, kind in (
+        ({"simulation.max_evaluations": 50}, "step budget: "),
+        ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, "diverged: "),
+        (endless, "time budget: "),
+    ):
+        evaluate = GaitEvaluation(compiled.with_changes(changes))
+        with InLanes(evaluate, LanePool(1)) as lanes:
+            failed = lanes.submit(Task(vectors[0])).result()
+        assert failed.failure.startswith(kind)
+        assert failed.wall_time > 0.0
 
 
 @pytest.mark.parametrize("engine", ["drake", "compiled", "mujoco"])
@@ -103,7 +106,7 @@ def test_time_budgets_hold_in_any_thread_and_end_with_their_evaluation(tiny, vec
     changes = {"engine": f"!{engine.capitalize()}", "simulation.duration": "60.0 s"}
     late = GaitEvaluation(tiny.with_changes(changes | {"evolution.time_budget": "0.01 s"}))
     with ThreadPoolExecutor(1) as thread:
-        failed = thread.submit(late, vectors[0]).result()
+        failed = thread.submit(late, Task(vectors[0])).result()
         assert failed.failure == "time budget: not done after 0.01 s"
         assert thread.submit(check_time).exception() is None
 
@@ -113,13 +116,22 @@ def test_many_gaits_in_lanes_are_those_gaits_one_by_one(tiny, vectors):
     draws = Disturbances(draws=2, start=0.1)
     among = compiled.with_changes({"disturbances": draws})
     for scenario, tasks in (
-        (compiled, vectors),
-        (among, [SeededVector(vector, (1, 2, 3)) for vector in vectors]),
+        (compiled, tasks_of(vectors)),
+        (among, tasks_of(vectors, (1, 2, 3))),
     ):
         evaluate = GaitEvaluation(scenario)
-        assert evaluate.side_by_side > 1
-        alone, together = [evaluate(task) for task in tasks], evaluate.many(tasks)
-        for one, other in zip(alone, together, strict=True):
-            assert replace(one, wall_time=0.0) == replace(other, wall_time=0.0)
-            assert other.wall_time > 0.0
-    assert GaitEvaluation(tiny).side_by_side == 1
+        alone = [evaluate(task) for task in tasks]
+        with InLanes(evaluate, LanePool(1)) as lanes:
+            together = evaluated(lanes, tasks)
+        for i, one in enumerate(alone):
+            assert replace(one, wall_time=0.0) == replace(together[i], wall_time=0.0)
+            assert together[i].wall_time > 0.0
+
+
+def test_an_error_of_an_objective_in_lanes_ends_the_run(tiny, vectors):
+    def objective(result):
+        raise ZeroDivisionError("mine")
+
+    evaluate = GaitEvaluation(tiny.with_changes({"engine": "!Compiled"}), objective)
+    with InLanes(evaluate, LanePool(1)) as lanes, pytest.raises(ZeroDivisionError, match="mine"):
+        evaluated(lanes, tasks_of(vectors))

@@ -1,10 +1,9 @@
 """Gaits of a run evaluated once more: which, how often, and what is kept of it."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
-from helpers.analytic import Bowl
+from helpers.analytic import Bowl, in_threads
 
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
@@ -17,9 +16,9 @@ class Slope:
     def __init__(self):
         self.asked = 0
 
-    def __call__(self, vector):
+    def __call__(self, task):
         self.asked += 1
-        bowl = Bowl(fails_every=10**9)(vector)
+        bowl = Bowl(fails_every=10**9)(task)
         return replace(bowl, metrics={"distance": bowl.metrics["distance"] - 0.5}, engine="drake")
 
 
@@ -28,13 +27,13 @@ def slope(monkeypatch):
     """Takes the place of the evaluation on the diagram."""
     evaluate = Slope()
     monkeypatch.setattr(
-        "tetra_drake.evolution.reevaluation.GaitEvaluation", lambda *given: evaluate
+        "tetra_drake.evolution.reevaluation.evaluator_of", lambda *_, **__: in_threads(evaluate)
     )
     return evaluate
 
 
 def again(directory, **options):
-    return reevaluate(directory, workers=2, executor=ThreadPoolExecutor, **options)
+    return reevaluate(directory, **options)
 
 
 def test_the_five_best_of_each_trial_are_evaluated_again(run_small, slope):

@@ -13,6 +13,7 @@ from thinning import last_population
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import append_lines, read_lines
 from tetra_drake.evolution.run import load_run
+from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.scenario.units import INCH
 
@@ -23,7 +24,7 @@ def test_a_run_loads_as_tables(run_small):
     assert len(run.evaluations) == 2 * 42
     row = run.evaluations.iloc[20]
     assert row["weight_3"] == run.vector(0, 20)[2]
-    expected = Bowl()(run.vector(0, 20))
+    expected = Bowl()(Task(run.vector(0, 20)))
     assert expected.failure or row["fitness"] == expected.fitness
     failed = run.evaluations["failure"].notna()
     assert failed.any()

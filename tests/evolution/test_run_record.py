@@ -18,7 +18,7 @@ from tetra_drake.evolution.manifest import Method, read_manifest
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.machine import versions
-from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation, Task
 
 
 def cut(path, lost):
@@ -343,7 +343,7 @@ def test_a_line_that_is_there_twice_is_refused(run_small, refused):
 
 
 def test_nothing_is_written_before_the_first_line(run_small, tmp_path):
-    def interrupt(genome):
+    def interrupt(task):
         raise InterruptedError
 
     with pytest.raises(InterruptedError):
@@ -355,7 +355,7 @@ def test_a_run_is_replaced_when_the_first_line_of_the_new_one_is_written(run_sma
     run = run_small()
     (run / "report.html").touch()
     before = read_record(run)
-    line = evaluation_entry(0, 0, np.ones(26), Evaluation(1.0))
+    line = evaluation_entry(Task(np.ones(26)), Evaluation(1.0))
     with RunRecord.create(run, scenario=small_scenario(), seed=6, overwrite=True) as record:
         trial = TrialRecord(record, 0)
         assert trial.recall(0, np.zeros(26)) is None
@@ -391,7 +391,7 @@ def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, 
     failed = Evaluation(-math.inf, {}, "why", 1.25)
     path = tmp_path / "trial_00" / "in_progress.jsonl"
     with create(tmp_path) as run:
-        TrialRecord(run, 0).keep(evaluation_entry(3, 1, genome, failed))
+        TrialRecord(run, 0).keep(evaluation_entry(Task(genome, index=3, iteration=1), failed))
         with path.open("a") as file:
             file.write('{"index": 4, "torn')
         record = TrialRecord(run, 0)

@@ -9,9 +9,9 @@ import pytest
 from helpers.analytic import Bowl, RandomSearch, read_record, record_run, small_scenario
 from thinning import last_population
 
-from tetra_drake.evolution.executors import process_executor
+from tetra_drake.evolution.evaluators import InProcesses, OnExecutor
 from tetra_drake.evolution.run import load_run
-from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation, Task
 
 
 def lines(path):
@@ -40,7 +40,7 @@ def test_every_evaluation_has_its_line_and_those_of_the_iterations_follow(run_sm
     assert [e["iteration"] for e in entries] == [0] * 12 + [1 + i // 2 for i in range(30)]
     assert [entry["placed"] for entry in entries[:12]] == list(range(12))
     for entry in entries:
-        expected = Bowl()(np.array(entry["genome"]))
+        expected = Bowl()(Task(np.array(entry["genome"])))
         assert entry["failure"] == expected.failure
         assert entry["fitness"] == (None if expected.failure else expected.fitness)
         assert entry["metrics"] == expected.metrics
@@ -62,8 +62,9 @@ def test_every_evaluation_has_its_line_and_those_of_the_iterations_follow(run_sm
 def test_neither_workers_nor_executor_nor_timing_change_the_record(run_small, tmp_path):
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
-    for name, workers, executor in (("pool", 2, process_executor), ("plain", 3, AtOnce)):
-        record_run(tmp_path / name, small_scenario(), workers=workers, executor=executor)
+    evaluators = {"pool": InProcesses(Bowl(), 2), "plain": OnExecutor(Bowl(), AtOnce, 3)}
+    for name, evaluator in evaluators.items():
+        record_run(tmp_path / name, small_scenario(), evaluator=evaluator)
         assert read_record(tmp_path / name) == reference
 
 
@@ -82,12 +83,12 @@ def test_trials_differ_and_do_not_depend_on_their_number(run_small):
 def test_as_many_evaluations_as_workers_are_under_way(run_small):
     under_way, most = set(), []
 
-    def evaluate(vector):
-        under_way.add(id(vector))
+    def evaluate(task):
+        under_way.add(str(task))
         most.append(len(under_way))
         time.sleep(0.002)
-        under_way.discard(id(vector))
-        return Bowl()(vector)
+        under_way.discard(str(task))
+        return Bowl()(task)
 
     run_small(workers=3, evaluate=evaluate)
     assert max(most) == 3

@@ -7,7 +7,7 @@ import json
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +16,13 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.evolution.draws import combine
-from tetra_drake.evolution.executors import MakeExecutor
+from tetra_drake.evolution.evaluators import Evaluator, OnExecutor, evaluate_all
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import TrialStatus, open_trials, run_trials
-from tetra_drake.optimizers.base import Evaluation, Iteration, MakeOptimizer
+from tetra_drake.optimizers.base import Evaluate, Evaluation, Iteration, MakeOptimizer, Task
 from tetra_drake.optimizers.steady_state import CHILDREN
+from tetra_drake.robot.gait import Vector
+from tetra_drake.scenario.disturbances import IterationSeed
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.schema import Scenario
 from tetra_drake.scenario.settings import Disturbances
@@ -34,7 +36,8 @@ class Bowl:
     delay: float = 0.0
     fails_every: int = 5
 
-    def __call__(self, genome):
+    def __call__(self, task):
+        genome = task.vector
         chance = hash(tuple(genome.tolist()))
         time.sleep(self.delay * (chance % 97) / 97)
         if chance % self.fails_every == 0:
@@ -52,20 +55,6 @@ def measures(genome):
     return {"travelling_index": genome[0] / 4.0, "lifted": genome[1] / 4.0}
 
 
-@dataclass(frozen=True)
-class Chunked:
-    """Another evaluation, which wants its tasks in chunks of a multiple of three."""
-
-    evaluate: Callable[[Any], Evaluation]
-    side_by_side = 3
-
-    def __call__(self, task):
-        return self.evaluate(task)
-
-    def many(self, tasks):
-        return [self.evaluate(task) for task in tasks]
-
-
 TAIL = 0.3
 
 
@@ -80,7 +69,7 @@ class DrawnBowl:
         draws = []
         for k in range(3):
             generator = np.random.default_rng([*task.seed, k])
-            draws.append(bowl(task.vector + generator.normal(size=task.vector.size)))
+            draws.append(bowl(Task(task.vector + generator.normal(size=task.vector.size))))
         return combine(draws, TAIL)
 
 
@@ -88,15 +77,15 @@ class DrawnBowl:
 class Deadly:
     """Kills its process for about one genome in eight."""
 
-    def __call__(self, genome):
-        if is_deadly(genome.tolist()):
+    def __call__(self, task):
+        if is_deadly(task.vector):
             os.kill(os.getpid(), signal.SIGKILL)
-        return Bowl()(genome)
+        return Bowl()(task)
 
 
 def is_deadly(genome):
-    """Whether Deadly dies of a genome, given as a list."""
-    return hash(tuple(genome)) % 8 == 0
+    """Whether Deadly dies of a genome."""
+    return hash(tuple(genome.tolist())) % 8 == 0
 
 
 def small_scenario(
@@ -119,25 +108,41 @@ def drawn_scenario(**options) -> Scenario:
     return small_scenario(**options).with_changes({"disturbances": settings})
 
 
+def in_threads(evaluate: Evaluate = BOWL, workers: int = 2) -> OnExecutor:
+    """An evaluator in threads."""
+    return OnExecutor(evaluate, ThreadPoolExecutor, workers)
+
+
+def evaluated(evaluator: Evaluator, tasks: Sequence[Task]) -> dict[int, Evaluation]:
+    """The evaluations of tasks, by their indices."""
+    return {task.index: evaluation for task, evaluation in evaluate_all(evaluator, tasks)}
+
+
+def tasks_of(vectors: Iterable[Vector], seed: IterationSeed | None = None) -> list[Task]:
+    """A task for each vector, numbered."""
+    return [Task(vector, index=index, seed=seed) for index, vector in enumerate(vectors)]
+
+
 def record_run(
     directory: Path,
     scenario: Scenario | None = None,
     *,
     seed: int = 5,
-    evaluate: Callable[[Any], Evaluation] = BOWL,
+    evaluate: Evaluate = BOWL,
     workers: int = 2,
-    executor: MakeExecutor = ThreadPoolExecutor,
+    evaluator: Evaluator | None = None,
     optimizer: MakeOptimizer | None = None,
     **options: Any,
 ) -> list[TrialStatus]:
-    """Begins a run in a new directory, or without a scenario goes on with one; its trials' ends."""
+    """Begins a run in a new directory, or without a scenario goes on with one; its trials' ends.
+    The evaluator is in_threads() by default."""
     if scenario is None:
         record = RunRecord.resume(directory)
     else:
         record = RunRecord.create(directory, scenario=scenario, seed=seed)
-    with record:
+    with record, evaluator or in_threads(evaluate, workers) as entered:
         trials = open_trials(record, optimizer=optimizer)
-        return run_trials(trials, evaluate=evaluate, workers=workers, executor=executor, **options)
+        return run_trials(trials, entered, **options)
 
 
 def read_record(directory: Path) -> dict[str, object]:

@@ -5,11 +5,10 @@ The executor is processes or threads.
 
 import signal
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from helpers.analytic import DrawnBowl, drawn_scenario
-from tetra_drake.evolution.executors import process_executor
+from helpers.analytic import DrawnBowl, drawn_scenario, in_threads
+from tetra_drake.evolution.evaluators import InProcesses
 from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.trials import open_trials, run_trials
@@ -21,11 +20,7 @@ if __name__ == "__main__":
         opened = RunRecord.resume(directory)
     else:
         opened = RunRecord.create(directory, scenario=drawn_scenario(iterations=150), seed=9)
-    with opened as record:
+    make = InProcesses if sys.argv[2] == "processes" else in_threads
+    with opened as record, make(DrawnBowl(delay=float(sys.argv[3])), 2) as evaluator:
         print("begun", flush=True)
-        run_trials(
-            open_trials(record),
-            evaluate=DrawnBowl(delay=float(sys.argv[3])),
-            workers=2,
-            executor=process_executor if sys.argv[2] == "processes" else ThreadPoolExecutor,
-        )
+        run_trials(open_trials(record), evaluator)

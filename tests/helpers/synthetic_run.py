@@ -10,7 +10,7 @@ import numpy as np
 from tetra_drake.evolution.entries import evaluation_entry
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
-from tetra_drake.optimizers.base import Evaluation
+from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
@@ -101,4 +101,5 @@ def _entry(index, iteration, fitness, scenario):
         inches |= {"twist": 0.0, "lateral_drift": 0.0}
         metrics = {name: value * INCH for name, value in inches.items()}
         evaluation = Evaluation(fitness, metrics, wall_time=0.5)
-    return evaluation_entry(index, iteration, genome, evaluation)
+    task = Task(genome, index=index, iteration=iteration)
+    return evaluation_entry(task, evaluation)

@@ -9,6 +9,6 @@ if os.environ.get("TETRA_DRAKE_LOADED_IN", str(os.getpid())) != str(os.getpid())
 os.environ["TETRA_DRAKE_LOADED_IN"] = str(os.getpid())
 
 
-def evaluate(vector):
+def evaluate(task):
     """As Bowl."""
-    return Bowl()(vector)
+    return Bowl()(task)

@@ -1,7 +1,5 @@
 """Making recorded runs: what is done is kept, and what is written can be read."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import pytest
 import record
 from analyse import ANALYSIS
@@ -28,7 +26,6 @@ def analysed(monkeypatch):
         (directory / ANALYSIS).write_text("{}")
 
     monkeypatch.setattr(record, "analyse", analyse)
-    monkeypatch.setattr("tetra_drake.experiment.process_executor", ThreadPoolExecutor)
 
     def take_pictures(page, *pictures):
         for picture in pictures:

@@ -1,12 +1,11 @@
 """A thinned run: the gaits that matter are whole, every evaluation is there."""
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas
 import pytest
-from helpers.analytic import Bowl
+from helpers.analytic import in_threads
 from helpers.synthetic_run import tiny_scenario, write_run
 from thinning import last_population, thin
 
@@ -118,8 +117,9 @@ def test_what_is_made_of_a_run_is_made_of_a_thinned_one(runs):
 
 def test_a_thinned_run_is_reevaluated_but_not_resumed(runs, refused, monkeypatch):
     _, thinned = runs
-    monkeypatch.setattr("tetra_drake.evolution.reevaluation.GaitEvaluation", lambda *_: Bowl())
-    again = reevaluate(thinned.directory, executor=ThreadPoolExecutor)
+    name = "tetra_drake.evolution.reevaluation.evaluator_of"
+    monkeypatch.setattr(name, lambda *_, **__: in_threads())
+    again = reevaluate(thinned.directory)
     assert len(again.reevaluations) == 1 + 2 * BEST_GAITS
     with refused(thinned.directory, "", "thinned"):
         RunRecord.resume(thinned.directory)

@@ -51,8 +51,8 @@ class Engine:
     def check(self, scenario: Scenario) -> None:
         """Raises InputError if the engine cannot simulate the scenario."""
 
-    def prepare(self, scenario: Scenario, *, many: bool) -> None:
-        """Compiles the kernels for simulations of one gait or many: simulates a moment."""
+    def prepare(self, scenario: Scenario) -> None:
+        """Compiles the kernels for simulations of one gait at a time: simulates a moment."""
         brief = max(_BRIEF, scenario.cpg.listing_step)
         if brief < scenario.simulation.duration:
             times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}

@@ -120,7 +120,6 @@ def check_scenario(scenario: Scenario) -> None:
     engine_of(scenario).check(scenario)
 
 
-def prepare(scenario: Scenario, *, many: bool = False) -> None:
-    """Compiles the scenario's engine, so that no simulation, nor one of many gaits, has to wait for
-    that."""
-    engine_of(scenario).prepare(scenario, many=many)
+def prepare(scenario: Scenario) -> None:
+    """Compiles the scenario's engine, so that no simulation has to wait for that."""
+    engine_of(scenario).prepare(scenario)

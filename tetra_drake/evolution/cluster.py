@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import time
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.executors import check_guard, deaf_to_ctrl_c
+from tetra_drake.evolution.evaluators import check_guard, deaf_to_ctrl_c
 from tetra_drake.machine import available_cores
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
-
-_COUNTING_PERIOD = 5.0  # s
 
 
 class DaskExecutors:
@@ -25,7 +22,6 @@ class DaskExecutors:
 
     def __init__(self, client: Client) -> None:
         self._client = client
-        self._counted, self._workers = -_COUNTING_PERIOD, 1
 
     def __call__(self, workers: int) -> Executor:
         # Not pure: a task that has killed its worker gets another chance under another key.
@@ -33,12 +29,8 @@ class DaskExecutors:
 
     @property
     def workers(self) -> int:
-        """The cluster's threads, counted every few seconds; 1 as long as there are none."""
-        if time.monotonic() > self._counted + _COUNTING_PERIOD:
-            with contextlib.suppress(OSError):  # the client is connecting again
-                self._workers = max(1, sum(self._client.nthreads().values()))
-            self._counted = time.monotonic()
-        return self._workers
+        """The cluster's threads."""
+        return sum(self._client.nthreads().values())
 
 
 @contextlib.contextmanager

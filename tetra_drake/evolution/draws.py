@@ -1,24 +1,15 @@
-"""Evaluations of a gait among disturbances: its draws, and one evaluation made of theirs."""
+"""The evaluation of a gait among disturbances, made of the evaluations of its draws."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.robot.gait import Vector
-from tetra_drake.scenario.disturbances import IterationSeed
 from tetra_drake.scenario.metric_units import LEAST, MOST
-
-
-class SeededVector(NamedTuple):
-    """A vector and the seed of the draws in which to evaluate it."""
-
-    vector: Vector
-    seed: IterationSeed
 
 
 def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:

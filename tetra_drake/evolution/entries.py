@@ -23,8 +23,7 @@ from typing import Any, NoReturn
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.json_lines import REMEDY, append_lines, read_lines, repair_torn_line
 from tetra_drake.files import json_number, make_folder
-from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.robot.gait import Vector
+from tetra_drake.optimizers.base import Evaluation, Task
 
 EVALUATIONS, ITERATIONS = "evaluations.jsonl", "iterations.jsonl"
 IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
@@ -42,14 +41,12 @@ def trial_folder(directory: Path, number: int) -> Path:
     return directory / f"trial_{number:02d}"
 
 
-def evaluation_entry(
-    index: int, iteration: int, vector: Vector, evaluation: Evaluation
-) -> dict[str, Any]:
+def evaluation_entry(task: Task, evaluation: Evaluation) -> dict[str, Any]:
     """An evaluation as a line of the record; the fitness of a failure is null."""
     entry = {
-        "index": index,
-        "iteration": iteration,
-        "genome": vector.tolist(),
+        "index": task.index,
+        "iteration": task.iteration,
+        "genome": task.vector.tolist(),
         "metrics": dict(evaluation.metrics),
         "fitness": json_number(evaluation.fitness),
         "failure": evaluation.failure,

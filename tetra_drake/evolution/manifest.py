@@ -26,9 +26,9 @@ from typing import Any
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.draws import SeededVector
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.machine import versions
+from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.schema import Scenario
@@ -113,12 +113,11 @@ class Manifest:
         gait = ParameterSpace.of(self.scenario).gait(vector, name=name)
         return dataclasses.replace(gait, scenario=self.scenario.name)
 
-    def task(self, vector: Vector, *, trial: int, iteration: int) -> Vector | SeededVector:
-        """Task that evaluates a vector, with the seed of its draws among
-        disturbances."""
-        if self.scenario.disturbances is None:
-            return vector
-        return SeededVector(vector, (self.seed, trial, iteration))
+    def task(self, vector: Vector, *, trial: int, index: int, iteration: int) -> Task:
+        """Task that evaluates a vector, with the seed of its draws among disturbances."""
+        draws = self.scenario.disturbances is not None
+        seed = (self.seed, trial, iteration) if draws else None
+        return Task(vector, trial, index, iteration, seed)
 
 
 def read_manifest(directory: Path) -> Manifest:

@@ -10,7 +10,7 @@ from pathlib import Path
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import REEVALUATIONS, evaluation_entry
 from tetra_drake.evolution.evaluation import GaitEvaluation, Objective
-from tetra_drake.evolution.executors import MakeExecutor, evaluate_all, process_executor
+from tetra_drake.evolution.evaluators import MakeExecutor, evaluate_all, evaluator_of
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
@@ -27,7 +27,7 @@ def reevaluate(
     objective: Objective | None = None,
     *,
     workers: int | None = None,
-    executor: MakeExecutor = process_executor,
+    executor: MakeExecutor | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """Evaluates a run's best gaits once more, on the Drake diagram, adds them to its record and
@@ -52,16 +52,17 @@ def reevaluate(
     missing = [row for row in rows if row[:2] not in done]
     if not missing:
         return run
-    vectors, tasks = [], []
+    tasks = []
     for trial, index, iteration in missing:
-        vectors.append(run.vector(trial, index))
-        tasks.append(manifest.task(vectors[-1], trial=trial, iteration=iteration))
+        vector = run.vector(trial, index)
+        tasks.append(manifest.task(vector, trial=trial, index=index, iteration=iteration))
     evaluate = GaitEvaluation(scenario.with_changes({"engine": "!Drake"}), objective)
     progress = progress or Progress()
     progress.stage(_TITLE, 0, len(missing))
-    results = evaluate_all(evaluate, tasks, workers=workers, executor=executor)
-    for finished, (i, evaluation) in enumerate(results, start=1):
-        trial, index, iteration = missing[i]
-        files[trial].append([evaluation_entry(index, iteration, vectors[i], evaluation)])
-        progress.stage(_TITLE, finished, len(missing))
+    chosen = evaluator_of(evaluate, workers=workers, executor=executor, warn=progress.warn)
+    with chosen as evaluator:
+        for finished, evaluated in enumerate(evaluate_all(evaluator, tasks), start=1):
+            task, _ = evaluated
+            files[task.trial].append([evaluation_entry(*evaluated)])
+            progress.stage(_TITLE, finished, len(missing))
     return load_run(run.directory)

@@ -11,18 +11,12 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.evolution.draws import SeededVector
 from tetra_drake.evolution.entries import evaluation_entry
-from tetra_drake.evolution.executors import (
-    EvaluationPool,
-    MakeExecutor,
-    evaluate_all,
-    process_executor,
-)
+from tetra_drake.evolution.evaluators import Evaluations, Evaluator, evaluate_all
 from tetra_drake.evolution.run_record import RunRecord, TrialRecord
 from tetra_drake.optimizers import optimizer_of
-from tetra_drake.optimizers.base import Evaluate, Evaluation, MakeOptimizer, Optimizer
-from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.optimizers.base import Evaluation, MakeOptimizer, Optimizer, Task
+from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.units import INCH
 
 _SHOW_PERIOD = 1.0  # s
@@ -60,18 +54,7 @@ class TrialStatus:
         self.best_distance_in = best_distance_in
 
 
-@dataclass(frozen=True)
-class Evaluated:
-    """A vector and its evaluation, as a line of the record numbers them."""
-
-    index: int
-    iteration: int
-    vector: Vector
-    evaluation: Evaluation
-
-    def entry(self) -> dict[str, Any]:
-        """The line of the record."""
-        return evaluation_entry(self.index, self.iteration, self.vector, self.evaluation)
+_Evaluated = tuple[Task, Evaluation]
 
 
 class Trial:
@@ -82,30 +65,25 @@ class Trial:
     def __init__(self, number: int, *, run: RunRecord, optimizer: Optimizer) -> None:
         self._manifest = run.manifest
         self.status = TrialStatus(number, self._manifest.scenario.evolution.evaluations)
-        self.unevaluated: dict[int, Vector] = {}
-        """Vectors to evaluate before the optimiser can go on, by index; empty at the end."""
-        self.recalled: Evaluated | None = None
-        """The first recorded vector with a fitness."""
+        self.unevaluated: dict[int, Task] = {}
+        """Tasks to evaluate before the optimiser can go on, by index; empty at the end."""
+        self.recalled: _Evaluated | None = None
+        """The first recorded task with a fitness."""
         self._optimizer = optimizer
         self._record = TrialRecord(run, number)
-        self._results: dict[int, Evaluated] = {}
-        """The evaluated vectors of this iteration, by index."""
-        self._best: Evaluated | None = None
-        self._saved: Evaluated | None = None
+        self._results: dict[int, _Evaluated] = {}
+        """The evaluated tasks of this iteration, by index."""
+        self._best: _Evaluated | None = None
+        self._saved: _Evaluated | None = None
         """The one whose gait is in the record as the best."""
         self._advance()
 
-    def task(self, vector: Vector, *, iteration: int | None = None) -> Vector | SeededVector:
-        """Task that evaluates a vector, by default one of the iteration under way."""
-        if iteration is None:
-            iteration = self.status.iteration + 1
-        return self._manifest.task(vector, trial=self.status.number, iteration=iteration)
-
-    def take(self, index: int, evaluation: Evaluation) -> bool:
+    def take(self, task: Task, evaluation: Evaluation) -> bool:
         """Takes an evaluation; True if that was the last of its iteration."""
-        self._add(index, self.unevaluated.pop(index), evaluation)
+        del self.unevaluated[task.index]
+        self._add(task, evaluation)
         if self.unevaluated:
-            self._record.keep(self._results[index].entry())
+            self._record.keep(evaluation_entry(task, evaluation))
             return False
         self._complete()
         self._advance()
@@ -125,20 +103,22 @@ class Trial:
     def _ask(self) -> None:
         """Begins an iteration: what is recorded of it is recalled, the rest is unevaluated."""
         self._results = {}
-        first = self.status.evaluations
+        first, trial = self.status.evaluations, self.status.number
+        iteration = self.status.iteration + 1
         batch = self._optimizer.ask()[: self.status.evaluations_at_most - first]
         for index, vector in enumerate(batch, start=first):
+            task = self._manifest.task(vector, trial=trial, index=index, iteration=iteration)
             evaluation = self._record.recall(index, vector)
             if evaluation is None:
-                self.unevaluated[index] = vector
+                self.unevaluated[index] = task
                 continue
-            self._add(index, vector, evaluation)
+            self._add(task, evaluation)
             if self.recalled is None and evaluation.failure is None:
-                self.recalled = self._results[index]
+                self.recalled = task, evaluation
 
-    def _add(self, index: int, vector: Vector, evaluation: Evaluation) -> None:
+    def _add(self, task: Task, evaluation: Evaluation) -> None:
         status = self.status
-        self._results[index] = Evaluated(index, status.iteration + 1, vector, evaluation)
+        self._results[task.index] = task, evaluation
         status.evaluations += 1
         status.failures += evaluation.failure is not None
         status.wall_time += evaluation.wall_time
@@ -146,33 +126,36 @@ class Trial:
     def _complete(self) -> None:
         """Tells the optimiser the results of an iteration, and records it."""
         results = [self._results[index] for index in sorted(self._results)]
-        outcome = self._optimizer.tell([result.evaluation for result in results])
-        for result in results:
-            fitness = self._best.evaluation.fitness if self._best else -math.inf
-            if result.evaluation.fitness > fitness:
-                self._best = result
-        entries = [result.entry() for result in results]
+        outcome = self._optimizer.tell([evaluation for _, evaluation in results])
+        for task, evaluation in results:
+            if evaluation.fitness > (self._best[1].fitness if self._best else -math.inf):
+                self._best = task, evaluation
+        entries = [evaluation_entry(*result) for result in results]
         if outcome.placed is not None:
             for entry, place in zip(entries, outcome.placed, strict=True):
                 entry["placed"] = place
-        best, status = self._best, self.status
+        status = self.status
         all_done = status.evaluations == status.evaluations_at_most
+        best_fitness, best_evaluation, distance = None, None, math.nan
+        if self._best is not None:
+            task, evaluation = self._best
+            best_fitness, best_evaluation = evaluation.fitness, task.index
+            distance = evaluation.metrics.get("distance", math.nan)
         line = {
             "iteration": status.iteration + 1,
             "evaluations": status.evaluations,
-            "best_fitness": best.evaluation.fitness if best else None,
-            "best_evaluation": best.index if best else None,
+            "best_fitness": best_fitness,
+            "best_evaluation": best_evaluation,
             "stop": ALL_DONE if all_done else outcome.stop,
             **outcome.report,
         }
         self._record.complete(entries, line)
-        distance = best.evaluation.metrics.get("distance", math.nan) if best else math.nan
         status.complete(line, best_distance_in=distance / INCH)
 
     def _save_best(self) -> None:
         if self._best is not None and self._best is not self._saved:
-            trial, index = self.status.number, self._best.index
-            gait = self._manifest.gait(self._best.vector, trial=trial, index=index)
+            task, _ = self._best
+            gait = self._manifest.gait(task.vector, trial=task.trial, index=task.index)
             self._record.save_best(gait, self._manifest.scenario)
             self._saved = self._best
 
@@ -193,51 +176,46 @@ def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) ->
 
 def run_trials(
     trials: Sequence[Trial],
+    evaluator: Evaluator,
     *,
-    evaluate: Evaluate,
-    workers: int,
-    executor: MakeExecutor = process_executor,
     show: Callable[[Sequence[TrialStatus]], None] = lambda statuses: None,
 ) -> list[TrialStatus]:
     """Runs trials to their ends, from wherever they are.
 
-    Their record depends on its scenario, method and seed only, not on the number of workers, the
-    executor, or interruptions.
+    Their record depends on its scenario, method and seed only, not on the evaluator or on
+    interruptions.
     """
     statuses = [trial.status for trial in trials]
     show(statuses)
-    waiting = [trial for trial in trials if trial.unevaluated]
-    if not waiting:
-        return statuses
-    with EvaluationPool[tuple[Trial, int]](evaluate, workers=workers, executor=executor) as pool:
-        while waiting or pool.busy:
-            for trial in waiting:
-                for index, vector in trial.unevaluated.items():
-                    pool.submit((trial, index), trial.task(vector))
-            done = pool.wait(_SHOW_PERIOD)
-            waiting = [trial for (trial, index), result in done if trial.take(index, result)]
-            show(statuses)
+    evaluations = Evaluations(evaluator)
+    waiting = list(trials)
+    while any(trial.unevaluated for trial in trials):
+        for trial in waiting:
+            evaluations.add(trial.unevaluated.values())
+        waiting = []
+        for task, evaluation in evaluations.wait(_SHOW_PERIOD):
+            trial = trials[task.trial]
+            if trial.take(task, evaluation):
+                waiting.append(trial)
+        show(statuses)
     return statuses
 
 
-def check_fitness(
-    trials: Sequence[Trial], directory: Path, *, evaluate: Evaluate, executor: MakeExecutor
-) -> None:
+def check_fitness(trials: Sequence[Trial], directory: Path, evaluator: Evaluator) -> None:
     """Evaluates the first recorded gait that has a fitness once more; InputError if its fitness is
     another now, so that no record ever holds two objectives."""
     for trial in trials:
-        recorded = trial.recalled
-        if recorded is None:
+        if trial.recalled is None:
             continue
-        task = trial.task(recorded.vector, iteration=recorded.iteration)
-        ((_, again),) = evaluate_all(evaluate, [task], workers=1, executor=executor)
-        fitness = recorded.evaluation.fitness
+        task, recorded = trial.recalled
+        ((_, again),) = evaluate_all(evaluator, [task])
+        fitness = recorded.fitness
         if again.fitness == fitness:
             return
         outcome = again.failure or f"fitness {again.fitness!r}"
         problem = (
-            f"trial {trial.status.number}, evaluation {recorded.index} has fitness {fitness!r}, "
-            f"and evaluated again {outcome}; resume the run with the objective, the versions of "
-            "the packages and the kind of processor it was begun with"
+            f"{task} has fitness {fitness!r}, and evaluated again {outcome}; resume the run "
+            "with the objective, the versions of the packages and the kind of processor it was "
+            "begun with"
         )
         raise InputError(directory, "objective", problem)

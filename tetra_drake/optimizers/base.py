@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tetra_drake.robot.gait import ParameterSpace, Vector
+from tetra_drake.scenario.disturbances import IterationSeed
 from tetra_drake.scenario.settings import EvolutionSection
 
 
@@ -33,9 +34,24 @@ class Evaluation:
         return cls(fitness=-math.inf, failure=reason)
 
 
-Evaluate = Callable[[Any], Evaluation]
-"""A pure function of a vector, or among disturbances of an evolution.draws.SeededVector; it must
-pickle to run in worker processes."""
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A vector to evaluate, numbered as in the record."""
+
+    vector: Vector
+    trial: int = 0
+    index: int = 0
+    """Number of the evaluation in its trial."""
+    iteration: int = 0
+    seed: IterationSeed | None = None
+    """Seed of its draws; None without disturbances."""
+
+    def __str__(self) -> str:
+        return f"trial {self.trial}, evaluation {self.index}"
+
+
+Evaluate = Callable[[Task], Evaluation]
+"""A pure function of a task; it must pickle to run in worker processes."""
 
 
 @dataclass(frozen=True)

@@ -231,8 +231,8 @@ def test_a_gait_that_takes_too_long_leaves_its_lane_to_others(short):
     gait, endless = seeded_gait(short), short.with_changes({"simulation.duration": "1 h"})
     with LanePool(1) as pool:
         with pytest.raises(TimeBudgetExceeded):
-            pool.result(*pool.submit([(endless, gait)], time_budget=0.05))
-        found = pool.result(*pool.submit([(short, gait)]))
+            pool.submit([(endless, gait)], time_budget=0.05)[0].result()
+        found = pool.submit([(short, gait)])[0].result()
     assert found.metrics == simulate(scenario=short, gait=gait).metrics
 
 
@@ -259,7 +259,7 @@ def test_an_error_of_the_engine_reaches_those_who_wait(short, monkeypatch):
             futures = pool.submit([(short, gait)] * 12)
             assert all(isinstance(future.exception(), MemoryError) for future in futures)
         (future,) = pool.submit([(short, gait)])
-        assert pool.result(future).metrics.distance != 0.0
+        assert future.result().metrics.distance != 0.0
 
 
 def test_the_end_of_a_pool_cancels_what_is_under_way(short):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
-from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
+from tetra_drake.engines.compiled.lane_engine import LaneEngine
 from tetra_drake.engines.compiled.lane_io import Prepared, make_outcome
 from tetra_drake.engines.compiled.lane_pool import LanePool
 from tetra_drake.engines.interface import Engine, Outcome, Viewer
@@ -25,11 +24,9 @@ class CompiledEngine(Engine):
 
     lane_pool = LanePool
 
-    def prepare(self, scenario: Scenario, *, many: bool) -> None:
+    def prepare(self, scenario: Scenario) -> None:
         prepared = Prepared.of(Robot.of(scenario), seeded_gait(scenario), record=False)
-        widths = {1, lanes_for(math.inf)} if many else {1}
-        for width in widths:
-            LaneEngine(prepared, width=width)
+        LaneEngine(prepared, width=1)
 
     def simulate(
         self,
@@ -55,7 +52,7 @@ class CompiledEngine(Engine):
         with LanePool(threads) as pool:
             for future in pool.submit(walks, record=record):
                 try:
-                    outcomes.append(pool.result(future))
+                    outcomes.append(future.result())
                 except SimulationFailure as failure:
                     outcomes.append(failure)
         return outcomes

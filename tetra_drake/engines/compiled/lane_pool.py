@@ -11,7 +11,7 @@ from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
-from tetra_drake.engines.compiled.lane_io import Finished, Prepared, make_outcome
+from tetra_drake.engines.compiled.lane_io import Prepared, make_outcome
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
@@ -35,7 +35,7 @@ class _Job:
     gait: Gait
     record: bool
     time_budget: float
-    future: Future[tuple[Prepared, Finished]] = field(default_factory=Future)
+    future: Future[SimulationResult] = field(default_factory=Future)
     deadline: float = math.inf
 
 
@@ -55,16 +55,6 @@ class LanePool:
         for thread in self._threads:
             thread.start()
 
-    @property
-    def capacity(self) -> int:
-        """The number of gaits that are simulated at a time."""
-        return len(self._threads) * self.most_lanes()
-
-    @staticmethod
-    def most_lanes() -> int:
-        """The number of gaits that one thread simulates at a time."""
-        return lanes_for(math.inf)
-
     def __enter__(self) -> LanePool:
         return self
 
@@ -77,21 +67,17 @@ class LanePool:
         for job in self._waiting:
             job.future.set_exception(CancelledError())
 
-    @staticmethod
-    def result(future: Future[tuple[Prepared, Finished]]) -> SimulationResult:
-        """Waits for a gait of submit(); raises as simulate() does."""
-        return make_outcome(*future.result())
-
     def submit(
         self,
         gaits: Sequence[tuple[Scenario, Gait]],
         *,
         record: bool = False,
         time_budget: float = math.inf,
-    ) -> list[Future[tuple[Prepared, Finished]]]:
-        """Puts gaits, each with its scenario, in the queue; result() waits for one.
+    ) -> list[Future[SimulationResult]]:
+        """Puts gaits, each with its scenario, in the queue; a future raises as simulate() does.
 
-        A gait that is not done after `time_budget` (s) fails with TimeBudgetExceeded.
+        A gait that is not done after `time_budget` (s) fails with TimeBudgetExceeded. Callbacks of
+        futures are called in the threads of the pool.
         """
         jobs = [_Job(scenario, gait, record, time_budget) for scenario, gait in gaits]
         with self._changed:
@@ -188,7 +174,13 @@ class _Crew:
         if engine is None or not self.jobs:
             return
         for lane, prepared, course in engine.advance(_BODY_STEPS):
-            self.jobs.pop(lane).future.set_result((prepared, course))
+            future = self.jobs.pop(lane).future
+            try:
+                result = make_outcome(prepared, course)
+            except Exception as failure:  # such as one that has diverged
+                future.set_exception(failure)
+            else:
+                future.set_result(result)
         now = time.perf_counter()
         for lane in [lane for lane, job in self.jobs.items() if now > job.deadline]:
             job = self.jobs.pop(lane)
