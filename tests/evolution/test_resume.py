@@ -25,11 +25,11 @@ class Counted:
     def __init__(self, evaluate, most=10**9):
         self.evaluate, self.most, self.asked = evaluate, most, 0
 
-    def __call__(self, genome):
+    def __call__(self, task):
         self.asked += 1
         if self.asked > self.most:
-            raise KeyboardInterrupt
-        return self.evaluate(genome)
+            raise InterruptedError
+        return self.evaluate(task)
 
 
 @pytest.fixture(autouse=True)
@@ -62,7 +62,7 @@ def test_an_interrupted_run_ends_like_one_that_was_not_and_makes_no_evaluation_a
     counts += [1, 11, evaluations + 25]
     for count in sorted(set(counts)) if robot == "row" else [9]:
         run, rest = tmp_path / f"{count}", Counted(evaluate)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(InterruptedError):
             record_run(run, scenario, evaluate=Counted(evaluate, count), workers=1)
         record_run(run, evaluate=rest, workers=1 if robot == "row" else 2)
         assert read_record(run) == whole
