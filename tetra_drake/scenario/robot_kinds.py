@@ -278,15 +278,16 @@ class StructureFile(Section):
         except ValueError:
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
 
-        def with_unit(value: Any) -> Any:
-            if isinstance(value, dict):
-                return {name: with_unit(item) for name, item in value.items()}
-            if isinstance(value, list):
-                return [with_unit(item) for item in value]
-            return f"{value!r} {unit}" if type(value) in (int, float) else value
+        def with_unit(place: Any) -> Any:
+            """The coordinates of a node; lists in them, which may be vast, stay as they are."""
+            if not isinstance(place, list):
+                return place
+            return [f"{x!r} {unit}" if type(x) in (int, float) else x for x in place]
 
         tree = {key: value for key, value in tree.items() if key != "unit"}
-        return tree | {"nodes": with_unit(tree.get("nodes"))}
+        if isinstance(tree.get("nodes"), dict):
+            tree["nodes"] = {name: with_unit(place) for name, place in tree["nodes"].items()}
+        return tree
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> StructureFile:
