@@ -53,7 +53,7 @@ def test_signals_integrated_with_error_control_are_those_of_the_diagram(compiled
 
 
 def test_cables_in_no_order_of_the_bodies_that_they_join_are_refused(scenario, structure):
-    structure.cables[[0, 6]] = structure.cables[[6, 0]]  # of T1-T2 and of T2-T3
+    structure.cable_ends[[0, 6]] = structure.cable_ends[[6, 0]]  # of T1-T2 and of T2-T3
     with pytest.raises(ValueError):
         Robot.of(scenario, structure)
 
