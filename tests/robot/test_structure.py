@@ -12,9 +12,8 @@ from pydrake.multibody.tree import FixedOffsetFrame
 
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.kinematics import V_WN
-from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.robot import MakeStructure, Robot
-from tetra_drake.robot.structure import Structure, moved_nodes, node_positions
+from tetra_drake.robot.structure import AddBodies, Structure, moved_nodes, node_positions
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.nesting import NODES, STRUTS
 

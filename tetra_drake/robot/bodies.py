@@ -1,19 +1,14 @@
-"""Rigid bodies: inertia of struts and nodes, poses of struts, bodies in a MultibodyPlant."""
+"""Rigid bodies: inertia of struts and nodes, poses of struts."""
 
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
+from pydrake.multibody.tree import SpatialInertia, UnitInertia
 
 from tetra_drake.scenario.blueprint import Blueprint
-
-if TYPE_CHECKING:
-    from tetra_drake.robot.structure import Structure
 
 ROUNDING = 1e-12
 """Share of a body's size, or of its moments, below which a distance, or a product, is rounding. Its
@@ -107,13 +102,3 @@ def _central(M_BFo_F: SpatialInertia) -> tuple[np.ndarray, np.ndarray]:
     moments, products = unit.get_moments(), unit.get_products()
     products = np.where(np.abs(products) > ROUNDING * moments.max(), products, 0.0)
     return centre, np.concatenate([moments, products])
-
-
-def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
-    """Adds the free bodies of a structure to a plant that is not finalized yet."""
-    return [
-        plant.AddRigidBody(name, SpatialInertia(mass, np.zeros(3), UnitInertia(*unit)))
-        for name, mass, unit in zip(
-            structure.bodies, structure.mass, structure.unit_inertia, strict=True
-        )
-    ]

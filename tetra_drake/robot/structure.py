@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 
 from tetra_drake.physics.cable import CABLE, PASSIVE, CableLaw
 from tetra_drake.physics.clearance import Struts
@@ -146,3 +148,13 @@ def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
     nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
     move_nodes(state, structure.p_BN, structure.first_node, nodes)
     return nodes
+
+
+def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
+    """Adds the free bodies of a structure to a plant that is not finalized yet."""
+    return [
+        plant.AddRigidBody(name, SpatialInertia(mass, np.zeros(3), UnitInertia(*unit)))
+        for name, mass, unit in zip(
+            structure.bodies, structure.mass, structure.unit_inertia, strict=True
+        )
+    ]

@@ -8,10 +8,10 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import signal_samples
+from tetra_drake.robot.structure import AddBodies
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems import (
     Actuators,
