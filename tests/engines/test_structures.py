@@ -23,10 +23,9 @@ from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import MODE_COLUMNS
 from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.mode_change import modes_after_step
-from tetra_drake.robot.bodies import AddBodies
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import MakeStructure, Robot
-from tetra_drake.robot.structure import Structure, node_positions
+from tetra_drake.robot.structure import AddBodies, Structure, node_positions
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_kinds import StructureFile

@@ -10,8 +10,7 @@ from tetra_drake.physics.cable import TENSION, CableLaw, cable_tension
 from tetra_drake.physics.forces import Forces, compute_cable_forces
 from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.physics.model import Model
-from tetra_drake.robot.bodies import AddBodies
-from tetra_drake.robot.structure import Structure, moved_nodes
+from tetra_drake.robot.structure import AddBodies, Structure, moved_nodes
 
 
 @pytest.fixture
