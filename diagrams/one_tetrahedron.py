@@ -26,8 +26,8 @@ from pydrake.systems.primitives import LogVectorOutput
 from tetra_drake.physics.kinematics import P_WN, V_WN
 from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import AddBodies, Structure, moved_nodes
-from tetra_drake.scenario.nesting import BOTTOM_LEFT, BOTTOM_RIGHT, STRUTS, TOP
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, STRUTS, TOP
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems import GroundContact
 
 BASE = BOTTOM_LEFT, BOTTOM_RIGHT, TOP

@@ -31,7 +31,7 @@ from tetra_drake.physics.oscillator import Network
 from tetra_drake.results.measures import dominant_frequency
 from tetra_drake.robot.robot import initial_neurons
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import POUND_FORCE
 from tetra_drake.systems import MatsuokaCpg
 

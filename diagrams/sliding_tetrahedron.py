@@ -22,8 +22,8 @@ from tetra_drake.figures.style import SHADE, common_style, make_figure, save_fig
 from tetra_drake.results.measures import intervals
 from tetra_drake.scenario.friction_kinds import ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.nesting import NODES
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.robot_tetrahedra import NODES
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 INITIAL_SPEED = 30.0 * INCH  # m/s

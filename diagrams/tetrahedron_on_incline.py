@@ -27,7 +27,7 @@ from one_tetrahedron import BASE, Samples, let_go, make_standing_tetrahedron, st
 from tetra_drake.figures.style import OKABE_ITO, common_style, make_figure, save_figure
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 

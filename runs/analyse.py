@@ -36,7 +36,7 @@ from tetra_drake.scenario.disturbances import Draw, disturbed
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.scenario.units import INCH
 

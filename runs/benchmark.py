@@ -33,7 +33,7 @@ from tetra_drake.machine import available_cores
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 GAITS = 12  # for each engine
 BATCHES = (1, 2, 4, 8, 30, 240)  # gaits at a time

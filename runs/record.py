@@ -42,7 +42,7 @@ from tetra_drake.prototype.export import export
 from tetra_drake.report.result_folder import REPLAY
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, OptimizerKind, QualityDiversity
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 HERE = Path(__file__).parent
 SCRATCH = Path("out/runs")

@@ -23,7 +23,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import Table, fixed, listed, percents
 from tetra_drake.report.result_folder import REPLAY
-from tetra_drake.scenario.metric_units import METRICS
+from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.units import INCH, customary
 
 HERE = Path(__file__).parent

@@ -35,7 +35,7 @@ from tetra_drake.evolution.manifest import MANIFEST, SCENARIO
 from tetra_drake.evolution.reevaluation import BEST_GAITS
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import write_whole
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 _DIGITS, _WALL_TIME_DIGITS = 3, 2
 """Significant ones of numbers of an evaluation without its genome, and of the time of all."""

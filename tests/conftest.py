@@ -13,7 +13,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 Refused = Callable[[object, str, str], contextlib.AbstractContextManager[None]]
 

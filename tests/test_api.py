@@ -18,7 +18,7 @@ from tetra_drake.prototype.export import export
 from tetra_drake.report.result_folder import save_result_folder
 from tetra_drake.robot.gait import save_gait
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 SHORT = {
     "engine": "!Compiled",

@@ -20,7 +20,7 @@ from tetra_drake.files import check_folder, write_whole
 from tetra_drake.interrupts import heeding_interrupts
 from tetra_drake.scenario.load import load_scenario, shipped_scenarios
 from tetra_drake.scenario.refusals import hint
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import shipped_structures
 
 if TYPE_CHECKING:

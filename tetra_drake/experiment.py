@@ -24,7 +24,7 @@ from tetra_drake.machine import available_cores, versions
 from tetra_drake.optimizers.base import MakeOptimizer
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import given_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 
 def evolve(

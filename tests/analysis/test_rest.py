@@ -13,7 +13,7 @@ from tetra_drake.report.structure_page import (
     structure_text,
 )
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.robot_kinds import StructureFile
+from tetra_drake.scenario.robot_structure import StructureFile
 
 SHIPPED = {"prism": (1, 1), "six_bar": (1, 1), "mast": (6, 0), "pair": (2, 0)}
 """Self-stress states and mechanisms. 24 cables on four bodies are 18 equations, 8 on two are 6."""

@@ -24,9 +24,9 @@ from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.report.analysis_text import robustness_text
 from tetra_drake.robot.gait import save_gait, seeded_gait
+from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws, fresh_seed
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.settings import Disturbances
 from tetra_drake.scenario.terrain_kinds import Steps
 from tetra_drake.scenario.units import INCH
 

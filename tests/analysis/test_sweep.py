@@ -13,8 +13,8 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import save_gait, seeded_gait
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.scenario import Scenario
 
 STIFFNESS = "robot.cables.outer_stiffness"
 

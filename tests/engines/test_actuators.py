@@ -25,8 +25,8 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.actuator_kinds import Actuation, Force, TensionMotor, Winch
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import StructureFile
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.scenario import Scenario
 
 LENGTH, FREE_LENGTH, STIFFNESS, DAMPING = 0.2, 0.1, 100.0, 0.4  # L, l0, k, c in SI units
 

@@ -21,11 +21,11 @@ from tetra_drake.engines.simulate import simulate, simulate_many
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import WALKING_SEED, Gains, Gait, seeded_gait
+from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.settings import PATHWAYS
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, HeightField, Incline, Obstacles, Rough, Steps
 
 Changes = Mapping[str, Any]

@@ -14,9 +14,9 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
-from tetra_drake.scenario.robot_kinds import StructureFile
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.metrics import METRICS_OF_A_ROW
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.scenario import Scenario
 
 STRUCTURES = ("prism", "six_bar", "mast", "pair")
 

@@ -17,8 +17,8 @@ from tetra_drake.robot.gait import Gait, load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Drake
-from tetra_drake.scenario.nesting import BOTTOM_LEFT, BOTTOM_RIGHT, TIP
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, BOTTOM_RIGHT, TIP
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Rough
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.systems.diagram import MakeTensegrityDiagram

@@ -21,11 +21,11 @@ from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import MakeStructure
 from tetra_drake.scenario import engine_kinds
+from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.settings import PATHWAYS
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Rough
 from tetra_drake.scenario.units import INCH
 

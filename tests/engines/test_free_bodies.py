@@ -12,8 +12,8 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import StructureFile
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 DURATION = 0.5

@@ -17,7 +17,7 @@ from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import (
     Incline,
     Rough,

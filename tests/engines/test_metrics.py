@@ -13,7 +13,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import moved_nodes
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metric_units import METRICS
+from tetra_drake.scenario.metrics import METRICS
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import Mujoco
 from tetra_drake.scenario.friction_kinds import MUJOCO_FRICTION, Coulomb
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 

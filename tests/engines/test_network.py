@@ -14,11 +14,11 @@ from tetra_drake.errors import InputError
 from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.robot.weights import Weights
+from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.settings import PATHWAYS
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 

@@ -28,7 +28,7 @@ from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import AddBodies, Structure, node_positions
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import StructureFile
+from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.simd.packed import Packed
 from tetra_drake.systems import CableNetwork, GroundContact
 

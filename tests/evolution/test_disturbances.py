@@ -30,8 +30,8 @@ from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
-from tetra_drake.scenario.settings import Disturbances
 from tetra_drake.scenario.terrain_kinds import Steps
 
 STIFFNESS = {"robot.cables.outer_stiffness": 0.05}

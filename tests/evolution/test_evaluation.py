@@ -15,7 +15,7 @@ from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import InLanes, InProcesses
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.scenario.settings import Disturbances
+from tetra_drake.scenario.common_sections import Disturbances
 
 
 @pytest.fixture

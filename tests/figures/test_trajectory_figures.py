@@ -24,7 +24,7 @@ from tetra_drake.figures.style import OKABE_ITO
 from tetra_drake.results.measures import last_step
 from tetra_drake.robot.ground import ground_heights
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.nesting import STRUTS
+from tetra_drake.scenario.robot_tetrahedra import STRUTS
 from tetra_drake.scenario.terrain_kinds import Steps
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 

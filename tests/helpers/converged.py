@@ -1,7 +1,7 @@
 """Short walks, and settings at which the diagram and the compiled engine agree to micrometres."""
 
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 CONVERGED: dict[str, Drake | Compiled] = {
     "drake": Drake(scheme="runge_kutta3", accuracy=1e-6, max_step=1e-4, mode_changes="witness"),

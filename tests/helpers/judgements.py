@@ -5,7 +5,7 @@ import pandas
 
 from helpers.synthetic_run import tiny_scenario
 from tetra_drake.analysis.robustness import START, Judgement
-from tetra_drake.scenario.settings import Disturbances
+from tetra_drake.scenario.common_sections import Disturbances
 
 
 def judgement_by_hand() -> Judgement:

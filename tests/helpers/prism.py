@@ -11,7 +11,7 @@ from tetra_drake.results.trajectory import Motion, make_dataset
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import StructureFile
+from tetra_drake.scenario.robot_structure import StructureFile
 
 SPEED = 0.01  # m/s
 PERIOD = 2.0  # s, of the signals

@@ -6,7 +6,7 @@ from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.forces import Forces, add_ground_forces, move_contacts
 from tetra_drake.physics.mode_change import mode_margin, time_to_mode_change
 from tetra_drake.robot.robot import MakeStructure, make_model
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 REST = (0.0, 0.0, 0.0)
 TOUCHING = (0.0, 0.0, -1e-4)

@@ -16,7 +16,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario import robot_kinds
+from tetra_drake.scenario import robot_structure
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +63,7 @@ def unit_inertias(structure: Structure) -> np.ndarray:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
 
 
-def joined_nodes(given: robot_kinds.StructureFile) -> dict[str, np.ndarray]:
+def joined_nodes(given: robot_structure.StructureFile) -> dict[str, np.ndarray]:
     """The nodes of a structure file and what joins them, as statics takes them."""
     number = {node: place for place, node in enumerate(given.nodes)}
     return {
@@ -73,7 +73,7 @@ def joined_nodes(given: robot_kinds.StructureFile) -> dict[str, np.ndarray]:
     }
 
 
-def statics_of(given: robot_kinds.StructureFile) -> Statics:
+def statics_of(given: robot_structure.StructureFile) -> Statics:
     """Statics of a structure with its nodes as given."""
     return find_statics(**joined_nodes(given))
 

@@ -14,7 +14,7 @@ from tetra_drake.optimizers.base import Evaluation, Task
 from tetra_drake.robot.gait import ParameterSpace
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH
 
 Child = tuple[float | None, int | None]

@@ -20,7 +20,7 @@ from tetra_drake.physics.model import Model
 from tetra_drake.robot.robot import MakeStructure, make_model
 from tetra_drake.robot.structure import Structure, moved_nodes
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 PAIR = Struts(np.array([0, 2]), np.array([1, 3]), np.array([0, 1, 2]), np.array([2.0, 2.0]))
 """Two struts of length 2, of two bodies."""

@@ -13,7 +13,7 @@ from tetra_drake.physics.contact import CONTACT, MODE, STICK_POINT, NormalForce,
 from tetra_drake.physics.friction import STICK
 from tetra_drake.physics.kinematics import FORCE
 from tetra_drake.robot.ground import make_ground
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 NORMAL = NormalForce(stiffness=4000.0, damping=2e5)
 

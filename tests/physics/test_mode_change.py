@@ -7,7 +7,7 @@ from helpers.robot_on_ground import RobotOnGround
 from tetra_drake.physics.contact import HEADING, MODE
 from tetra_drake.physics.friction import ResetConstants, first_zero
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Incline
 
 SLOPE = 0.2

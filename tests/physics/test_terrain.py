@@ -9,7 +9,7 @@ from tetra_drake.robot.ground import ground_frames, ground_heights, make_ground
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import HeightField, Incline, Rough, Steps
 
 INCH = 0.0254

@@ -56,7 +56,7 @@ def test_an_unfinished_run_is_drawn_as_far_as_it_has_come(tmp_path, trials, miss
 def test_what_cannot_be_drawn_or_written_is_refused_before_anything_is_simulated(
     run, tmp_path, monkeypatch, refused
 ):
-    monkeypatch.setattr("tetra_drake.report.book.simulate", None)
+    monkeypatch.setattr("tetra_drake.report.run_figures.simulate", None)
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").touch()
     write_run(tmp_path / "no trial", [[]])

@@ -14,7 +14,7 @@ from tetra_drake.cli import make_parser
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.run import load_run
 from tetra_drake.formatting import rounded
-from tetra_drake.report.book import study_run
+from tetra_drake.report.run_figures import study_run
 from tetra_drake.report.run_page import render_report, write_report
 from tetra_drake.report.summary import ground_text
 from tetra_drake.scenario.terrain_kinds import Incline

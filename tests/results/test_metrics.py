@@ -19,9 +19,9 @@ from tetra_drake.results.metrics import (
 from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario import schema
-from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, Metrics
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario import scenario as scenario_module
+from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, Metrics
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough
 
 INCH = 0.0254
@@ -128,7 +128,7 @@ def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(robot: Robot) -
 
 
 def test_the_page_of_scenarios_lists_each_metric() -> None:
-    page = Path(schema.__file__).with_name("README.md").read_text(encoding="utf-8")
+    page = Path(scenario_module.__file__).with_name("README.md").read_text(encoding="utf-8")
     section = page.split("## Objective")[1].split("\n## ")[0]
     listed = [line for line in section.splitlines() if line.startswith(("- ", "  "))]
     names = set(re.findall(r"`([a-z_]+)`", " ".join(listed)))

@@ -13,7 +13,7 @@ from tetra_drake.results.trajectory import sample_times, save_dataset, with_inde
 from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.nesting import NODES
+from tetra_drake.scenario.robot_tetrahedra import NODES
 
 
 @pytest.fixture(scope="module", params=["drake", "compiled"])

@@ -13,7 +13,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot, rest_of
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.nesting import BOTTOM_LEFT, TIP
+from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, TIP
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 

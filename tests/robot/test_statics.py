@@ -11,7 +11,7 @@ from helpers.structures import joined_nodes, statics_of
 import tetra_drake
 from tetra_drake.robot.statics import cable_wrenches
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.robot_kinds import StructureFile
+from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 
 SHIPPED = Path(tetra_drake.__file__).parent / "scenario" / "structures"

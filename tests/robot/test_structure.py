@@ -15,7 +15,7 @@ from tetra_drake.physics.kinematics import V_WN
 from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import AddBodies, Structure, moved_nodes, node_positions
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.nesting import NODES, STRUTS
+from tetra_drake.scenario.robot_tetrahedra import NODES, STRUTS
 
 IN = 0.0254
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 LoadText = Callable[[str], Scenario]
 

@@ -9,7 +9,7 @@ from helpers.structures import statics_of
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.ntrt import ntrt_tree
-from tetra_drake.scenario.robot_kinds import StructureFile
+from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.structure_files import read_structure
 
 # Height 2, radius 1, the upper triangle twisted by 30 deg about the vertical, which is y.

@@ -9,8 +9,8 @@ from pytest import approx
 
 from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.robot_kinds import StructureFile
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.structure_files import read_structure, shipped_structures
 
 BAR = """

@@ -6,7 +6,7 @@ import pytest
 
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems import MatsuokaCpg
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 

@@ -11,7 +11,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS
 from tetra_drake.physics.friction import STICK
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 
 def make_simulator(

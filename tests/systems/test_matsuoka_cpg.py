@@ -17,7 +17,7 @@ from tetra_drake.physics.oscillator import (
 )
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.robot import Robot, initial_neurons
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.systems import MatsuokaCpg
 
 

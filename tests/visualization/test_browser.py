@@ -264,7 +264,7 @@ def test_a_simulation_can_be_watched_as_it_runs(browser, tmp_path):
 def test_the_report_of_a_run_shows_its_figures_and_leads_to_the_replay(
     browser, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("tetra_drake.report.book.save_figure", quick_figures.save_figure)
+    monkeypatch.setattr("tetra_drake.report.run_figures.save_figure", quick_figures.save_figure)
     run = write_run(tmp_path / "run", [[[(1.0, 0), (2.0, 1)]]])
     _, replay, report = write_report(run)
     with opened(browser, report.as_uri()) as page:

@@ -15,11 +15,11 @@ from tetra_drake.machine import versions
 from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
+from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import Draw, disturbed, fresh_draws
-from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import varied, written
-from tetra_drake.scenario.settings import Disturbances
+from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.section import varied, written
 
 if TYPE_CHECKING:
     import pandas

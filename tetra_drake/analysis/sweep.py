@@ -14,9 +14,9 @@ from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.load import GivenScenario, given_scenario
-from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import flattened
+from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.section import flattened
 
 if TYPE_CHECKING:
     import xarray

@@ -17,8 +17,8 @@ from tetra_drake.results.result import IntegratorWork, SimulationResult, make_re
 from tetra_drake.results.trajectory import make_dataset
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal
+from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.engine_kinds import Drake
-from tetra_drake.scenario.settings import SimulationSection
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 _WITNESS_WINDOW = 2e-5  # s: how closely a witness localises, where the accuracy is 1e-3 or more

@@ -12,7 +12,7 @@ from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     import xarray

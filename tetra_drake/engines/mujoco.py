@@ -39,7 +39,7 @@ from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.engine_kinds import Mujoco
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 Array = np.ndarray
 

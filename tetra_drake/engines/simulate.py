@@ -13,7 +13,7 @@ from tetra_drake.robot.command import Command, commanded_robot
 from tetra_drake.robot.gait import GivenGait, given_gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, constant_steering
 from tetra_drake.scenario.load import GivenScenario, given_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 
 def simulate(

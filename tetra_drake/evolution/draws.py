@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.scenario.metric_units import LEAST, MOST
+from tetra_drake.scenario.metrics import LEAST, MOST
 
 
 def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:

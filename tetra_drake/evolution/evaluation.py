@@ -25,7 +25,7 @@ from tetra_drake.results.metrics import unmet_requirements
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, ParameterSpace
 from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 Objective = Callable[[SimulationResult], float]
 """Function of a result that evolution maximises; -inf or NaN is a failure. One that reads the

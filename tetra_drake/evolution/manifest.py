@@ -31,8 +31,8 @@ from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import Section
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.section import Section
 
 SCHEMA = 4
 MANIFEST, SCENARIO = "manifest.json", "scenario.yaml"

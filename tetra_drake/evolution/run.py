@@ -24,8 +24,8 @@ from tetra_drake.evolution.trials import TrialStatus
 from tetra_drake.files import given_path
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
-from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:

@@ -40,7 +40,7 @@ from tetra_drake.evolution.manifest import (
 from tetra_drake.files import check_folder, make_folder
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Gait, Vector, save_gait
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 LOCK = ".lock"
 

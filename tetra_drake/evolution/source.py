@@ -11,7 +11,7 @@ from tetra_drake.evolution.manifest import MANIFEST, read_manifest
 from tetra_drake.evolution.run import load_run
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from tetra_drake.analysis.elites import CELLS, LUCKY, chosen, distinct_gaits, el
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures.style import Drawn, Page, figure_function, name_panel, page_of, set_title
 from tetra_drake.formatting import listed
-from tetra_drake.scenario.metric_units import METRICS
+from tetra_drake.scenario.metrics import METRICS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.units import customary
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tetra_drake.optimizers.base import Evaluation, Iteration
 from tetra_drake.robot.gait import TAU_B, ParameterSpace, Vector
-from tetra_drake.scenario.settings import EvolutionSection
+from tetra_drake.scenario.common_sections import EvolutionSection
 
 Matrix = npt.NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from tetra_drake.physics.actuator import DIRECT, TENSION_MOTOR, WINCH
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.refusals import hint
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 TIME = "time_s"
 

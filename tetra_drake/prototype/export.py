@@ -25,7 +25,7 @@ from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import dump_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 COMMAND, EXPECTED, LIMITS = "command.csv", "expected.csv", "limits.csv"
 README = "README.md"

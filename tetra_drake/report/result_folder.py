@@ -28,9 +28,9 @@ from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.metric_units import METRICS, Metrics
+from tetra_drake.scenario.metrics import METRICS, Metrics
 from tetra_drake.scenario.refusals import refuse
-from tetra_drake.scenario.sections import Section
+from tetra_drake.scenario.section import Section
 
 if TYPE_CHECKING:
     import xarray

@@ -18,15 +18,21 @@ from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, listed, render, rounded
 from tetra_drake.machine import versions
-from tetra_drake.report.book import Study, draw_run, draw_trajectory, simulate_again, study_run
 from tetra_drake.report.result_folder import RESULT, load_result
+from tetra_drake.report.run_figures import (
+    Study,
+    draw_run,
+    draw_trajectory,
+    simulate_again,
+    study_run,
+)
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, save_gait
 from tetra_drake.robot.weights import KINDS
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metric_units import METRICS, inverse
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.metrics import METRICS, inverse
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import shown
 
 REPORT, REPLAY, FIGURES = "report.html", "replay.html", "figures"

@@ -11,8 +11,8 @@ from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.formatting import Table, fixed, rounded
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.scenario.metric_units import METRICS
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import customary
 
 if TYPE_CHECKING:

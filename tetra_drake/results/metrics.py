@@ -14,8 +14,8 @@ from tetra_drake.results.measures import travelling_index
 from tetra_drake.robot.path import CentrePath, curvature
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
-from tetra_drake.scenario.metric_units import LEAST_WAY, METRICS, MOST, Metrics, looks_for_distance
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, MOST, Metrics, looks_for_distance
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH, shown
 
 

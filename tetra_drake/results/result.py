@@ -21,10 +21,10 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.path import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.metric_units import METRICS, Metrics
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import Section
-from tetra_drake.scenario.settings import SimulationSection
+from tetra_drake.scenario.common_sections import SimulationSection
+from tetra_drake.scenario.metrics import METRICS, Metrics
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.section import Section
 from tetra_drake.scenario.units import INCH
 
 if TYPE_CHECKING:

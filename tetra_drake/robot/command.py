@@ -12,7 +12,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.physics.actuator import TENSION_MOTOR, WINCH
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 _NONE_COUPLED = -1
 """Reach of oscillators none of which inhibit each other."""

@@ -17,8 +17,8 @@ from tetra_drake.files import given_path, read_json, write_whole
 from tetra_drake.formatting import Table
 from tetra_drake.robot.weights import KINDS, Weights
 from tetra_drake.scenario.load import GivenScenario, given_scenario
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import Section
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.section import Section
 
 LARGEST_GAIN = 1.0
 """Greatest absolute value of a feedback gain of random gaits."""

@@ -20,7 +20,7 @@ from tetra_drake.physics.terrain import (
     find_frames,
 )
 from tetra_drake.robot.structure import Structure, node_positions
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Grid
 from tetra_drake.scenario.units import INCH
 

@@ -25,8 +25,8 @@ from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure, node_positions, turn_with_slope
 from tetra_drake.robot.weights import Weights
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.settings import CpgSection
+from tetra_drake.scenario.common_sections import CpgSection
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat
 
 AMPLITUDE = 0.5

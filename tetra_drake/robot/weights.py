@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 KINDS = "extensor", "flexor"
 """Kinds of neurons, by their number modulo 2."""

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from tetra_drake.scenario import quantities
 from tetra_drake.scenario.quantities import Length, Speed, Time
-from tetra_drake.scenario.sections import Kinds, Section
+from tetra_drake.scenario.section import Kinds, Section
 
 if TYPE_CHECKING:
     from tetra_drake.physics.actuator import Actuator

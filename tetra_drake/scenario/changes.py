@@ -7,7 +7,7 @@ from typing import Any
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.refusals import TAG
-from tetra_drake.scenario.sections import Section, Tree, joined, python_value
+from tetra_drake.scenario.section import Section, Tree, joined, python_value
 from tetra_drake.scenario.yaml_text import parse_yaml
 
 REPLACED = ("objective", "require", "robot.actuated")

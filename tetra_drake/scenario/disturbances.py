@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.settings import separate
+from tetra_drake.scenario.common_sections import separate
+from tetra_drake.scenario.scenario import Scenario
 
 IterationSeed = tuple[int, int, int]
 """Seed of a run, number of a trial, number of an iteration."""

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from tetra_drake.scenario.friction_kinds import FrictionKind
 from tetra_drake.scenario.quantities import Speed, Time
-from tetra_drake.scenario.sections import Kinds, Section
+from tetra_drake.scenario.section import Kinds, Section
 
 SHORTEST_STEP = 1e-9
 """Lower limit (s) of the steps of !Compiled."""

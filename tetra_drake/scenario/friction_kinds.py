@@ -14,7 +14,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario.kind_text import settings_text
 from tetra_drake.scenario.quantities import Damping, DampingPerLength, Length, Stiffness
 from tetra_drake.scenario.refusals import refuse
-from tetra_drake.scenario.sections import Kinds, Section, Varied
+from tetra_drake.scenario.section import Kinds, Section, Varied
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from tetra_drake.scenario.sections import Section, written
+from tetra_drake.scenario.section import Section, written
 from tetra_drake.scenario.units import shown
 
 

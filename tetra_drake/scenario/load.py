@@ -8,8 +8,8 @@ from typing import Protocol
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.refusals import no_such
-from tetra_drake.scenario.schema import Scenario
-from tetra_drake.scenario.sections import Tree, keys_of, written
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.scenario.section import Tree, keys_of, written
 from tetra_drake.scenario.structure_files import structure_file
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 

@@ -20,7 +20,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.refusals import hint, refuse
-from tetra_drake.scenario.robot_kinds import (
+from tetra_drake.scenario.robot_structure import (
     MOST_NODES,
     MOST_PAIRS,
     CableGroup,
@@ -28,7 +28,7 @@ from tetra_drake.scenario.robot_kinds import (
     StructureFile,
     StrutGroup,
 )
-from tetra_drake.scenario.sections import Section, Tree, keys_of, written
+from tetra_drake.scenario.section import Section, Tree, keys_of, written
 from tetra_drake.scenario.yaml_text import read_mapping
 
 MOST_BYTES = 2**20

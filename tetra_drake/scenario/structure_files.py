@@ -10,8 +10,8 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.ntrt import MOST_BYTES, NtrtFile, ntrt_tree
 from tetra_drake.scenario.refusals import TAG, described, no_such
-from tetra_drake.scenario.robot_kinds import StructureFile
-from tetra_drake.scenario.sections import Tree, keys_of
+from tetra_drake.scenario.robot_structure import StructureFile
+from tetra_drake.scenario.section import Tree, keys_of
 from tetra_drake.scenario.units import quantity_to_si
 from tetra_drake.scenario.yaml_text import read_mapping
 

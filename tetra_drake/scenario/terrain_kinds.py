@@ -20,7 +20,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_bytes
 from tetra_drake.scenario.kind_text import settings_text
 from tetra_drake.scenario.quantities import Angle, Length
-from tetra_drake.scenario.sections import Kinds, Section
+from tetra_drake.scenario.section import Kinds, Section
 from tetra_drake.scenario.units import INCH
 
 BEHIND, AHEAD, ASIDE = 24.0 * INCH, 120.0 * INCH, 30.0 * INCH

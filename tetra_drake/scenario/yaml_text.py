@@ -12,7 +12,7 @@ import yaml
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario.refusals import TAG
-from tetra_drake.scenario.sections import Tree
+from tetra_drake.scenario.section import Tree
 
 
 def parse_yaml(content: str, source: object) -> Any:

@@ -11,7 +11,7 @@ from pydrake.geometry import Meshcat, MeshcatParams
 
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH
 from tetra_drake.visualization.replay import quiet_meshcat
 from tetra_drake.visualization.scene import (

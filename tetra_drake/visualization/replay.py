@@ -24,7 +24,7 @@ from tetra_drake.robot.ground import ground_axes
 from tetra_drake.robot.path import follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import followed_nodes
-from tetra_drake.scenario.metric_units import looks_for_distance
+from tetra_drake.scenario.metrics import looks_for_distance
 from tetra_drake.scenario.units import INCH, POUND_FORCE
 from tetra_drake.visualization.scene import (
     COLOURS,

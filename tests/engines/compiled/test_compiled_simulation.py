@@ -10,7 +10,7 @@ from tetra_drake.errors import Diverged, StepBudgetExceeded
 from tetra_drake.robot.gait import load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import SHORTEST_STEP, Compiled
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 
 @pytest.fixture

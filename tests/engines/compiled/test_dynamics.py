@@ -17,7 +17,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.friction_kinds import Coulomb, ResetIntegrator
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 

@@ -28,7 +28,7 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.actuator_kinds import TensionMotor, Winch
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Rough
 
 FAR_TOO_STRONG = {"cpg.gain": "4e9 N"}

@@ -11,7 +11,7 @@ from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 PULL = np.array([1.0, -2.0, 3.0, 0.5])
 """Rise of the signals per second, in 100 N."""

@@ -13,7 +13,7 @@ from tetra_drake.errors import SimulationFailure
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait, seeded_gait
 from tetra_drake.robot.robot import Robot, SteeringSignal
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 _BODY_STEPS = 100_000
 """Iterations times bodies, some 70 ms, after which signals of the operating system are heard."""

@@ -29,7 +29,7 @@ from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import sample_count
 from tetra_drake.scenario.engine_kinds import Compiled
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.allocation import allocate
 
 _SPARE_MARKS = 4

@@ -16,7 +16,7 @@ from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.schema import Scenario
+from tetra_drake.scenario.scenario import Scenario
 
 _GATHERING = 1e-3
 """Time (s) that a thread without work waits for more than one gait to come."""

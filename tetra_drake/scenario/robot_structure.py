@@ -16,14 +16,7 @@ import pydantic
 from pydantic import Field
 
 from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.metric_units import METRICS_OF_A_ROW
-from tetra_drake.scenario.nesting import (
-    LONGEST,
-    CableConstants,
-    Tetrahedra,
-    check_one_per_body,
-    check_strut,
-)
+from tetra_drake.scenario.metrics import METRICS_OF_A_ROW
 from tetra_drake.scenario.quantities import (
     Acceleration,
     Density,
@@ -34,7 +27,14 @@ from tetra_drake.scenario.quantities import (
     Stiffness,
 )
 from tetra_drake.scenario.refusals import described, hint, refuse
-from tetra_drake.scenario.sections import Kinds, Section, Tree, Varied
+from tetra_drake.scenario.robot_tetrahedra import (
+    LONGEST,
+    CableConstants,
+    Tetrahedra,
+    check_one_per_body,
+    check_strut,
+)
+from tetra_drake.scenario.section import Kinds, Section, Tree, Varied
 from tetra_drake.scenario.units import quantity_to_si
 
 MOST_NODES, MOST_PAIRS = 1000, 2000

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from tetra_drake.scenario.quantities import DampingPerLength, Force, Stiffness, Time
 from tetra_drake.scenario.refusals import refuse
-from tetra_drake.scenario.sections import Section, Varied
+from tetra_drake.scenario.section import Section, Varied
 
 Pathway = Literal["length", "load", "pitch"]
 """A signal that can be fed back to the oscillators; see physics.feedback."""

@@ -7,8 +7,8 @@ import pytest
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.changes import merged
-from tetra_drake.scenario.robot_kinds import MOST_NODES, MOST_PAIRS, Member, StructureFile
-from tetra_drake.scenario.sections import Tree, written
+from tetra_drake.scenario.robot_structure import MOST_NODES, MOST_PAIRS, Member, StructureFile
+from tetra_drake.scenario.section import Tree, written
 from tetra_drake.scenario.structure_files import read_structure
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 

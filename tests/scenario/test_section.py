@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError
 
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.quantities import Angle, Length, UnitsByName
-from tetra_drake.scenario.sections import Kinds, Section, written
+from tetra_drake.scenario.section import Kinds, Section, written
 from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 
 

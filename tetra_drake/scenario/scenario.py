@@ -15,15 +15,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.scenario.actuator_kinds import Actuation, Force
 from tetra_drake.scenario.changes import merged, tree_of_changes
-from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
-from tetra_drake.scenario.friction_kinds import Friction
-from tetra_drake.scenario.metric_units import METRICS, inverse
-from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
-from tetra_drake.scenario.quantities import UnitsByName
-from tetra_drake.scenario.refusals import TAG, hint, refuse
-from tetra_drake.scenario.robot_kinds import Robot
-from tetra_drake.scenario.sections import Section, Tree, flattened, written
-from tetra_drake.scenario.settings import (
+from tetra_drake.scenario.common_sections import (
     CpgSection,
     Disturbances,
     EvolutionSection,
@@ -32,6 +24,14 @@ from tetra_drake.scenario.settings import (
     SimulationSection,
     separate,
 )
+from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
+from tetra_drake.scenario.friction_kinds import Friction
+from tetra_drake.scenario.metrics import METRICS, inverse
+from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
+from tetra_drake.scenario.quantities import UnitsByName
+from tetra_drake.scenario.refusals import TAG, hint, refuse
+from tetra_drake.scenario.robot_structure import Robot
+from tetra_drake.scenario.section import Section, Tree, flattened, written
 from tetra_drake.scenario.structure_files import names_structure, with_structure
 from tetra_drake.scenario.terrain_kinds import Flat, Terrain
 from tetra_drake.scenario.units import plainest, rounded, shortest

@@ -21,7 +21,7 @@ from tetra_drake.scenario.quantities import (
     Stiffness,
 )
 from tetra_drake.scenario.refusals import refuse
-from tetra_drake.scenario.sections import Section, Tree, Varied
+from tetra_drake.scenario.section import Section, Tree, Varied
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
 """The nodes of a tetrahedron; the first three form the base triangle."""
