@@ -410,11 +410,11 @@ def _structure(options: Options) -> None:
     Prints bodies, cables, states of self-stress, infinitesimal mechanisms, natural frequencies,
     tensions and heights.
     """
-    from tetra_drake.analysis.rest import study_rest
+    from tetra_drake.analysis.equilibrium import study_equilibrium
     from tetra_drake.engines.mujoco import make_mjcf
     from tetra_drake.report.structure_page import robot_of_file, save_structure_page, structure_text
 
-    study = study_rest(robot_of_file(options.source, unit=options.unit))
+    study = study_equilibrium(robot_of_file(options.source, unit=options.unit))
     text = structure_text(study)
     if options.out:
         save_structure_page(study, options.out)

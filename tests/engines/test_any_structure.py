@@ -150,7 +150,7 @@ def test_mujoco_lets_it_fall_alike(name):
 
 def resting_heights(robot: Robot) -> np.ndarray:
     """(nodes,): of the nodes at rest, in m."""
-    return node_positions(robot.structure, robot.rest.state)[:, 2]
+    return node_positions(robot.structure, robot.equilibrium.state)[:, 2]
 
 
 @pytest.mark.parametrize("name", ["pair", "body"])

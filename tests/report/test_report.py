@@ -14,7 +14,7 @@ from tetra_drake.cli import make_parser
 from tetra_drake.evolution.manifest import Method
 from tetra_drake.evolution.run import load_run
 from tetra_drake.formatting import rounded
-from tetra_drake.report.run_figures import study_run
+from tetra_drake.report.run_figures import simulate_shown_gaits
 from tetra_drake.report.run_page import render_report, write_report
 from tetra_drake.report.summary import ground_text
 from tetra_drake.scenario.terrain_kinds import Incline
@@ -93,7 +93,7 @@ def page(source):
 
 @pytest.fixture(scope="module")
 def study(run):
-    return study_run(load_run(run))
+    return simulate_shown_gaits(load_run(run))
 
 
 def render(study, **changes):
@@ -188,7 +188,9 @@ def test_objective_requirements_and_ground_are_those_of_the_scenario(tmp_path, p
     terms, incline = {"speed": "2 s/in", "twist": "-10 /in"}, Incline(slope=0.1)
     changes = {"objective": terms, "require": {"lead": "0.5 in"}, "terrain": incline}
     scenario = tiny_scenario().with_changes(changes)
-    shown = render(study_run(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario))))
+    shown = render(
+        simulate_shown_gaits(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
+    )
     assert shown.row("objective") == ["speed: 2 s/in, twist: -10 /in"]
     assert shown.row("required") == ["lead: 0.5 in"]
     assert shown.row("ground") == [ground_text(scenario)]
@@ -197,7 +199,7 @@ def test_objective_requirements_and_ground_are_those_of_the_scenario(tmp_path, p
 def test_gaits_of_a_run_with_disturbances_are_shown_undisturbed(tmp_path, study):
     disturbed = {"disturbances": {"draws": 3, "start": 0.1}}
     scenario = tiny_scenario().with_changes(disturbed)
-    shown = study_run(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
+    shown = simulate_shown_gaits(load_run(write_run(tmp_path / "run", TRIALS, scenario=scenario)))
     assert shown.best.distance_in == study.best.distance_in
     (note,) = (text for text in render(shown).texts["p"] if "3 draws" in text)
     assert f"{rounded(shown.best.distance_in)} in" in note
@@ -223,7 +225,7 @@ def test_what_was_given_from_python_is_named_and_no_command_claims_to_repeat_it(
 
 
 def test_an_unfinished_run_and_what_the_diagram_made_of_its_best(tmp_path):
-    study = study_run(load_run(write_run(tmp_path / "run", TRIALS, unfinished=(0,))))
+    study = simulate_shown_gaits(load_run(write_run(tmp_path / "run", TRIALS, unfinished=(0,))))
     page = render(study, reevaluations=study.run.evaluations.assign(distance=1.23 * INCH))
     assert any("--resume" in text for text in page.texts["p"])
     (place,) = (row.index("in Drake") for row in page.table if "in Drake" in row)

@@ -10,7 +10,7 @@ from helpers.quantities import with_unit
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot import equilibrium
 from tetra_drake.robot.gait import seeded_gait
-from tetra_drake.robot.robot import Robot, rest_of
+from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, TIP
@@ -20,7 +20,7 @@ from tetra_drake.scenario.units import INCH, POUND_FORCE
 
 def resting_nodes(robot: Robot) -> np.ndarray:
     """(nodes, 3) in m."""
-    return node_positions(robot.structure, robot.rest.state)
+    return node_positions(robot.structure, robot.equilibrium.state)
 
 
 def normal_forces(robot: Robot) -> np.ndarray:
@@ -65,7 +65,7 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     }
     scenario = scenario.with_changes(still | changes)
     walk = simulate(scenario=scenario, gait=seeded_gait(scenario, 0), record=True).trajectory
-    np.testing.assert_allclose(walk.length[-1], Robot.of(scenario).rest.lengths, rtol=1e-6)
+    np.testing.assert_allclose(walk.length[-1], Robot.of(scenario).equilibrium.lengths, rtol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -85,13 +85,13 @@ def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
 )
 def test_no_force_is_left_on_any_body(scenario, changes, slack):
     robot = Robot.of(scenario.with_changes(changes | {"robot.cables.slack": True}))
-    structure, state, p_WN = robot.structure, robot.rest.state, resting_nodes(robot)
+    structure, state, p_WN = robot.structure, robot.equilibrium.state, resting_nodes(robot)
     bodies, cables = len(structure.bodies), structure.cables
     force = np.zeros_like(p_WN)
     force[structure.contacts, 2] = normal_forces(robot)
     along = p_WN[cables["node_b"]] - p_WN[cables["node_a"]]
     length = np.linalg.norm(along, axis=1)
-    np.testing.assert_allclose(robot.rest.lengths, length, rtol=0, atol=0.51e-9)
+    np.testing.assert_allclose(robot.equilibrium.lengths, length, rtol=0, atol=0.51e-9)
     tension = np.maximum(0.0, cables["stiffness"] * (length - cables["free_length"]))
     assert (tension == 0.0).sum() == slack
     pull = along * (tension / length)[:, np.newaxis]
@@ -107,9 +107,9 @@ def test_no_force_is_left_on_any_body(scenario, changes, slack):
 def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario, robot):
     # It gets there in other last digits on another processor, and so it does from another start.
     elsewhere = scenario.with_changes({"robot.spacing": f"{1.01 * scenario.robot.spacing} m"})
-    other = Robot.of(elsewhere).rest
-    assert (np.diff(other.state[4:35:7]) != np.diff(robot.rest.state[4:35:7])).any()
-    assert np.array_equal(other.lengths, robot.rest.lengths)
+    other = Robot.of(elsewhere).equilibrium
+    assert (np.diff(other.state[4:35:7]) != np.diff(robot.equilibrium.state[4:35:7])).any()
+    assert np.array_equal(other.lengths, robot.equilibrium.lengths)
 
     elsewhere = scenario.with_changes(
         {
@@ -118,7 +118,7 @@ def test_the_lengths_do_not_depend_on_how_the_solver_gets_there(scenario, robot)
             "robot.offsets": with_unit([[0.01 * i, 0.01, 0.1] for i in range(5)], "m"),
         }
     )
-    assert np.array_equal(Robot.of(elsewhere).rest.state, robot.rest.state)
+    assert np.array_equal(Robot.of(elsewhere).equilibrium.state, robot.equilibrium.state)
 
 
 @pytest.mark.parametrize("where", [math.nan, 1e308])
@@ -126,26 +126,26 @@ def test_forces_that_are_not_finite_end_the_search_at_once(scenario, robot, wher
     start = robot.structure.initial_state
     start[7 + 4] = where  # x of T2
     with refused("thesis", "robot", "not finite, is on 'T1'"):
-        rest_of(scenario, robot.structure, start)
+        equilibrium_of(scenario, robot.structure, start)
 
 
 def test_a_step_whose_end_has_no_forces_is_too_long(robot, monkeypatch):
     """Such as one on which the ends of a cable meet."""
-    expected, displaced, steps = robot.rest.lengths, equilibrium.displaced, []
+    expected, displaced, steps = robot.equilibrium.lengths, equilibrium.displaced, []
 
     def first_meeting(resting, state, step):
         steps.append(np.abs(step).max())
         return displaced(resting, state, step if len(steps) > 1 else math.nan * step)
 
     monkeypatch.setattr(equilibrium, "displaced", first_meeting)
-    again = Robot.of(robot.scenario).rest
+    again = Robot.of(robot.scenario).equilibrium
     assert steps[1] <= 0.5 * steps[0]
     assert np.array_equal(again.lengths, expected)
 
 
 def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
     monkeypatch.setattr(equilibrium, "LONG", -1.0)
-    rest = robot.rest
+    rest = robot.equilibrium
     assert [record.levelname for record in caplog.records] == ["WARNING"]
     assert "thesis" in caplog.text
     assert rest.feet
@@ -153,5 +153,5 @@ def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
 
 def test_a_robot_that_finds_no_rest_is_refused_by_name(robot, refused, monkeypatch):
     monkeypatch.setattr(equilibrium, "ITERATIONS", 2)
-    with refused("thesis", "robot", "no rest"):
-        _ = robot.rest
+    with refused("thesis", "robot", "no equilibrium"):
+        _ = robot.equilibrium

@@ -8,7 +8,7 @@ from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
 from tetra_drake.robot import equilibrium
-from tetra_drake.robot.equilibrium import Resting, force_at_rest
+from tetra_drake.robot.equilibrium import Unactuated, force_at_rest
 from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.load import load_scenario
@@ -23,14 +23,14 @@ def test_rests_where_the_independent_simulation_does(name, data):
     np.testing.assert_allclose(ours[:, 2], theirs[:, 2], atol=1e-6)
     np.testing.assert_allclose(distances(ours), distances(theirs), atol=1e-6)
 
-    resting = Resting.of(robot.model)
+    resting = Unactuated.of(robot.model)
     force_at_rest(resting, structure.initial_state)
     tension = {cable["ends"][0] + cable["ends"][1]: i for i, cable in enumerate(recorded["cables"])}
     places = [tension["".join(name.split()[1:])] for name in structure.cable_names]
     expected = np.array(recorded["tensions_at_rest"])[places]
     np.testing.assert_allclose(resting.forces.cable_forces[:, TENSION], expected, rtol=1e-6)
     assert resting.forces.ground_forces[:, NORMAL].sum() == pytest.approx(robot.weight, rel=1e-9)
-    assert robot.rest.feet == np.count_nonzero(theirs[:, 2] < 0.0) == 3
+    assert robot.equilibrium.feet == np.count_nonzero(theirs[:, 2] < 0.0) == 3
 
 
 def distances(p_WN: np.ndarray) -> np.ndarray:
@@ -86,8 +86,8 @@ def test_offsets_move_the_bodies_of_the_robot_at_rest():
 
 def test_a_robot_knows_the_rest_at_which_it_starts():
     robot = Robot.of(load_scenario("prism"))
-    assert robot.rest is robot.structure.rest
-    np.testing.assert_array_equal(robot.rest.state, robot.structure.initial_state)
+    assert robot.equilibrium is robot.structure.equilibrium
+    np.testing.assert_array_equal(robot.equilibrium.state, robot.structure.initial_state)
 
 
 def test_nodes_placed_in_the_ground_are_refused(refused):

@@ -329,7 +329,7 @@ def _contact(robot: Robot, mass: float) -> dict:
 
 def _feet(robot: Robot) -> int:
     """The nodes that bear the weight: by the blueprint, or at rest."""
-    return robot.structure.feet or max(1, robot.rest.feet)
+    return robot.structure.feet or max(1, robot.equilibrium.feet)
 
 
 def _add_cables(model: Element, structure: Structure) -> None:

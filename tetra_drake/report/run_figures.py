@@ -47,7 +47,7 @@ class RecordedGait:
 
 
 @dataclass(frozen=True)
-class Study:
+class ShownGaits:
     """A run with the gaits that its report shows."""
 
     run: Run
@@ -62,7 +62,7 @@ class Study:
         return int(self.best.recorded["trial"])
 
 
-def study_run(run: Run) -> Study:
+def simulate_shown_gaits(run: Run) -> ShownGaits:
     """Simulates the fittest gait of the best trial, initially and of all.
 
     Raises InputError if no gait of the run has a fitness, and SimulationFailure if other versions
@@ -72,7 +72,7 @@ def study_run(run: Run) -> Study:
     first = run.initial_best(fittest["trial"])
     best = simulate_again(run, fittest)
     initial = best if first["index"] == fittest["index"] else simulate_again(run, first)
-    return Study(run, best=best, initial=initial)
+    return ShownGaits(run, best=best, initial=initial)
 
 
 def simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
@@ -99,20 +99,20 @@ def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:
     return _save(folder, *pictures)
 
 
-def draw_run(study: Study, folder: Path) -> dict[str, str]:
+def draw_run(shown: ShownGaits, folder: Path) -> dict[str, str]:
     """Writes the figures of a run and of its best gait; returns captions as draw_trajectory()."""
-    run = study.run
+    run = shown.run
     pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
     trials = fitness.initial_extremes(run).index
     if len(trials):
         pictures.append((fitness.initial_distances, run))
-    if study.trial in trials:
-        pictures.append((fitness.initial_fitness, run, study.trial))
+    if shown.trial in trials:
+        pictures.append((fitness.initial_fitness, run, shown.trial))
     if len(elites(run)):
         pictures.append((map_of_gaits, run))
-    pictures.append((motion.before_and_after, study.initial.result, study.best.result))
+    pictures.append((motion.before_and_after, shown.initial.result, shown.best.result))
     captions = _save(folder, *pictures)
-    return captions | draw_trajectory(study.best.result, folder)
+    return captions | draw_trajectory(shown.best.result, folder)
 
 
 def _save(folder: Path, *pictures: tuple[Any, ...]) -> dict[str, str]:

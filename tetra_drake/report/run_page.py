@@ -20,11 +20,11 @@ from tetra_drake.formatting import Table, listed, render, rounded
 from tetra_drake.machine import versions
 from tetra_drake.report.result_folder import RESULT, load_result
 from tetra_drake.report.run_figures import (
-    Study,
+    ShownGaits,
     draw_run,
     draw_trajectory,
     simulate_again,
-    study_run,
+    simulate_shown_gaits,
 )
 from tetra_drake.report.summary import ground_text, metrics_table, results, trials_table
 from tetra_drake.results.metrics import headline
@@ -63,7 +63,7 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
         check_folder(folder)
         if out is None:
             return write_report(source)
-        draw_run(study_run(load_run(source)), folder)
+        draw_run(simulate_shown_gaits(load_run(source)), folder)
     elif os.path.exists(source / RESULT):
         check_folder(folder)
         draw_trajectory(load_result(source), folder)
@@ -81,63 +81,63 @@ def write_report(directory: Path) -> list[Path]:
     one, or one without any fitness, or cannot be written to.
     """
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
-    study = study_run(load_run(directory))
-    captions = draw_run(study, figures)
-    _write_map(study, directory)
-    study.best.result.save_replay(replay)
-    write_whole(report, render_report(study, captions, folder=figures))
+    shown = simulate_shown_gaits(load_run(directory))
+    captions = draw_run(shown, figures)
+    _write_map(shown, directory)
+    shown.best.result.save_replay(replay)
+    write_whole(report, render_report(shown, captions, folder=figures))
     return [figures, replay, report]
 
 
-def _write_map(study: Study, directory: Path) -> None:
+def _write_map(shown: ShownGaits, directory: Path) -> None:
     """Writes all gaits of the run's map as a table, and the chosen ones as gait files and, but for
     the run's best, replay pages."""
-    run = study.run
+    run = shown.run
     on_map = distinct_gaits(chosen(run))
     if on_map:
         write_whole(directory / ELITES / ELITES_CSV, elites(run).to_csv(index=False))
     for names, row in on_map:
         trial, index = row["trial"], row["index"]
-        gait_file, page = _map_files(names, row, study)
+        gait_file, page = _map_files(names, row, shown)
         save_gait(run.gait(trial, index), directory / gait_file, run.scenario)
         if page != Path(REPLAY):
             simulate_again(run, row).result.save_replay(directory / page)
 
 
-def _map_files(names: Sequence[str], row: pandas.Series, study: Study) -> tuple[Path, Path]:
+def _map_files(names: Sequence[str], row: pandas.Series, shown: ShownGaits) -> tuple[Path, Path]:
     """Gait file and replay page of a chosen gait of the map in a run's directory."""
     path = Path(ELITES) / names[0].replace(", ", "_").replace(" ", "_")
-    page = Path(REPLAY) if gait_label(row) == study.best.label else path.with_suffix(".html")
+    page = Path(REPLAY) if gait_label(row) == shown.best.label else path.with_suffix(".html")
     return path.with_suffix(".json"), page
 
 
-def render_report(study: Study, captions: Mapping[str, str], *, folder: Path) -> str:
+def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Path) -> str:
     """The report as HTML, with the pictures in `folder`, whose captions are given by name."""
-    run, manifest = study.run, study.run.manifest
+    run, manifest = shown.run, shown.run.manifest
     scenario = run.scenario
-    best_gait = trial_folder(Path(), study.trial) / BEST_GAIT
-    named = {"initially": study.initial.recorded, "best": study.best.recorded}
+    best_gait = trial_folder(Path(), shown.trial) / BEST_GAIT
+    named = {"initially": shown.initial.recorded, "best": shown.best.recorded}
     gaits, on_map = distinct_gaits(named), distinct_gaits(chosen(run))
     map_files: dict[str, Path] = {}
     map_pages: dict[str, Path] = {}
     for names, gait in on_map:
-        gait_file, page = _map_files(names, gait, study)
+        gait_file, page = _map_files(names, gait, shown)
         map_files |= dict.fromkeys(names, gait_file)
         map_pages[names[0]] = page
     changed = {}
-    for shown_gait in (study.best, study.initial):
+    for shown_gait in (shown.best, shown.initial):
         change = abs(shown_gait.distance_in - shown_gait.recorded["distance_in"])
         if change > 1e-6:
             changed[shown_gait.label] = change
-    gait = run.gait(study.trial, study.best.recorded["index"])
+    gait = run.gait(shown.trial, shown.best.recorded["index"])
     return render(
         "report/report.html.jinja",
         run=run,
         manifest=manifest,
-        title=f"{scenario.name}: {headline(scenario, study.best.recorded)}",
+        title=f"{scenario.name}: {headline(scenario, shown.best.recorded)}",
         evaluations=f"{sum(status.evaluations for status in run.statuses):,}",
         ground=ground_text(scenario),
-        best=study.best,
+        best=shown.best,
         changed=changed,
         versions=versions(),
         differences=_settings(scenario),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetra_drake.analysis.rest import RestStudy
+from tetra_drake.analysis.equilibrium import EquilibriumStudy
 from tetra_drake.formatting import Table, fixed, rounded
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.results.trajectory import Motion, make_dataset
@@ -37,7 +37,7 @@ def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
     return Robot.of(surroundings.with_sections(name=name, robot=structure, engine=Mujoco()))
 
 
-def structure_text(study: RestStudy) -> str:
+def structure_text(study: EquilibriumStudy) -> str:
     """What a robot is, and how it rests: tables in g, in and lbf."""
     robot, statics = study.robot, study.statics
     structure = robot.structure
@@ -57,7 +57,7 @@ def structure_text(study: RestStudy) -> str:
     return "\n\n".join(lines)
 
 
-def _bodies_table(study: RestStudy) -> Table:
+def _bodies_table(study: EquilibriumStudy) -> Table:
     rows, bodies = [], study.nodes.groupby("body", sort=False)
     for (body, nodes), mass in zip(bodies, study.robot.structure.mass, strict=True):
         heights = _range(nodes["z"] / INCH, fixed)
@@ -66,7 +66,7 @@ def _bodies_table(study: RestStudy) -> Table:
     return Table(["body", "mass (g)", "heights of nodes (in)", "load on the ground (lbf)"], rows)
 
 
-def _cables_table(study: RestStudy) -> Table:
+def _cables_table(study: EquilibriumStudy) -> Table:
     rows = []
     for group, cables in study.cables.groupby("group", sort=False):
         free = rounded(cables["free_length"].mean() / INCH)
@@ -81,7 +81,7 @@ def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> st
     return low if low == high else f"{low} to {high}"
 
 
-def save_structure_page(study: RestStudy, path: Path) -> None:
+def save_structure_page(study: EquilibriumStudy, path: Path) -> None:
     """Writes a page that shows the robot at rest; raises InputError if that cannot be written."""
     robot = study.robot
     loads = study.nodes["load"].to_numpy()[robot.structure.contacts]
@@ -89,7 +89,7 @@ def save_structure_page(study: RestStudy, path: Path) -> None:
     modes[:, :, CONTACT] = loads > 0.0
     motion = Motion(
         times=np.array([0.0, 1.0]),
-        states=np.tile(robot.rest.state, (2, 1)),
+        states=np.tile(robot.equilibrium.state, (2, 1)),
         signals=np.zeros((2, robot.structure.signals)),
         modes=modes,
         drives=np.tile(robot.starting_drives(), (2, 1)),

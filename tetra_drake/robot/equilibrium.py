@@ -49,7 +49,7 @@ linear algebra does, and a walk with feedback would enlarge it."""
 _LOG = logging.getLogger(LOGGER)
 
 
-class Rest(NamedTuple):
+class Equilibrium(NamedTuple):
     """A robot at rest."""
 
     state: np.ndarray
@@ -61,7 +61,7 @@ class Rest(NamedTuple):
     """The number of contact nodes that bear a load."""
 
 
-class Resting(NamedTuple):
+class Unactuated(NamedTuple):
     """A robot whose forces are sought, without actuation, and room to compute them in."""
 
     model: Model
@@ -75,13 +75,16 @@ class Resting(NamedTuple):
         return cls(model._replace(cables=cables), Forces.of(model))
 
 
-def find_rest(model: Model, start: np.ndarray, *, bodies: Sequence[str], source: str) -> Rest:
-    """Rest of a robot on flat ground, let go at `start` (13 n,) without actuation: the minimum of
-    potential energy downhill from there; friction carries nothing.
+def find_equilibrium(
+    model: Model, start: np.ndarray, *, bodies: Sequence[str], source: str
+) -> Equilibrium:
+    """Equilibrium of a robot on flat ground, let go at `start` (13 n,) without actuation.
+
+    It is the minimum of potential energy downhill from there; friction carries nothing.
 
     Raises InputError if it is not found, with the source and the name of a body.
     """
-    robot, state = Resting.of(model), start
+    robot, state = Unactuated.of(model), start
     weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
     reach, announce_at = FIRST_REACH * radius, math.inf
     for iteration in range(ITERATIONS):
@@ -93,12 +96,12 @@ def find_rest(model: Model, start: np.ndarray, *, bodies: Sequence[str], source:
         if np.abs(force).max() <= TOLERANCE * greatest:
             lengths = np.round(robot.forces.cable_forces[:, LENGTH], LENGTH_DIGITS)
             feet = int(np.count_nonzero(robot.forces.ground_forces[:, NORMAL]))
-            return Rest(state, lengths, feet)
+            return Equilibrium(state, lengths, feet)
         now = time.perf_counter()
         if iteration == 1:  # kernels are compiled by now
             announce_at = now + LONG
         if now > announce_at:
-            _LOG.warning("%s: finding the robot's rest takes a while", source)
+            _LOG.warning("%s: finding the robot's equilibrium takes a while", source)
             announce_at = math.inf
         step = _newton_step(robot, state, force)
         if step is None:
@@ -112,11 +115,11 @@ def find_rest(model: Model, start: np.ndarray, *, bodies: Sequence[str], source:
     left = np.abs(force.reshape(-1, 6)).max(axis=1)
     body = int(left.argmax())  # the first one with NaN, if there is any
     amount = f"{left[body]:.3g} N" if np.isfinite(left[body]) else "which is not finite"
-    problem = f"finds no rest; the greatest force left, {amount}, is on '{bodies[body]}'"
+    problem = f"finds no equilibrium; the greatest force left, {amount}, is on '{bodies[body]}'"
     raise InputError(source, "robot", problem)
 
 
-def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.ndarray | None:
+def _newton_step(robot: Unactuated, state: np.ndarray, force: np.ndarray) -> np.ndarray | None:
     """Displacements (6 n,) that bring the force to zero where the potential energy is convex, and
     lead downhill where it is not; the robot as a whole stays where it is. None if the derivatives
     of the forces are not finite."""
@@ -132,7 +135,7 @@ def _newton_step(robot: Resting, state: np.ndarray, force: np.ndarray) -> np.nda
     return None
 
 
-def _free_motions(robot: Resting, state: np.ndarray) -> np.ndarray:
+def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
     """(6 n, 3): displacements of the whole robot along x, along y, and about z."""
     motions = np.zeros((len(state) // 13, 6, 3))
     p_WB = state[: 7 * len(motions)].reshape(-1, 7)[:, 4:]
@@ -166,7 +169,7 @@ def solve_convex(matrix: Table, right: Table, least: float, x: Table) -> bool:
 
 
 @compiled
-def force_at_rest(robot: Resting, state: Table) -> Table:
+def force_at_rest(robot: Unactuated, state: Table) -> Table:
     """(6 n,): [t_W / radius; f_W] of all forces at each Bo; contact nodes stick where they are."""
     model, forces = robot.model, robot.forces
     modes = np.zeros((forces.ground_forces.shape[0], MODE_COLUMNS))
@@ -181,7 +184,7 @@ def force_at_rest(robot: Resting, state: Table) -> Table:
 
 
 @compiled
-def displaced(robot: Resting, state: Table, step: Table) -> Table:
+def displaced(robot: Unactuated, state: Table, step: Table) -> Table:
     """A state whose bodies have moved by `step`, (6 n,): rotation times radius, translation (m)."""
     moved, motion = state.copy(), step.copy()
     radius = robot.model.bodies.radius.max()
@@ -192,7 +195,7 @@ def displaced(robot: Resting, state: Table, step: Table) -> Table:
 
 
 @compiled
-def stiffness_at_rest(robot: Resting, state: Table) -> Table:
+def stiffness_at_rest(robot: Unactuated, state: Table) -> Table:
     """(6 n, 6 n), in N/m: minus the derivative of the forces by the displacements."""
     count, half = state.size // 13 * 6, DIFFERENCE * robot.model.bodies.radius.max()
     stiffness, motion = np.empty((count, count)), np.zeros(count)

@@ -20,7 +20,7 @@ from tetra_drake.physics.forces import Forces
 from tetra_drake.physics.mode_change import modes_after_step
 from tetra_drake.physics.model import Bodies, Model
 from tetra_drake.physics.oscillator import Network, steered_input
-from tetra_drake.robot.equilibrium import Rest, find_rest
+from tetra_drake.robot.equilibrium import Equilibrium, find_equilibrium
 from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure, node_positions, turn_with_slope
@@ -86,17 +86,19 @@ class Robot:
         return float(self.structure.mass.sum()) * self.scenario.robot.gravity
 
     @functools.cached_property
-    def rest(self) -> Rest:
-        """Rest of the robot on flat ground without actuation, whatever the scenario's terrain and
-        offsets; raises InputError if it finds no rest."""
-        return self.structure.rest or rest_of(self.scenario, undisturbed_structure(self.scenario))
+    def equilibrium(self) -> Equilibrium:
+        """Equilibrium of the robot on flat ground without actuation, whatever the scenario's
+        terrain and offsets; raises InputError if there is none."""
+        if self.structure.equilibrium is not None:
+            return self.structure.equilibrium
+        return equilibrium_of(self.scenario, undisturbed_structure(self.scenario))
 
     @functools.cached_property
     def senses(self) -> Senses:
-        """Constants of what the oscillators sense; raises InputError if the robot finds no rest."""
+        """Constants of what the oscillators sense; raises InputError if there is no equilibrium."""
         drivers, pathways = self.structure.drivers, self.scenario.cpg.feedback
         sizes = np.bincount(drivers - PASSIVE)[drivers - PASSIVE]  # cables of each cable's group
-        settled = self.rest.lengths if "length" in pathways else np.ones(len(drivers))
+        settled = self.equilibrium.lengths if "length" in pathways else np.ones(len(drivers))
         per_load = 1.0 / self.weight if "load" in pathways else 0.0
         return Senses(
             drivers=drivers,
@@ -202,9 +204,11 @@ def undisturbed_structure(scenario: Scenario) -> Structure:
     if not blueprint.settles:
         return placed
     up = np.array([0.0, 0.0, _lift(scenario, placed)])
-    rest = rest_of(scenario, dataclasses.replace(placed, p_WB=placed.p_WB + up))
-    poses = rest.state[: 7 * len(placed.bodies)].reshape(-1, 7)
-    return dataclasses.replace(placed, q_WB=poses[:, :4], p_WB=poses[:, 4:], rest=rest)
+    equilibrium = equilibrium_of(scenario, dataclasses.replace(placed, p_WB=placed.p_WB + up))
+    poses = equilibrium.state[: 7 * len(placed.bodies)].reshape(-1, 7)
+    return dataclasses.replace(
+        placed, q_WB=poses[:, :4], p_WB=poses[:, 4:], equilibrium=equilibrium
+    )
 
 
 def _lift(scenario: Scenario, placed: Structure) -> float:
@@ -219,12 +223,14 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
     return float(depth)
 
 
-def rest_of(scenario: Scenario, structure: Structure, start: np.ndarray | None = None) -> Rest:
-    """Rest of a structure on flat ground without actuation, let go at `start` (13 bodies,), or else
-    where it starts; raises InputError if there is none."""
+def equilibrium_of(
+    scenario: Scenario, structure: Structure, start: np.ndarray | None = None
+) -> Equilibrium:
+    """Equilibrium of a structure on flat ground without actuation, let go at `start` (13 bodies,)
+    or, without it, where the structure starts; raises InputError if there is none."""
     model = make_model(scenario.with_sections(terrain=Flat()), structure)
     start = structure.initial_state if start is None else start
-    return find_rest(model, start, bodies=structure.bodies, source=scenario.name)
+    return find_equilibrium(model, start, bodies=structure.bodies, source=scenario.name)
 
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:

@@ -17,7 +17,7 @@ from tetra_drake.physics.clearance import Struts
 from tetra_drake.physics.kinematics import NODE_COLUMNS, P_WN, move_nodes
 from tetra_drake.physics.model import Couplings
 from tetra_drake.robot.bodies import body_inertias
-from tetra_drake.robot.equilibrium import Rest
+from tetra_drake.robot.equilibrium import Equilibrium
 from tetra_drake.scenario.blueprint import Blueprint
 
 
@@ -36,8 +36,8 @@ class Structure(Blueprint):
     """(bodies, 3): the bodies at t = 0."""
     q_WB: np.ndarray
     """(bodies, 4): their quaternions then, w first."""
-    rest: Rest | None = None
-    """The rest at which it starts, but for offsets and slope; None if it starts as placed."""
+    equilibrium: Equilibrium | None = None
+    """The equilibrium where it starts, but for offsets and slope; None if it starts as placed."""
 
     @classmethod
     def of(cls, blueprint: Blueprint) -> Self:

@@ -149,7 +149,7 @@ class StructureFile(Section):
         """Length in m of the shortest strut, of which `disturbances.start` is a share."""
         return min(map(self._length, self.all_struts))
 
-    def following(self, base: Section, changes: Tree) -> Tree:
+    def implied_changes(self, base: Section, changes: Tree) -> Tree:
         """What changes, too, where `changes` made this robot of a base: nothing."""
         return {}
 
@@ -379,7 +379,7 @@ Robot = Annotated[Tetrahedra | StructureFile, Kinds()]
 """The tagged kinds of robots; without a tag it is the first.
 
 All have `gravity`, `offsets` (one for each body), `body_count`, `slack`, `size`, `lacking`
-(metrics), `blueprint()` and `following()`.
+(metrics), `blueprint()` and `implied_changes()`.
 """
 
 

@@ -221,7 +221,7 @@ class Tetrahedra(Section):
                 groups.append(tuple(len(CABLES) * i + CABLES.index(cable) for cable in group))
         return tuple(names), tuple(groups)
 
-    def following(self, base: Section, changes: Tree) -> Tree:
+    def implied_changes(self, base: Section, changes: Tree) -> Tree:
         """What changes, too, where `changes` made this robot of a base: the spacing, unless it is
         given or nothing has changed on which the balanced one depends."""
         if "spacing" in changes or not isinstance(base, Tetrahedra):

@@ -171,10 +171,12 @@ class Scenario(Section):
         tree = merged(base, changes)
         changed = self.from_tree(tree, source)
         robot = changes.get("robot")
-        following = changed.robot.following(self.robot, robot) if isinstance(robot, dict) else {}
-        if not following:
+        if not isinstance(robot, dict):
             return changed
-        return self.from_tree(merged(tree, {"robot": following}), source)
+        implied = changed.robot.implied_changes(self.robot, robot)
+        if not implied:
+            return changed
+        return self.from_tree(merged(tree, {"robot": implied}), source)
 
     def with_sections(self, **sections: Any) -> Self:
         """A copy with other sections, which are not checked."""

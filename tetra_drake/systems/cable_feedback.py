@@ -22,7 +22,7 @@ class Feedback(LeafSystem):
     """
 
     def __init__(self, robot: Robot, *, gains: npt.ArrayLike) -> None:
-        """`gains` of length, load and pitch. Raises InputError if the robot finds no rest."""
+        """`gains` of length, load and pitch. Raises InputError if there is no equilibrium."""
         super().__init__()
         structure = robot.structure
         self._senses = robot.senses

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tetra_drake.analysis.rest import RestStudy, study_rest
+from tetra_drake.analysis.equilibrium import EquilibriumStudy, study_equilibrium
 from tetra_drake.engines.mujoco import make_mjcf
 from tetra_drake.report.structure_page import (
     robot_of_file,
@@ -20,8 +20,8 @@ SHIPPED = {"prism": (1, 1), "six_bar": (1, 1), "mast": (6, 0), "pair": (2, 0)}
 
 
 @pytest.fixture(scope="module")
-def studies() -> dict[str, RestStudy]:
-    return {name: study_rest(robot_of_file(name)) for name in SHIPPED}
+def studies() -> dict[str, EquilibriumStudy]:
+    return {name: study_equilibrium(robot_of_file(name)) for name in SHIPPED}
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -31,7 +31,7 @@ def test_statics_are_those_of_the_structure_without_weight(studies, name):
 
 
 def test_each_junction_of_the_row_has_a_self_stress_and_a_mechanism(robot):
-    statics = study_rest(robot).statics
+    statics = study_equilibrium(robot).statics
     assert (len(statics.self_stresses), statics.mechanisms) == (4, 4)
 
 
@@ -69,7 +69,7 @@ def test_two_bars_side_by_side_bounce_as_masses_on_springs():
     mass, ground = math.pi * 0.002**2 * 0.2 * 1e4, robot.scenario.ground.stiffness
     slow = math.sqrt(2.0 * ground / mass) / (2.0 * math.pi)
     expected = [slow, slow, math.sqrt(3.0) * slow, math.sqrt(3.0) * slow]
-    assert study_rest(robot).frequencies == pytest.approx(expected, rel=2e-3)
+    assert study_equilibrium(robot).frequencies == pytest.approx(expected, rel=2e-3)
 
 
 def test_one_rigid_body_without_cables_rests_and_is_shown(tmp_path):
@@ -77,7 +77,9 @@ def test_one_rigid_body_without_cables_rests_and_is_shown(tmp_path):
     bar["struts"] = {"bar": {"pairs": [["a", "b"]], "diameter": 0.004, "density": 1e4}}
     bar["struts"]["bar"]["node_diameter"] = 0.0
     scenario = robot_of_file("prism").scenario
-    study = study_rest(Robot.of(scenario.with_sections(robot=StructureFile.model_validate(bar))))
+    study = study_equilibrium(
+        Robot.of(scenario.with_sections(robot=StructureFile.model_validate(bar)))
+    )
     assert study.nodes["load"].tolist() == pytest.approx([study.robot.weight / 2] * 2)
     assert (study.statics.self_stresses.shape, study.statics.mechanisms) == ((0, 0), 0)
     assert len(study.cables) == 0

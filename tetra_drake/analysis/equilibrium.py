@@ -11,8 +11,8 @@ from pydrake.multibody.tree import RotationalInertia
 
 from tetra_drake.physics.cable import TENSION
 from tetra_drake.physics.contact import NORMAL
-from tetra_drake.robot.equilibrium import Resting, force_at_rest, stiffness_at_rest
-from tetra_drake.robot.robot import Robot, rest_of
+from tetra_drake.robot.equilibrium import Unactuated, force_at_rest, stiffness_at_rest
+from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.statics import Statics, find_statics
 from tetra_drake.robot.structure import node_positions
 
@@ -24,7 +24,7 @@ LEAST_FREQUENCY = 0.05
 
 
 @dataclass(frozen=True)
-class RestStudy:
+class EquilibriumStudy:
     """A robot at rest; SI units."""
 
     robot: Robot
@@ -38,60 +38,60 @@ class RestStudy:
     """Natural frequencies without damping, in Hz, ascending. Nodes on the ground slide freely."""
 
 
-def study_rest(robot: Robot) -> RestStudy:
+def study_equilibrium(robot: Robot) -> EquilibriumStudy:
     """Studies a robot at rest; raises InputError if it finds none."""
     import pandas
 
-    structure, rest = robot.structure, robot.rest
-    resting = Resting.of(robot.model)
-    force_at_rest(resting, rest.state)
+    structure, equilibrium = robot.structure, robot.equilibrium
+    unactuated = Unactuated.of(robot.model)
+    force_at_rest(unactuated, equilibrium.state)
     loads = np.zeros(len(structure.node_names))
-    loads[structure.contacts] = resting.forces.ground_forces[:, NORMAL]
+    loads[structure.contacts] = unactuated.forces.ground_forces[:, NORMAL]
     ends = np.column_stack([structure.cables["node_a"], structure.cables["node_b"]])
     bodies = np.array(structure.bodies)[structure.carriers]
-    x, y, z = node_positions(structure, rest.state).T
+    x, y, z = node_positions(structure, equilibrium.state).T
     nodes = {"body": bodies, "x": x, "y": y, "z": z, "load": loads}
     cables = {
         "group": structure.cable_groups,
-        "length": rest.lengths,
+        "length": equilibrium.lengths,
         "free_length": structure.cables["free_length"],
-        "tension": resting.forces.cable_forces[:, TENSION],
+        "tension": unactuated.forces.cable_forces[:, TENSION],
     }
-    return RestStudy(
+    return EquilibriumStudy(
         robot=robot,
         statics=find_statics(
             p_WN=_weightless_nodes(robot), body_of_node=structure.carriers, cable_ends=ends
         ),
         nodes=pandas.DataFrame(nodes, index=list(structure.node_names)),
         cables=pandas.DataFrame(cables, index=list(structure.cable_names)),
-        frequencies=_frequencies(resting, rest.state),
+        frequencies=_frequencies(unactuated, equilibrium.state),
     )
 
 
 def _weightless_nodes(robot: Robot) -> np.ndarray:
     """p_WN (nodes, 3) where the robot is in balance without weight, away from the ground."""
-    bodies, start = robot.model.bodies, robot.rest.state.copy()
+    bodies, start = robot.model.bodies, robot.equilibrium.state.copy()
     start[6 : 7 * len(bodies.mass) : 7] += 10.0 * bodies.radius.max()
     weightless = robot.scenario.with_numbers({"robot.gravity": 0.0})
-    return node_positions(robot.structure, rest_of(weightless, robot.structure, start).state)
+    return node_positions(robot.structure, equilibrium_of(weightless, robot.structure, start).state)
 
 
-def _frequencies(resting: Resting, state: np.ndarray) -> np.ndarray:
+def _frequencies(unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
     """Natural frequencies (Hz) above LEAST_FREQUENCY."""
-    stiffness = stiffness_at_rest(resting, state)
+    stiffness = stiffness_at_rest(unactuated, state)
     stiffness = 0.5 * (stiffness + stiffness.T)
     # Of M x'' = -K x with M = L Lᵀ: the eigenvalues of L^-1 K L^-T.
-    factor = np.linalg.cholesky(_mass_matrix(resting))
+    factor = np.linalg.cholesky(_mass_matrix(unactuated))
     scaled = np.linalg.solve(factor, np.linalg.solve(factor, stiffness).T)
     squares = np.linalg.eigvalsh(scaled)
     least = (2.0 * math.pi * LEAST_FREQUENCY) ** 2
     return np.sqrt(squares[squares > least]) / (2.0 * math.pi)
 
 
-def _mass_matrix(resting: Resting) -> np.ndarray:
+def _mass_matrix(unactuated: Unactuated) -> np.ndarray:
     """(6 n, 6 n) at the state that was last computed, for rotations times the greatest radius."""
-    model, bodies = resting.model, resting.model.bodies
-    inertia_W = bodies.inertia if model.isotropic else resting.forces.inertia
+    model, bodies = unactuated.model, unactuated.model.bodies
+    inertia_W = bodies.inertia if model.isotropic else unactuated.forces.inertia
     matrix = np.diag(np.repeat(bodies.mass, 6))
     for body, inertia in enumerate(inertia_W):
         turning = slice(6 * body, 6 * body + 3)
