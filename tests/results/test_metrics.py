@@ -149,9 +149,9 @@ def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario
 @pytest.mark.parametrize(
     ("objective", "text"),
     [
-        ({"speed": 1.0, "heading_change": 9.0}, "walks 2.0 in in 15 s"),
+        ({"speed": 1.0, "heading_change": 9.0}, "walks 2.0 inches in 15 s"),
         ({"heading_change": 1.0}, "turns 180 degrees in 15 s"),
-        ({"cost_of_transport": -1.0, "twist": -1.0}, "cost of transport 4, walks 2.0 in in 15 s"),
+        ({"cost_of_transport": -1, "twist": -1}, "cost of transport 4, walks 2.0 inches in 15 s"),
     ],
 )
 def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text):
@@ -163,9 +163,9 @@ def test_the_headline_is_what_the_objective_looks_for(scenario, objective, text)
 @pytest.mark.parametrize(
     ("terrain", "text"),
     [
-        (Incline(slope=math.radians(10.0)), "walks 2.0 in backward up 10 degrees in 15 s"),
-        (Incline(slope=math.radians(-5.0)), "walks 2.0 in backward down 5 degrees in 15 s"),
-        (Rough(amplitude=0.01, wavelength=0.1), "walks 2.0 in backward on rough ground in 15 s"),
+        (Incline(slope=math.radians(10.0)), "walks 2.0 inches backward up 10 degrees in 15 s"),
+        (Incline(slope=math.radians(-5.0)), "walks 2.0 inches backward down 5 degrees in 15 s"),
+        (Rough(amplitude=0.01, wavelength=1), "walks 2.0 inches backward on rough ground in 15 s"),
     ],
 )
 def test_the_headline_says_where_the_robot_walks(scenario, terrain, text):

@@ -123,11 +123,11 @@ def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]
 
 
 def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
-    """What a gait does, by its scenario's objective, as "walks 14.3 in in 15 s"."""
+    """What a gait does, by its scenario's objective, such as "walks 14.3 inches in 15 s"."""
     seconds = f"in {scenario.simulation.duration:g} s"
     inches = metrics["distance"] / INCH
     backward = " backward" if inches < 0.0 else ""
-    walk = f"walks {fixed(abs(inches), 1)} in{backward}{_ground(scenario)} {seconds}"
+    walk = f"walks {fixed(abs(inches), 1)} inches{backward}{_ground(scenario)} {seconds}"
     name = headline_metric(scenario.objective, metrics)
     if name == "distance":
         return walk
