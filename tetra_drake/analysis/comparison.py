@@ -1,6 +1,6 @@
-"""Comparison of searches: the best of their trials against their cost.
+"""Comparison of runs: the best fitness of their trials against the cost of the search.
 
-Costs are numbers of simulations: an evaluation has one in each draw of disturbances.
+The cost is the number of simulations. An evaluation costs one simulation per draw of disturbances.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 QUARTILES = (0.25, 0.5, 0.75)
 
-# Sections of the scenario that say how runs search, and not for what.
+# Sections of the scenario that may differ: they say how a run searches, not for which gaits.
 _SEARCH = ("evolution", "optimizer")
 
 
@@ -33,35 +33,51 @@ _TRIAL_COLUMNS = ["run", "trial", "ended", "cost", "at_common", "fitness", "dist
 
 @dataclass(frozen=True)
 class Compared:
-    """Result of compare(). All runs maximise fitness, so fitness is compared."""
+    """Result of compare(): tables of trials, curves and runs."""
 
     common: int
-    """Cost at which the cheapest run ends."""
+    """Cost at which the shortest curve ends; all runs have fitnesses there."""
     reach: float | None
-    """The distance (m) to be reached by the fittest gait so far."""
+    """Distance (m) for the columns `reached`; None if compare() got none."""
     trials: pandas.DataFrame
-    """A row per trial that has begun: run, trial, ended, cost, at_common and fitness (the best so
-    far there and at the trial's end, -inf where there is none), distance (m, of the fittest),
-    reached (cost of the first fittest so far that walks `reach`; infinite where none does)."""
+    """A row per trial with evaluations. Columns:
+
+    - run, trial, ended (True if the trial is finished), cost
+    - at_common: best fitness at the cost `common`; -inf if all gaits failed
+    - fitness: best fitness at the end; -inf if all gaits failed
+    - distance (m): distance of the fittest gait
+    - reached: cost at which the fittest gait so far walks `reach`; infinite if none does
+    """
     curves: pandas.DataFrame
-    """The best fitness so far, where it rises: run, cost, low, median, high (QUARTILES over the
-    trials). A trial that has ended goes on with its last value; the curve ends where the first
-    trial does that has not, else with the longest."""
+    """Best fitness over cost: run, cost, low, median, high (QUARTILES over trials).
+
+    A row is a cost at which a trial improves. A finished trial keeps its last value. The curve ends
+    with the first unfinished trial, or with the longest trial if all are finished.
+    """
     runs: pandas.DataFrame
-    """A row per run: trials, going_on, draws, cost (median over trials); at_common, fitness and
-    distance (medians over trials with a fitness), each with _mean, _low and _high (interquartile
-    mean and its 95 % confidence interval); reached_low, reached and reached_high (quartiles over
-    trials), share (of trials that reach it); wall_time (s, mean per evaluation)."""
+    """A row per run. Columns:
+
+    - trials, going_on: number of trials, and of unfinished trials
+    - draws: simulations per evaluation; cost: median over trials
+    - at_common, fitness, distance: medians over trials with a fitness; with suffix _mean the
+      interquartile mean, with _low and _high its 95 % confidence interval
+    - reached_low, reached, reached_high: quartiles over trials; share: share of trials that reach
+      `reach`
+    - wall_time: mean time per evaluation, in s
+    """
     notes: list[str]
-    """Notes on differences other than search, and on unfinished runs."""
+    """Notes on differences of the scenarios outside the search, and on unfinished trials."""
 
 
 def compare(directories: Sequence[str | Path], *, reach: float | None = None) -> Compared:
-    """Compares how runs of one objective search, finished or not.
+    """Compares runs with the same objective, finished or not.
 
-    reach: a distance (m); the result says when it was walked.
+    Args:
+        directories: folders of runs.
+        reach: a distance (m); the result says at which cost it was reached.
 
-    Raises InputError where objectives differ, a run is given twice, or one has no fitness yet.
+    Raises:
+        InputError: if objectives differ, a run is given twice, or a run has no fitness yet.
     """
     import pandas
 
@@ -95,8 +111,9 @@ def compare(directories: Sequence[str | Path], *, reach: float | None = None) ->
 
 
 def _progress(run: Run) -> pandas.DataFrame:
-    """The course of each trial, a row per evaluation: trial, ended (the trial), cost, and fitness
-    and distance (m) of the trial's fittest gait so far, -inf and NaN where there is none."""
+    """Progress of each trial, a row per evaluation: trial, ended (True if the trial is finished),
+    cost, fitness and distance (m) of the trial's fittest gait so far. Before the first success,
+    fitness is -inf and distance is NaN."""
     run.fittest()  # raises InputError if there is none
     table = run.evaluations[["trial", "fitness", "distance"]].copy()
     trial = table["trial"]
@@ -109,14 +126,14 @@ def _progress(run: Run) -> pandas.DataFrame:
 
 
 def _end(progress: pandas.DataFrame) -> int:
-    """Cost at which a run's curve ends."""
+    """Cost at the end of a run's curve; see Compared.curves."""
     ends = progress.groupby("trial")[["cost", "ended"]].last()
     going_on = ends[~ends["ended"]]
     return int(ends["cost"].max() if going_on.empty else going_on["cost"].min())
 
 
 def _trials(progress: pandas.DataFrame, common: int, reach: float | None) -> pandas.DataFrame:
-    """A run's rows of Compared.trials."""
+    """The rows of Compared.trials for one run."""
     table = progress.drop_duplicates("trial", keep="last").set_index("trial")
     at_common = progress[progress["cost"] <= common].groupby("trial")["fitness"].last()
     far = progress[progress["distance"] >= (math.inf if reach is None else reach)]
@@ -127,7 +144,8 @@ def _trials(progress: pandas.DataFrame, common: int, reach: float | None) -> pan
 
 
 def _curve(progress: pandas.DataFrame) -> pandas.DataFrame:
-    """The quartiles over the trials where one of them rises, and at the end."""
+    """Quartiles of the best fitness over the trials, at each cost at which a trial improves, and at
+    the end."""
     best = progress.pivot(index="cost", columns="trial", values="fitness").ffill()
     best = best.loc[: _end(progress)]
     rises = (best != best.shift()).any(axis=1)
@@ -138,21 +156,21 @@ def _curve(progress: pandas.DataFrame) -> pandas.DataFrame:
 
 
 def _quartiles(values: npt.NDArray[np.float64]) -> list[Any]:
-    """QUARTILES of each column (or of one), linear between values as numpy's, which are NaN where
-    values are infinite."""
+    """QUARTILES along the first axis, with linear interpolation. Unlike numpy's they are not NaN
+    if values are infinite."""
     ordered = np.sort(values, axis=0)
     quartiles = []
     for share in QUARTILES:
-        place = share * (len(values) - 1)
-        quartile, weight = ordered[math.floor(place)], place % 1.0
+        position = share * (len(values) - 1)
+        quartile, weight = ordered[math.floor(position)], position % 1.0
         if weight > 0.0:
-            quartile = (1.0 - weight) * quartile + weight * ordered[math.ceil(place)]
+            quartile = (1.0 - weight) * quartile + weight * ordered[math.ceil(position)]
         quartiles.append(quartile)
     return quartiles
 
 
 def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
-    """A run's columns of Compared.runs, from its trials."""
+    """Columns of Compared.runs for one run, computed from its trials."""
     row: dict[str, Any] = {"trials": len(trials), "going_on": int((~trials["ended"]).sum())}
     row["cost"] = trials["cost"].median()
     for name in ("at_common", "fitness", "distance"):
@@ -167,7 +185,7 @@ def _summary(trials: pandas.DataFrame) -> dict[str, Any]:
 
 
 def _labelled(runs: Sequence[Run]) -> dict[str, Run]:
-    """The runs by the names of their folders, by their paths where names are the same."""
+    """Runs by the name of the folder, or by path if two folders have the same name."""
     labels = [run.directory.resolve().name for run in runs]
     if len({*labels}) < len(labels):
         labels = [str(run.directory) for run in runs]
@@ -180,13 +198,14 @@ def _labelled(runs: Sequence[Run]) -> dict[str, Run]:
 
 
 def _differences(runs: Mapping[str, Run]) -> list[str]:
-    """Differences from the first run beside search; InputError where the objective differs."""
+    """Notes on scenarios that differ from the first run's outside the search. Raises InputError if
+    objectives differ."""
     (first, base), *others = runs.items()
     notes = []
     for label, run in others:
         if _objective(run) != _objective(base):
-            problem = f"is not that of {first}, and fitnesses of different objectives say nothing"
-            raise InputError(run.directory, "objective", f"{problem} about each other")
+            problem = f"differs from {first}; fitnesses of different objectives cannot be compared"
+            raise InputError(run.directory, "objective", problem)
         changed = [
             f"{key} {value}"
             for key, value in run.scenario.differences(base.scenario)
@@ -203,7 +222,7 @@ def _objective(run: Run) -> tuple[str, Mapping[str, float]]:
 
 
 def comparison_numbers(compared: Compared) -> dict[str, Any]:
-    """The content of summary.json, lengths in m; null for what is infinite or unknown."""
+    """Content of summary.json. Lengths are in m. Infinite and unknown numbers are null."""
     return {
         "common": compared.common,
         "reach": compared.reach,

@@ -1,6 +1,8 @@
-"""The map of a run: the fittest gait in each cell of a grid of two metrics, made from its record.
+"""Map of a run: the fittest gait in each cell of a grid of two metrics (an elite).
 
-elites.jsonl    those gaits of a run's map that were simulated on disturbed robots, line by line
+The map is computed from the record of the run.
+
+elites.jsonl    results of elites on disturbed robots, one line per gait
 """
 
 from __future__ import annotations
@@ -25,19 +27,21 @@ if TYPE_CHECKING:
     import pandas
 
 LUCKY = 0.5
-"""A gait of the map that keeps a smaller share of the draws of disturbances is there by luck."""
+"""Least share of draws that an elite must keep; an elite below it is left out as lucky. For `kept`
+see robustness.LOSS."""
 
 CELLS = ["cell_1", "cell_2"]
 _KEY = ["trial", "index"]
 _JUDGED = ["kept", "mean_distance"]
-_EPSILON = 1e-6  # which pyribs adds against rounding
+_EPSILON = 1e-6  # pyribs adds this number against rounding
 
 
 def elites(run: Run) -> pandas.DataFrame:
-    """The fittest gait of each cell, of all trials, the fittest first: rows of the evaluations, and
-    cell_1 and cell_2, the numbers of the cell, from 0; kept and mean_distance, the share of the
-    draws kept and the mean distance (m) on disturbed robots, NaN where not simulated. Empty if the
-    run's scenario asks for no map.
+    """Elites of a run over all trials, the fittest first; empty if the optimiser makes no map.
+
+    A row is a row of Run.evaluations with more columns: cell_1 and cell_2 (numbers of the cell,
+    from 0), kept (share of draws that the gait keeps, see robustness.LOSS), mean_distance (m, on
+    disturbed robots). The last two are NaN if the gait was not simulated on disturbed robots.
     """
     import pandas
 
@@ -54,18 +58,20 @@ def elites(run: Run) -> pandas.DataFrame:
 
 
 def _cells(gaits: pandas.DataFrame, kind: QualityDiversity) -> npt.NDArray[np.int64]:
-    """Cell numbers (gaits, 2) of gaits along each of the two measures, as pyribs has them."""
+    """Numbers (gaits, 2) of the cell of each gait, computed as pyribs does."""
     low, high = np.array(list(kind.measures.values())).T
     count = np.array(kind.cells)
-    places = (count * (gaits[list(kind.measures)].to_numpy() - low) + _EPSILON) / (high - low)
-    return places.clip(0, count - 1).astype(np.int64)
+    cells = (count * (gaits[list(kind.measures)].to_numpy() - low) + _EPSILON) / (high - low)
+    return cells.clip(0, count - 1).astype(np.int64)
 
 
 def judge_elites(
     directory: Path, *, workers: int | None = None, say: Callable[[str], None] = lambda text: None
 ) -> None:
-    """Simulates the elites of a run on robots disturbed as judge() does, as often as the scenario
-    says, and adds to the record how far they walk. Those that have been are skipped."""
+    """Simulates the elites of a run on disturbed robots, as judge() does, and records the results.
+
+    The scenario sets the number of draws. Elites with a recorded result are skipped.
+    """
     manifest = read_manifest(directory)
     kind, file = manifest.scenario.optimizer, RecordFile.of(directory, manifest.run, ELITES)
     if not isinstance(kind, QualityDiversity) or not kind.draws:
@@ -90,12 +96,13 @@ def judge_elites(
 
 
 def robust(gaits: pandas.DataFrame) -> pandas.DataFrame:
-    """Elites without the lucky ones, the fittest first."""
+    """Elites that keep at least the share LUCKY of the draws, the fittest first."""
     return gaits[~(gaits["kept"] < LUCKY)]
 
 
 def chosen(run: Run) -> dict[str, pandas.Series]:
-    """Fittest of the robust elites and those nearest to the corners of the map, by name."""
+    """Notable gaits of the map by name: the fittest robust elite, and the robust elites nearest to
+    the corners."""
     gaits, kind = robust(elites(run)), run.scenario.optimizer
     if not isinstance(kind, QualityDiversity) or gaits.empty:
         return {}
@@ -103,7 +110,7 @@ def chosen(run: Run) -> dict[str, pandas.Series]:
 
 
 def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, pandas.Series]:
-    """Gaits whose cells are nearest to the corners, by the corners' names."""
+    """The gait nearest to each corner of the map, by the name of the corner."""
     named = {}
     count = np.array(kind.cells)
     first, second = (name.replace("_", " ") for name in kind.measures)
@@ -115,7 +122,7 @@ def _corners(gaits: pandas.DataFrame, kind: QualityDiversity) -> dict[str, panda
 
 
 def distinct_gaits(named: Mapping[str, pandas.Series]) -> list[tuple[list[str], pandas.Series]]:
-    """The different ones among named gaits, each with all of its names."""
+    """Named gaits without repetitions: each gait with all of its names."""
     names: dict[Any, list[str]] = {}
     for name, gait in named.items():
         names.setdefault((gait["trial"], gait["index"]), []).append(name)

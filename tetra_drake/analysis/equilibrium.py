@@ -1,4 +1,5 @@
-"""A robot at rest on flat ground without actuation: statics, tensions, heights, frequencies."""
+"""Study of a robot in equilibrium on flat ground without actuation: statics, tensions, node
+positions, natural frequencies."""
 
 from __future__ import annotations
 
@@ -20,18 +21,19 @@ if TYPE_CHECKING:
     import pandas
 
 LEAST_FREQUENCY = 0.05
-"""Hz; slower modes are motions that nothing resists, such as the spin of a bar about its axis."""
+"""Least natural frequency in Hz. A slower mode is a motion that no force resists, such as the spin
+of a bar about its axis."""
 
 
 @dataclass(frozen=True)
 class EquilibriumStudy:
-    """A robot at rest; SI units."""
+    """Result of study_equilibrium(); SI units."""
 
     robot: Robot
     statics: Statics
-    """Statics where the robot is in balance without weight, away from the ground."""
+    """Statics of the robot without weight, away from the ground."""
     nodes: pandas.DataFrame
-    """A row per node, by its name: body, x, y, z, load (that the ground bears)."""
+    """A row per node, by its name: body, x, y, z, load (normal force of the ground)."""
     cables: pandas.DataFrame
     """A row per cable, by its name: group, length, free_length, tension."""
     frequencies: np.ndarray
@@ -39,7 +41,7 @@ class EquilibriumStudy:
 
 
 def study_equilibrium(robot: Robot) -> EquilibriumStudy:
-    """Studies a robot at rest; raises InputError if it finds none."""
+    """Studies a robot in equilibrium. Raises InputError if no equilibrium is found."""
     import pandas
 
     structure, equilibrium = robot.structure, robot.equilibrium
@@ -69,7 +71,7 @@ def study_equilibrium(robot: Robot) -> EquilibriumStudy:
 
 
 def _weightless_nodes(robot: Robot) -> np.ndarray:
-    """p_WN (nodes, 3) where the robot is in balance without weight, away from the ground."""
+    """p_WN (nodes, 3) in the equilibrium without weight, away from the ground."""
     bodies, start = robot.model.bodies, robot.equilibrium.state.copy()
     start[6 : 7 * len(bodies.mass) : 7] += 10.0 * bodies.radius.max()
     weightless = robot.scenario.with_numbers({"robot.gravity": 0.0})
@@ -80,7 +82,7 @@ def _frequencies(unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
     """Natural frequencies (Hz) above LEAST_FREQUENCY."""
     stiffness = stiffness_at_rest(unactuated, state)
     stiffness = 0.5 * (stiffness + stiffness.T)
-    # Of M x'' = -K x with M = L Lᵀ: the eigenvalues of L^-1 K L^-T.
+    # M x'' = -K x with M = L Lᵀ: the squared frequencies are the eigenvalues of L^-1 K L^-T.
     factor = np.linalg.cholesky(_mass_matrix(unactuated))
     scaled = np.linalg.solve(factor, np.linalg.solve(factor, stiffness).T)
     squares = np.linalg.eigvalsh(scaled)
@@ -89,7 +91,8 @@ def _frequencies(unactuated: Unactuated, state: np.ndarray) -> np.ndarray:
 
 
 def _mass_matrix(unactuated: Unactuated) -> np.ndarray:
-    """(6 n, 6 n) at the state that was last computed, for rotations times the greatest radius."""
+    """Mass matrix (6 n, 6 n) at the last computed state. Rotations are scaled by the largest radius
+    of the bodies, so all coordinates are lengths."""
     model, bodies = unactuated.model, unactuated.model.bodies
     inertia_W = bodies.inertia if model.isotropic else unactuated.forces.inertia
     matrix = np.diag(np.repeat(bodies.mass, 6))

@@ -1,5 +1,7 @@
-"""Robustness of gaits, judged on fresh draws: how far they walk when robot and surroundings differ
-from the model."""
+"""Robustness of gaits: how far they walk if robot and surroundings differ from the model.
+
+Gaits are simulated on draws of disturbances that evolution never uses.
+"""
 
 from __future__ import annotations
 
@@ -26,44 +28,46 @@ if TYPE_CHECKING:
 
 NOTHING, ALL = "nothing", "all"
 START, TERRAIN = "displaced start", "terrain seed"
-"""Names of changes beside the keys of the scenario's spreads."""
+"""Names of the changes that are not keys of the scenario's spreads."""
 
 PERCENT, DRAWS = 5.0, 200
 ALONE = 8
-"""Draws of which the displaced start, or the terrain seed, is also simulated alone."""
+"""Number of draws whose start and terrain seed are also simulated alone."""
 
 LOSS = 0.1
-"""A gait keeps a draw in which it loses at most this share of its undisturbed distance, and misses
-none of the scenario's requirements."""
+"""Largest loss of distance, as a share of the undisturbed distance, with which a gait keeps a draw.
+The gait must also meet the scenario's requirements in the draw."""
 
 _Planned = tuple[dict[str, Any], Draw]
-"""A draw with its labels in Judgement's tables."""
+"""Labels of a draw in the tables of Judgement, and the draw."""
 
 QUANTILES = {"5 %": 0.05, "25 %": 0.25, "50 %": 0.5, "75 %": 0.75, "95 %": 0.95}
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """Simulations of judge().
+    """Result of judge(): tables with one row per simulation.
 
-    All tables have the columns gait (its key), failure (missing where there is none), missed (the
-    scenario's requirements that are not met), fitness and the metrics (distance ...) in SI, NaN
-    where the simulation failed.
+    All tables have the columns gait (its key), failure (reason, or missing), missed (requirements
+    of the scenario that are not met), fitness, and the metrics in SI. Fitness and metrics are NaN
+    if the simulation failed.
     """
 
     scenario: Scenario
-    """Scenario with the disturbances of the draws."""
+    """Scenario with the disturbances that the draws are made of."""
     seed: int
     undisturbed: pandas.DataFrame
-    """A row per gait."""
+    """A row per gait, simulated without disturbances."""
     draws: pandas.DataFrame
-    """A row per gait and draw. Also: draw, and a factor by each key of the scenario's spreads."""
+    """A row per gait and draw. More columns: draw (its number), and for each key of the scenario's
+    spreads its factor."""
     alone: pandas.DataFrame
-    """A row per gait and single change. Also: what (a key, START or TERRAIN), spread (of a key, of
-    either sign), draw (whose start or seed it is)."""
+    """A row per gait and single change. More columns: what (a key, START or TERRAIN), spread (the
+    relative change of the key), draw (the draw that start or terrain seed are taken from)."""
 
     def compared(self, table: pandas.DataFrame) -> pandas.DataFrame:
-        """A table with more columns: undisturbed (distance), change (of the distance), kept."""
+        """A table with three more columns: undisturbed (distance without disturbances), change
+        (difference of the distance to it), kept (see LOSS)."""
         before = table["gait"].map(self.undisturbed.set_index("gait")["distance"])
         change = table["distance"] - before
         kept = (change >= -LOSS * before.abs()) & (table["missed"] == "")  # False where NaN
@@ -71,7 +75,8 @@ class Judgement:
 
 
 def default_disturbances(scenario: Scenario, percent: float = PERCENT) -> Disturbances:
-    """Default disturbances: so many percent for numbers marked as Varied, and for starts."""
+    """Default disturbances: a spread of `percent` for all numbers marked as Varied, and for the
+    start."""
     share = percent / 100.0
     together: dict[str, list[str]] = {}
     for key, name in varied(scenario):
@@ -90,13 +95,22 @@ def judge(
     alone: bool = True,
     workers: int | None = None,
 ) -> Judgement:
-    """Simulates gaits on the compiled engine: undisturbed, under fresh draws of the scenario's
-    disturbances, the same for all gaits, and, if `alone`, under each change alone.
+    """Simulates gaits on disturbed robots, with the compiled engine.
 
-    Without disturbances in the scenario, or with `percent`, they are the default ones. No evolution
-    ever sees these draws, whatever its seed. `workers` are those of simulate_many().
+    Each gait is simulated undisturbed and in all draws; the draws are the same for all gaits. No
+    evolution uses these draws, whatever its seed.
 
-    Raises InputError where a gait is for another robot, or percent too large for the scenario.
+    Args:
+        scenario: its disturbances are used, if it has any and `percent` is None.
+        gaits: gaits by any key.
+        percent: size of the default disturbances.
+        draws: number of draws.
+        seed: seed of the draws.
+        alone: also simulates each change alone.
+        workers: number of threads, see simulate_many().
+
+    Raises:
+        InputError: if a gait is for another robot, or `percent` is too large for the scenario.
     """
     disturbances = scenario.disturbances
     if disturbances is None or percent is not None:
@@ -121,7 +135,7 @@ def judge(
 
 
 def _alone(disturbances: Disturbances, fresh: Sequence[Draw]) -> Iterator[_Planned]:
-    """Each change alone."""
+    """Draws with a single change each: the keys up and down, then starts and terrain seeds."""
     for key, size in disturbances.spreads.items():
         for spread in (-size, size):
             yield {"what": key, "spread": spread}, Draw({key: 1.0 + spread})
@@ -135,15 +149,16 @@ def _alone(disturbances: Disturbances, fresh: Sequence[Draw]) -> Iterator[_Plann
 def _simulated(
     scenario: Scenario, plan: Sequence[_Planned], gaits: Mapping[Any, Gait], workers: int | None
 ) -> list[dict[str, Any]]:
-    """A row for each draw of the plan and gait: labels and what Judgement's tables have in common.
+    """Simulates each gait in each draw of the plan. A row has the labels of the draw and the common
+    columns of Judgement.
 
-    A robot that cannot start, such as one displaced into a step of the terrain, is a failure.
+    A robot that cannot start is a failure; it may have been displaced into a step of the terrain.
     """
     check_scenario(scenario)
     rows: list[dict[str, Any]] = []
     walking: list[tuple[dict[str, Any], Scenario, Gait]] = []
     for labels, draw in plan:
-        changed = disturbed(scenario, draw)  # one for all gaits: the engine prepares it once
+        changed = disturbed(scenario, draw)  # shared by all gaits: the engine prepares it once
         refusal = None
         try:
             check_scenario(changed)
@@ -178,10 +193,14 @@ def _table(rows: list[dict[str, Any]], *labels: str) -> pandas.DataFrame:
 
 
 def by_gait(judgement: Judgement) -> pandas.DataFrame:
-    """A row per gait: undisturbed, QUANTILES and mean of the distance (m) under the draws, without
-    those that failed; kept (share of all draws); mean_low, mean_high, kept_low and kept_high (95 %
-    confidence intervals); failed and missed (draws that failed, or with too little of a required
-    metric)."""
+    """Summary of a judgement with a row per gait. Columns:
+
+    - undisturbed: distance (m) without disturbances
+    - QUANTILES and mean of the distance (m) over the draws that did not fail
+    - kept: share of all draws that the gait keeps
+    - mean_low, mean_high, kept_low, kept_high: 95 % confidence intervals
+    - failed, missed: numbers of draws that failed, and that miss a requirement
+    """
     import pandas
 
     rows = {}
@@ -200,12 +219,13 @@ def by_gait(judgement: Judgement) -> pandas.DataFrame:
 
 
 def by_change(judgement: Judgement) -> pandas.DataFrame:
-    """A row per change, first what hurts most alone.
+    """Summary of a judgement with a row per change, the most harmful change first. Columns:
 
-    Columns: median (of the absolute change of the distance, m, over gaits and signs or draws),
-    worst (change) and failed (simulations) alone; correlation (mean over gaits of those of
-    rank_correlations()) and correlation_size (median over gaits of their absolute value), NaN where
-    nothing is scaled.
+    - median: absolute change of the distance (m) by this change alone, median over the simulations
+    - worst: most negative change of the distance; failed: number of failures
+    - correlation: mean over gaits of the rank correlation with the distance, see
+      rank_correlations(); correlation_size: median of its absolute value. Both are NaN for start
+      and terrain.
     """
     alone = judgement.compared(judgement.alone)
     alone = alone.assign(size=alone["change"].abs(), failed=alone["failure"].notna())
@@ -218,8 +238,8 @@ def by_change(judgement: Judgement) -> pandas.DataFrame:
 
 
 def rank_correlations(judgement: Judgement) -> pandas.DataFrame:
-    """Spearman's correlation of each factor (columns) and the distance over the draws of a gait
-    (index) without those that failed; NaN where all distances are the same."""
+    """Spearman's correlation between factor and distance, with a row per gait and a column per
+    factor. Failed draws are left out. NaN if all distances are equal."""
     import pandas
 
     settings = judgement.scenario.disturbances
@@ -232,7 +252,7 @@ def rank_correlations(judgement: Judgement) -> pandas.DataFrame:
 
 
 def robustness_numbers(judgement: Judgement) -> dict[str, Any]:
-    """The content of summary.json, in SI: gaits and changes, and what they are of."""
+    """Content of summary.json, in SI: the tables of gaits and changes, and their origin."""
     return {
         "versions": versions(),
         "scenario": judgement.scenario.name,
@@ -245,5 +265,6 @@ def robustness_numbers(judgement: Judgement) -> dict[str, Any]:
 
 
 def chance(draws: int) -> float:
-    """The size that 95 % of the rank correlations of unrelated numbers do not reach."""
+    """Limit below which 95 % of the rank correlations of unrelated numbers lie, in absolute
+    value."""
     return min(1.0, 1.96 / math.sqrt(max(draws - 1, 1)))

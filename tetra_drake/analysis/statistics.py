@@ -1,4 +1,4 @@
-"""Statistics of few values, such as those of a run's trials, and how sure they are."""
+"""Statistics of few values, such as the trials of a run, with confidence intervals."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ RESAMPLES = 2000
 
 
 def interval(values: npt.ArrayLike, statistic: Callable[..., Any] = np.mean) -> tuple[float, float]:
-    """The 95 % confidence interval of a statistic of the values, by bootstrap, always with the same
-    resamples; NaN are left out. It has no width where all values are alike."""
+    """95 % confidence interval of a statistic, by bootstrap with a fixed seed. NaN are left out.
+    If all values are equal, the width is 0."""
     numbers = np.asarray(values, dtype=float)
     numbers = numbers[~np.isnan(numbers)]
     if not len(numbers):
@@ -31,22 +31,24 @@ def interval(values: npt.ArrayLike, statistic: Callable[..., Any] = np.mean) -> 
 def resampled(
     values: np.ndarray, generator: np.random.Generator, statistic: Callable[..., Any] = np.mean
 ) -> np.ndarray:
-    """The statistic of RESAMPLES resamples of the values (n,), each of n drawn with replacement."""
+    """The statistic of RESAMPLES resamples. Each resample has n of the n values, drawn with
+    replacement."""
     picks = generator.integers(len(values), size=(RESAMPLES, len(values)))
     return np.asarray(statistic(values[picks], axis=1))
 
 
 def middle(resamples: np.ndarray) -> tuple[float, float]:
-    """The ends of the middle 95 % of resamples: a confidence interval, by bootstrap."""
+    """Ends of the middle 95 % of resampled statistics: the bootstrap confidence interval."""
     low, high = np.quantile(resamples, [0.025, 0.975])
     return float(low), float(high)
 
 
 def share_interval(count: int, total: int) -> tuple[float, float]:
-    """Wilson score interval, at 95 % confidence, of the share of `count` in `total`.
+    """Wilson score interval (95 %) of the share `count` / `total`.
 
-    It has a width where the share is 0 or 1, too: 40 of 40 give 91 to 100 %. From Wilson (1927),
-    "Probable inference, the law of succession, and statistical inference", J. Am. Stat. Assoc. 22.
+    Its width is positive even if the share is 0 or 1: 40 of 40 give 91 to 100 %. See Wilson,
+    "Probable inference, the law of succession, and statistical inference", J. Am. Stat. Assoc. 22,
+    1927.
     """
     if total == 0:
         return math.nan, math.nan
@@ -58,15 +60,18 @@ def share_interval(count: int, total: int) -> tuple[float, float]:
 
 
 def interquartile_mean(values: npt.ArrayLike, axis: int = -1) -> Any:
-    """The mean without the lowest and the highest quarter of the values along an axis, quarters
-    rounded down: less moved by single values than the mean, surer than the median (Agarwal et al.
-    2021, "Deep reinforcement learning at the edge of the statistical precipice")."""
+    """Interquartile mean: the mean without the lowest and the highest quarter of the values.
+
+    The size of a quarter is rounded down. Outliers move it less than the mean, and it varies less
+    than the median (Agarwal et al. 2021, "Deep reinforcement learning at the edge of the
+    statistical precipice").
+    """
     ordered = np.sort(np.asarray(values, dtype=float), axis=axis)
     count = ordered.shape[axis]
     return ordered.take(range(count // 4, count - count // 4), axis=axis).mean(axis=axis)
 
 
 def json_rows(table: pandas.DataFrame) -> list[dict[Any, Any]]:
-    """Rows of a table, its index among them, as JSON holds them: null for what is not finite."""
+    """Rows of a table as JSON objects, including the index. Infinities and NaN are null."""
     rows = table.reset_index().to_dict("records")
     return [{key: json_number(value) for key, value in row.items()} for row in rows]

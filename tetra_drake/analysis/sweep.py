@@ -1,4 +1,4 @@
-"""sweep(): gaits simulated on a grid of scenarios."""
+"""Parameter sweep: `sweep` simulates gaits on a grid of scenarios."""
 
 from __future__ import annotations
 
@@ -38,13 +38,17 @@ def sweep(
         {'outer_stiffness': 3, 'gait': 1}
         >>> mean = metrics.distance.mean("gait").sel(outer_stiffness=35)
 
-    `changes` are values, or lists of values, by scenario keys; the same rules hold as in
-    with_changes(), so quantities have units. Each key is a dimension, named by its last part where
-    that is unique; its coordinate is in SI. The dimension `gait` has the names of the gaits. A
-    simulation that fails is NaN. All are simulated at once by simulate_many(), on so many
-    `workers`.
+    Each key of `changes` is a dimension of the result. The name of the dimension is the last part
+    of the key, or the whole key if the last part is not unique. Coordinates are in SI. The
+    dimension `gait` has the names of the gaits. A failed simulation is NaN.
 
-    Raises InputError, naming the key, for what cannot be used.
+    Args:
+        changes: a value or a list of values by scenario key. Quantities need units, as in
+            Scenario.with_changes().
+        workers: number of threads, see simulate_many().
+
+    Raises:
+        InputError: names the key that cannot be used.
     """
     import xarray
 
@@ -62,8 +66,8 @@ def sweep(
         workers=workers,
     )
     labels = {}
-    for place, (key, values) in enumerate(changes.items()):
-        along = [each[place] for each in combinations]
+    for position, (key, values) in enumerate(changes.items()):
+        along = [each[position] for each in combinations]
         firsts = [scenarios[along.index(value)] for value in values]
         labels[_dimension(key, changes)] = _labels(key, values, firsts)
     labels["gait"] = [gait.name for gait in walkers], {}
@@ -78,7 +82,7 @@ def sweep(
 
 
 def _values(key: str, given: Any) -> list[Any]:
-    """The values of a key, of which a single one may be given."""
+    """The values for a key as a list; `given` may be a single value."""
     is_single = isinstance(given, (str, Mapping)) or not isinstance(given, Iterable)
     values = [given] if is_single else list(given)
     if not values:
@@ -87,7 +91,8 @@ def _values(key: str, given: Any) -> list[Any]:
 
 
 def _dimension(key: str, changes: Iterable[str]) -> str:
-    """The last part of a key, or all of it if the dataset has another use for the last part."""
+    """Name of the dimension of a key: its last part, or the whole key if the dataset already has
+    that name."""
     name = key.rpartition(".")[2]
     others = [other.rpartition(".")[2] for other in changes if other != key]
     return key if name in ("gait", "fitness", *METRICS, *others) else name
@@ -96,8 +101,8 @@ def _dimension(key: str, changes: Iterable[str]) -> str:
 def _labels(
     key: str, values: Iterable[Any], scenarios: Sequence[Scenario]
 ) -> tuple[list[Any], dict[str, str]]:
-    """The SI numbers at a key of scenarios, and their unit; where they are no numbers, the values
-    as given."""
+    """Coordinates of a dimension: the numbers of a key in SI and their unit. Values that are not
+    numbers become text."""
     numbers = [flattened(changed.model_dump()).get(key) for changed in scenarios]
     if not all(isinstance(number, int | float) for number in numbers):
         return [str(value) for value in values], {}
@@ -105,7 +110,7 @@ def _labels(
 
 
 def _numbers(outcome: Outcome) -> dict[str, float]:
-    """Fitness and metrics of a simulation; NaN if it failed."""
+    """Fitness and metrics of a simulation; NaN if the simulation failed."""
     if isinstance(outcome, SimulationFailure):
         return dict.fromkeys(("fitness", *METRICS), math.nan)
     return {"fitness": outcome.fitness, **vars(outcome.metrics)}

@@ -1,8 +1,12 @@
 """Evolving gaits.
 
-trials: the loop over optimisers and evaluations, of all trials of a run
-evaluation, draws: from a vector to its fitness, by simulation; evaluators, cluster: many at once
-manifest, entries, json_lines, run_record: a run on disk, and how it is resumed
-run: `load_run`, a recorded run as pandas tables; source: its gaits for other commands
-reevaluation: best gaits on the Drake diagram; progress: what is shown meanwhile
+trials                      the loop over all trials of a run: ask, evaluate, tell, record
+evaluation, draws           the fitness of one vector, by simulation
+evaluators, cluster         many evaluations at once: lanes, processes, Dask
+manifest, run_record        a run on disk: its definition, its lock, how it is resumed
+entries, json_lines         the lines of a record and their checksums
+run                         `load_run`: a recorded run as pandas tables
+source                      the gaits of a run or of a file, for other commands
+reevaluation                the best gaits, evaluated again on the Drake diagram
+progress                    bars and lines that show how far a run is
 """

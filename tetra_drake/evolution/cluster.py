@@ -1,4 +1,4 @@
-"""Executors whose workers are those of a Dask cluster."""
+"""Executors that run tasks on the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -18,29 +18,33 @@ if TYPE_CHECKING:
 
 
 class DaskExecutors:
-    """Makes executors of a Dask client; all have the workers of its cluster."""
+    """Factory of executors on one Dask client. Each executor uses all workers of the cluster."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
 
     def __call__(self, workers: int) -> Executor:
-        # Not pure: a task that has killed its worker gets another chance under another key.
+        # Dask refuses a key that has killed its worker. Without `pure`, a second try has a new key.
         return self._client.get_executor(pure=False)
 
     @property
     def workers(self) -> int:
-        """The cluster's threads."""
+        """Number of threads in the cluster."""
         return sum(self._client.nthreads().values())
 
 
 @contextlib.contextmanager
 def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator[DaskExecutors]:
-    """Executors for evolve(), for as long as the block lasts, on a Dask cluster: an object, such as
-    an SSHCluster, or its scheduler's address. By default one of its own on this machine, with as
-    many worker processes (one per core by default).
+    """Context manager: executors on a Dask cluster, for evolve().
 
-    Raises InputError if Dask is missing, no scheduler answers, workers do not start, or have
-    another version of this package or of Drake.
+    Args:
+        cluster: a cluster object, such as an SSHCluster, or the address of a scheduler. By default
+            a new cluster on this machine, which ends with the block.
+        workers: number of worker processes of a new cluster; one per core by default.
+
+    Raises:
+        InputError: if Dask is missing, no scheduler answers, workers do not start, or a worker has
+            another version of this package or of Drake.
     """
     try:
         import distributed
@@ -52,7 +56,7 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
         try:
             if cluster is None:
                 cluster = stack.enter_context(local_cluster(workers or available_cores()))
-            # Not the default client: where none answers, Dask would still be the default scheduler.
+            # A default client would stay Dask's default even if its scheduler does not answer.
             client = distributed.Client(cluster, set_as_default=False)
             stack.enter_context(client)
         except RuntimeError as error:
@@ -66,7 +70,7 @@ def dask_cluster(cluster: Any = None, *, workers: int | None = None) -> Iterator
 
 
 def _check_version(client: Client, name: str) -> None:
-    """Raises InputError if a worker that is up has another version of a package, or none."""
+    """Raises InputError if a running worker lacks a package or has another version of it."""
     ours = metadata.version(name)
     for worker, theirs in client.run(metadata.version, name, on_error="return").items():
         if theirs != ours:
@@ -75,18 +79,19 @@ def _check_version(client: Client, name: str) -> None:
 
 
 def local_cluster(workers: int) -> LocalCluster:
-    """A Dask cluster of so many worker processes on this machine, which replaces those that die."""
+    """A Dask cluster of worker processes on this machine. A worker that dies is replaced."""
     import dask
     from distributed import LocalCluster
 
-    # Drake before 1.56 keeps memory: a worker that has too much is replaced, and never paused.
+    # Drake before 1.56 leaks memory. Dask's nanny replaces a worker at its limit; a worker that
+    # only pauses or spills would not get its memory back.
     memory = {f"distributed.worker.memory.{level}": False for level in ("target", "spill", "pause")}
     with dask.config.set(memory), deaf_to_ctrl_c():
         cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             dashboard_address="localhost:0",
-            silence_logs=logging.CRITICAL,  # of workers that die: the pool copes
+            silence_logs=logging.CRITICAL,  # dead workers are replaced; no need to log them
         )
-    cluster.adapt(minimum=workers, maximum=workers)  # also replaces one that died as it started
+    cluster.adapt(minimum=workers, maximum=workers)  # even if they die at their start
     return cluster

@@ -1,4 +1,4 @@
-"""The evaluation of a gait among disturbances, made of the evaluations of its draws."""
+"""Evaluation of a gait on disturbed robots: combines the evaluations of its draws."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from tetra_drake.scenario.metrics import LEAST, MOST
 
 
 def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
-    """The evaluation of a gait from those of its draws, of which the worst share counts. It fails
-    if one of them does."""
+    """Combines the evaluations of a gait's draws. Fitness is the mean over the worst `share` of the
+    draws. The gait fails if one draw fails."""
     wall_time = sum(draw.wall_time for draw in draws)
     failures = [f"draw {k}: {e.failure}" for k, e in enumerate(draws) if e.failure is not None]
     metrics = combine_metrics([draw.metrics for draw in draws])
@@ -28,14 +28,15 @@ def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
 
 
 def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Means, least or greatest values of each metric; none if a draw has none."""
+    """Each metric over the draws: its mean, least or greatest value. Empty if a draw has no
+    metrics."""
     if not all(draws):
         return {}
     return {name: _combined(name, [draw[name] for draw in draws]) for name in draws[0]}
 
 
 def _combined(name: str, values: Sequence[Any]) -> Any:
-    if None in values:  # infinite
+    if None in values:  # an infinite metric is recorded as null
         return None
     if name in LEAST:
         return min(values)
@@ -45,8 +46,8 @@ def _combined(name: str, values: Sequence[Any]) -> Any:
 
 
 def worst_mean(fitnesses: Sequence[float], share: float) -> float:
-    """Mean over the worst share, above 0, of the fitnesses: as many as that are, the last one by
-    the fraction of it that is left; the least alone if they are less than one."""
+    """Mean of the lowest `share` of the fitnesses. A fractional last value gets its fraction as
+    weight. At least one value counts."""
     ranked, count = sorted(fitnesses), max(1.0, share * len(fitnesses))
     weights = [min(1.0, max(0.0, count - i)) for i in range(len(ranked))]
     return math.fsum(w * f for w, f in zip(weights, ranked, strict=True)) / count

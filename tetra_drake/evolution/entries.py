@@ -1,15 +1,14 @@
-"""The files of a record, and what their lines hold.
+"""Files of a run's record and the content of their lines.
 
 trial_00/
-  evaluations.jsonl       one line per evaluation, in the order asked; metrics in SI
+  evaluations.jsonl       one line per evaluation, in the optimiser's order; metrics in SI
   iterations.jsonl        one line per iteration: best fitness, the optimiser's report
-  in_progress.jsonl       during an iteration: those of its evaluations that are done
-  best_gait.json          the fittest gait so far, a gait file
+  in_progress.jsonl       evaluations of the current iteration that are done
+  best_gait.json          gait file of the fittest gait so far
   reevaluations.jsonl     gaits evaluated once more on the Drake diagram
-elites.jsonl              of a map: its gaits on disturbed robots
+elites.jsonl              the map's gaits on disturbed robots (only with !QualityDiversity)
 
-Each line of a trial begins with the name of its run and the number of its trial, each line of a map
-with the name of its run.
+Each line begins with the name of its run, and in a trial's folder with the number of the trial.
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ IN_PROGRESS, BEST_GAIT = "in_progress.jsonl", "best_gait.json"
 REEVALUATIONS, ELITES = "reevaluations.jsonl", "elites.jsonl"
 
 _COUNTERS = {EVALUATIONS: "index", ITERATIONS: "iteration"}
-"""Key that counts the lines of a file."""
+"""Key that holds the number of the line, by file name."""
 
 _UNIQUE = {IN_PROGRESS: ("index",), REEVALUATIONS: ("index",), ELITES: ("trial", "index")}
-"""Keys that no two lines of a file share."""
+"""Keys whose values are unique among the lines of a file, by file name."""
 
 
 def trial_folder(directory: Path, number: int) -> Path:
@@ -59,7 +58,7 @@ def evaluation_entry(task: Task, evaluation: Evaluation) -> dict[str, Any]:
 
 
 def recorded_evaluation(entry: Mapping[str, Any]) -> Evaluation:
-    """The evaluation of a line of the record."""
+    """The evaluation that a line of the record holds; inverse of evaluation_entry()."""
     return Evaluation(
         fitness=-math.inf if entry["fitness"] is None else entry["fitness"],
         metrics=entry["metrics"],
@@ -72,24 +71,24 @@ def recorded_evaluation(entry: Mapping[str, Any]) -> Evaluation:
 
 @dataclass(frozen=True)
 class RecordFile:
-    """A file of lines of a run, which say that they are the run's."""
+    """A JSON-lines file of a run. Each line names its run, so foreign lines are found."""
 
     path: Path
     owner: Mapping[str, Any]
-    """Keys and values that each line begins with: run, and trial in the folder of a trial."""
+    """First keys and values of each line: run, and trial for a file in a trial's folder."""
 
     @classmethod
     def of(cls, directory: Path, run: str, name: str, *, trial: int | None = None) -> RecordFile:
-        """A file of a run, or of one of its trials, by their names."""
+        """The file `name` in the directory of a run, or in the folder of a trial."""
         if trial is None:
             return cls(directory / name, {"run": run})
         return cls(trial_folder(directory, trial) / name, {"run": run, "trial": trial})
 
     def read(self) -> list[dict[str, Any]]:
-        """The content of all whole lines, without their owner.
+        """The content of all complete lines, without the keys of `owner`.
 
-        Raises InputError, naming file and line, where a line is damaged, missing, there twice or
-        of another run or trial.
+        Raises InputError, naming file and line, if a line is damaged, missing, repeated, or belongs
+        to another run or trial.
         """
         entries = read_lines(self.path)
         counter = _COUNTERS.get(self.path.name)
@@ -112,14 +111,14 @@ class RecordFile:
             seen.add(values)
 
     def append(self, entries: Iterable[Mapping[str, Any]]) -> None:
-        """Appends lines; their folder is made if need be."""
+        """Appends lines; creates the folder if it is missing."""
         make_folder(self.path.parent)
         append_lines(self.path, [{**self.owner, **entry} for entry in entries])
 
     def repair(self) -> None:
-        """Cuts off a last line that was not written to its end."""
+        """Cuts off an incomplete last line."""
         repair_torn_line(self.path)
 
     def refuse(self, row: int, problem: str) -> NoReturn:
-        """Raises InputError of a line, counted from 0."""
+        """Raises InputError about the line with this number, counted from 0."""
         raise InputError(self.path, f"line {row + 1}", problem)

@@ -1,5 +1,5 @@
-"""GaitEvaluation: from a vector of parameters to its evaluation, by one simulation, or by one for
-each draw of the scenario's disturbances."""
+"""GaitEvaluation: the fitness of a parameter vector, by one simulation or by one per draw of the
+scenario's disturbances."""
 
 from __future__ import annotations
 
@@ -28,25 +28,27 @@ from tetra_drake.scenario.disturbances import IterationSeed, draws_of_iteration
 from tetra_drake.scenario.scenario import Scenario
 
 Objective = Callable[[SimulationResult], float]
-"""Function of a result that evolution maximises; -inf or NaN is a failure. One that reads the
-trajectory has the attribute `needs_trajectory = True`."""
+"""Function of a result that evolution maximises; -inf or NaN is a failure. A function that reads
+the trajectory must have the attribute `needs_trajectory = True`."""
 
 _SEEDS_KEPT = 32
-"""Number of seeds whose draws are kept: more than there are vectors under way."""
+"""Size of the cache of draws, in seeds; larger than the number of concurrent evaluations."""
 
 
 @dataclass(frozen=True)
 class GaitEvaluation:
-    """Evaluates vectors by simulating their gaits: with the same numbers, bit for bit, in any
-    process, unless the time budget runs out."""
+    """Evaluates vectors by simulating their gaits.
+
+    The result is the same in any process, bit for bit, unless the time budget runs out.
+    """
 
     scenario: Scenario
     objective: Objective | None = None
-    """None for the scenario's own."""
+    """Function to maximise; None for the objective of the scenario."""
 
     def __call__(self, task: Task) -> Evaluation:
-        """Fitness and metrics of a vector, or the reason of a failure. Its draws are simulated one
-        after another, until one has failed."""
+        """Fitness and metrics of a vector, or the reason of its failure. Draws are simulated one
+        after another; the first draw without metrics ends the evaluation."""
         started = time.perf_counter()
         draws = []
         for scenario, gait in self.simulations(task):
@@ -57,21 +59,21 @@ class GaitEvaluation:
         return dataclasses.replace(self.combined(task, draws), wall_time=wall_time)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return GaitEvaluation, (self.scenario, self.objective)  # nothing that is kept
+        return GaitEvaluation, (self.scenario, self.objective)  # without the caches
 
     @property
     def records(self) -> bool:
-        """True if the objective needs the trajectories of its results."""
+        """True if the objective needs the trajectory of each simulation."""
         return bool(getattr(self.objective, "needs_trajectory", False))
 
     def simulations(self, task: Task) -> list[tuple[Scenario, Gait]]:
-        """What is simulated for a task: its gait on the scenario, or on each of its draws."""
+        """Scenario and gait of each simulation of a task: one, or one per draw."""
         gait = self._space.gait(task.vector, name=str(task))
         scenarios = [self.scenario] if task.seed is None else self._draws(task.seed)
         return [(scenario, gait) for scenario in scenarios]
 
     def judged(self, scenario: Scenario, simulation: Callable[[], SimulationResult]) -> Evaluation:
-        """The evaluation of a gait by one simulation."""
+        """Runs one simulation and evaluates its result; failures become failed evaluations."""
         try:
             result = simulation()
         except (SimulationFailure, TimeBudgetExceeded) as error:
@@ -92,7 +94,7 @@ class GaitEvaluation:
         return Evaluation(fitness, metrics, wall_time=wall_time)
 
     def combined(self, task: Task, draws: Sequence[Evaluation]) -> Evaluation:
-        """The evaluation of a task by its simulations."""
+        """Combines the evaluations of a task's simulations into one."""
         settings, evaluation = self.scenario.disturbances, draws[0]
         if settings is not None and task.seed is not None:
             evaluation = combine(draws, settings.tail)
@@ -104,7 +106,8 @@ class GaitEvaluation:
 
     @functools.cached_property
     def _draws(self) -> Callable[[IterationSeed], list[Scenario]]:
-        """The scenario's draws of a seed: the same objects for all vectors of an iteration."""
+        """Function from a seed to disturbed scenarios. It is cached, so all vectors of an iteration
+        share the same scenario objects."""
         return functools.lru_cache(_SEEDS_KEPT)(
             functools.partial(draws_of_iteration, self.scenario)
         )

@@ -1,10 +1,10 @@
-"""Evaluators: a task in, a future of its evaluation out.
+"""Evaluators: take a task and return a future of its evaluation.
 
     InLanes        threads of the compiled engine, each with several gaits side by side
-    InProcesses    worker processes, for engines that keep Python to themselves
+    InProcesses    worker processes, for engines that hold Python's global lock
     OnExecutor     any executor of concurrent.futures: threads, Dask, MPI
 
-Whatever dies, a run goes on from its record. An evaluator keeps nothing.
+An evaluator stores no results. After a crash, a run is resumed from its record.
 """
 
 from __future__ import annotations
@@ -36,25 +36,25 @@ if TYPE_CHECKING:
     from tetra_drake.evolution.evaluation import GaitEvaluation
 
 MakeExecutor = Callable[[int], Executor]
-"""Makes an executor with this many workers. One that cannot choose their number has an attribute
-`workers`: the current number."""
+"""Function that makes an executor with the given number of workers. If it cannot choose the number,
+it has an attribute `workers`: the current number."""
 
 TASKS_PER_WORKER = 150
-"""Tasks after which a worker process is replaced: Drake before 1.56 keeps about 2 MB of every
-diagram that holds Python systems."""
+"""Number of tasks after which a worker process is replaced. Drake before 1.56 leaks about 2 MB per
+diagram with Python systems."""
 
 
 class Evaluator(Protocol):
-    """Evaluates tasks, in any order, within its `with` block; at its end, what is under way is
-    cancelled."""
+    """Evaluates tasks in any order. It is used in a `with` block; the end of the block cancels the
+    evaluations that are not done."""
 
     def __enter__(self) -> Self: ...
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None: ...
 
     def submit(self, task: Task) -> Future[Evaluation]:
-        """Future of a task's evaluation. If the worker dies, it raises what its executor raises
-        then, such as BrokenExecutor."""
+        """Future of a task's evaluation. If the worker dies, the future raises the error of its
+        executor, such as BrokenExecutor."""
 
 
 def evaluator_of(
@@ -64,10 +64,11 @@ def evaluator_of(
     executor: MakeExecutor | None = None,
     warn: Callable[[str], None],
 ) -> Evaluator:
-    """The evaluator for gaits on a scenario's engine, compiled: on an executor if one is given,
-    else in lanes or processes of this machine, one per core by default.
+    """The evaluator for a scenario's engine; the engine's code is compiled on return.
 
-    If worker processes cannot get the evaluation, it takes place in this one, and `warn` is told.
+    It uses the given executor. By default it uses lanes or processes of this machine, one per core.
+    If the evaluation cannot be sent to worker processes, gaits are evaluated in this process, and
+    `warn` gets the reason.
     """
     from tetra_drake.engines.interface import engine_of
     from tetra_drake.engines.simulate import prepare
@@ -126,7 +127,7 @@ class InLanes:
 
 
 class InProcesses:
-    """Evaluates in worker processes, which start from scratch and end with this one."""
+    """Evaluates in worker processes. They are spawned, not forked, and end with this process."""
 
     def __init__(self, evaluate: Evaluate, workers: int) -> None:
         self._threads = futures.ThreadPoolExecutor(workers)
@@ -149,7 +150,7 @@ class InProcesses:
         return self._threads.submit(self._in_process, task)
 
     def _in_process(self, task: Task) -> Evaluation:
-        worker = self._idle.pop()  # one for each thread
+        worker = self._idle.pop()  # never empty: there are as many workers as threads
         try:
             return worker.evaluate(task)
         finally:
@@ -157,9 +158,9 @@ class InProcesses:
 
 
 class _Worker:
-    """A worker process, which is replaced if it dies and after TASKS_PER_WORKER tasks.
+    """A worker process. It is replaced if it dies, and after TASKS_PER_WORKER tasks.
 
-    It has an executor of its own, as processes of one executor die together.
+    Each worker has its own executor, because all processes of one executor die together.
     """
 
     def __init__(self, evaluate: Evaluate) -> None:
@@ -168,7 +169,7 @@ class _Worker:
         self._process, self._tasks_left, self._killed = 0, 0, False
 
     def evaluate(self, task: Task) -> Evaluation:
-        """The evaluation of a task; BrokenExecutor if the process dies."""
+        """Evaluates a task; raises BrokenExecutor if the process dies."""
         if self._executor is None or self._tasks_left == 0:
             self.end()
             self._executor = self._start()
@@ -193,12 +194,12 @@ class _Worker:
         return executor
 
     def end(self) -> None:
-        """Lets the process end."""
+        """Ends the process when its task is done."""
         if self._executor is not None:
             self._executor.shutdown()
 
     def kill(self) -> None:
-        """Ends the process at once; no other one takes its place."""
+        """Ends the process at once. It is not replaced."""
         self._killed = True
         for process in multiprocessing.active_children():
             if process.pid == self._process:
@@ -206,12 +207,12 @@ class _Worker:
 
 
 def _load(evaluate: Evaluate) -> int:
-    """First task of a worker process, which loads the function: its process number."""
+    """First task of a worker process: loads the function and returns the process id."""
     return os.getpid()
 
 
 class _DeafProcess(SpawnProcess):
-    """A process that a Ctrl-C at the terminal does not reach, not even while it starts."""
+    """A process that ignores Ctrl-C at the terminal, even while it starts."""
 
     def start(self) -> None:
         with deaf_to_ctrl_c():
@@ -224,8 +225,8 @@ class _Context(SpawnContext):
 
 @contextlib.contextmanager
 def deaf_to_ctrl_c() -> Iterator[None]:
-    """A block whose new threads and processes, and theirs, no Ctrl-C reaches, from birth."""
-    resource_tracker.ensure_running()  # it starts with the first process, and unblocks signals
+    """Context manager: threads and processes that start in the block never receive Ctrl-C."""
+    resource_tracker.ensure_running()  # its start would unblock signals, so it starts before
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -234,7 +235,7 @@ def deaf_to_ctrl_c() -> Iterator[None]:
 
 
 def _end_with_parent() -> None:
-    """Ends this worker when its parent ends; it would wait for work for ever otherwise."""
+    """Ends this worker process when its parent ends. Otherwise it would wait for work for ever."""
 
     def watch() -> None:
         wait_for_any([multiprocessing.parent_process().sentinel])  # type: ignore[union-attr]
@@ -244,7 +245,7 @@ def _end_with_parent() -> None:
 
 
 class OnExecutor:
-    """Evaluates on an executor of concurrent.futures, which is made again where it breaks."""
+    """Evaluates on an executor of concurrent.futures. A broken executor is replaced."""
 
     def __init__(self, evaluate: Evaluate, make: MakeExecutor, workers: int) -> None:
         self._evaluate, self._make = evaluate, functools.partial(make, workers)
@@ -273,10 +274,10 @@ class OnExecutor:
 
 
 class Evaluations:
-    """Evaluations under way.
+    """Queue of tasks in front of an evaluator.
 
-    A task whose worker dies is tried once more when nothing else is under way, as memory may have
-    been short. If that worker dies, too, an InputError names the task.
+    If a worker dies, its task is tried once more, alone, because memory may have been short. If the
+    second worker dies, too, an InputError names the task.
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
@@ -284,19 +285,20 @@ class Evaluations:
         self._waiting: deque[Task] = deque()
         self._running: dict[Future[Evaluation], Task] = {}
         self._died: deque[Task] = deque()
-        """Tasks whose workers died; while there are any, no other task begins."""
+        """Tasks whose workers died. While it is not empty, no other task begins."""
 
     @property
     def busy(self) -> bool:
-        """True if anything is under way or waits."""
+        """True if a task is running or waiting."""
         return any((self._waiting, self._running, self._died))
 
     def add(self, tasks: Iterable[Task]) -> None:
-        """Adds tasks."""
+        """Adds tasks to the queue."""
         self._waiting.extend(tasks)
 
     def wait(self, timeout: float | None = None) -> list[tuple[Task, Evaluation]]:
-        """Tasks that are done, as soon as there is one or time (s) is up."""
+        """Finished tasks and their evaluations. Returns when at least one is finished, or after
+        `timeout` seconds."""
         if self._died and not self._running:
             return [self._try_alone(self._died.popleft())]
         while self._waiting and not self._died:
@@ -314,7 +316,7 @@ class Evaluations:
                 continue
             del self._running[future]
         if failed is not None and not evaluated:
-            _result(failed)  # raises, as soon as all that is done has been taken
+            _result(failed)  # raises its error, but only after all finished tasks were returned
         return evaluated
 
     def _try_alone(self, task: Task) -> tuple[Task, Evaluation]:
@@ -333,7 +335,7 @@ class _WorkerDied(Exception):
 
 
 def _result(future: Future[Evaluation]) -> Evaluation:
-    """The result of a future, where all executors tell of deaths alike."""
+    """The result of a future. The death of a worker is _WorkerDied for every executor."""
     try:
         return future.result()
     except CancelledError as error:
@@ -347,7 +349,7 @@ def _result(future: Future[Evaluation]) -> Evaluation:
 
 
 def evaluate_all(evaluator: Evaluator, tasks: Iterable[Task]) -> Iterator[tuple[Task, Evaluation]]:
-    """Evaluates tasks and yields each with its evaluation as soon as it is ready."""
+    """Evaluates tasks. Yields each task with its evaluation as soon as it is finished."""
     evaluations = Evaluations(evaluator)
     evaluations.add(tasks)
     while evaluations.busy:
@@ -359,13 +361,13 @@ _UNGUARDED = 'the program lacks `if __name__ == "__main__":` around what it does
 
 
 def check_guard() -> None:
-    """Raises InputError in a worker that is importing the program and so runs it."""
+    """Raises InputError in a worker process whose import of the main program runs the program."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise InputError(_SOURCE, "", _UNGUARDED)
 
 
 def _why_not_sent(evaluate: object) -> str:
-    """Why worker processes cannot get a function; empty if they can."""
+    """The reason why a function cannot be sent to worker processes; empty if it can."""
     try:
         pickled = pickle.dumps(evaluate)
     except Exception as error:

@@ -1,8 +1,7 @@
 """Append-only files of JSON objects, one per line, that survive a kill at any moment.
 
-Each line ends with a checksum, so that a damaged one is told from one that was written. Files that
-`xz` has compressed, and so protects by checksums of its own, are NAME.xz; what is appended later
-stands in NAME.
+Each line ends with a checksum, so that damaged lines are found. NAME.xz holds the earlier lines of
+NAME, compressed by `xz`, which has its own checksums. New lines are appended to NAME.
 """
 
 from __future__ import annotations
@@ -24,11 +23,12 @@ REMEDY = (
 )
 
 _CHECKSUM = re.compile(rb'(.*), "crc": "([0-9a-f]{8})"\}')
-"""A line with a checksum: that of what is before it, in hexadecimal digits."""
+"""Pattern of a line: its content, then the CRC-32 of the content in hexadecimal digits."""
 
 
 def append_lines(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
-    """Appends the entries, handed to the system on return; a kill can tear only the last line."""
+    """Appends entries as lines. On return the operating system has them. A kill during the call
+    damages at most the last line."""
     text = "".join(json_line(entry) for entry in entries)
     try:
         with path.open("ab") as file:
@@ -38,7 +38,7 @@ def append_lines(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
 
 
 def repair_torn_line(path: Path) -> None:
-    """Cuts off a last line that was not written to its end."""
+    """Cuts off an incomplete last line."""
     content = _read(path)
     if content and not content.endswith(b"\n"):
         try:
@@ -48,9 +48,9 @@ def repair_torn_line(path: Path) -> None:
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:
-    """The entries of all whole lines, compressed or not; none if there is no file.
+    """The entries of all complete lines, compressed or not; empty if there is no file.
 
-    InputError, naming file and line, where a line is not as it was written.
+    Raises InputError, naming file and line, if a line is damaged.
     """
     packed = compressed(path)
     try:
@@ -62,12 +62,12 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
 
 
 def compressed(path: Path) -> Path:
-    """The compressed file of lines, which stands before `path` or in its place."""
+    """Path of the compressed file with the lines that precede the lines of `path`."""
     return path.with_name(path.name + ".xz")
 
 
 def json_line(entry: Mapping[str, Any]) -> str:
-    """An entry as a line with its checksum."""
+    """An entry as a line of text with a checksum."""
     text = json.dumps(entry, allow_nan=False).removesuffix("}")
     return f'{text}, "crc": "{zlib.crc32(text.encode()):08x}"}}\n'
 
@@ -82,7 +82,7 @@ def _read(path: Path) -> bytes:
 
 
 def _parse(content: bytes, file: Path, *, checksums: bool) -> list[dict[str, Any]]:
-    """The entries of a file's whole lines, which must have checksums if so said."""
+    """The entries of a file's complete lines. With `checksums`, each line must have a checksum."""
     entries = []
     for number, line in enumerate(content.split(b"\n")[:-1], start=1):
         problem = ""
@@ -90,7 +90,7 @@ def _parse(content: bytes, file: Path, *, checksums: bool) -> list[dict[str, Any
         if match is None and checksums:
             problem = "it has no checksum"
         if match is not None and zlib.crc32(match[1]) != int(match[2], 16):
-            problem = "its checksum is not that of its content"
+            problem = "its checksum does not match its content"
         if problem:
             raise InputError(file, f"line {number}", f"is damaged: {problem}; {REMEDY}")
         entries.append(json.loads(line if match is None else match[1] + b"}"))

@@ -1,14 +1,14 @@
-"""The manifest of a run: what defines it, on disk and in memory.
+"""Manifest of a run: its definition, on disk and in memory.
 
-    manifest.json    name of the run, seed, versions, method (objective, optimiser), SHA-256 of
-    scenario.yaml    the scenario in full
+    manifest.json    name of the run, seed, versions, objective, optimiser, SHA-256 of scenario.yaml
+    scenario.yaml    the scenario with all settings
 
-The run's name is a digest of all this as the run began. Each line of the record has it.
+The name of a run is a digest of this definition. Each line of the record has the name.
 
-Objective and optimiser are names. A name is what a person compares, and what a run without its
-parts is refused by. What proves that the parts are the same when a run is resumed is its record:
-the optimiser must ask for the recorded vectors, and a recorded gait must get its fitness again (see
-trials.check_fitness).
+Objective and optimiser are recorded by name only. A run with an objective or optimiser from Python
+cannot be resumed by the command line. When a run is resumed, its record proves that they are
+unchanged: the optimiser must ask for the recorded vectors, and a recorded gait must get its
+recorded fitness (see trials.check_fitness).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SCHEMA = 4
 MANIFEST, SCENARIO = "manifest.json", "scenario.yaml"
 
 _NAME = 12
-"""Characters of a run's name."""
+"""Number of characters of a run's name."""
 
 FITNESS = "fitness"
 """The name of the scenario's objective."""
@@ -46,8 +46,8 @@ FITNESS = "fitness"
 
 @dataclass(frozen=True)
 class Method:
-    """The parts of a run that its scenario does not hold, by name; those from Python have a
-    module."""
+    """Names of a run's objective and optimiser. A name with a dot is an object from Python, with
+    its module."""
 
     objective: str
     optimizer: str
@@ -60,7 +60,7 @@ class Method:
         objective: object | None = None,
         optimizer: object | None = None,
     ) -> Method:
-        """The method of a run; what is not given is the scenario's."""
+        """The method of a run. By default objective and optimiser are the scenario's."""
         return cls(
             objective=FITNESS if objective is None else _name(objective),
             optimizer=_name(scenario.optimizer if optimizer is None else optimizer),
@@ -71,11 +71,11 @@ class Method:
 
     @property
     def given_from_python(self) -> list[str]:
-        """The parts that a command line cannot give: "objective", "optimizer"."""
+        """Which of "objective" and "optimizer" come from Python, not from the scenario."""
         return [part for part, name in vars(self).items() if "." in name]
 
     def check_same(self, other: Method, source: object) -> None:
-        """Raises InputError, with the part as key, unless `other` has the same names."""
+        """Raises InputError, with "objective" or "optimizer" as key, if `other` differs."""
         for part, ours in vars(self).items():
             theirs = getattr(other, part)
             if ours == theirs:
@@ -89,7 +89,7 @@ class Method:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a run."""
+    """Definition of a run: scenario, seed, versions and method."""
 
     scenario: Scenario
     seed: int
@@ -98,7 +98,7 @@ class Manifest:
     run: str
     """Name of the run in the lines of its record."""
     thinned: bool = False
-    """True if most genomes were left out, as in the runs recorded beside the package."""
+    """True if most genomes were removed to save space, as in the folder runs/."""
 
     @classmethod
     def of(cls, scenario: Scenario, seed: int, method: Method) -> Manifest:
@@ -114,14 +114,14 @@ class Manifest:
         return dataclasses.replace(gait, scenario=self.scenario.name)
 
     def task(self, vector: Vector, *, trial: int, index: int, iteration: int) -> Task:
-        """Task that evaluates a vector, with the seed of its draws among disturbances."""
+        """Task to evaluate a vector. With disturbances it has the seed of the draws."""
         draws = self.scenario.disturbances is not None
         seed = (self.seed, trial, iteration) if draws else None
         return Task(vector, trial, index, iteration, seed)
 
 
 def read_manifest(directory: Path) -> Manifest:
-    """The manifest of a run directory; InputError if there is none or it is damaged."""
+    """Reads the manifest of a run; raises InputError if it is missing or damaged."""
     path = directory / MANIFEST
     if not os.path.exists(path):
         raise InputError(directory, "", f"holds no {MANIFEST}, so it is not a run")
@@ -139,7 +139,7 @@ def read_manifest(directory: Path) -> Manifest:
 
 
 def write_manifest(directory: Path, manifest: Manifest) -> None:
-    """Makes a directory a run: the scenario's file first, the manifest last."""
+    """Writes scenario.yaml and then manifest.json, which makes the directory a run."""
     text = dump_scenario(manifest.scenario)
     write_whole(directory / SCENARIO, text)
     content = {
@@ -172,10 +172,10 @@ def _sha256(text: str) -> str:
 
 
 def _name(given: object) -> str:
-    """Name of a function, class or instance, with its module, unless that is of this
-    package, and with the fields of a user's dataclass."""
+    """Name of a function, class or instance. Outside this package it includes the module, and the
+    fields of a dataclass."""
     kind: Any = given if isinstance(given, (type, types.FunctionType)) else type(given)
-    module = kind.__module__ or "__main__"  # code that was executed from a text has none
+    module = kind.__module__ or "__main__"  # code run by exec() has no module
     if module.startswith("tetra_drake."):
         return str(kind.__qualname__)
     name = f"{module}.{kind.__qualname__}"

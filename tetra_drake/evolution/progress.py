@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
 _LINE_PERIOD = 10.0  # s, between plain lines
-_FIRST_ESTIMATE = 5  # number of tasks done before the time left is estimated
+_FIRST_ESTIMATE = 5  # tasks; the time left is estimated after these
 
 
 class Progress:
-    """Receives what a run does, entered when it begins; this one shows nothing."""
+    """Receiver of a run's messages and progress. This base class shows nothing but warnings."""
 
     def __enter__(self) -> Progress:
         return self
@@ -29,22 +29,22 @@ class Progress:
         return None
 
     def say(self, text: str) -> None:
-        """Something the user may like to know."""
+        """Receives information for the user."""
 
     def warn(self, text: str) -> None:
-        """Something the user should know; here it becomes a Python warning."""
+        """Receives a warning for the user; here it becomes a Python warning."""
         warnings.warn(text, RuntimeWarning, stacklevel=3)
 
     def show(self, statuses: Sequence[TrialStatus]) -> None:
-        """The state of all trials: about once per second and after every evaluation."""
+        """Receives the state of all trials, after each evaluation and about once per second."""
 
     def stage(self, title: str, done: int, total: int, text: str = "") -> None:
-        """The state of a part of the run; `text` says more."""
+        """Receives the progress of one stage of the run: `done` of `total`, and a remark."""
 
 
 class Display(Progress):
-    """Progress on a stream: on a terminal one bar per stage; elsewhere a line when a stage begins
-    and ends, and every ten seconds. Both show the time left for all trials together."""
+    """Progress on a stream. A terminal gets one bar per stage. Another stream gets a line when a
+    stage begins and ends, and every ten seconds. Both show the time left for all trials."""
 
     def __init__(self, stream: TextIO) -> None:
         from rich import progress
@@ -58,13 +58,13 @@ class Display(Progress):
             progress.TextColumn("{task.fields[text]}"),
             console=Console(file=stream),
             refresh_per_second=4,
-            speed_estimate_period=math.inf,  # as one evaluation may take minutes
+            speed_estimate_period=math.inf,  # one evaluation may take minutes
             get_time=lambda: time.monotonic(),
             disable=self._plain,
         )
         self._tasks: dict[str, TaskID] = {}
         self._printed = -math.inf
-        """When the last plain line was printed."""
+        """Time at which the last plain line was printed."""
         self._line = ""
         """The last plain line."""
 
@@ -85,13 +85,13 @@ class Display(Progress):
         print(f"tetra-drake: {text}", file=sys.stderr, flush=True)
 
     def show(self, statuses: Sequence[TrialStatus]) -> None:
-        """Shows the evaluations of all trials; one that has ended early takes no more."""
+        """Shows the evaluations of all trials. A trial that ended early needs no more."""
         done = sum(status.evaluations for status in statuses)
         total = sum(s.evaluations if s.stop else s.evaluations_at_most for s in statuses)
         self.stage("evaluations", done, total, overview(statuses))
 
     def stage(self, title: str, done: int, total: int, text: str = "") -> None:
-        """Moves the stage's bar, or prints a line where one is due."""
+        """Moves the bar of the stage, or prints a line if one is due."""
         begins = title not in self._tasks
         if begins:
             self._tasks[title] = self._bars.add_task(title, completed=done, total=total, text="")
@@ -112,7 +112,7 @@ class Display(Progress):
 
 
 def overview(statuses: Sequence[TrialStatus]) -> str:
-    """Distance and fitness of the fittest gait, finished trials, failures."""
+    """Summary in one line: the fittest gait, finished trials, failures."""
     fittest = max(statuses, key=lambda status: status.best_fitness)
     ended = sum(status.stop is not None for status in statuses)
     failures = sum(status.failures for status in statuses)

@@ -1,6 +1,6 @@
-"""Gaits of a run evaluated once more, on the Drake diagram.
+"""Reevaluation: the best gaits of a run, evaluated again on the Drake diagram.
 
-trial_00/reevaluations.jsonl    lines as in evaluations.jsonl, with the engine that made them
+trial_00/reevaluations.jsonl    lines as in evaluations.jsonl; `engine` is the Drake diagram
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.run import Run, load_run
 
 BEST_GAITS = 5
-"""Number of best gaits per trial that are evaluated once more; among disturbances fewer, but one,
-so that there are about as many simulations."""
+"""Number of gaits per trial to evaluate again. With disturbances it is divided by the number of
+draws, so that the number of simulations is about the same; at least one."""
 
 _TITLE = "checking the best gaits in Drake"
 
@@ -30,12 +30,15 @@ def reevaluate(
     executor: MakeExecutor | None = None,
     progress: Progress | None = None,
 ) -> Run:
-    """Evaluates a run's best gaits once more, on the Drake diagram, adds them to its record and
-    returns it. Gaits that have been evaluated so already are skipped.
+    """Evaluates the best gaits of a run again, on the Drake diagram, and adds them to its record.
 
-    objective: the run's, if that is not the fitness of its scenario.
+    Gaits that were reevaluated before are skipped. Returns the run with the new evaluations.
 
-    Raises InputError if the run has another objective.
+    Args:
+        objective: the objective of the run; None if it is the fitness of the scenario.
+
+    Raises:
+        InputError: if the run has another objective.
     """
     run = load_run(directory)
     manifest, scenario = run.manifest, run.scenario

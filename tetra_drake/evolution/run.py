@@ -32,37 +32,43 @@ if TYPE_CHECKING:
     import pandas
 
 _EMPTY = ["trial", "index", "iteration", "fitness", "failure", "wall_time_s", "distance_in"]
-"""Columns of an empty table."""
+"""Columns of a table without rows."""
 _NUMBERS = {*METRICS, "distance_in", "fitness", "best_fitness", "mean_fitness"}
-"""Columns of numbers that may be missing."""
+"""Columns of floating-point numbers; a missing number is NaN."""
 _INDICES = {"placed", "best_evaluation"}
-"""Columns of whole numbers that may be missing."""
+"""Columns of integers that may be missing."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A recorded run, finished or not; metrics in SI, times in s. A gait's row is one of
-    `evaluations`."""
+    """A recorded run, finished or not, as tables. Metrics are in SI, times in s.
+
+    The row of a gait is a row of `evaluations`.
+    """
 
     directory: Path
     manifest: Manifest
     """Scenario, seed, versions, and the method: objective, optimiser."""
     evaluations: pandas.DataFrame
-    """One row per evaluation: trial, index, iteration, fitness (NaN where it failed), failure,
-    wall_time_s, engine, placed (index in the population, missing if dropped; for optimisers that
-    have one), the metrics (distance ...), lifted_T1 ... (Metrics.lifted_shares, by the names of the
-    bodies), distance_in, and
-    the parameters: weight_1 ... in the listing's order, gain_length ...,
-    tau_a_s, tau_b_s, NaN where thinning has left them out. Among disturbances, also draws_fitness
-    and draws_distance (m), lists with a number for each draw (missing if it failed), and
-    worst_distance_in."""
+    """One row per evaluation. Columns:
+
+    - trial, index, iteration, failure (reason or missing), wall_time_s, engine
+    - fitness: NaN if the evaluation failed
+    - placed: index in the population, missing if the vector was dropped; only for optimisers with a
+      population
+    - the metrics in SI (distance ...), distance_in (inches)
+    - lifted_T1 ...: Metrics.lifted_shares, by the names of the bodies
+    - the parameters: weight_1 ... (order of the thesis's listing), gain_length ..., tau_a_s,
+      tau_b_s; NaN in a thinned run
+    - with disturbances: draws_fitness and draws_distance (m), lists with one number per draw, and
+      worst_distance_in. Lists are missing if the evaluation failed.
+    """
     iterations: pandas.DataFrame
-    """One row per iteration, 0 being the initial one: trial, iteration, evaluations so far,
-    best_fitness, best_evaluation (its index), best_distance_in (that gait's), stop, and the
-    optimiser's report (mean_fitness)."""
+    """One row per iteration; iteration 0 is the initial one. Columns: trial, iteration, evaluations
+    (so far), best_fitness (so far), best_evaluation (index of the fittest gait), best_distance_in
+    (its distance), stop, and the optimiser's report, such as mean_fitness."""
     reevaluations: pandas.DataFrame
-    """Gaits evaluated once more on the Drake diagram: columns as in evaluations, without
-    `placed`; empty if there are none."""
+    """Gaits evaluated again on the Drake diagram. Columns as in `evaluations`, without `placed`."""
 
     def __str__(self) -> str:
         manifest, trials = self.manifest, self.statuses
@@ -88,7 +94,7 @@ class Run:
 
     @cached_property
     def whole(self) -> pandas.DataFrame:
-        """The evaluations with their genomes: all of them, unless the run is thinned."""
+        """The evaluations whose parameters are recorded: all, unless the run is thinned."""
         return self.evaluations[self.evaluations.filter(self._columns).notna().all(axis=1)]
 
     @cached_property
@@ -97,10 +103,10 @@ class Run:
         return [self._status(trial) for trial in range(self.scenario.evolution.trials)]
 
     def best(self, count: int = 1) -> pandas.DataFrame:
-        """The fittest different gaits of each trial: rows of `evaluations`.
+        """The `count` fittest different gaits of each trial: rows of `evaluations`.
 
-        Trial after trial, within a trial the best first. So the first row is the best of trial 0,
-        not of the run: that is fittest().
+        Rows are sorted by trial, then from best to worst. The first row is the best gait of trial
+        0. For the best gait of the run, see fittest().
         """
         ranked = self.whole.dropna(subset="fitness").sort_values(
             ["trial", "fitness", "index"], ascending=[True, False, True]
@@ -108,25 +114,25 @@ class Run:
         return ranked.drop_duplicates(["trial", *self._columns]).groupby("trial").head(count)
 
     def fittest(self) -> pandas.Series:
-        """The row of the run's fittest gait; InputError while no gait has a fitness."""
+        """The row of the run's fittest gait. Raises InputError if no gait has a fitness yet."""
         best = self.best()
         if best.empty:
             raise InputError(self.directory, "", "no gait of this run has a fitness yet")
         return best.loc[best["fitness"].idxmax()]
 
     def initial_best(self, trial: int) -> pandas.Series:
-        """The row of the fittest gait of a trial's first iteration in which not all failed."""
+        """The row of the fittest gait in the first iteration of a trial that has a fitness."""
         rows = self.evaluations.query("trial == @trial").dropna(subset="fitness")
         first = rows[rows["iteration"] == rows["iteration"].min()]
         return first.loc[first["fitness"].idxmax()]
 
     def best_gait(self) -> Gait:
-        """The run's fittest gait, of all trials; InputError while no gait has a fitness."""
+        """The fittest gait of all trials. Raises InputError if no gait has a fitness yet."""
         return self._gait_of(self.fittest())
 
     def gaits(self, count: int = 1) -> list[Gait]:
-        """The fittest `count` different gaits of each trial, in the order of best(). Their names
-        say trial and evaluation."""
+        """The `count` fittest different gaits of each trial, in the order of best(). The name of
+        each gait contains its trial and evaluation."""
         return [self._gait_of(row) for _, row in self.best(count).iterrows()]
 
     def file(self, name: str, trial: int | None = None) -> RecordFile:
@@ -138,7 +144,7 @@ class Run:
         return self.evaluations[self.evaluations["iteration"] == 0]
 
     def vector(self, trial: int, index: int) -> Vector:
-        """The parameters of an evaluation; InputError if thinning has left them out."""
+        """The parameters of an evaluation. Raises InputError if thinning removed them."""
         rows = self.whole.set_index(["trial", "index"])
         if (trial, index) not in rows.index:
             problem = f"has no genome of trial {trial}, evaluation {index}"
@@ -172,7 +178,7 @@ class Run:
 
 
 def gait_label(row: pandas.Series) -> str:
-    """Trial and number of an evaluation, one of `Run.evaluations`."""
+    """Name of an evaluation (a row of `Run.evaluations`), such as "trial 0, evaluation 12"."""
     return f"trial {row['trial']}, evaluation {row['index']}"
 
 
@@ -187,7 +193,7 @@ def load_run(path: str | Path) -> Run:
     """
     directory = given_path(path, "load_run", "path")
     manifest = read_manifest(directory)
-    # Iterations first: a run at work writes them last, so each has its evaluations.
+    # A running process writes iterations last. They are read first, so no evaluation is missing.
     iterations = _table(directory, manifest, ITERATIONS)
     evaluations = _table(directory, manifest, EVALUATIONS)
     reevaluations = _table(directory, manifest, REEVALUATIONS)
@@ -204,7 +210,7 @@ def load_run(path: str | Path) -> Run:
 def _check_iterations(
     file: RecordFile, iterations: pandas.DataFrame, evaluations: pandas.DataFrame
 ) -> None:
-    """Raises InputError, naming file and line, if the iterations of a trial contradict its
+    """Raises InputError, naming file and line, if the iterations of a trial do not match its
     evaluations."""
     made = np.searchsorted(evaluations["iteration"], iterations["iteration"], side="right")
     fitnesses = evaluations["fitness"].fillna(-math.inf).to_numpy()
@@ -221,7 +227,7 @@ def _check_iterations(
 
 
 def _parameters(scenario: Scenario) -> list[str]:
-    """The columns of a gait's parameters, in the order of ParameterSpace.names."""
+    """Names of the parameter columns, in the order of ParameterSpace.names."""
     space = ParameterSpace.of(scenario)
     others = [f"gain_{name}" for name in space.pathways] + ["tau_a_s", "tau_b_s"]
     weights = len(space.names) - len(others)
@@ -229,7 +235,7 @@ def _parameters(scenario: Scenario) -> list[str]:
 
 
 def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
-    """The lines of a file of all trials."""
+    """The lines of one file of all trials, as a table."""
     import pandas
 
     columns = _parameters(manifest.scenario)
@@ -246,11 +252,11 @@ def _table(directory: Path, manifest: Manifest, name: str) -> pandas.DataFrame:
     table = pandas.DataFrame(rows, columns=None if rows else _EMPTY)
     kinds = dict.fromkeys(_NUMBERS.intersection(table), "float")
     kinds |= dict.fromkeys(_INDICES.intersection(table), "Int64")
-    return table.astype(kinds).copy()  # in one piece, as astype() makes one of each column
+    return table.astype(kinds).copy()  # copy() joins the blocks that astype() makes per column
 
 
 def _flat(entry: dict[str, Any], columns: list[str], bodies: Sequence[str]) -> dict[str, Any]:
-    """A line of evaluations with a column for each number."""
+    """A row of the table of evaluations: one column for each number of a line."""
     genome = entry.pop("genome") or [math.nan] * len(columns)
     metrics = dict.fromkeys(METRICS, math.nan) | entry.pop("metrics")
     for body, share in zip(bodies, metrics.pop("lifted_shares", []), strict=False):

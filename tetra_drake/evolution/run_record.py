@@ -1,13 +1,13 @@
-"""A run's record on disk: how it is begun, written, checked and resumed.
+"""Record of a run on disk: begins, writes, checks and resumes it.
 
-    manifest.json, scenario.yaml    what defines the run; see evolution.manifest
-    .lock                           locked while a process is at work on the run
+    manifest.json, scenario.yaml    definition of the run; see evolution.manifest
+    .lock                           locked while a process works on the run
     trial_00/ ...                   see evolution.entries
 
-Evaluations become final lines iteration by iteration, so the record does not depend on
-which of them was ready first. A run is resumed by repeating it from the start with recorded
-fitnesses in place of simulations; every vector and every line must come out as recorded. So it goes
-on with the same versions of the packages and on the same kind of processor only.
+Evaluations are written to evaluations.jsonl iteration by iteration, so their order does not depend
+on which simulation was finished first. A run is resumed by repeating it from the start, with
+recorded fitnesses in place of simulations. Every vector and every line must be as recorded.
+Therefore resuming needs the same versions of the packages and the same kind of processor.
 """
 
 from __future__ import annotations
@@ -45,13 +45,14 @@ from tetra_drake.scenario.scenario import Scenario
 LOCK = ".lock"
 
 _ASIDE = ".replaced"
-"""Folder of a run that is replaced, for the moment in which that is done."""
+"""Folder that holds the old run while it is replaced."""
 
 _Lines = Sequence[dict[str, Any]]
 
 
 class RunRecord:
-    """A run directory, locked against other processes until closed; a new one from its begin."""
+    """A run directory, locked against other processes until the end of its `with` block. A new run
+    is locked from begin() on."""
 
     def __init__(self, directory: Path, manifest: Manifest, lock: BinaryIO | None = None) -> None:
         """See create() and resume()."""
@@ -71,8 +72,8 @@ class RunRecord:
         method: Method | None = None,
         overwrite: bool = False,
     ) -> RunRecord:
-        """A new run, in a directory that does not exist or is empty, or with `overwrite` holds a
-        run, which nobody else may be at work on. Nothing is written before begin()."""
+        """A new run in a new or empty directory. With `overwrite` the directory may hold another
+        run, unless a process is working on it. begin() writes the first file."""
         manifest = Manifest.of(scenario, seed, method or Method.of(scenario))
         check_folder(directory)
         if not overwrite or _is_empty(directory):
@@ -90,7 +91,8 @@ class RunRecord:
         seed: int | None = None,
         method: Method | None = None,
     ) -> RunRecord:
-        """Opens a run to go on with it. What is given must be the run's."""
+        """Opens a run to continue it. A given scenario, seed or method must be equal to the
+        run's."""
         manifest = read_manifest(directory)
         if manifest.thinned:
             raise InputError(directory, "", "is thinned: it lacks genomes that resuming needs")
@@ -107,7 +109,7 @@ class RunRecord:
         return record
 
     def begin(self) -> None:
-        """Writes the manifest unless that is done; a run that was there before goes."""
+        """Writes the manifest, if it is not written yet. Deletes the run that is overwritten."""
         if self.begun:
             return
         if self._lock is None:
@@ -137,7 +139,7 @@ _NOT_REPEATED = (
 
 
 class TrialRecord:
-    """The files of one trial. What is recorded already is checked instead of written."""
+    """The files of one trial. Lines that are recorded already are checked, not written again."""
 
     def __init__(self, run: RunRecord, number: int) -> None:
         self._run = run
@@ -156,8 +158,8 @@ class TrialRecord:
                 self._recorded[entry["index"]] = name, row
 
     def recall(self, index: int, vector: Vector) -> Evaluation | None:
-        """The recorded evaluation of this index, None if there is none; InputError if it is of
-        another vector."""
+        """The recorded evaluation with this index, or None. Raises InputError if it was recorded
+        for another vector."""
         if index not in self._recorded:
             return None
         name, row = self._recorded[index]
@@ -167,12 +169,12 @@ class TrialRecord:
         return recorded_evaluation(entry)
 
     def keep(self, entry: dict[str, Any]) -> None:
-        """Saves an evaluation whose iteration is not complete yet."""
+        """Saves an evaluation of an incomplete iteration."""
         self._append(IN_PROGRESS, [entry])
 
     def complete(self, evaluations: _Lines, iteration: dict[str, Any]) -> None:
-        """Writes an iteration's lines, or checks those that are there."""
-        # In this order: a kill in between leaves nothing that repeating the run cannot complete.
+        """Writes the lines of an iteration; lines that are recorded already are checked."""
+        # The order matters: after a kill in between, a resumed run completes the files.
         self._write(EVALUATIONS, evaluations, first=evaluations[0]["index"])
         self._write(ITERATIONS, [iteration], first=iteration["iteration"])
         if evaluations[-1]["index"] >= len(self._lines[EVALUATIONS]):
@@ -183,7 +185,7 @@ class TrialRecord:
         save_gait(gait, self._best_gait, scenario)
 
     def finish(self, evaluations: int) -> None:
-        """Checks that the record ends where the trial does."""
+        """Checks that the record has no evaluations beyond the end of the trial."""
         if len(self._lines[EVALUATIONS]) > evaluations:
             self._files[EVALUATIONS].refuse(evaluations, "the trial ends before this evaluation")
         self._files[IN_PROGRESS].path.unlink(missing_ok=True)
@@ -206,7 +208,7 @@ class TrialRecord:
 
 
 def _is_empty(directory: Path) -> bool:
-    """True if nothing is there but what a process leaves that is killed as it begins a run."""
+    """True if a directory is empty, or has only the files of a process killed in begin()."""
     ours = (LOCK, SCENARIO, _ASIDE, ".manifest.", ".scenario.")
     if not directory.is_dir():
         return True
@@ -224,12 +226,13 @@ def _check_empty(directory: Path) -> None:
 
 @contextlib.contextmanager
 def _set_aside(directory: Path) -> Iterator[None]:
-    """Removes what a directory holds, the lock aside, if the block succeeds."""
+    """Context manager: moves the content of a directory away, except the lock. The content is
+    deleted if the block succeeds and restored if it fails."""
     aside = directory / _ASIDE
     shutil.rmtree(aside, ignore_errors=True)
     aside.mkdir()
     names = [file.name for file in directory.iterdir() if file.name not in (LOCK, _ASIDE)]
-    names.sort(key=lambda name: name != MANIFEST)  # without its manifest it is no run
+    names.sort(key=lambda name: name != MANIFEST)  # the manifest first: it makes a run
     try:
         for name in names:
             (directory / name).rename(aside / name)
@@ -243,8 +246,8 @@ def _set_aside(directory: Path) -> Iterator[None]:
 
 
 def _locked(directory: Path) -> BinaryIO:
-    """The run's locked file, which the system releases whenever this process ends; InputError if
-    another process has locked it."""
+    """The lock file of a run, locked. The system unlocks it when this process ends. Raises
+    InputError if another process has the lock."""
     with contextlib.ExitStack() as undo:
         try:
             lock = undo.enter_context((directory / LOCK).open("ab"))

@@ -1,4 +1,4 @@
-"""Sources of gaits for commands: a gait file, or the folder of a run."""
+"""Source of gaits for a command: a gait file or the folder of a run."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from tetra_drake.scenario.scenario import Scenario
 
 @dataclass(frozen=True)
 class GaitSource:
-    """Gaits, and the scenario to simulate them on."""
+    """Gaits and the scenario to simulate them on."""
 
     scenario: Scenario
     best: Gait
-    """Gait of the file, or the run's best."""
+    """The gait of the file, or the best gait of the run."""
     gaits: dict[str, Gait]
-    """Gaits by the name of the file, or the best gait of each trial."""
+    """The gait of the file by its name, or the best gait of each trial by "trial 0" ..."""
 
 
 def load_source(
@@ -31,10 +31,16 @@ def load_source(
     scenario: str | None = None,
     warn: Callable[[str], None] = lambda text: None,
 ) -> GaitSource:
-    """The gait of a file, or the best gaits of a run.
+    """Loads the gait of a file, or the best gaits of a run.
 
-    The scenario is the given one, a name or file; else that of the run in whose folder the gait
-    is; else the thesis's. `warn` is told if the gaits were made for another one. Raises InputError.
+    Args:
+        source: a gait file, or the folder of a run.
+        scenario: name or file of a scenario. By default the scenario of the run that contains the
+            gait; "thesis" if the gait is in no run.
+        warn: function that gets a warning if the gaits were made for another scenario.
+
+    Raises:
+        InputError: if a file cannot be used.
     """
     folder = _run_folder(source)
     if scenario is not None or folder is None:
@@ -55,6 +61,7 @@ def load_source(
 
 
 def _run_folder(source: Path) -> Path | None:
-    """The folder of the run that a path is, or is in: run/trial_00/best_gait.json."""
+    """The run that contains a path, or is the path; such as `run` of run/trial_00/best_gait.json.
+    None if there is no run."""
     folders = (source, *source.absolute().parents[:2])
     return next((folder for folder in folders if os.path.isfile(folder / MANIFEST)), None)

@@ -1,4 +1,4 @@
-"""The trials of a run: each an optimiser, its record and its state; and the loop over all."""
+"""Trials of a run: each has an optimiser, a record and a state. Also the loop over all trials."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ from tetra_drake.scenario.units import INCH
 _SHOW_PERIOD = 1.0  # s
 
 ALL_DONE = "all evaluations done"
-"""Why a trial ends whose optimiser does not stop earlier."""
+"""Reason for the end of a trial whose optimiser did not stop earlier."""
 
 
 @dataclass
 class TrialStatus:
-    """State of a trial, live or recorded. Distances are the fittest gait's; NaN before there is
-    any."""
+    """State of a trial, running or recorded."""
 
     number: int
     evaluations_at_most: int
-    """Evaluations of a trial that does not end early."""
+    """Number of evaluations if the trial does not end early."""
     iteration: int = -1
-    """The last complete one; 0 is the initial population."""
+    """The last complete iteration; 0 is the initial population, -1 is none."""
     evaluations: int = 0
     failures: int = 0
     wall_time: float = 0.0
-    """Total of the evaluations, in s."""
+    """Sum over the evaluations, in s."""
     best_fitness: float = -math.inf
     best_distance_in: float = math.nan
+    """Distance (in) of the fittest gait; NaN if no gait has a fitness yet."""
     stop: str | None = None
     """Why the trial ended; None while it goes on."""
 
     def complete(self, line: Mapping[str, Any], *, best_distance_in: float) -> None:
-        """Takes over a line of iterations.jsonl, and the distance of its best evaluation."""
+        """Updates the state with a line of iterations.jsonl and the distance of the best gait."""
         self.iteration = line["iteration"]
         self.stop = line["stop"] if isinstance(line["stop"], str) else None
         best = line["best_fitness"]
-        # NaN stands for null in a table.
+        # A line from a table has NaN in place of null.
         self.best_fitness = -math.inf if best is None or math.isnan(best) else best
         self.best_distance_in = best_distance_in
 
@@ -58,28 +58,31 @@ _Evaluated = tuple[Task, Evaluation]
 
 
 class Trial:
-    """Gives evaluations, taken in any order, to the optimiser in the order asked, until
-    `evolution.evaluations` are done or the optimiser stops. What the record holds already it goes
-    through at once."""
+    """One optimisation of a run, with its record.
+
+    Evaluations arrive in any order; the optimiser gets them in the order of its vectors. The trial
+    ends after `evolution.evaluations` evaluations, or when the optimiser stops. The constructor
+    repeats the recorded iterations, without simulation.
+    """
 
     def __init__(self, number: int, *, run: RunRecord, optimizer: Optimizer) -> None:
         self._manifest = run.manifest
         self.status = TrialStatus(number, self._manifest.scenario.evolution.evaluations)
         self.unevaluated: dict[int, Task] = {}
-        """Tasks to evaluate before the optimiser can go on, by index; empty at the end."""
+        """Tasks that the current iteration waits for, by index; empty at the end of the trial."""
         self.recalled: _Evaluated | None = None
         """The first recorded task with a fitness."""
         self._optimizer = optimizer
         self._record = TrialRecord(run, number)
         self._results: dict[int, _Evaluated] = {}
-        """The evaluated tasks of this iteration, by index."""
+        """Evaluated tasks of the current iteration, by index."""
         self._best: _Evaluated | None = None
         self._saved: _Evaluated | None = None
-        """The one whose gait is in the record as the best."""
+        """The task and evaluation that best_gait.json holds."""
         self._advance()
 
     def take(self, task: Task, evaluation: Evaluation) -> bool:
-        """Takes an evaluation; True if that was the last of its iteration."""
+        """Takes an evaluation. Returns True if it completes the iteration."""
         del self.unevaluated[task.index]
         self._add(task, evaluation)
         if self.unevaluated:
@@ -90,7 +93,7 @@ class Trial:
         return True
 
     def _advance(self) -> None:
-        """Goes on to the next vectors that are not recorded, or to the end."""
+        """Runs recorded iterations, up to the first unrecorded vectors or the trial's end."""
         while self.status.stop is None:
             self._ask()
             if self.unevaluated:
@@ -101,7 +104,8 @@ class Trial:
         self._save_best()
 
     def _ask(self) -> None:
-        """Begins an iteration: what is recorded of it is recalled, the rest is unevaluated."""
+        """Begins an iteration: asks for vectors and takes their recorded evaluations. The other
+        vectors become `unevaluated`."""
         self._results = {}
         first, trial = self.status.evaluations, self.status.number
         iteration = self.status.iteration + 1
@@ -124,7 +128,7 @@ class Trial:
         status.wall_time += evaluation.wall_time
 
     def _complete(self) -> None:
-        """Tells the optimiser the results of an iteration, and records it."""
+        """Ends an iteration: tells the optimiser its evaluations, and records it."""
         results = [self._results[index] for index in sorted(self._results)]
         outcome = self._optimizer.tell([evaluation for _, evaluation in results])
         for task, evaluation in results:
@@ -132,8 +136,8 @@ class Trial:
                 self._best = task, evaluation
         entries = [evaluation_entry(*result) for result in results]
         if outcome.placed is not None:
-            for entry, place in zip(entries, outcome.placed, strict=True):
-                entry["placed"] = place
+            for entry, member in zip(entries, outcome.placed, strict=True):
+                entry["placed"] = member
         status = self.status
         all_done = status.evaluations == status.evaluations_at_most
         best_fitness, best_evaluation, distance = None, None, math.nan
@@ -161,8 +165,11 @@ class Trial:
 
 
 def open_trials(record: RunRecord, *, optimizer: MakeOptimizer | None = None) -> list[Trial]:
-    """All trials of a record, each as far as it is recorded; by default with the scenario's
-    optimiser. Trials share nothing: one more trial changes no other."""
+    """All trials of a record, each at the end of its recorded part.
+
+    The default optimiser is the scenario's. Trials are independent: their number does not change
+    their results.
+    """
     scenario = record.manifest.scenario
     make = optimizer or optimizer_of(scenario.optimizer)
     space = ParameterSpace.of(scenario)
@@ -180,9 +187,9 @@ def run_trials(
     *,
     show: Callable[[Sequence[TrialStatus]], None] = lambda statuses: None,
 ) -> list[TrialStatus]:
-    """Runs trials to their ends, from wherever they are.
+    """Runs all trials to their ends.
 
-    Their record depends on its scenario, method and seed only, not on the evaluator or on
+    The record depends only on scenario, method and seed. It does not depend on the evaluator or on
     interruptions.
     """
     statuses = [trial.status for trial in trials]
@@ -202,8 +209,8 @@ def run_trials(
 
 
 def check_fitness(trials: Sequence[Trial], directory: Path, evaluator: Evaluator) -> None:
-    """Evaluates the first recorded gait that has a fitness once more; InputError if its fitness is
-    another now, so that no record ever holds two objectives."""
+    """Evaluates the first recorded gait with a fitness again. Raises InputError if its fitness
+    differs, so that a record never mixes two objectives."""
     for trial in trials:
         if trial.recalled is None:
             continue

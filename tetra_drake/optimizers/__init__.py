@@ -1,4 +1,4 @@
-"""Optimisers behind ask/tell."""
+"""Optimisers with the interface ask/tell."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ OPTIMIZERS: dict[type, Any] = {
     kinds.RandomSearch: RandomSearch,
     kinds.QualityDiversity: QualityDiversity,
 }
-"""The class of each kind; its constructor takes the arguments of a MakeOptimizer and settings."""
+"""Class of optimiser by kind. Its constructor takes the arguments of MakeOptimizer and
+`settings`."""
 
 
 def optimizer_of(kind: kinds.OptimizerKind) -> MakeOptimizer:
-    """The maker of the optimiser that a scenario asks for.
+    """Function that makes an optimiser of the scenario's kind.
 
     Raises InputError if pyribs is missing.
     """

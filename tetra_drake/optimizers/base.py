@@ -1,4 +1,4 @@
-"""Evaluations and optimisers: all that the trial loop knows about either."""
+"""Interface between optimisers and the trial loop: tasks, evaluations, iterations."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ from tetra_drake.scenario.disturbances import IterationSeed
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The outcome of one vector. A failed one has fitness -inf, and metrics only if it walked."""
+    """Outcome of one vector. A failure has fitness -inf; it has metrics only if the simulation was
+    completed."""
 
     fitness: float
     metrics: Mapping[str, Any] = field(default_factory=dict)
     """Metrics in the form of Metrics.to_json()."""
     failure: str | None = None
     wall_time: float = 0.0
-    """Wall time in s; for simulations side by side on a core, its share of that core's time."""
+    """Wall time in s. Simulations that run side by side on a core share the time of the core."""
     engine: str = ""
     draws: Mapping[str, Sequence[float]] | None = None
-    """Among disturbances, fitness and distance (m) of each draw."""
+    """Fitness and distance (m) of each draw of disturbances; None without disturbances."""
 
     @classmethod
     def failed(cls, reason: str) -> Evaluation:
-        """A failed evaluation and its reason."""
+        """A failed evaluation with this reason."""
         return cls(fitness=-math.inf, failure=reason)
 
 
@@ -44,7 +45,7 @@ class Task:
     """Number of the evaluation in its trial."""
     iteration: int = 0
     seed: IterationSeed | None = None
-    """Seed of its draws; None without disturbances."""
+    """Seed of the draws of disturbances; None without disturbances."""
 
     def __str__(self) -> str:
         return f"trial {self.trial}, evaluation {self.index}"
@@ -56,33 +57,33 @@ Evaluate = Callable[[Task], Evaluation]
 
 @dataclass(frozen=True)
 class Iteration:
-    """Iteration of an optimiser: its report on the evaluations it was told."""
+    """Outcome of an optimiser's iteration: its report on the evaluations."""
 
     report: Mapping[str, Any]
-    """Numbers to record with the iteration, by the optimiser's own names; None where unknown."""
+    """Numbers to record with the iteration, by name; an unknown number is None."""
     stop: str | None = None
-    """Why the optimisation ends before its evaluations are used up; None while it goes on."""
+    """Reason to stop before all evaluations are used; None to continue."""
     placed: Sequence[int | None] | None = None
-    """Index in the population of each vector of the batch, None if it was dropped; None for
-    an optimiser without a population."""
+    """Index in the population of each vector of the batch; None for a dropped vector. None instead
+    of a list for an optimiser without a population."""
 
 
 class Optimizer(Protocol):
-    """Asks for vectors to be evaluated, batch by batch, and is told their evaluations; it depends
-    on these and its random generator only, so that a trial can be repeated from its record.
+    """An optimiser: ask() gives a batch of vectors, tell() takes their evaluations.
 
-    The trial ends after `evolution.evaluations`, whatever the optimiser. Its last batch is cut to
-    the evaluations that are left.
+    It depends only on the evaluations and its random generator, so that a trial can be repeated
+    from its record. Every trial ends after `evolution.evaluations`. Its last batch is cut to the
+    number of evaluations that are left.
     """
 
     def ask(self) -> list[Vector]:
-        """The vectors of the next iteration, to be evaluated in any order."""
+        """The vectors of the next iteration. They may be evaluated in any order."""
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes the evaluations in the order in which the vectors were asked for; of a batch that
-        was cut, those of its first vectors."""
+        """Takes the evaluations, in the order of the vectors from ask(). If the batch was cut, only
+        its first vectors have evaluations."""
 
 
 MakeOptimizer = Callable[[ParameterSpace, EvolutionSection, np.random.Generator], Optimizer]
-"""Makes the optimiser of one trial from the space to search, the scenario's `evolution` section
-and the trial's own generator."""
+"""Function that makes the optimiser of one trial. Its arguments are the search space, the
+`evolution` section of the scenario, and the random generator of the trial."""

@@ -1,7 +1,8 @@
 """CMA-ES with restarts, through pycma (Hansen, arXiv 1604.00772; IPOP: Auger and Hansen, CEC 2005).
 
-pycma searches the roots of the distances to floors (see Ranges.from_roots), so that no vector is
-thrown away, and nothing keeps it from a best vector at a floor.
+A parameter with a lower limit (floor) is replaced by the square root of its distance to the floor
+(see Ranges.from_roots). So every point of pycma is valid, and a best point at the floor can be
+found.
 """
 
 from __future__ import annotations
@@ -17,27 +18,29 @@ from tetra_drake.robot.gait import Vector
 from tetra_drake.scenario import optimizer_kinds as kinds
 
 TRYOUT = 350
-"""Evaluations in which each search is tried out."""
+"""Number of evaluations of each search before the best search is selected."""
 
 SIGMA = 0.2
-"""Standard deviation at the start, as a share of each parameter's range in random gaits (in its
-middle; smaller near a floor)."""
+"""Initial standard deviation, as a share of each parameter's range in random gaits. Near a floor
+the standard deviation of the parameter itself is smaller."""
 
 TOLERANCE = 0.05
-"""A search has converged where all standard deviations are below this share of the ranges."""
+"""Threshold of convergence: all standard deviations below this share of the ranges."""
 
 GROWTH = 2.0
 """Factor on the population at each restart (IPOP)."""
 
 
 class CmaEs(Generational[kinds.CmaEs]):
-    """Several searches by CMA-ES, each for some evaluations; the one with the best point goes on.
+    """Several searches by CMA-ES. Each runs for TRYOUT evaluations; then the best continues.
 
-    Where they end is decided early and differs much more between searches than within one. The
-    first starts from the mean of the best quarter of a random sample, the others from its best
-    points; without a sample, from the middle and from random points. Reports besides the number of
-    the search (`start`), its restarts, and sigma, the standard deviation of its parameters in units
-    of their ranges (root mean square).
+    The result depends mostly on the start: searches differ more from each other than one search
+    differs over time. The first search starts at the mean of the best quarter of a random sample,
+    the others at the best points of the sample. Without a sample, the first starts in the middle of
+    the ranges, the others at random points.
+
+    The report also has the number of the search (`start`), its restarts (`restart`), and `sigma`:
+    the root mean square of the standard deviations, in units of the ranges.
     """
 
     def __post_init__(self) -> None:
@@ -51,7 +54,7 @@ class CmaEs(Generational[kinds.CmaEs]):
             self._begin(np.vstack([middle, *self._random(self._starts - 1)]))
 
     def _begin(self, points: Matrix) -> None:
-        """Begins the searches from the first of these points."""
+        """Begins one search at each of the first points."""
         population = self.settings.population
         self._searches = [
             _Search(population, self._ranges, self.generator, start)
@@ -71,7 +74,7 @@ class CmaEs(Generational[kinds.CmaEs]):
 
     @property
     def _current(self) -> _Search:
-        """The search that draws next, or has drawn."""
+        """The search whose points are being evaluated."""
         for search in self._searches:
             if search.evaluations < TRYOUT:
                 return search
@@ -86,7 +89,7 @@ class CmaEs(Generational[kinds.CmaEs]):
 
 
 class _Search:
-    """CMA-ES from a point; where it has converged, anew around its best one, with a larger
+    """A search by CMA-ES. When it has converged, it restarts at its best point with a larger
     population."""
 
     def __init__(
@@ -103,8 +106,8 @@ class _Search:
         """Fitness of the best point."""
         self._best = start
         self._drawn: Matrix = np.empty((0, 0))
-        """The roots drawn last, with a second one where there is a single parameter only, as pycma
-        knows no single dimension."""
+        """Roots that were drawn last. pycma needs two dimensions, so a single parameter gets an
+        unused second one."""
         self._strategy = self._make_strategy()
 
     @property
@@ -113,12 +116,12 @@ class _Search:
         return float(np.sqrt(np.mean(self._strategy.stds**2)))
 
     def draw(self) -> Matrix:
-        """Points of the distribution."""
+        """Draws a population of points."""
         self._drawn = np.array(self._strategy.ask())
         return self._ranges.from_roots(self._drawn[:, : self._ranges.size])
 
     def learn(self, points: Matrix, fitnesses: Vector) -> None:
-        """Takes the points evaluated for it and their fitnesses."""
+        """Takes the evaluated points and their fitnesses."""
         self.evaluations += len(points)
         best = int(np.argmax(fitnesses))
         if fitnesses[best] > self.best:
@@ -138,8 +141,8 @@ class _Search:
             "popsize": self._population,
             "tolx": TOLERANCE,
             "randn": lambda *shape: self._generator.standard_normal(shape),
-            "seed": math.nan,  # leaves the generator of numpy alone
-            "verbose": -10,  # and reads no file of signals
+            "seed": math.nan,  # does not seed numpy's global generator
+            "verbose": -10,  # no output, and no file of options
         }
         roots = np.pad(self._ranges.roots(self._best), (0, max(0, 2 - len(self._best))))
         return cma.CMAEvolutionStrategy(roots, SIGMA, options)

@@ -20,8 +20,10 @@ MIDDLE = 0.5
 
 
 class Ranges:
-    """The parameters that vary, in units of their ranges in random gaits: 0 is the lower bound, 1
-    the upper one. Only floors limit them."""
+    """Scale of the varying parameters: 0 and 1 are the bounds of random gaits.
+
+    A search may leave these bounds. Only floors (lower limits) are respected.
+    """
 
     def __init__(self, space: ParameterSpace) -> None:
         self._space = space
@@ -32,27 +34,28 @@ class Ranges:
         self.floors = (space.floors - space.low)[self._free] / self._width
 
     def vector(self, point: Vector) -> Vector:
-        """The vector of a point; what is below its floor is put there."""
+        """The parameter vector of a scaled point. Values below a floor are raised to it."""
         vector = self._space.low.copy()
         vector[self._free] += point * self._width
         return self._space.repair(np.maximum(vector, self._space.floors))
 
     def from_roots(self, roots: Matrix) -> Matrix:
-        """The points floor + root^2 / (4 (MIDDLE - floor)), and the roots where there is no floor.
+        """Converts roots to points: floor + root^2 / (4 (MIDDLE - floor)). A parameter without a
+        floor is its own root.
 
-        All roots are allowed, and a best point at the floor is one that fitness is smooth around.
-        In the middle of its range, a point moves as its root does.
+        Every root is a valid point. Fitness is a smooth function of the root even at the floor. In
+        the middle of the range, point and root change at the same rate.
         """
         points = self.floors + roots**2 / (4.0 * (MIDDLE - self.floors))
         return np.where(np.isfinite(self.floors), points, roots)
 
     def roots(self, points: Matrix) -> Matrix:
-        """The roots of points, none negative where there is a floor."""
+        """Converts points to roots; the inverse of from_roots(), without negative roots."""
         roots = 2.0 * np.sqrt((MIDDLE - self.floors) * (points - self.floors))
         return np.where(np.isfinite(self.floors), roots, points)
 
     def point(self, vector: Vector) -> Vector:
-        """The point of a vector."""
+        """The scaled point of a parameter vector."""
         return (vector - self._space.low)[self._free] / self._width
 
 
@@ -61,8 +64,10 @@ SettingsT = TypeVar("SettingsT")
 
 @dataclass(eq=False)
 class Generational(Generic[SettingsT]):
-    """An Optimizer that learns from a whole batch at once, unless all of it has failed; a failure
-    is worse than all others. Reports mean_fitness, over the evaluations without failure.
+    """Base class of optimisers that learn from a whole batch at once.
+
+    A failure counts as worse than every success. A batch of failures teaches nothing. The report
+    has mean_fitness over the successes.
     """
 
     space: ParameterSpace
@@ -74,7 +79,7 @@ class Generational(Generic[SettingsT]):
     def __post_init__(self) -> None:
         self._ranges = Ranges(self.space)
         self._points: Matrix = np.empty((0, self._ranges.size))
-        """Points drawn last."""
+        """Points that were drawn last."""
 
     def ask(self) -> list[Vector]:
         """The next batch."""
@@ -93,17 +98,17 @@ class Generational(Generic[SettingsT]):
         return Iteration(report)
 
     def _random(self, count: int) -> Matrix:
-        """The points of random vectors."""
+        """Points of random gaits."""
         drawn = [self.space.random(self.generator) for _ in range(count)]
         return np.array([self._ranges.point(vector) for vector in drawn])
 
     def _draw(self) -> Matrix:
-        """The points to evaluate next."""
+        """Draws the points of the next batch."""
         raise NotImplementedError
 
     def _learn(self, fitnesses: Vector) -> None:
-        """Takes the fitnesses of all points drawn last, all finite."""
+        """Learns from the fitnesses of the points of the last batch. All are finite."""
 
     def _state(self) -> Mapping[str, Any]:
-        """State of the search, for the report."""
+        """Numbers about the search, for the report."""
         return {}

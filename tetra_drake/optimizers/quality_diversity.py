@@ -1,4 +1,4 @@
-"""Quality-diversity through pyribs: CMA-MAE."""
+"""Quality-diversity search with CMA-MAE from pyribs: a map of gaits over two metrics."""
 
 from __future__ import annotations
 
@@ -16,28 +16,29 @@ from tetra_drake.scenario import optimizer_kinds as kinds
 INSTALL = 'pip install "tetra_drake[qd]"'
 
 FLOOR = 0.0
-"""The fitness that gaits on the map exceed: the level of all cells at the start."""
+"""Fitness that a gait must exceed to enter the map; the initial threshold of every cell."""
 
 LEARNING_RATE = 0.01
-"""Share of the way to a better gait's fitness by which it raises the level of its cell."""
+"""Learning rate of CMA-MAE: a better gait raises its cell's threshold by this share of the
+difference."""
 
 EMITTERS = 4
-"""Runs of CMA-ES side by side."""
+"""Number of emitters; each is a CMA-ES that proposes vectors."""
 
 BATCH = 15
-"""Vectors of each emitter in an iteration."""
+"""Number of vectors per emitter and iteration."""
 
 SIGMA = 0.5
-"""Standard deviation at the start; starts are random gaits, later gaits of the map."""
+"""Initial standard deviation. An emitter starts at a random gait and restarts at one of the map."""
 
 
 class QualityDiversity(Generational[kinds.QualityDiversity]):
-    """Emitters that draw a part of each batch each, and an archive that says how far each vector is
-    above the level of its cell.
+    """An optimiser that fills a map of gaits.
 
-    A failure, or what lacks a measure, never enters the archive; it counts as farther below than
-    all others. From a batch without any other, nothing is learnt. Reports besides elites, the
-    number of cells with a gait.
+    Each emitter draws a part of the batch. The archive (the map) rates a vector by the difference
+    between its fitness and the threshold of its cell. A vector that failed or lacks a measure never
+    enters the archive; it is rated below all others. A batch of such vectors teaches nothing. The
+    report also has `elites`: the number of cells with a gait.
     """
 
     def __post_init__(self) -> None:
@@ -46,12 +47,12 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
 
         super().__post_init__()
         self._roots: Matrix = np.empty((0, self._ranges.size))
-        """Roots of the points drawn last; see Ranges.from_roots()."""
+        """Roots of the points that were drawn last; see Ranges.from_roots()."""
         self._told: dict[str, npt.NDArray[Any]] = {}
-        """Arguments of tell() of the emitters: `solution` (roots), `objective`, `measures`; none
-        after a batch of which nothing may enter the archive."""
+        """Arguments of the emitters' tell(): `solution` (roots), `objective`, `measures`. Empty if
+        no vector of the batch may enter the archive."""
         self._added: dict[str, npt.NDArray[Any]] = {}
-        """The archive's `status` and `value` of each."""
+        """The archive's rating of each vector: `status` and `value`."""
         self._archive = GridArchive(
             solution_dim=self._ranges.size,
             dims=self.settings.cells,
@@ -82,7 +83,7 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
         return self._ranges.from_roots(self._roots)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes a batch."""
+        """Adds a batch to the archive; then the emitters learn from it."""
         count = len(evaluations)
         objective, status, value = np.empty(count), np.zeros(count, np.int32), np.zeros(count)
         measures = np.empty((count, len(self.settings.measures)))
@@ -102,7 +103,7 @@ class QualityDiversity(Generational[kinds.QualityDiversity]):
             status[enters], value[enters] = added["status"], added["value"]
             value[~enters] = np.min(added["value"]) - 1.0
             objective[~enters] = np.min(objective[enters])
-            measures[~enters] = measures[enters][0]  # no emitter looks at them
+            measures[~enters] = measures[enters][0]  # unused by the emitters
             self._told = {"solution": self._roots, "objective": objective, "measures": measures}
             self._added = {"status": status, "value": value}
         return super().tell(evaluations)

@@ -1,14 +1,14 @@
-"""Random search, the baseline of all others."""
+"""Random search: the baseline for the other optimisers."""
 
 from tetra_drake.optimizers.generational import Generational, Matrix
 from tetra_drake.scenario import optimizer_kinds as kinds
 
 GAITS = 50
-"""Gaits of an iteration."""
+"""Number of gaits per iteration."""
 
 
 class RandomSearch(Generational[kinds.RandomSearch]):
-    """Draws random gaits."""
+    """An optimiser that only draws random gaits."""
 
     def _draw(self) -> Matrix:
         return self._random(GAITS)

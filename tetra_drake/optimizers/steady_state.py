@@ -1,7 +1,7 @@
 """The thesis's steady-state evolutionary algorithm and its operators (section 2.3, listing A.3).
 
-The comparisons are the listing's: an event of probability p happens if a number drawn from
-[0, 1) is at least 1 - p.
+Comparisons are as in the listing: an event of probability p happens if a random number from [0, 1)
+is at least 1 - p.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ GAIN_MUTATION = 0.2
 
 @dataclass(eq=False)
 class SteadyState:
-    """An Optimizer: first the random population, then two children per iteration.
+    """The thesis's optimiser: a random population, then two children per iteration.
 
-    Both children come from the same two parents and the same mutation numbers, before either is
-    placed, so they can be evaluated at once. Reports mean_fitness, over members without failure.
+    Both children have the same parents and the same mutation. Both are made before either enters
+    the population, so they can be evaluated at the same time. The report has mean_fitness over the
+    members that did not fail.
     """
 
     space: ParameterSpace
@@ -53,7 +54,7 @@ class SteadyState:
         return [vector.copy() for vector in self._asked]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> Iteration:
-        """Takes the initial population, or places the children one after the other."""
+        """Takes the initial population, or places the two children one after the other."""
         if not self._population:
             self._population = self._asked
             self._fitnesses = np.array([e.fitness for e in evaluations], dtype=float)
@@ -101,20 +102,20 @@ class SteadyState:
     def _place(self, vector: Vector, evaluation: Evaluation) -> int | None:
         tournament, generator = self.settings.tournament, self.generator
         fitness = evaluation.fitness
-        place = find_place(self._fitnesses, fitness, tournament=tournament, generator=generator)
-        if place is not None:
-            self._population[place], self._fitnesses[place] = vector, fitness
-        return place
+        member = find_place(self._fitnesses, fitness, tournament=tournament, generator=generator)
+        if member is not None:
+            self._population[member], self._fitnesses[member] = vector, fitness
+        return member
 
 
 def select_parent(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
-    """The best of a tournament; of equals the first drawn (listing A.3.2)."""
+    """Index of the best of a tournament. Among equals the first drawn wins (listing A.3.2)."""
     candidates = generator.integers(0, len(fitnesses), size=tournament)
     return int(candidates[np.argmax(fitnesses[candidates])])
 
 
 def select_victim(fitnesses: Vector, *, tournament: int, generator: np.random.Generator) -> int:
-    """The worst of a tournament; of equals the last drawn (listing A.3.5)."""
+    """Index of the worst of a tournament. Among equals the last drawn counts (listing A.3.5)."""
     candidates = generator.integers(0, len(fitnesses), size=tournament)[::-1]
     return int(candidates[np.argmin(fitnesses[candidates])])
 
@@ -122,15 +123,15 @@ def select_victim(fitnesses: Vector, *, tournament: int, generator: np.random.Ge
 def cross_over(
     first: Vector, second: Vector, *, probability: float, generator: np.random.Generator
 ) -> tuple[Vector, Vector]:
-    """Two children: the parents with each parameter swapped at this probability."""
+    """Two children: copies of the parents. Each parameter is swapped with this probability."""
     swapped = generator.random(len(first)) >= 1.0 - probability
     return np.where(swapped, second, first), np.where(swapped, first, second)
 
 
 def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector:
-    """Largest change of each parameter in one mutation (Table 6); 0 where its bounds are equal.
+    """Largest change of each parameter in one mutation (Table 6); 0 if its bounds are equal.
 
-    With `tau_mutation: listing`, tau_A does not mutate: the listing's index 26 is that of tau_B.
+    With `tau_mutation: listing`, tau_A does not mutate: index 26 of the listing means tau_B.
     """
     is_gain = np.array([name.startswith("gain ") for name in space.names])
     steps = np.where(is_gain, GAIN_MUTATION, settings.weight_mutation)
@@ -141,8 +142,8 @@ def mutation_steps(space: ParameterSpace, settings: kinds.SteadyState) -> Vector
 
 
 def draw_mutation(steps: Vector, *, probability: float, generator: np.random.Generator) -> Vector:
-    """Changes of all parameters: 0, or up to the parameter's step with either sign; one draw
-    serves both children of an iteration, as in the listing."""
+    """Random changes of all parameters. A parameter changes with this probability, by at most its
+    step, up or down. As in the listing, both children of an iteration get the same changes."""
     sign = np.where(generator.random(len(steps)) > 0.5, 1.0, -1.0)
     moved = generator.random(len(steps)) >= 1.0 - probability
     size = steps * generator.random(len(steps))
@@ -150,8 +151,8 @@ def draw_mutation(steps: Vector, *, probability: float, generator: np.random.Gen
 
 
 def mutate(vector: Vector, *, mutation: Vector, floors: Vector) -> Vector:
-    """The vector with the mutation added; a parameter that would fall to its floor stays. Only
-    reductions are checked, as in the listing (A.3.3, A.3.4)."""
+    """Adds a mutation to a vector. A parameter that would fall to its floor or below stays as it
+    is. As in the listing (A.3.3, A.3.4), only reductions are checked."""
     moved = vector + mutation
     return np.where((mutation < 0.0) & ~(moved > floors), vector, moved)
 
@@ -159,8 +160,11 @@ def mutate(vector: Vector, *, mutation: Vector, floors: Vector) -> Vector:
 def find_place(
     fitnesses: Vector, child: float, *, tournament: int, generator: np.random.Generator
 ) -> int | None:
-    """Index of the member that a child of this fitness replaces: the worst of a tournament if the
-    child is fitter, else the worst of all if it is fitter than that, else None."""
+    """Index of the member that a child with fitness `child` replaces; None if there is none.
+
+    If the child is fitter than the worst of a tournament, it replaces this member. Otherwise, if it
+    is fitter than the worst of the population, it replaces that member.
+    """
     victim = select_victim(fitnesses, tournament=tournament, generator=generator)
     worst = int(np.argmin(fitnesses))
     for member in (victim, worst):
@@ -170,14 +174,14 @@ def find_place(
 
 
 def mean_fitness(fitnesses: Vector) -> float:
-    """Mean over the members that have not failed; NaN if all have."""
+    """Mean fitness of the members that did not fail; NaN if all failed."""
     finite = fitnesses[np.isfinite(fitnesses)]
     return float(np.mean(finite)) if finite.size else float("nan")
 
 
 def has_levelled_off(means: Sequence[float], *, rise: float, window: int, after: int) -> bool:
-    """True if the mean fitness rose by less than `rise` in the last `window` iterations, and
-    iteration `after` is over; `means` begins with iteration 0."""
+    """True if the mean fitness rose by less than `rise` in the last `window` iterations. False up
+    to iteration `after`. `means` begins with iteration 0."""
     iteration = len(means) - 1
     long_enough = iteration > after and iteration >= window
     return long_enough and means[iteration] - means[iteration - window] < rise

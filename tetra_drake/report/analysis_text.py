@@ -17,7 +17,8 @@ _LONGEST_NAME = 12  # largest number of letters of a gait's name; longer ones ar
 
 
 def robustness_text(judgement: Judgement) -> str:
-    """Tables of the distances of gaits under disturbances, and of which of these hurt most."""
+    """Tables of a judgement: distances of gaits on disturbed robots, and the most harmful
+    changes."""
     gaits, count = by_gait(judgement), judgement.draws["draw"].nunique()
     require = bool(judgement.scenario.require)
     misses = " and misses no requirement" if require else ""
