@@ -27,7 +27,6 @@ from tetra_drake.engines.interface import Engine, Outcome, Viewer
 from tetra_drake.engines.observer import Observer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import Diverged, InputError, SimulationFailure, StepBudgetExceeded
-from tetra_drake.physics.actuator import DIRECT
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.contact import CONTACT, MODE_COLUMNS
 from tetra_drake.physics.inertia import XX
@@ -87,10 +86,7 @@ class MujocoEngine(Engine):
             kind = type(scenario.terrain).__name__
             problem = f"found !{kind}, but mujoco simulates planes: !Flat, !Incline"
             raise InputError(scenario.name, "terrain", problem)
-        if scenario.actuation.law().kind != DIRECT:
-            kind = type(scenario.actuation).__name__
-            problem = f"found !{kind}, but mujoco knows forces on cables only: !Force"
-            raise InputError(scenario.name, "actuation", problem)
+        scenario.actuation.check_mujoco(scenario.name)
         scenario.friction.cone(scenario.name)
 
     def simulate(

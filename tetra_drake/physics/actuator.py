@@ -5,7 +5,8 @@
     tension motor  pulls the cable by force control: its tension is a state, commanded as the
                    whole law of the cable, of which spring and damper are played by software
 
-A *drive* is the state of an actuator, one for each driven cable of a winch or a tension motor.
+A *drive* is the state of an actuator: of a winch the free length (m), of a tension motor the
+tension (N). A direct force has none.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ DIRECT, WINCH, TENSION_MOTOR = range(3)
 """Kinds of actuators."""
 
 DRIVE, RATE, LIMITED, DRIVE_COLUMNS = range(4)
-"""Columns of `drives`, a row per drive: free length (m) of a winch or tension (N) of a tension
-motor, its rate per s, 1 where a limit binds or else 0; and their number."""
+"""Columns of `drives`, a row for each driven cable whose actuator has one: the drive, its rate per
+s, 1 where a limit binds or else 0; and their number."""
 
 
 class Limits(NamedTuple):
@@ -63,10 +64,25 @@ class ActuatorForce(NamedTuple):
 
 
 @inlined
+def has_drive(actuator: Actuator) -> bool:
+    """True if the actuators have states."""
+    return actuator.kind != DIRECT
+
+
+@inlined
+def wound(actuator: Actuator, drive: Table, otherwise: Table) -> Table:
+    """The drive if it is the free length of a wound cable, or else `otherwise`; also of tables."""
+    if actuator.kind == WINCH:
+        return drive
+    return otherwise
+
+
+@inlined
 def actuator_force(
     actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
 ) -> ActuatorForce:
-    """The force of a winch or a tension motor, for a cable of `length` that lengthens at `rate`."""
+    """The force of an actuator that has a drive, for a cable of `length` that lengthens at
+    `rate`."""
     limits = named(Limits, actuator.limits)
     if actuator.kind == WINCH:
         return winch_force(drive, length, rate, signal, law, limits)

@@ -20,6 +20,11 @@ class CableLaw(NamedTuple):
     damping: Real
     free_length: Real
 
+    @classmethod
+    def of(cls, cables: Table) -> Self:
+        """The laws of an array of dtype CABLE."""
+        return cls(*(cables[name].copy() for name in cls._fields))
+
 
 CABLE = np.dtype(
     [
@@ -42,8 +47,8 @@ class Cables(NamedTuple):
     @classmethod
     def of(cls, cables: Table) -> Self:
         """Cables of an array of dtype CABLE."""
-        node_a, node_b, signal, *law = (cables[name].copy() for name in CABLE.names or ())
-        return cls(node_a, node_b, signal, CableLaw(*law))
+        node_a, node_b, signal = (cables[name].copy() for name in ("node_a", "node_b", "signal"))
+        return cls(node_a, node_b, signal, CableLaw.of(cables))
 
 
 @inlined

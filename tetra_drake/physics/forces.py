@@ -36,8 +36,8 @@ class Forces(NamedTuple):
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
     """Of the bodies along World's axes, unless they are isotropic."""
     drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
-    """Of winches or tension motors, in the order of their cables. What forces are computed from is
-    given; the rest is written."""
+    """In the order of the driven cables. What forces are computed from is given; the rest is
+    written."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
@@ -48,13 +48,13 @@ class Forces(NamedTuple):
 def sizes_of(robot: Model) -> dict[str, int]:
     """The numbers of a robot's parts, for allocate()."""
     drivers = robot.cables.signal
-    driven = np.count_nonzero(drivers != cable.PASSIVE)
+    has_drive = actuator.has_drive(robot.actuator)
     return {
         "bodies": len(robot.bodies.mass),
         "nodes": len(robot.p_BN),
         "contacts": robot.ground.contacts.size,
         "cables": drivers.size,
-        "drives": 0 if robot.actuator.kind == actuator.DIRECT else driven,
+        "drives": np.count_nonzero(drivers != cable.PASSIVE) if has_drive else 0,
     }
 
 
@@ -102,7 +102,7 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
             signal = signals[driver]
         rate = dot(v_AB, direction)
         law = cable.law_of(robot.cables, i)
-        if driver == cable.PASSIVE or robot.actuator.kind == actuator.DIRECT:
+        if driver == cable.PASSIVE or not actuator.has_drive(robot.actuator):
             tension_per_rate = law.damping
             tension = cable.cable_tension(length, rate, signal, law)
             if robot.slack:

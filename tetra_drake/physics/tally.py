@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tetra_drake.physics.actuator import DIRECT, DRIVE, LIMITED, WINCH
+from tetra_drake.physics.actuator import DRIVE, LIMITED, has_drive, wound
 from tetra_drake.physics.cable import LENGTH, PASSIVE, TENSION
 from tetra_drake.physics.clearance import least_strut_distance
 from tetra_drake.physics.contact import NORMAL
@@ -27,11 +27,11 @@ class Tally(NamedTuple):
     signals: Table
     """(signals,): signals at the latest observation, in N."""
     lengths: Table
-    """(cables,): what actuators have left to wind at the latest observation, in m: free lengths of
-    cables with winches, lengths of other driven cables."""
+    """(cables,): what actuators have left to wind at the latest observation, in m: free lengths if
+    they wind, or else lengths of the driven cables."""
     work: Table
-    """(1,): the integral of max(0, -S dl/dt) of the driven cables, in J. With winches and tension
-    motors, S is the tension."""
+    """(1,): the integral of max(0, -S dl/dt) of the driven cables, in J. S is the signal, or the
+    tension if actuators have drives."""
     peaks: Table
     """(3,): greatest tension (N), speed of either sign (m/s) and power (W) of an actuator."""
     sums: Table
@@ -51,8 +51,7 @@ class Tally(NamedTuple):
 def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forces) -> None:
     """Adds the step that ends at a time (s) with these signals and forces. A second observation of
     the same time adds nothing."""
-    cables, kind = robot.cables, robot.actuator.kind
-    drives, cable_forces = forces.drives, forces.cable_forces
+    cables, drives, cable_forces = robot.cables, forces.drives, forces.cable_forces
     passed = time - tally.time[0]
     moves = passed > 0.0
     counts, per_time = moves & (tally.time[0] >= tally.begins[0]), select(moves, 1.0 / passed, 0.0)
@@ -63,17 +62,17 @@ def observe(tally: Tally, robot: Model, time: Real, signals: Table, forces: Forc
         driver = cables.signal[i]
         if driver != PASSIVE:
             force, left = 0.5 * (tally.signals[driver] + signals[driver]), cable_forces[i, LENGTH]
-            if kind != DIRECT:
+            if has_drive(robot.actuator):
                 force = cable_forces[i, TENSION]
-                left = drives[drive, DRIVE] if kind == WINCH else left
+                left = wound(robot.actuator, drives[drive, DRIVE], left)
                 tally.sums[LIMITED_TIME] += counted * drives[drive, LIMITED]
                 drive += 1
-            wound = select(moves, tally.lengths[i] - left, 0.0)
+            way = select(moves, tally.lengths[i] - left, 0.0)
             tally.lengths[i] = left
-            note_peaks(tally.peaks, cable_forces[i, TENSION], wound * per_time)
-            wound = select(counts, wound, 0.0)
-            work += maximum(force * wound, 0.0)
-            add_actuator(tally.sums, cable_forces[i, TENSION], wound, counted)
+            note_peaks(tally.peaks, cable_forces[i, TENSION], way * per_time)
+            way = select(counts, way, 0.0)
+            work += maximum(force * way, 0.0)
+            add_actuator(tally.sums, cable_forces[i, TENSION], way, counted)
         tension = minimum(tension, cable_forces[i, TENSION])
     tally.tension[0] = tension
     for k in range(tally.signals.size):

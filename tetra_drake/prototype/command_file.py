@@ -12,7 +12,6 @@ import pandas
 
 from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
-from tetra_drake.physics.actuator import DIRECT, TENSION_MOTOR, WINCH
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.refusals import hint
@@ -23,28 +22,21 @@ TIME = "time_s"
 SCENARIO = "scenario.yaml"
 """File beside a command: the scenario whose actuators the command is for."""
 
-QUANTITIES = {
-    DIRECT: ("force_N", 1.0),
-    WINCH: ("free_length_mm", 1e-3),
-    TENSION_MOTOR: ("tension_N", 1.0),
-}
-"""Quantity that each kind of actuators is commanded, and its unit in SI."""
-
 _UNEVEN = 0.05
 """Largest error of the time between two samples, as a share of it: times may be rounded."""
 
 
 def command_columns(robot: Robot) -> list[str]:
     """The columns of a robot's commands but for the time, such as "T1-T2 outer top tension_N"."""
-    quantity, _ = QUANTITIES[robot.model.actuator.kind]
-    return [f"{robot.structure.cable_names[cable]} {quantity}" for cable in robot.driven]
+    quantity, names = robot.scenario.actuation.commanded, robot.structure.cable_names
+    return [f"{names[cable]} {quantity}" for cable in robot.driven]
 
 
 def command_text(robot: Robot, command: Command) -> str:
     """A command as the content of its file."""
-    _, unit = QUANTITIES[robot.model.actuator.kind]
     times = command.period * np.arange(len(command.samples))
-    return table_text(command_columns(robot), times, command.samples / unit)
+    values = command.samples / robot.scenario.actuation.command_unit
+    return table_text(command_columns(robot), times, values)
 
 
 def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) -> str:
@@ -88,10 +80,9 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
             problem = f"found '{cells[name][row]}', expected a number"
             raise InputError(path, f"line {row + 2}, {name}", problem)
         cells[name] = numbers
-    _, unit = QUANTITIES[robot.model.actuator.kind]
     table = cells[wanted].to_numpy(dtype=float)
     period = _period(table[:, 0], scenario.cpg.listing_step, path)
-    return Command(Path(path).name, period, unit * table[:, 1:])
+    return Command(Path(path).name, period, scenario.actuation.command_unit * table[:, 1:])
 
 
 def _period(times: np.ndarray, least: float, source: str | Path) -> float:

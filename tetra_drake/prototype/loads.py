@@ -9,16 +9,11 @@ import numpy as np
 import pandas
 import xarray
 
-from tetra_drake.physics.actuator import (
-    DIRECT,
-    WINCH,
-    ActuatorForce,
-    Limits,
-    actuator_force,
-)
-from tetra_drake.physics.cable import CableLaw, cable_tension
+from tetra_drake.physics import actuator
+from tetra_drake.physics.cable import CableLaw
 from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.actuator_kinds import DrivenCables
 
 _HAIR = 1e-9
 """m or N: a drive so near to a limit is at it, as the tension of a motor is never beyond."""
@@ -33,33 +28,34 @@ class Loads(NamedTuple):
     """(times, driven cables): 1 where a limit binds, or else 0; NaN for forces without limits."""
     table: pandas.DataFrame
     """Peaks at any time and means over the steady stretch, a row for each driven cable, with units
-    in the names; NaN where there is no limit. What is wound is the free length with winches, else
-    the cable."""
+    in the names; NaN where there is no limit. Lengths and speeds are those of physics.actuator's
+    wound()."""
 
 
 def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
     """The loads in a trajectory of a robot that walks by a gait."""
-    cables, actuator = robot.structure.cables[robot.driven], robot.model.actuator
-    law, limits = CableLaw(*(cables[name] for name in CableLaw._fields)), Limits(*actuator.limits)
+    kind, constants = robot.scenario.actuation, robot.model.actuator
+    cables, limits = robot.structure.cables[robot.driven], actuator.Limits(*constants.limits)
     walk = trajectory.isel(cable=robot.driven)
-    tension, length, free_length = walk.tension.values, walk.length.values, walk.free_length.values
+    law, length, tension = CableLaw.of(cables), walk.length.values, walk.tension.values
     signal = trajectory.signal.values[:, cables["signal"]]
     a, b = cables["node_a"], cables["node_b"]
     p_WN, v_WN = trajectory.p_WN.values, trajectory.v_WN.values
     rate = ((p_WN[:, b] - p_WN[:, a]) * (v_WN[:, b] - v_WN[:, a])).sum(axis=2) / length
 
-    @np.vectorize
-    def pull(drive: float, length: float, rate: float, signal: float, *law: float) -> ActuatorForce:
-        return actuator_force(actuator, drive, length, rate, signal, CableLaw(*law))
+    driven = DrivenCables(law, signal, length, rate, tension, walk.free_length.values)
+    left, limited, drives = length, np.full_like(length, math.nan), kind.drives(driven)
 
-    if actuator.kind == DIRECT:
-        commands, left, limited = signal, length, np.full_like(length, math.nan)
-    elif actuator.kind == WINCH:
-        commands, left = law.free_length - signal / law.stiffness, free_length
-        _, _, rate, limited = pull(left + _HAIR, length, rate, signal, *law)
-    else:
-        commands = np.clip(cable_tension(length, rate, signal, law), 0.0, limits.max_force)
-        left, limited = length, pull(tension + _HAIR, length, rate, signal, *law)[3]
+    @np.vectorize
+    def pull(
+        drive: float, length: float, rate: float, signal: float, *law: float
+    ) -> actuator.ActuatorForce:
+        return actuator.actuator_force(constants, drive, length, rate, signal, CableLaw(*law))
+
+    if actuator.has_drive(constants):
+        _, _, drive_rate, limited = pull(drives + _HAIR, length, rate, signal, *law)
+        left = actuator.wound(constants, drives, length)
+        rate = actuator.wound(constants, drive_rate, rate)
     power, steady = -tension * rate, trajectory.time.values >= steady_start(robot.scenario)
     columns = {
         "peak_force_N": tension.max(axis=0),
@@ -74,7 +70,8 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
         "mean_power_W": _mean(np.maximum(power, 0.0)[steady]),
         "time_at_a_limit_percent": 100.0 * _mean(limited[steady]),
     }
-    return Loads(commands, limited, pandas.DataFrame(columns, index=walk.cable.to_index()))
+    table = pandas.DataFrame(columns, index=walk.cable.to_index())
+    return Loads(kind.commands(driven), limited, table)
 
 
 def _mean(samples: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tetra_drake.formatting import fixed
-from tetra_drake.physics.actuator import DIRECT
+from tetra_drake.physics.actuator import has_drive
 from tetra_drake.physics.tally import Tally
 from tetra_drake.results.measures import travelling_index
 from tetra_drake.robot.path import CentrePath, curvature
@@ -98,7 +98,7 @@ def compute_metrics(
         mean_actuator_speed=speed,
         peak_actuator_power=peak_power,
         mean_actuator_power=power,
-        actuator_limited=math.nan if robot.model.actuator.kind == DIRECT else limited,
+        actuator_limited=limited if has_drive(robot.model.actuator) else math.nan,
         lifted_shares=tuple(lifted),
     )
 

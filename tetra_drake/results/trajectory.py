@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetra_drake.files import write_whole
-from tetra_drake.physics.actuator import WINCH
+from tetra_drake.physics.actuator import has_drive, wound
 from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS, LENGTH, PASSIVE, TENSION
 from tetra_drake.physics.contact import GROUND_FORCE_COLUMNS, STICK_POINT
 from tetra_drake.physics.forces import Forces, forces_along
@@ -58,7 +58,7 @@ class Motion:
     """(k, contacts, MODE_COLUMNS): `modes` of physics.contact, those of the step in which, or at
     whose end, the time lies."""
     drives: np.ndarray
-    """(k, drives): free lengths (m) of winches, or tensions (N) of tension motors."""
+    """(k, drives): states of the actuators; see physics.actuator."""
     ground_forces: np.ndarray | None = None
     """(k, contacts, 3): forces of the ground along t1, t2 and n, of an engine that has a law of its
     own; otherwise they follow from states and modes."""
@@ -126,10 +126,11 @@ def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
 
 
 def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:
-    """(k, cables): free lengths in m, those of winches as wound."""
+    """(k, cables): free lengths in m, as wound."""
     lengths = np.tile(robot.structure.cables["free_length"], (len(motion.times), 1))
-    if robot.model.actuator.kind == WINCH:
-        lengths[:, robot.driven] = motion.drives
+    actuator, driven = robot.model.actuator, robot.driven
+    if has_drive(actuator):
+        lengths[:, driven] = wound(actuator, motion.drives, lengths[:, driven])
     return lengths
 
 

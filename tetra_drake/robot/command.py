@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.actuator import TENSION_MOTOR, WINCH
+from tetra_drake.physics.cable import CableLaw
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
@@ -20,15 +20,14 @@ _NONE_COUPLED = -1
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What actuators shall do at evenly spaced times from 0 on; each sample is held until the next
-    one, the last one for ever."""
+    """What actuators are commanded at evenly spaced times from 0 on; each sample is held until the
+    next one, the last one for ever."""
 
     name: str
     period: float
     """Time (s) between samples."""
     samples: np.ndarray
-    """(samples, driven cables): free lengths (m) for winches, tensions (N) for tension motors,
-    superimposed forces (N) for forces."""
+    """(samples, driven cables): in SI units of the quantity that the kind of actuators says."""
 
     @property
     def gait(self) -> Gait:
@@ -39,30 +38,27 @@ class Command:
 def commanded_robot(scenario: Scenario, command: Command) -> Robot:
     """The robot of a scenario that follows a command.
 
-    A tension motor starts with its first tension. Raises InputError if the command is for another
-    number of cables.
+    Raises InputError if the command is for another number of cables.
     """
     robot = robot_without_network(scenario)
     driven = robot.driven
     if command.samples.shape[1:] != driven.shape:
         problem = f"is of shape {command.samples.shape}, expected {driven.size} driven cables"
         raise InputError(f"command {command.name}", "samples", problem)
-    signals = held_samples(command, scenario.cpg.listing_step, scenario.simulation.duration)
-    if robot.model.actuator.kind == WINCH:
-        law = robot.structure.cables[driven]
-        signals = law["stiffness"] * (law["free_length"] - signals)
+    held = held_samples(command, scenario.cpg.listing_step, scenario.simulation.duration)
+    signals = scenario.actuation.signals(held, CableLaw.of(robot.structure.cables[driven]))
     return dataclasses.replace(robot, commanded=signals)
 
 
 def robot_without_network(scenario: Scenario) -> Robot:
     """The robot of a scenario in which each driven cable has a signal of its own.
 
-    There is no network, so no start-up and no feedback. A tension motor plays no spring and damper,
-    which are in its command.
+    There is no network, so no start-up and no feedback. Springs and dampers that actuators play are
+    in their commands, and missing here.
     """
-    plain = Robot.of(scenario)
-    is_motor = plain.model.actuator.kind == TENSION_MOTOR
-    structure = plain.structure.with_oscillator_per_cable(without_law=is_motor)
+    structure = Robot.of(scenario).structure.with_oscillator_per_cable(
+        without_law=scenario.actuation.plays_cable
+    )
     without_network = {"signals": "listing", "feedback": [], "start_up": 0.0}
     cpg = scenario.cpg.model_copy(update=without_network | {"reach": _NONE_COUPLED})
     return Robot.of(scenario.with_sections(cpg=cpg), structure)

@@ -12,7 +12,6 @@ from typing import Any, Self
 import numpy as np
 
 from tetra_drake.errors import InputError
-from tetra_drake.physics.actuator import DIRECT, WINCH
 from tetra_drake.physics.cable import PASSIVE, CableLaw, Cables, cable_tension
 from tetra_drake.physics.contact import MODE_COLUMNS, Ground
 from tetra_drake.physics.feedback import Senses
@@ -25,6 +24,7 @@ from tetra_drake.robot.gait import Gait, check_gait
 from tetra_drake.robot.ground import make_ground
 from tetra_drake.robot.structure import Structure, node_positions, turn_with_slope
 from tetra_drake.robot.weights import Weights
+from tetra_drake.scenario.actuator_kinds import DrivenCables
 from tetra_drake.scenario.common_sections import CpgSection
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat
@@ -159,24 +159,22 @@ class Robot:
         return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
 
     def starting_drives(self) -> np.ndarray:
-        """(drives,): free lengths (m) of winches, or tensions (N) of tension motors, at t = 0."""
-        driven, kind = self.structure.cables[self.driven], self.model.actuator.kind
-        if kind == DIRECT:
-            return np.zeros(0)
-        if kind == WINCH:
-            return driven["free_length"].copy()
+        """(drives,): states of the actuators at t = 0; see physics.actuator."""
+        driven, length = self.structure.cables[self.driven], self._starting_lengths()
+        rate: Any = np.zeros(len(driven))
+        law, signal = CableLaw.of(driven), rate
         if len(self.commanded):
-            return np.maximum(self.commanded[0], 0.0)
-        law = CableLaw(*(driven[name] for name in CableLaw._fields))
-        lengths: Any = self._starting_lengths()
-        return np.maximum(np.asarray(cable_tension(lengths, 0.0, 0.0, law)), 0.0)
+            signal = self.commanded[0, driven["signal"]]
+        tension = np.maximum(cable_tension(length, rate, signal, law), 0.0)
+        cables = DrivenCables(law, signal, length, rate, tension, law.free_length)
+        drives: np.ndarray = self.scenario.actuation.drives(cables)
+        return drives
 
-    def _starting_lengths(self) -> np.ndarray:
+    def _starting_lengths(self) -> Any:
         """(driven cables,): lengths in m at t = 0."""
         driven = self.structure.cables[self.driven]
         p_WN = node_positions(self.structure, self.structure.initial_state)
-        lengths = np.linalg.norm(p_WN[driven["node_b"]] - p_WN[driven["node_a"]], axis=1)
-        return np.asarray(lengths)
+        return np.linalg.norm(p_WN[driven["node_b"]] - p_WN[driven["node_a"]], axis=1)
 
     def starting_modes(self) -> np.ndarray:
         """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""

@@ -5,40 +5,96 @@ Their kernels, which need numba, are imported only where a law is asked for.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
+import numpy as np
 from pydantic import Field
 
+from tetra_drake.errors import InputError
 from tetra_drake.scenario import quantities
 from tetra_drake.scenario.quantities import Length, Speed, Time
 from tetra_drake.scenario.section import Kinds, Section
 
 if TYPE_CHECKING:
     from tetra_drake.physics.actuator import Actuator
+    from tetra_drake.physics.cable import CableLaw
 
 
-class Force(Section):
-    """Signals are forces, superimposed on cables without limits (thesis section 2.1.3)."""
+class DrivenCables(NamedTuple):
+    """The driven cables of a robot: arrays (..., driven cables), in SI units."""
 
-    lacking: ClassVar[tuple[str, ...]] = ("actuator_limited",)
+    law: CableLaw
+    signal: Any
+    length: Any
+    rate: Any
+    """Rate of the length."""
+    tension: Any
+    free_length: Any
+    """As wound."""
+
+
+class ActuatorKind(Section):
+    """A kind of actuators: one on each driven cable."""
+
+    lacking: ClassVar[tuple[str, ...]] = ()
     """Metrics that walks with such actuators do not have."""
+    commanded: ClassVar[str]
+    """Quantity that an actuator is commanded, with its unit: the end of a column's name."""
+    command_unit: ClassVar[float] = 1.0
+    """The unit of that in SI."""
+    plays_cable: ClassVar[bool] = False
+    """True if spring and damper of the cable are software: a command has them in it."""
 
     def law(self) -> Actuator:
         """Law as the kernels take it."""
-        from tetra_drake.physics.actuator import DIRECT, Actuator
-
-        return Actuator.of(DIRECT)
+        raise NotImplementedError
 
     def excess(self, signal: float, *, free_length: float) -> str:
         """What signals up to `signal` (N) ask beyond the actuator's limits, of a cable whose
         commanded free length (m) then is least; empty if nothing."""
         return ""
 
+    def check_mujoco(self, source: object) -> None:
+        """Raises InputError, naming `source` and key, where MuJoCo cannot simulate it."""
+        problem = f"found !{self.tag}, but mujoco knows forces on cables only: !Force"
+        raise InputError(source, "actuation", problem)
 
-class LimitedActuator(Section):
+    def drives(self, cables: DrivenCables) -> Any:
+        """(..., drives): states of the actuators; see physics.actuator."""
+        raise NotImplementedError
+
+    def commands(self, cables: DrivenCables) -> Any:
+        """What the actuators are commanded, in SI units."""
+        raise NotImplementedError
+
+    def signals(self, commands: Any, law: CableLaw) -> Any:
+        """The signals (N) that have the effect of commands (..., driven cables)."""
+        return commands
+
+
+class Force(ActuatorKind):
+    """Signals are forces, superimposed on cables without limits (thesis section 2.1.3)."""
+
+    lacking = ("actuator_limited",)
+    commanded = "force_N"
+
+    def law(self) -> Actuator:
+        from tetra_drake.physics import actuator
+
+        return actuator.Actuator.of(actuator.DIRECT)
+
+    def check_mujoco(self, source: object) -> None:
+        pass
+
+    def drives(self, cables: DrivenCables) -> Any:
+        return cables.signal[..., :0]
+
+    def commands(self, cables: DrivenCables) -> Any:
+        return cables.signal
+
+
+class LimitedActuator(ActuatorKind):
     """An actuator of limited force and speed on each driven cable, which then never pushes."""
-
-    lacking: ClassVar[tuple[str, ...]] = ()
 
     max_force: quantities.Force = Field(gt=0)
     max_speed: Speed = Field(gt=0)
@@ -52,6 +108,9 @@ class Winch(LimitedActuator):
     It winds at most at max_speed (1 - tension / max_force); above max_force it is driven backward.
     """
 
+    commanded = "free_length_mm"
+    command_unit = 1e-3
+
     time_constant: Time = Field(default=0.02, gt=0)
     """Time constant of the lag with which the free length follows its command. The default is the
     1 / (2 pi f) of a position loop with a bandwidth f of 8 Hz, as small geared motors have."""
@@ -59,16 +118,24 @@ class Winch(LimitedActuator):
     """Least free length of a cable."""
 
     def law(self) -> Actuator:
-        from tetra_drake.physics.actuator import WINCH, Actuator
+        from tetra_drake.physics import actuator
 
-        return Actuator.of(WINCH, **dict(self))
+        return actuator.Actuator.of(actuator.WINCH, **dict(self))
 
     def excess(self, signal: float, *, free_length: float) -> str:
-        """See Force.excess()."""
         if free_length >= self.least_length:
             return ""
         asked, least = 1e3 * free_length, 1e3 * self.least_length
         return f"ask for a free length of {asked:.3g} mm, a winch winds to {least:.3g} mm at least"
+
+    def drives(self, cables: DrivenCables) -> Any:
+        return cables.free_length
+
+    def commands(self, cables: DrivenCables) -> Any:
+        return cables.law.free_length - cables.signal / cables.law.stiffness
+
+    def signals(self, commands: Any, law: CableLaw) -> Any:
+        return law.stiffness * (law.free_length - commands)
 
 
 class TensionMotor(LimitedActuator):
@@ -79,16 +146,27 @@ class TensionMotor(LimitedActuator):
     max_force.
     """
 
-    def law(self) -> Actuator:
-        from tetra_drake.physics.actuator import TENSION_MOTOR, Actuator
+    commanded = "tension_N"
+    plays_cable = True
 
-        return Actuator.of(TENSION_MOTOR, **dict(self))
+    def law(self) -> Actuator:
+        from tetra_drake.physics import actuator
+
+        return actuator.Actuator.of(actuator.TENSION_MOTOR, **dict(self))
 
     def excess(self, signal: float, *, free_length: float) -> str:
-        """See Force.excess()."""
         if signal <= self.max_force:
             return ""
         return f"ask for {signal:.3g} N, a motor pulls with {self.max_force:.3g} N at most"
+
+    def drives(self, cables: DrivenCables) -> Any:
+        return cables.tension
+
+    def commands(self, cables: DrivenCables) -> Any:
+        from tetra_drake.physics.cable import cable_tension
+
+        law, signal, length, rate, _, _ = cables
+        return np.clip(cable_tension(length, rate, signal, law), 0.0, self.max_force)
 
 
 Actuation = Annotated[Force | Winch | TensionMotor, Kinds()]

@@ -8,12 +8,12 @@ from tetra_drake.robot.robot import Robot
 
 
 class Actuators(LeafSystem):
-    """The drives of winches or tension motors (see physics.actuator).
+    """The states of actuators, their drives (see physics.actuator).
 
     | port   | shape     | unit       | meaning                                                   |
     |--------|-----------|------------|-----------------------------------------------------------|
     | rates  | (drives,) | m/s or N/s | rate of each drive, from the cables                       |
-    | drives | (drives,) | m or N     | free length of each winch, or tension of each motor       |
+    | drives | (drives,) | m or N     | state of each actuator                                    |
 
     Continuous state: the drives. The output depends on it alone, so the cables, which know lengths
     and tensions, compute the rates without an algebraic loop.

@@ -19,14 +19,14 @@ class CableNetwork(LeafSystem):
     |-------------------|----------------|--------|------------------------------------------|
     | state             | (13 n,)        | SI     | [q; v] of n free bodies, from the plant  |
     | signals           | (m,)           | N      | actuation, one per oscillator            |
-    | drives            | (drives,)      | m or N | of winches or motors, from `actuators`   |
+    | drives            | (drives,)      | m or N | states of the actuators                  |
     | generalized_force | (6 n,)         | N m, N | [t_W; f_W] at each body's origin         |
     | tensions          | (cables,)      | N      | tension of each cable                    |
     | lengths           | (cables,)      | m      | length of each cable                     |
     | rates             | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 
     With `robot.cables.slack`, a cable that would have to push goes slack. Ports of drives are there
-    with `actuation` of winches or tension motors only.
+    if actuators have states, as `!Force` has not.
     """
 
     def __init__(self, robot: Robot) -> None:

@@ -40,7 +40,7 @@ def MakeTensegrityDiagram(
         actuators ←──→ cables
 
     With `cpg.signals: live`, cpg is the network, else its signals, computed beforehand; feedback is
-    there if `cpg.feedback` is not empty, actuators with winches or tension motors. `steering` acts
+    there if `cpg.feedback` is not empty, actuators if they have states. `steering` acts
     in place of the gait's turn. Without oscillators, start_up is a source of no signals, and there
     is no cpg.
 
