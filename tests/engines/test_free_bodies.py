@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from helpers.states import mass_matrix
-from helpers.structures import course_of, poses_of, thrown, unit_inertias
+from helpers.structures import poses_of, simulated, thrown, unit_inertias
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 from tetra_drake.robot.gait import seeded_gait
@@ -98,8 +98,8 @@ def expected(flying) -> np.ndarray:
 
 def test_thrown_bodies_turn_by_eulers_equations_on_the_compiled_engine(flying, expected):
     fine = {"engine.tolerance": "1e-7 m/s", "engine.max_step": "1e-3 s"}
-    course = course_of(dataclasses.replace(flying, scenario=flying.scenario.with_changes(fine)))
-    np.testing.assert_allclose(poses_of(course.motion.states)[-1], expected, atol=1e-6)
+    _, motion = simulated(dataclasses.replace(flying, scenario=flying.scenario.with_changes(fine)))
+    np.testing.assert_allclose(poses_of(motion.states)[-1], expected, atol=1e-6)
 
 
 def test_thrown_bodies_turn_by_eulers_equations_on_the_diagram(flying, expected):
@@ -120,12 +120,12 @@ def test_the_spin_of_a_bar_about_its_axis_hardly_shortens_steps():
     a, b = structure.struts.T
     axes = structure.p_BN[b] - structure.p_BN[a]
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    still, spinning = (
-        course_of(thrown(robot, np.hstack([spin * axes, np.zeros((3, 3))])))
+    (still, motion), (spinning, spun) = (
+        simulated(thrown(robot, np.hstack([spin * axes, np.zeros((3, 3))])))
         for spin in (0.0, 10.0)  # rad/s
     )
-    assert spinning.steps < 1.25 * still.steps
-    poses, others = poses_of(still.motion.states), poses_of(spinning.motion.states)
+    assert spinning.integrator.steps < 1.25 * still.integrator.steps
+    poses, others = poses_of(motion.states), poses_of(spun.states)
     np.testing.assert_allclose(others[..., 4:], poses[..., 4:], atol=5e-4)
     assert np.ptp(poses[..., 4:], axis=0).max() > 5e-3, "it walks"
 
@@ -141,7 +141,7 @@ def test_a_structure_in_the_air_keeps_its_energy_and_momentum(name):
     robot = Robot.of(scenario)
     moving = np.random.default_rng(0).normal(size=(len(robot.structure.bodies), 6))
     moving *= [2.0, 2.0, 2.0, 0.2, 0.2, 0.2]  # rad/s, m/s
-    states = course_of(thrown(robot, moving)).motion.states
+    states = simulated(thrown(robot, moving))[1].states
     energy, momenta = zip(*(energy_and_momenta(robot, state) for state in states), strict=True)
     assert np.abs(poses_of(states)[-1] - poses_of(states)[0]).max() > 0.05, "it moves"
     np.testing.assert_allclose(energy, energy[0], rtol=1e-8)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers.forces import forces_at
 from helpers.steps import make_step
-from helpers.structures import course_of, onto_recorded, poses_of, recorded_structure
+from helpers.structures import onto_recorded, poses_of, recorded_structure, simulated
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Adder, Sine
@@ -128,10 +128,10 @@ def test_a_row_of_tetrahedra_written_as_a_structure_walks_as_the_row(scenario_na
     alike = Robot.of(written, dataclasses.replace(structure, **start))
     assert alike.model.isotropic
     general = dataclasses.replace(alike, model=alike.model._replace(isotropic=False))
-    expected = poses_of(course_of(row).motion.states)
+    expected = poses_of(simulated(row)[1].states)
     assert np.ptp(expected[..., 4:], axis=0).max() > 0.01, "it walks"
     for robot in (alike, general):
-        poses = poses_of(course_of(robot).motion.states)
+        poses = poses_of(simulated(robot)[1].states)
         np.testing.assert_allclose(poses[..., 4:], expected[..., 4:], rtol=0, atol=allowed)
 
 

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
-from tetra_drake.engines.compiled.lane_io import Finished, Prepared
-from tetra_drake.engines.compiled.loop import DONE
+from tetra_drake.engines.compiled.prepared import Prepared
+from tetra_drake.results.result import SimulationResult
+from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.statics import Statics, find_statics
@@ -39,16 +40,14 @@ def thrown(robot: Robot, v_WB: np.ndarray) -> Robot:
     return dataclasses.replace(robot, structure=Thrown(**fields, v_WB=v_WB))
 
 
-def course_of(robot: Robot, *, seed: int = 1) -> Finished:
-    """How a seeded gait goes on the compiled engine, without what results make of it."""
+def simulated(robot: Robot, *, seed: int = 1) -> tuple[SimulationResult, Motion]:
+    """Result and motion of a robot that walks by a seeded gait on the compiled engine."""
     prepared = Prepared.of(robot, seeded_gait(robot.scenario, seed), record=True)
     engine = LaneEngine(prepared, width=1)
     engine.load(0, prepared)
-    while not (ended := engine.advance(100_000)):
+    while not engine.advance(100_000):
         pass
-    course = ended[0][2]
-    assert course.status == DONE
-    return course
+    return engine.result(0), engine.motion(0)
 
 
 def poses_of(states: np.ndarray) -> np.ndarray:

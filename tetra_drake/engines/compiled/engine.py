@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine
-from tetra_drake.engines.compiled.lane_io import Prepared, make_outcome
 from tetra_drake.engines.compiled.lane_pool import LanePool
+from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.engines.interface import Engine, Outcome, Viewer
 from tetra_drake.engines.time_limit import check_time
 from tetra_drake.errors import SimulationFailure
@@ -40,10 +40,9 @@ class CompiledEngine(Engine):
         prepared = Prepared.of(robot, gait, record=record, steering=steering)
         engine = LaneEngine(prepared, width=1)
         engine.load(0, prepared)
-        while not (ended := engine.advance(_BODY_STEPS)):
+        while not engine.advance(_BODY_STEPS):
             check_time()
-        _, prepared, course = ended[0]
-        return make_outcome(prepared, course)
+        return engine.result(0)
 
     def simulate_many(
         self, walks: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numba.core import registry
 
-from tetra_drake.engines.compiled.lane_io import Finished, Prepared
 from tetra_drake.engines.compiled.loop import (
+    DONE,
     DUE,
     EVALUATIONS,
     IDLE,
@@ -19,19 +19,26 @@ from tetra_drake.engines.compiled.loop import (
     ROUND,
     SAMPLES,
     STATUS,
+    STEP_TOO_SMALL,
     TAKEN,
     TIME,
+    TOO_FAST,
+    TOO_MANY_EVALUATIONS,
     TRIED,
     WALKING,
     Constants,
     Log,
     advance,
 )
+from tetra_drake.engines.compiled.prepared import Prepared
+from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE
 from tetra_drake.physics.tally import Tally
 from tetra_drake.physics.terrain import SurfaceGrid
+from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.scenario.engine_kinds import Compiled
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.allocation import allocate
 from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.lanes import FieldArray, lane_table
@@ -114,40 +121,68 @@ class LaneEngine:
         self._lanes.clock.array[STATUS, lane] = IDLE
         return self._wall_times[lane]
 
-    def advance(self, body_steps: int) -> list[tuple[int, Prepared, Finished]]:
-        """Simulates until one of the lanes ends, or for about so many iterations times bodies;
-        returns lanes and gaits that have ended, which are idle then. Other threads run meanwhile.
-        """
+    def advance(self, body_steps: int) -> list[int]:
+        """Simulates until a lane ends, or for about so many iterations times bodies. Returns the
+        lanes that have ended, each to be emptied by result(). Other threads run meanwhile."""
         started = time.perf_counter()
         self._advance(*self._arguments, max(1, body_steps // (ROUND * self._bodies)))
-        busy = [(lane, gait) for lane, gait in enumerate(self._in_lane) if gait is not None]
+        busy = [lane for lane, prepared in enumerate(self._in_lane) if prepared is not None]
         share = (time.perf_counter() - started) / max(len(busy), 1)
-        ended = []
-        for lane, prepared in busy:
+        for lane in busy:
             self._wall_times[lane] += share
-            if self._lanes.clock.array[STATUS, lane] != WALKING:
-                ended.append((lane, prepared, self._finished(lane)))
-                self.stop(lane)
-        return ended
+        return [lane for lane in busy if self._lanes.clock.array[STATUS, lane] != WALKING]
 
-    def _finished(self, lane: int) -> Finished:
-        clock, log = self._lanes.clock.array[:, lane], self._log
-        kept = slice(log.kept[lane])
-        return Finished(
-            status=int(clock[STATUS]),
-            time=float(clock[TIME]),
-            steps=int(clock[TAKEN]),
-            evaluations=EVALUATIONS * int(clock[TRIED]),
-            motion=Motion(
-                times=log.times[lane, kept].copy(),
-                states=log.states[lane, kept].copy(),
-                signals=log.signals[lane, kept].copy(),
-                modes=log.modes[lane, kept].copy(),
-                drives=log.drives[lane, kept].copy(),
-            ),
+    def result(self, lane: int) -> SimulationResult:
+        """The result of a simulation that has ended, whose lane becomes idle. Raises Diverged or
+        StepBudgetExceeded if the simulation failed."""
+        prepared, status = self._in_lane[lane], int(self._lanes.clock.array[STATUS, lane])
+        if prepared is None:
+            raise ValueError(f"lane {lane} is idle")
+        wall_time = self.stop(lane)
+        clock = self._lanes.clock.array[:, lane]
+        if status != DONE:
+            failure = _failure(status, time=float(clock[TIME]), scenario=prepared.robot.scenario)
+            failure.wall_time = wall_time
+            raise failure
+        return make_result(
+            prepared.robot,
+            prepared.gait,
+            self.motion(lane),
             totals=Tally(*(table.array[..., lane].copy() for table in self._lanes.tally)),
-            wall_time=self._wall_times[lane],
+            work=IntegratorWork(
+                scheme="ros2",
+                accuracy=prepared.robot.scenario.settings_of(Compiled).tolerance,
+                steps=int(clock[TAKEN]),
+                derivative_evaluations=EVALUATIONS * int(clock[TRIED]),
+            ),
+            wall_time=wall_time,
+            record=prepared.record,
         )
+
+    def motion(self, lane: int) -> Motion:
+        """The samples that the latest simulation in a lane has recorded so far."""
+        log = self._log
+        kept = slice(log.kept[lane])
+        return Motion(
+            times=log.times[lane, kept].copy(),
+            states=log.states[lane, kept].copy(),
+            signals=log.signals[lane, kept].copy(),
+            modes=log.modes[lane, kept].copy(),
+            drives=log.drives[lane, kept].copy(),
+        )
+
+
+def _failure(status: int, *, time: float, scenario: Scenario) -> SimulationFailure:
+    """The failure of a simulation that ended at a time (s) with this status."""
+    budget = scenario.simulation.max_evaluations
+    if status == TOO_MANY_EVALUATIONS:
+        reason = f"force evaluations exceed the budget of {budget}"
+        return StepBudgetExceeded(time=time, reason=reason)
+    reasons = {
+        TOO_FAST: f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s",
+        STEP_TOO_SMALL: "no step is small enough for the tolerance",
+    }
+    return Diverged(time=time, reason=reasons[status])
 
 
 def lanes_for(gaits: float) -> int:

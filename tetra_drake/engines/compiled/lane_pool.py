@@ -11,7 +11,7 @@ from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, field
 
 from tetra_drake.engines.compiled.lane_engine import LaneEngine, lanes_for
-from tetra_drake.engines.compiled.lane_io import Prepared, make_outcome
+from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.errors import InputError, TimeBudgetExceeded
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.gait import Gait
@@ -173,10 +173,10 @@ class _Crew:
         engine = self._engine
         if engine is None or not self.jobs:
             return
-        for lane, prepared, course in engine.advance(_BODY_STEPS):
+        for lane in engine.advance(_BODY_STEPS):
             future = self.jobs.pop(lane).future
             try:
-                result = make_outcome(prepared, course)
+                result = engine.result(lane)
             except Exception as failure:  # such as one that has diverged
                 future.set_exception(failure)
             else:

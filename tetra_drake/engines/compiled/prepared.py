@@ -1,35 +1,23 @@
-"""Input and output of a lane of the compiled engine: a prepared gait, a finished simulation."""
+"""A gait prepared for a lane of the compiled engine: constants, state at t = 0, sample times."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from tetra_drake.engines.compiled.dynamics import Solver
-from tetra_drake.engines.compiled.loop import (
-    DONE,
-    STEP_TOO_SMALL,
-    TOO_FAST,
-    TOO_MANY_EVALUATIONS,
-    Constants,
-    LaneState,
-)
-from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
+from tetra_drake.engines.compiled.loop import Constants, LaneState
 from tetra_drake.physics.actuator import DRIVE, Limits
 from tetra_drake.physics.forces import sizes_of
 from tetra_drake.physics.oscillator import make_neurons
-from tetra_drake.physics.tally import Tally
 from tetra_drake.results.metrics import empty_tally
-from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result, motion_times
-from tetra_drake.results.trajectory import Motion
+from tetra_drake.results.result import motion_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
 from tetra_drake.robot.signals import sample_count
 from tetra_drake.scenario.engine_kinds import Compiled
-from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.simd.allocation import allocate
 
 _SPARE_MARKS = 4
@@ -173,52 +161,3 @@ def sizes_in_lanes(robot: Robot, solver: Solver) -> dict[str, int]:
     """Sizes of the tables of a robot in lanes, for allocate()."""
     signals, width = robot.structure.signals, solver.schedule.width
     return sizes_of(robot.model) | {"signals": signals, "width": width}
-
-
-class Finished(NamedTuple):
-    """A finished simulation."""
-
-    status: int
-    time: float
-    """When it ended, in s."""
-    steps: int
-    evaluations: int
-    motion: Motion
-    totals: Tally
-    wall_time: float
-    """Wall time in s, shared with the other lanes of the same core."""
-
-
-def make_outcome(prepared: Prepared, finished: Finished) -> SimulationResult:
-    """The result of a simulation; raises Diverged or StepBudgetExceeded if it failed."""
-    scenario = prepared.robot.scenario
-    if finished.status != DONE:
-        raise _failure(finished, scenario)
-    tolerance = scenario.settings_of(Compiled).tolerance
-    return make_result(
-        prepared.robot,
-        prepared.gait,
-        finished.motion,
-        totals=finished.totals,
-        work=IntegratorWork(
-            scheme="ros2",
-            accuracy=tolerance,
-            steps=finished.steps,
-            derivative_evaluations=finished.evaluations,
-        ),
-        wall_time=finished.wall_time,
-        record=prepared.record,
-    )
-
-
-def _failure(finished: Finished, scenario: Scenario) -> SimulationFailure:
-    settings = scenario.simulation
-    reasons = {
-        TOO_FAST: f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s",
-        STEP_TOO_SMALL: "no step is small enough for the tolerance",
-        TOO_MANY_EVALUATIONS: f"force evaluations exceed the budget of {settings.max_evaluations}",
-    }
-    kind = StepBudgetExceeded if finished.status == TOO_MANY_EVALUATIONS else Diverged
-    failure = kind(time=finished.time, reason=reasons[finished.status])
-    failure.wall_time = finished.wall_time
-    return failure
