@@ -31,10 +31,11 @@ from tetra_drake.evolution.entries import (
     trial_folder,
 )
 from tetra_drake.evolution.json_lines import compressed
-from tetra_drake.evolution.manifest import MANIFEST, SCENARIO
+from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.reevaluation import BEST_GAITS
 from tetra_drake.evolution.run import Run, load_run
 from tetra_drake.files import write_whole
+from tetra_drake.scenario.load import SCENARIO
 from tetra_drake.scenario.scenario import Scenario
 
 _DIGITS, _WALL_TIME_DIGITS = 3, 2
@@ -67,6 +68,7 @@ def thin(source: Path, out: Path) -> None:
             text = best_gait.read_text(encoding="utf-8")
             write_whole(trial_folder(out, trial) / BEST_GAIT, text)
     _write(run, out, ELITES, run.file(ELITES).read())
+    run.scenario.terrain.save(out)
     write_whole(out / SCENARIO, (source / SCENARIO).read_text(encoding="utf-8"))
     write_whole(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
 

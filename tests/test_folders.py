@@ -3,13 +3,17 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from helpers import quick_figures
 from helpers.actuations import MOTOR, WINCH
 
 from tetra_drake.cli import main
+from tetra_drake.engines.simulate import simulate
+from tetra_drake.evolution.run import load_run
 from tetra_drake.files import write_whole
-from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.report.result_folder import load_result
+from tetra_drake.scenario.load import load_scenario
 
 BRIEF = {
     "engine": "!Compiled",
@@ -19,9 +23,10 @@ BRIEF = {
     "evolution.evaluations": 6,
     "optimizer": {"population": 4, "tournament": 2},
 }
+FIELD = {"robot.contacts": "all", "terrain": "!HeightField {file: heights.txt, cell: 0.5 m}"}
 MAP = {"optimizer": {"_tag": "QualityDiversity", "cells": [2, 2]}}
 SCENARIOS = {
-    "force": ("thesis", BRIEF),
+    "force": ("coulomb", BRIEF | FIELD),
     "map": ("thesis", BRIEF | MAP),
     "winch": ("coulomb", BRIEF | WINCH),
     "motor": ("coulomb", BRIEF | MOTOR),
@@ -69,14 +74,16 @@ def quick_drawing():
 def written(tmp_path_factory) -> Path:
     """A folder with what each writer writes."""
     folder = tmp_path_factory.mktemp("written")
-    for name, (base, changes) in SCENARIOS.items():
-        scenario = load_scenario(base).with_changes(changes)
-        write_whole(folder / f"{name}.yaml", dump_scenario(scenario))
+    np.savetxt(folder / "heights.txt", -0.002 * np.random.default_rng(0).random((11, 11)))
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
+        for name, (base, changes) in SCENARIOS.items():
+            scenario = load_scenario(base).with_changes(changes)
+            write_whole(folder / f"{name}.yaml", scenario.to_yaml())
         for name, command in WRITERS.items():
             assert main([*command.split(), "--out", name]) == 0, command
-    return folder
+    (folder / "heights.txt").unlink()  # what is written needs no other file
+    return folder.rename(folder.with_name("moved"))
 
 
 @pytest.mark.parametrize("writer", WRITERS)
@@ -95,3 +102,12 @@ def test_a_folder_is_read_or_refused_in_one_line(
     assert status == 2 and not out.exists()
     (line,) = captured.err.splitlines()
     assert re.match(rf"tetra-drake: {writer}\b", line), line
+
+
+def test_what_is_written_simulates_to_the_same_digits(written):
+    result, run = load_result(written / "simulate"), load_run(written / "evolve")
+    walked = simulate(result.scenario, result.gait).metrics.distance
+    assert walked == result.metrics.distance
+    assert simulate(run, run).metrics.distance == run.fittest()["distance"]
+    flat = simulate(result.scenario.with_changes({"terrain": "!Flat"}), result.gait)
+    assert flat.metrics.distance != walked

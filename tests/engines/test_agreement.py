@@ -26,7 +26,15 @@ from tetra_drake.scenario.engine_kinds import Compiled, Drake, Mujoco
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat, HeightField, Incline, Obstacles, Rough, Steps
+from tetra_drake.scenario.terrain_kinds import (
+    Flat,
+    HeightField,
+    Incline,
+    Obstacles,
+    Relief,
+    Rough,
+    Steps,
+)
 
 Changes = Mapping[str, Any]
 Engine = Compiled | Drake | Mujoco
@@ -53,7 +61,7 @@ NO_BRISTLES = {"friction.stiffness": "0 N/m"}
 """Coulomb friction as in MuJoCo."""
 
 COULOMB, FIRM = Coulomb(), Coulomb(static=0.6, kinetic=0.5, stiffness=1000.0, backward=2.0)
-FIELD = HeightField(file="waves.npy", cell=0.02)
+FIELD = Relief()
 """Stands for waves of 8 in, 0.1 in high, that lie across the way at an angle."""
 TERRAINS = {
     "incline": Incline(slope=np.radians(5.0)),
@@ -189,7 +197,7 @@ def changed(tmp_path) -> Callable[[Changes], Changes]:
     """Changes with the file of the height field in the place of FIELD."""
     x, y = np.meshgrid(0.02 * np.arange(100), 0.02 * np.arange(50), indexing="ij")
     np.save(tmp_path / "waves.npy", 0.0012 * (np.sin(30.0 * x + 10.0 * y) - 1.0))
-    field = HeightField(file=str(tmp_path / "waves.npy"), cell=FIELD.cell)
+    field = HeightField(file=str(tmp_path / "waves.npy"), cell=0.02)
     return lambda changes: {k: field if v is FIELD else v for k, v in changes.items()}
 
 

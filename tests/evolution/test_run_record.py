@@ -118,11 +118,12 @@ def test_no_run_is_resumed_where_there_is_none_and_none_begun_in_a_used_director
 
 def test_what_a_kill_in_the_first_moment_leaves_is_an_empty_directory(tmp_path):
     leftover = tmp_path / f".manifest.{2**22 + 1}.abcd_123.json"  # of no process
-    (tmp_path / ".lock").touch()
-    leftover.touch()
+    heights = tmp_path / "heights-0123456789abcdef.npy"
+    for file in (tmp_path / ".lock", leftover, heights):
+        file.touch()
     with create(tmp_path):
         pass
-    assert not leftover.exists()
+    assert not leftover.exists() and not heights.exists()
 
 
 def test_a_second_process_is_refused_until_the_first_ends(run_small):

@@ -10,11 +10,11 @@ from helpers.actuations import FORCE, MOTOR, WINCH
 from tetra_drake.cli import main
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError
-from tetra_drake.prototype.command_file import SCENARIO, load_command
+from tetra_drake.prototype.command_file import load_command
 from tetra_drake.prototype.export import COMMAND, EXPECTED, LIMITS, README, export
 from tetra_drake.robot.gait import load_gait, seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.load import SCENARIO, load_scenario
 
 RECORDED = Path(__file__).parents[2] / "runs/coulomb/trial_08/best_gait.json"
 

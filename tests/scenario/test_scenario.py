@@ -228,8 +228,13 @@ CHANGES: list[dict[str, object]] = [
 
 
 @pytest.fixture(scope="module")
-def scenarios():
+def scenarios(tmp_path_factory):
     """Scenarios that are shipped, and some that differ from one of them in one way."""
+    file, fields = tmp_path_factory.mktemp("field") / "heights.npy", []
+    for height in (0.0, 0.5):
+        np.save(file, np.full((3, 4), height))
+        field = f"!HeightField {{file: {file}, cell: 1 m}}"
+        fields.append(load_scenario("thesis").with_changes({"terrain": field}))
     names = "thesis", "thesis-listing", "quick", "coulomb", "winch", "pair", "robust"
     shipped = [load_scenario(name) for name in names]
     changed = [load_scenario("thesis").with_changes(changes) for changes in CHANGES]
@@ -237,7 +242,7 @@ def scenarios():
     *others, last = prism.robot.actuated.items()
     first, second, *rest = prism.robot.nodes.items()
     return [
-        *(*shipped, *changed),
+        *(*shipped, *changed, *fields),
         prism.with_changes({"robot.actuated": dict([last, *others])}),
         prism.with_changes({"robot.contacts": [*prism.robot.nodes]}),
         prism.with_sections(

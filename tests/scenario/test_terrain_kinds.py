@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
+from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import (
     Grid,
     HeightField,
@@ -148,15 +149,22 @@ def write_heights(file: Path, heights: np.ndarray) -> None:
         np.savetxt(file, heights, delimiter=", " if file.suffix == ".csv" else " ", header="x, y")
 
 
-def field(file: Path) -> HeightField:
-    return HeightField(file=str(file), cell=0.5)
+def scenario_file(folder: Path, terrain: str, base: str = "thesis") -> Path:
+    file = folder / "scenario.yaml"
+    folder.mkdir(exist_ok=True)
+    file.write_text(f"base: {base}\n{terrain}\n")
+    return file
+
+
+def on_field(file: Path) -> Scenario:
+    return load_scenario("thesis").with_changes({"terrain": HeightField(file=str(file), cell=0.5)})
 
 
 @pytest.mark.parametrize("suffix", [".npy", ".csv", ".txt"])
 def test_a_height_file_has_rows_along_x(tmp_path, suffix):
     file = tmp_path / f"heights{suffix}"
     write_heights(file, HEIGHTS)
-    grid = grid_of(field(file))
+    grid = grid_of(HeightField(file=str(file), cell=0.5))
     assert np.array_equal(grid.heights, HEIGHTS)
     assert (grid.corner, grid.cell) == ((-0.5, -0.75), (0.5, 0.5))  # centred: 1 by 1.5 m
 
@@ -165,16 +173,19 @@ def test_a_height_file_has_rows_along_x(tmp_path, suffix):
     ("heights", "found"),
     [
         (np.array([[0.0] * 3, [0.0, np.nan, 0.0], [0.0] * 3]), "nan in row 2, column 2"),
+        (np.array([[0.0] * 3, [0.0, 0.0, -1e7], [0.0] * 3]), "-10000000.0 in row 2, column 3"),
         (HEIGHTS[:2], "2 x 4"),
         (HEIGHTS[None], "1 x 3 x 4"),
+        (np.zeros((2000, 2001), dtype=np.int8), "2000 x 2001"),
         (np.array([[{}] * 3] * 3), "heights.npy"),
     ],
     ids=lambda value: None if isinstance(value, np.ndarray) else value,
 )
 def test_what_are_no_heights_is_refused(tmp_path, heights, found, refused):
     np.save(tmp_path / "heights.npy", heights, allow_pickle=True)
-    with refused("file", "terrain.file", found):
-        grid_of(field(tmp_path / "heights.npy"))
+    file = scenario_file(tmp_path, "terrain: !HeightField {file: heights.npy, cell: 1 m}")
+    with refused(file, "terrain.file", found):
+        load_scenario(file)
 
 
 @pytest.mark.parametrize("content", [b"", b"one two", b"1 2 3\n4 5\n"])
@@ -182,18 +193,9 @@ def test_what_are_no_heights_is_refused(tmp_path, heights, found, refused):
 @pytest.mark.filterwarnings("error")
 def test_what_is_no_height_file_is_refused(tmp_path, name, content, refused):
     (tmp_path / name).write_bytes(content)
-    with refused("file", "terrain.file", name):
-        grid_of(field(tmp_path / name))
-
-
-# In scenario files
-
-
-def scenario_file(folder: Path, terrain: str, base: str = "thesis") -> Path:
-    file = folder / "scenario.yaml"
-    folder.mkdir(exist_ok=True)
-    file.write_text(f"base: {base}\n{terrain}\n")
-    return file
+    file = scenario_file(tmp_path, f"terrain: !HeightField {{file: {name}, cell: 1 m}}")
+    with refused(file, "terrain.file", name):
+        load_scenario(file)
 
 
 def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, monkeypatch):
@@ -205,3 +207,41 @@ def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, mon
     assert load_scenario(file.relative_to(tmp_path)).terrain == absolute
     based = scenario_file(tmp_path / "mine", "terrain: !HeightField {cell: 1 m}", base=str(file))
     assert load_scenario(based).terrain == HeightField(file=absolute.file, cell=1.0)
+
+
+def test_fields_are_equal_if_their_heights_are_wherever_they_were_read(tmp_path):
+    names = "one.npy", "same.csv", "other.npy"
+    for name, heights in zip(names, (HEIGHTS, HEIGHTS, HEIGHTS + 1e-12), strict=True):
+        write_heights(tmp_path / name, heights)
+    one, same, other = (on_field(tmp_path / name) for name in names)
+    assert one == same and hash(one) == hash(same) and one.differences(same) == []
+    assert one != other
+    [(key, text)], [(_, other_text)] = one.differences(other), other.differences(one)
+    assert key == "terrain.file" and text != other_text
+    assert load_scenario(scenario_file(tmp_path, one.to_yaml(), base="thesis")) == one
+
+
+@pytest.mark.parametrize("damage", ["gone", "changed"])
+def test_a_saved_field_does_not_need_the_file_it_was_read_from(tmp_path, damage, refused):
+    write_heights(tmp_path / "heights.csv", HEIGHTS)
+    scenario = on_field(tmp_path / "heights.csv")
+    save_scenario(tmp_path / "record", scenario)
+    (tmp_path / "heights.csv").unlink()
+    changed = scenario.with_changes({"terrain.cell": "1 m"})
+    assert np.array_equal(grid_of(changed.terrain).heights, HEIGHTS)
+
+    moved = (tmp_path / "record").rename(tmp_path / "moved")
+    loaded = load_scenario(moved / SCENARIO)
+    assert loaded == scenario
+    assert np.array_equal(grid_of(loaded.terrain).heights, HEIGHTS)
+    save_scenario(tmp_path / "again", loaded)
+    files = [
+        {file.name: file.read_bytes() for file in folder.iterdir()}
+        for folder in (moved, tmp_path / "again")
+    ]
+    assert files[0] == files[1]
+
+    (copy,) = (file for file in moved.iterdir() if file.name != SCENARIO)
+    copy.unlink() if damage == "gone" else write_heights(copy, 2.0 * HEIGHTS)
+    with refused(moved / SCENARIO, "terrain.file", copy.name):
+        load_scenario(moved / SCENARIO)

@@ -1,7 +1,7 @@
 """Manifest of a run: its definition, on disk and in memory.
 
     manifest.json    name of the run, seed, versions, objective, optimiser, SHA-256 of scenario.yaml
-    scenario.yaml    the scenario with all settings
+    scenario.yaml    the scenario with all settings; its height file, if any, beside it
 
 The name of a run is a digest of this definition. Each line of the record has the name.
 
@@ -30,12 +30,12 @@ from tetra_drake.files import read_text, write_whole
 from tetra_drake.machine import versions
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import Gait, ParameterSpace, Vector
-from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.load import SCENARIO, dump_scenario, load_scenario, save_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Section
 
 SCHEMA = 4
-MANIFEST, SCENARIO = "manifest.json", "scenario.yaml"
+MANIFEST = "manifest.json"
 
 _NAME = 12
 """Number of characters of a run's name."""
@@ -140,8 +140,7 @@ def read_manifest(directory: Path) -> Manifest:
 
 def write_manifest(directory: Path, manifest: Manifest) -> None:
     """Writes scenario.yaml and then manifest.json, which makes the directory a run."""
-    text = dump_scenario(manifest.scenario)
-    write_whole(directory / SCENARIO, text)
+    text = save_scenario(directory, manifest.scenario)
     content = {
         "schema": SCHEMA,
         "run": manifest.run,

@@ -31,7 +31,6 @@ from tetra_drake.evolution.entries import (
 )
 from tetra_drake.evolution.manifest import (
     MANIFEST,
-    SCENARIO,
     Manifest,
     Method,
     read_manifest,
@@ -40,6 +39,8 @@ from tetra_drake.evolution.manifest import (
 from tetra_drake.files import check_folder, make_folder
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import Gait, Vector, save_gait
+from tetra_drake.scenario.height_files import RECORDED
+from tetra_drake.scenario.load import SCENARIO
 from tetra_drake.scenario.scenario import Scenario
 
 LOCK = ".lock"
@@ -209,10 +210,9 @@ class TrialRecord:
 
 def _is_empty(directory: Path) -> bool:
     """True if a directory is empty, or has only the files of a process killed in begin()."""
-    ours = (LOCK, SCENARIO, _ASIDE, ".manifest.", ".scenario.")
-    if not directory.is_dir():
-        return True
-    return all(file.name.startswith(ours) for file in directory.iterdir())
+    ours = (LOCK, SCENARIO, _ASIDE, ".manifest.", ".scenario.", ".heights-")
+    names = [file.name for file in directory.iterdir()] if directory.is_dir() else []
+    return all(name.startswith(ours) or RECORDED.fullmatch(name) for name in names)
 
 
 def _check_empty(directory: Path) -> None:

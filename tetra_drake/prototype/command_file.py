@@ -14,13 +14,12 @@ from tetra_drake.errors import InputError
 from tetra_drake.files import read_text
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import SCENARIO
 from tetra_drake.scenario.refusals import hint
 from tetra_drake.scenario.scenario import Scenario
 
 TIME = "time_s"
 
-SCENARIO = "scenario.yaml"
-"""File beside a command: the scenario whose actuators the command is for."""
 
 _UNEVEN = 0.05
 """Largest error of the time between two samples, as a share of it: times may be rounded."""
@@ -46,7 +45,7 @@ def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) ->
 
 
 def scenario_beside(path: Path) -> Path | None:
-    """The scenario file in the folder of a command, if there is one."""
+    """The scenario file in the folder of a command, which the command is for, if there is one."""
     scenario = path.parent / SCENARIO
     return scenario if os.path.isfile(scenario) else None
 

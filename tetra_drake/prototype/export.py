@@ -13,18 +13,13 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import fixed
-from tetra_drake.prototype.command_file import (
-    SCENARIO,
-    command_text,
-    load_command,
-    table_text,
-)
+from tetra_drake.prototype.command_file import command_text, load_command, table_text
 from tetra_drake.prototype.loads import Loads, actuator_loads
 from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.command import Command
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.scenario.load import dump_scenario
+from tetra_drake.scenario.load import save_scenario
 from tetra_drake.scenario.scenario import Scenario
 
 COMMAND, EXPECTED, LIMITS = "command.csv", "expected.csv", "limits.csv"
@@ -61,7 +56,7 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
         write_whole(folder / COMMAND, command_text(robot, command))
         write_whole(folder / EXPECTED, table_text(axes, motion.time.values, positions))
         write_whole(folder / LIMITS, loads.table.to_csv(float_format="%.6g"))
-        write_whole(folder / SCENARIO, dump_scenario(scenario))
+        save_scenario(folder, scenario)
 
         played, distance = _played(scenario, folder / COMMAND), fixed(result.metrics.distance_in)
         verdict = load_verdict(loads, result)

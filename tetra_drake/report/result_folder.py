@@ -1,6 +1,6 @@
 """The folder of one simulation: written by `simulate`, read by `replay` and `figures`.
 
-scenario.yaml     the scenario in full, for `--scenario`
+scenario.yaml     the scenario in full, for `--scenario`; its height file, if any, beside it
 trajectory.nc     motion and forces over time, for xarray
 replay.html       a page that plays the motion
 result.json       the numbers, the gait, and the path of the centre
@@ -19,7 +19,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.manifest import MANIFEST
-from tetra_drake.files import check_folder, given_path, read_json, write_whole
+from tetra_drake.files import check_folder, given_path, read_json
 from tetra_drake.results.result import IntegratorWork, SimulationResult, save_result
 from tetra_drake.results.trajectory import DIMENSIONS, labels, with_indexes
 from tetra_drake.robot.command import robot_without_network
@@ -27,7 +27,7 @@ from tetra_drake.robot.gait import load_gait
 from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure
-from tetra_drake.scenario.load import dump_scenario, load_scenario
+from tetra_drake.scenario.load import SCENARIO, load_scenario, save_scenario
 from tetra_drake.scenario.metrics import METRICS, Metrics
 from tetra_drake.scenario.refusals import refuse
 from tetra_drake.scenario.section import Section
@@ -35,8 +35,7 @@ from tetra_drake.scenario.section import Section
 if TYPE_CHECKING:
     import xarray
 
-SCENARIO, TRAJECTORY = "scenario.yaml", "trajectory.nc"
-REPLAY, RESULT = "replay.html", "result.json"
+TRAJECTORY, REPLAY, RESULT = "trajectory.nc", "replay.html", "result.json"
 
 
 def check_result_folder(folder: Path) -> None:
@@ -55,7 +54,7 @@ def save_result_folder(folder: Path, result: SimulationResult) -> None:
     # Written last and removed first: where there is a result.json, the other files belong to it.
     if (folder / RESULT).is_file():
         (folder / RESULT).unlink()
-    write_whole(folder / SCENARIO, dump_scenario(result.scenario))
+    save_scenario(folder, result.scenario)
     save_dataset(trajectory, folder / TRAJECTORY)
     result.save_replay(folder / REPLAY)
     save_result(folder / RESULT, result)

@@ -13,7 +13,7 @@ import pandas
 from tetra_drake.analysis.elites import chosen, distinct_gaits, elites
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.entries import BEST_GAIT, trial_folder
-from tetra_drake.evolution.manifest import MANIFEST, SCENARIO
+from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.evolution.run import gait_label, load_run
 from tetra_drake.files import check_folder, write_whole
 from tetra_drake.formatting import Table, listed, render, rounded
@@ -30,7 +30,7 @@ from tetra_drake.report.summary import ground_text, metrics_table, results, tria
 from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, save_gait
 from tetra_drake.robot.weights import KINDS
-from tetra_drake.scenario.load import load_scenario
+from tetra_drake.scenario.load import SCENARIO, load_scenario
 from tetra_drake.scenario.metrics import METRICS, inverse
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import shown

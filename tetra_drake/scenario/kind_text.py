@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from tetra_drake.scenario.section import Section, written
 from tetra_drake.scenario.units import shown
@@ -18,9 +17,7 @@ def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
     settings = {name: getattr(kind, name) for name in always} | given
     texts = []
     for name, value in settings.items():
-        if name == "file":
-            value = Path(value).name
-        elif isinstance(value, list):
+        if isinstance(value, list):
             value = " ".join(value)
         texts.append(f"{name} {value}")
     return f" ({', '.join(texts)})" if texts else ""

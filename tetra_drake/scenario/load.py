@@ -7,11 +7,15 @@ from pathlib import Path
 from typing import Protocol
 
 from tetra_drake.errors import InputError
+from tetra_drake.files import write_whole
 from tetra_drake.scenario.refusals import no_such
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Tree, keys_of, written
 from tetra_drake.scenario.structure_files import structure_file
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
+
+SCENARIO = "scenario.yaml"
+"""The scenario's file in the folder of a command."""
 
 MOST_BYTES = 2**20
 """Upper limit of the size of a scenario file."""
@@ -54,7 +58,7 @@ GivenScenario = Scenario | HasScenario | str | Path
 def given_scenario(scenario: GivenScenario) -> Scenario:
     """The scenario that an argument stands for; InputError for what stands for none."""
     if isinstance(scenario, (str, Path)):
-        in_folder = Path(scenario) / "scenario.yaml"
+        in_folder = Path(scenario) / SCENARIO
         is_folder = str(scenario) not in shipped_scenarios() and os.path.isfile(in_folder)
         return load_scenario(in_folder if is_folder else scenario)
     own = getattr(scenario, "scenario", scenario)
@@ -66,8 +70,17 @@ def given_scenario(scenario: GivenScenario) -> Scenario:
 
 def dump_scenario(scenario: Scenario) -> str:
     """The scenario as a scenario file that gives all values, in SI: it loads back to the same
-    scenario, whatever the defaults."""
+    scenario, whatever the defaults, beside the height file of save_scenario()."""
     return dump_yaml(written(scenario.model_dump()))
+
+
+def save_scenario(folder: Path, scenario: Scenario) -> str:
+    """Writes a scenario into a folder that can be moved, with its height file if it has one;
+    returns dump_scenario(), the content of the file SCENARIO."""
+    text = dump_scenario(scenario)
+    scenario.terrain.save(folder)
+    write_whole(folder / SCENARIO, text)
+    return text
 
 
 def _file(name: str, folder: Path) -> Path:

@@ -98,7 +98,9 @@ class Scenario(Section):
 
     def to_yaml(self) -> str:
         """All settings as a scenario file, in units in which they are round numbers."""
-        return dump_yaml(written(self.model_dump(), shortest))
+        tree = written(self.model_dump(), shortest)
+        tree["terrain"] |= self.terrain.paths
+        return dump_yaml(tree)
 
     def differences(self, base: Scenario) -> list[tuple[str, str]]:
         """(key, value) of what differs from `base`, in units in which the number is round.

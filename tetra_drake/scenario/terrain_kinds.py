@@ -6,18 +6,16 @@ whose control points are the heights of a grid: smooth, exact on planes, nowhere
 height around, with edges rounded by a cell; outside the grid it goes on as it is at the edge.
 """
 
-import io
 import math
-import re
-import warnings
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
 from tetra_drake.errors import InputError
-from tetra_drake.files import read_bytes
+from tetra_drake.scenario.height_files import HeightFile
 from tetra_drake.scenario.kind_text import settings_text
 from tetra_drake.scenario.quantities import Angle, Length
 from tetra_drake.scenario.section import Kinds, Section
@@ -54,12 +52,19 @@ class Relief(Section):
         """The terrain in words, as "incline (slope 5 deg)"."""
         return type(self).__name__.lower() + settings_text(self)
 
+    @property
+    def paths(self) -> dict[str, str]:
+        """The paths of files that the settings stand for, by their keys."""
+        return {}
+
+    def save(self, folder: Path) -> None:
+        """Writes those files into a folder, under the names that the settings have in a record."""
+
     def grid(self, *, ahead: float, source: object) -> Grid:
         """The heights of the terrain.
 
         Steps and obstacles without a start begin at x = `ahead` (m). Raises InputError, naming
-        `source` and the key, for more than MOST_CELLS cells, and for a height file that cannot be
-        used.
+        `source` and the key, for more than MOST_CELLS cells.
         """
         raise NotImplementedError
 
@@ -178,51 +183,27 @@ class HeightField(Relief):
     """Heights in m from a file: rows along x, columns along y, both upward.
 
     The grid's centre is the origin. The file is numpy's `.npy`, or text of numbers separated by
-    blanks or commas; at least 3 x 3. A relative path starts at the scenario file that names it.
+    blanks or commas; at least 3 x 3, at most 4 million. A relative path starts at the scenario file
+    that names it. A record has a copy of the file beside it, named by a digest of the heights.
     """
 
-    file: str
+    file: HeightFile
     cell: Length = Field(gt=0)  # between neighbours, along x and y
 
+    @property
+    def paths(self) -> dict[str, str]:
+        return {"file": self.file.path}
+
+    def save(self, folder: Path) -> None:
+        self.file.save(folder)
+
     def grid(self, *, ahead: float, source: object) -> Grid:
-        heights = _read_heights(self.file, source)
-        if heights.ndim != 2 or min(heights.shape) < 3:
-            shape = " x ".join(map(str, heights.shape)) or "a single number"
-            problem = f"'{self.file}' holds {shape}, expected at least 3 x 3 heights"
-            raise _file_error(source, problem)
-        bad = np.argwhere(~np.isfinite(heights))
-        if len(bad):
-            row, column = bad[0]
-            found = f"{heights[row, column]} in row {row + 1}, column {column + 1}"
-            raise _file_error(source, f"'{self.file}' has {found}, expected finite heights in m")
+        heights = self.file.heights
         x, y = (-0.5 * (size - 1) * self.cell for size in heights.shape)
         return Grid(heights, (x, y), (self.cell, self.cell))
 
 
 Terrain = Annotated[Flat | Incline | Steps | Rough | Obstacles | HeightField, Kinds()]
-
-
-def _read_heights(file: str, source: object) -> np.ndarray:
-    """Content of a height file, as floats of any shape."""
-    try:
-        content = read_bytes(file, "height file")
-        if file.endswith(".npy"):
-            heights = np.lib.format.read_array(io.BytesIO(content))
-            return heights.astype(float, casting="same_kind")
-        text = re.sub("#.*", "", content.decode("utf-8"))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that it holds nothing
-            return np.loadtxt(text.splitlines(), delimiter="," if "," in text else None, ndmin=2)
-    except InputError as error:
-        raise _file_error(source, f"'{file}': {error.problem}") from error
-    except (ValueError, TypeError, MemoryError) as error:
-        # Without what stands there: the file may be any.
-        problem = re.sub("string '.*' to float64", "text to a number", str(error))
-        raise _file_error(source, f"'{file}' cannot be read as heights: {problem}") from error
-
-
-def _file_error(source: object, problem: str) -> InputError:
-    return InputError(source, "terrain.file", problem)
 
 
 def _check_size(cell: tuple[float, float], source: object, key: str) -> None:

@@ -110,3 +110,4 @@ _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"), "-+0123456789"
 )
 _Dumper.add_representer(dict, _Dumper.represent_dict)
+_Dumper.add_multi_representer(str, _Dumper.represent_str)  # also of the names of height files

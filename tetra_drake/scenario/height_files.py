@@ -1,0 +1,93 @@
+"""Height files: read once, and known by their content from then on."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import re
+import warnings
+from typing import Any
+
+import numpy as np
+import pydantic
+from pydantic_core import CoreSchema, core_schema
+
+from tetra_drake.errors import InputError
+from tetra_drake.files import read_bytes, write_whole
+from tetra_drake.scenario.refusals import described, refuse
+
+MOST_HEIGHTS = 4_000_000
+LARGEST = 1e6
+"""m: heights beyond would leave no digits for the robot."""
+
+RECORDED = re.compile(r"heights-[0-9a-f]{16}\.npy")
+"""Names of files that save() writes."""
+
+
+class HeightFile(str):
+    """Heights from a file, as the name under which a record holds them.
+
+    The name has a digest of the heights, so equal names are equal heights. In a scenario's tree a
+    path stands for it.
+    """
+
+    heights: np.ndarray
+    """(rows, columns), m."""
+    path: str
+    """Where the heights were read."""
+
+    @classmethod
+    def read(cls, path: str) -> HeightFile:
+        """The heights of a file; refuses what has none, and one whose name has another digest."""
+        heights = _read_heights(path)
+        if heights.ndim != 2 or min(heights.shape) < 3 or heights.size > MOST_HEIGHTS:
+            shape = " x ".join(map(str, heights.shape)) or "a single number"
+            expected = f"at least 3 x 3 heights, at most {MOST_HEIGHTS}"
+            refuse("", f"'{path}' holds {shape}, expected {expected}")
+        for row, column in np.argwhere(~(np.abs(heights) <= LARGEST))[:1]:
+            found = f"{heights[row, column]} in row {row + 1}, column {column + 1}"
+            refuse("", f"'{path}' has {found}, expected heights of at most {LARGEST:g} m")
+        digest = hashlib.sha256(f"{heights.shape}".encode() + heights.astype("<f8").tobytes())
+        file = cls(f"heights-{digest.hexdigest()[:16]}.npy")
+        if RECORDED.fullmatch(os.path.basename(path)) and os.path.basename(path) != file:
+            refuse("", f"'{path}' was changed: by its content its name would be {file}")
+        file.heights, file.path = heights, os.path.abspath(path)
+        return file
+
+    def save(self, folder: str | os.PathLike[str]) -> None:
+        """Writes the heights into a folder, under this name."""
+        content = io.BytesIO()
+        np.lib.format.write_array(content, self.heights, version=(1, 0))
+        write_whole(os.path.join(folder, self), content.getvalue())
+
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: Any, handler: pydantic.GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(cls._of)
+
+    @classmethod
+    def _of(cls, given: Any) -> HeightFile:
+        if not isinstance(given, str):
+            refuse("", f"found {described(given)}, expected the path of a height file")
+        return given if isinstance(given, HeightFile) else cls.read(given)
+
+
+def _read_heights(path: str) -> np.ndarray:
+    """Content of a height file, as floats of any shape."""
+    try:
+        content = read_bytes(path, "height file")
+        if path.endswith(".npy"):
+            heights = np.lib.format.read_array(io.BytesIO(content))
+            return np.ascontiguousarray(heights.astype(float, casting="same_kind"))
+        text = re.sub("#.*", "", content.decode("utf-8"))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that it holds nothing
+            return np.loadtxt(text.splitlines(), delimiter="," if "," in text else None, ndmin=2)
+    except InputError as error:
+        refuse("", f"'{path}': {error.problem}")
+    except (ValueError, TypeError, MemoryError) as error:
+        # Without what stands there: the file may be any.
+        problem = re.sub("string '.*' to float64", "text to a number", str(error))
+        refuse("", f"'{path}' cannot be read as heights: {problem}")
