@@ -1,1 +1,1 @@
-"""Pictures of a model and of what it did."""
+"""Figures of simulations, runs and analyses."""

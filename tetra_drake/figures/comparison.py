@@ -1,4 +1,4 @@
-"""The search of several runs, compared, as a figure and files."""
+"""Figure and files of a comparison of runs."""
 
 from __future__ import annotations
 
@@ -23,12 +23,14 @@ from tetra_drake.figures.style import (
     units_named,
 )
 
-_FIRST = 10  # beginning of the axes of costs, in simulations
+_FIRST = 10  # simulations; the axes of costs begin here
 
 
 def save_comparison(compared: Compared, folder: Path) -> list[str]:
-    """Writes trials.csv, curves.csv, summary.json (lengths in m) and the figure to the folder;
-    returns the names. Raises InputError if a file cannot be written."""
+    """Writes trials.csv, curves.csv, summary.json (lengths in m) and the figure to a folder.
+
+    Returns the names of the files. Raises InputError if a file cannot be written.
+    """
     tables = {"trials": compared.trials, "curves": compared.curves}
     figure, summary = comparison(compared), comparison_numbers(compared)
     return save_findings(figure, folder, "comparison", tables=tables, summary=summary)
@@ -36,10 +38,11 @@ def save_comparison(compared: Compared, folder: Path) -> list[str]:
 
 @figure_function
 def comparison(compared: Compared, *, figure: Page | None = None, units: str = "in") -> Drawn:
-    """Best fitness so far, median and interquartile band over the trials of each run, and the share
-    of trials whose fittest gait so far walks the distance to be reached.
+    """Comparison of runs: the best fitness so far, as median and interquartile band over the trials
+    of each run.
 
-    Trials that have ended go on with their last values; a dot marks the end of a run."""
+    If a distance to reach was given, a second panel shows the share of trials that have reached it.
+    Finished trials keep their last values. A dot marks the end of a run."""
     columns, unit = 1 if compared.reach is None else 2, units_named(units)
     labels = []
     for label, count in compared.runs["trials"].items():
@@ -48,8 +51,8 @@ def comparison(compared: Compared, *, figure: Page | None = None, units: str = "
     row = page.subplots(1, columns, squeeze=False)[0]
     ends = compared.curves.groupby("run", sort=False)["cost"].max()
     first = min(_FIRST, ends.min())
-    for place, label in enumerate(compared.runs.index):
-        style = {**line_style(place), "drawstyle": "steps-post", "marker": "o", "markevery": [-1]}
+    for series, label in enumerate(compared.runs.index):
+        style = {**line_style(series), "drawstyle": "steps-post", "marker": "o", "markevery": [-1]}
         _draw_best(row[0], compared, label, first, style)
         if compared.reach is not None:
             _draw_reached(row[1], compared, label, ends[label], style)
@@ -62,7 +65,7 @@ def comparison(compared: Compared, *, figure: Page | None = None, units: str = "
         panel.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         panel.xaxis.set_minor_formatter(NullFormatter())
     row[0].set_ylabel("best fitness so far")
-    legend_below(page, {label: line_style(place) for place, label in enumerate(labels)})
+    legend_below(page, {label: line_style(series) for series, label in enumerate(labels)})
     set_title(page, "How well runs search: median and quartiles over trials")
     return page
 

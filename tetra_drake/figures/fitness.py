@@ -1,4 +1,4 @@
-"""Figures of a run of evolution, from its record."""
+"""Figures of the fitnesses of a recorded run."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from tetra_drake.figures.style import (
 from tetra_drake.formatting import fixed
 from tetra_drake.scenario.units import INCH
 
-_TICKS = 20  # largest number of trial numbers below the axes
-_SEVERAL = 4  # trials from which on quartiles are drawn
+_TICKS = 20  # largest number of labels below the axes
+_SEVERAL = 4  # least number of trials for which quartiles are drawn
 
 _TRIAL: Any = {"color": "0.7", "linewidth": 0.8, "linestyle": "-"}
 _MEDIAN: Any = {"color": OKABE_ITO["blue"], "linewidth": 2.0, "linestyle": "-"}
@@ -35,10 +35,8 @@ _BAND: Any = {"color": OKABE_ITO["blue"], "alpha": 0.18, "linewidth": 0.0}
 
 
 def initial_extremes(run: Run) -> pandas.DataFrame:
-    """Distances (in) of the fittest and the least fit initial gait of each trial.
-
-    Index: trial. Columns: best and worst. Failed gaits are left out.
-    """
+    """Distances (in) of the fittest and the least fit initial gait: a row per trial, columns best
+    and worst. Failed gaits are left out."""
     walked = run.initial().dropna(subset="fitness").sort_values(["trial", "fitness"])
     distances = walked.groupby("trial")["distance_in"]
     return pandas.DataFrame({"best": distances.last(), "worst": distances.first()})
@@ -46,8 +44,8 @@ def initial_extremes(run: Run) -> pandas.DataFrame:
 
 @figure_function
 def initial_distances(run: Run, *, figure: Page | None = None, units: str = "in") -> Drawn:
-    """Distances of the fittest and the least fit gait of each trial's first iteration, without
-    those that failed."""
+    """Distances of the fittest and the least fit initial gait of each trial. Failed gaits are left
+    out."""
     unit, width = units_named(units), 0.4
     extremes = initial_extremes(run) * INCH / unit.length
     page = page_of(figure, height_in=3.6)
@@ -56,7 +54,7 @@ def initial_distances(run: Run, *, figure: Page | None = None, units: str = "in"
     best = panel.bar(extremes.index - width / 2, extremes["best"], width, color=blue)
     worst = panel.bar(extremes.index + width / 2, extremes["worst"], width, color=orange)
     panel.axhline(0.0, color="black", linewidth=0.8)
-    margin = max(0.9, 2.0 - len(extremes) / 2)  # else the bars of a single trial fill the axes
+    margin = max(0.9, 2.0 - len(extremes) / 2)  # a single trial has thin bars, too
     duration = run.scenario.simulation.duration
     panel.set(
         xlabel="trial",
@@ -74,13 +72,13 @@ def initial_distances(run: Run, *, figure: Page | None = None, units: str = "in"
 
 @figure_function
 def initial_fitness(run: Run, trial: int, *, figure: Page | None = None) -> Drawn:
-    """Histogram of the fitness of a trial's initial gaits; those that walk backward are hatched."""
+    """Histogram of the fitness of a trial's initial gaits. Gaits that walk backward are hatched."""
     initial = run.initial().query("trial == @trial")
     walked = initial.dropna(subset="fitness")
     fitness, backward = walked["fitness"], walked["distance_in"] < 0.0
     page = page_of(figure, height_in=3.6)
     panel = page.subplots()
-    # Bin edges at round numbers, zero among them where the values pass it.
+    # Bin edges are round numbers, so zero is an edge if the values have both signs.
     locator = MaxNLocator(nbins=20, steps=[1, 2, 2.5, 5, 10])
     panel.hist(
         [fitness[~backward], fitness[backward]],
@@ -103,10 +101,10 @@ def initial_fitness(run: Run, trial: int, *, figure: Page | None = None) -> Draw
 
 
 def quartiles_over_trials(run: Run, fitness: pandas.DataFrame) -> pandas.DataFrame:
-    """Quartiles over the trials, columns of `fitness`: low, median, high. Index: evaluations.
+    """Quartiles over trials: low, median, high, by number of evaluations.
 
-    A trial that has ended counts with its last value, as its population no longer changes; the
-    quartiles end where the first unfinished trial does.
+    `fitness` has a column per trial. A finished trial keeps its last value, because its population
+    no longer changes. The quartiles end at the last value of the shortest unfinished trial.
     """
     ended = run.iterations.dropna(subset="stop")["trial"]
     going_on = [fitness[t].last_valid_index() for t in fitness if t not in ended.values]
@@ -118,10 +116,10 @@ def quartiles_over_trials(run: Run, fitness: pandas.DataFrame) -> pandas.DataFra
 @figure_function
 def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
     """Fitness over evaluations: the mean of each trial's population, or the best if the optimiser
-    reports no mean. Four trials or more are grey, but the fittest and the least fit. Blue: their
-    median, and from the lower to the upper quartile.
+    reports no mean.
 
-    A trial that has ended counts in the quartiles with its last value."""
+    With four trials or more, the fittest and the least fit trial are dark, the others grey. Blue:
+    median and quartiles over trials. A finished trial keeps its last value in the quartiles."""
     kind = "mean" if "mean_fitness" in run.iterations else "best"
     whole = _whole_iterations(run)
     table = whole.pivot(index="evaluations", columns="trial", values=f"{kind}_fitness")
@@ -132,7 +130,7 @@ def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
     looks = _looks(list(ends.index))
     for trial in table:
         series = table[trial].dropna()
-        # The dot marks the end of a line, and makes a line of one point visible.
+        # A dot at the end makes even a line of one point visible.
         dot: Any = {"marker": "o", "markersize": 3.0, "markevery": [-1]}
         panel.plot(series.index, series, label=f"trial {trial}", **looks.get(trial, _TRIAL), **dot)
     legend = {f"trial {trial}: {fixed(ends[trial], 1)}": look for trial, look in looks.items()}
@@ -149,15 +147,15 @@ def fitness_of_trials(run: Run, *, figure: Page | None = None) -> Drawn:
 
 
 def _looks(trials: Sequence[int]) -> dict[int, Any]:
-    """Line styles of the trials that the legend names, the fittest first."""
+    """Line styles of the trials in the legend. `trials` begins with the fittest."""
     if len(trials) < _SEVERAL:
-        return {trial: line_style(place) for place, trial in enumerate(trials)}
+        return {trial: line_style(series) for series, trial in enumerate(trials)}
     return {trials[0]: _FITTEST, trials[-1]: _LEAST_FIT}
 
 
 def _whole_iterations(run: Run) -> pandas.DataFrame:
-    """The iterations but those that the budget of evaluations has cut short, whose mean is of few
-    gaits."""
+    """The iterations of a run, without last iterations that were cut by the budget of evaluations.
+    Their mean would be over few gaits."""
     rows = run.iterations
     sizes = rows.groupby("trial")["evaluations"].diff()
     is_last = ~rows.duplicated("trial", keep="last")

@@ -1,4 +1,4 @@
-"""Figures of forces: in the actuated cables and on the ground."""
+"""Figures of forces in the actuated cables and at the ground."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ from tetra_drake.formatting import fixed
 from tetra_drake.results.measures import intervals, off_ground, share_of_time
 from tetra_drake.results.result import SimulationResult
 
-_SECONDS = 4.0  # shown unless a time is given
+_SECONDS = 4.0  # length of the part that is shown by default
 
 _FIRST: Any = {"color": OKABE_ITO["blue"], "linestyle": "-"}
 _SECOND: Any = {"color": OKABE_ITO["vermillion"], "linestyle": (0, (4, 1.2))}
 _LANDING: Any = {"color": "black", "marker": "v", "markersize": 4.0, "linestyle": ""}
 
 _TOP = 0.92  # height of the marks of landings, as a share of a panel's height
-_IMPACTS = 0.01  # share of the samples at either end that does not count for the scale of forces
-_MARGIN = 0.25  # free space above and below the others, as a share of their range
-_ROWS, _COLUMNS = 10, 4  # largest number of panels one below the other, and of columns
-_LETTERS = 80  # largest number of letters of the names of panels in a row
-_MIRRORED = 0.01  # mean difference over mean force, below which two nodes are mirror images
+_IMPACTS = 0.01  # share of the smallest and of the largest forces that the y axis may cut off
+_MARGIN = 0.25  # free space above and below the forces, as a share of their range
+_ROWS, _COLUMNS = 10, 4  # largest numbers of rows and columns of panels
+_LETTERS = 80  # largest number of letters in the names of a row of panels
+_MIRRORED = 0.01  # two nodes share a panel if mean difference / mean force is at most this
 
 
 @figure_function
@@ -53,10 +53,10 @@ def signals_and_tensions(
     time: tuple[float, float] | None = None,
     units: str = "in",
 ) -> Drawn:
-    """Actuation signals, and the tension of the cable that each drives, in the last 4 s.
+    """Actuation signals and the tensions of the cables that they drive, in the last 4 s.
 
-    The title of a panel is the name of the cable. If a signal drives several, the first is shown.
-    Start-up, when signals are 0, is shaded."""
+    The title of a panel is the name of the cable. If a signal drives several cables, the first is
+    shown. The start-up is shaded; signals are 0 there."""
     unit, trajectory = units_named(units), shown_part(result.trajectory, time or _last(result))
     forces = trajectory[["signal", "tension"]] / unit.force
     oscillators, signals = forces.oscillator.values, forces.cable_signal.values.tolist()
@@ -86,11 +86,11 @@ def ground_forces(
     time: tuple[float, float] | None = None,
     units: str = "in",
 ) -> Drawn:
-    """Normal force and friction along x in the last 4 s; on uneven ground, friction along the
-    forward tangent, which is x projected on the slope.
+    """Normal force and friction of the feet in the last 4 s.
 
-    One panel for each foot that stands, but one for two that bear the same. Grey: stance. The peaks
-    of impacts are cut off, as they are shorter than the time between samples."""
+    Friction is along x; on uneven ground, along x projected on the slope. Each foot that touches
+    the ground has a panel; feet of one body with equal forces share a panel. Grey: stance. Peaks of
+    impacts are cut off, because they are shorter than the time between samples."""
     unit, end = units_named(units), shown_part(result.trajectory, time or _last(result))
     forces = end[["normal_force", "friction_force"]] / unit.force
     feet = _feet_to_show(end)
@@ -123,7 +123,8 @@ def _last(result: SimulationResult) -> tuple[float, float]:
 
 
 def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | None:
-    """Range of the forces of nodes that touch, without impacts; None if no node touches."""
+    """Range of the y axis: the forces of touching nodes without impacts. None if no node touches
+    the ground."""
     touching = forces.where(forces.normal_force > 0.0)
     normal, friction = touching.normal_force, touching.friction_force.sel(horizontal="x")
     values = np.concatenate([normal.values.ravel(), friction.values.ravel(), [0.0]])
@@ -133,17 +134,18 @@ def _limits_between_impacts(forces: xarray.Dataset) -> tuple[float, float] | Non
 
 
 def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
-    """Nodes of each body that touch and bear something else than the first of them, and their
-    titles; the first node if none touches."""
+    """Nodes to show, with the titles of their panels. A node that touches the ground is shown,
+    unless it has the same forces as the first touching node of its body. If no node touches, the
+    first node is shown."""
     feet: dict[str, str] = {}
     for body in dict.fromkeys(trajectory.contact_body.values):
         normal = trajectory.normal_force[:, (trajectory.contact_body == body).values]
         names, forces = normal.contact.values, normal.values.T
         touching = np.flatnonzero((forces > 0.0).any(axis=1))
-        for place, node in enumerate(touching):
+        for node in touching:
             first = touching[0]
-            apart = np.abs(forces[node] - forces[first]).mean()
-            if place and apart <= _MIRRORED * forces[first].mean():
+            difference = np.abs(forces[node] - forces[first]).mean()
+            if node != first and difference <= _MIRRORED * forces[first].mean():
                 feet[names[first]] += f" = {foot_name(names[node]).removeprefix(f'{body} ')}"
             else:
                 feet[names[node]] = foot_name(names[node])
@@ -154,8 +156,8 @@ def _feet_to_show(trajectory: xarray.Dataset) -> dict[str, str]:
 def _panels_over_time(
     figure: Page | None, names: Sequence[str], *, groups: int
 ) -> tuple[Page, list[Axes]]:
-    """The page, and a panel of forces for each name, in a column for each group if these are
-    few."""
+    """The page and a panel per name. If there are few groups of panels, each group has a
+    column."""
     several = 1 < groups <= _COLUMNS
     columns = groups if several else min(math.ceil(len(names) / _ROWS), _COLUMNS)
     rows = math.ceil(len(names) / columns)

@@ -1,4 +1,4 @@
-"""The gait diagram: which feet stand when, with the signals and the speed."""
+"""Gait diagram: signals, stance of the feet, and speed over time."""
 
 from __future__ import annotations
 
@@ -31,12 +31,11 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.robot.structure import Structure
 
 _CYCLES = 3
-_LAST_SHARE = 0.25  # share of the time that is shown where no signal oscillates
-
-_ROW = 0.165  # height of a signal, or of a foot, in inches
-_ROWS = (4, 20)  # fewest and most rows of the heights of signals, and of feet
-_SPEED_ROWS = 5  # height of the speed, in rows
-_NAMED = 14  # largest number of feet, or of signals, all of which are named
+_LAST_SHARE = 0.25  # share of the time that is shown if no signal oscillates
+_ROW = 0.165  # height of a row, in inches; a signal or a foot takes one
+_ROWS = (4, 20)  # least and greatest height of the panels of signals and of stance, in rows
+_SPEED_ROWS = 5  # height of the panel of speed, in rows
+_NAMED = 14  # largest number of feet, or of signals, for which each has its name
 
 _BETWEEN_BODIES = 0.5  # gap between the feet of two bodies, in heights of a row
 _BAR = 0.78  # height of a stance bar, in heights of a row
@@ -61,9 +60,9 @@ def gait_diagram(
     """Gait diagram of the last three cycles: actuation signals, stance of each foot, and forward
     speed of the centre of mass.
 
-    A bar shows when a foot bears load; the lead is on top. The duty factor is the share of the time
-    in which a foot stands. Dotted lines mark cycles. If no signal has two periods in the second
-    half, the last quarter is shown."""
+    A bar shows when a foot bears load. The front body is on top. The duty factor is the share of
+    time during which a foot bears load. Dotted lines mark cycles. If no signal has two periods in
+    the second half of the simulation, the last quarter is shown."""
     structure, unit = result.robot.structure, units_named(units)
     cycle = measures.last_step(result.trajectory)
     trajectory = shown_part(result.trajectory, time or _last_cycles(result.trajectory, cycle))
@@ -87,7 +86,7 @@ def gait_diagram(
 def _last_cycles(
     trajectory: xarray.Dataset, cycle: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Start and end (s) of the last cycles, or of the last part where no signal oscillates."""
+    """Start and end (s) of the last cycles. Without a cycle, of the last quarter."""
     if cycle is None:
         start, end = (float(trajectory.time[i]) for i in (0, -1))
         return end - _LAST_SHARE * (end - start), end
@@ -96,16 +95,16 @@ def _last_cycles(
 
 
 def _stance(trajectory: xarray.Dataset, structure: Structure) -> xarray.DataArray:
-    """(time, contact): whether a foot bears load. Feet are the bottom nodes of a row, and all nodes
-    that touch the ground."""
+    """True if a foot bears load (time, contact). Feet are the bottom nodes of tetrahedra, and all
+    other nodes that touch the ground."""
     stands = ~measures.off_ground(trajectory)
     are_feet = np.isin(structure.contacts, structure.markers)
     return stands[:, stands.any("time").values | are_feet]
 
 
 def _rows_of_feet(stands: xarray.DataArray) -> dict[str, float]:
-    """Height of each foot in the diagram, in rows: the rear, or the first body, is below, and a
-    left foot above the right one."""
+    """Height of each foot in the diagram, in rows. The first body (the rear) is at the bottom; a
+    left foot is above the right foot."""
     rows: dict[str, float] = {}
     row = 0.5
     bodies = stands.contact_body.values
@@ -123,13 +122,13 @@ def foot_name(node: str) -> str:
 
 
 def _draw_signals(panel: Axes, trajectory: xarray.Dataset, unit: Units) -> None:
-    """Signals one above the other, the last on top as the lead is."""
+    """Draws signals one above the other. The last signal, of the front body, is on top."""
     signals, oscillators = trajectory.signal / unit.force, trajectory.oscillator.values
     largest = float(np.abs(signals.values).max())
     scale = _SWING / largest if largest else 0.0
-    for place, name in enumerate(oscillators):
-        panel.axhline(place, color="0.8", linewidth=0.5)
-        panel.plot(signals.time, place + scale * signals.sel(oscillator=name), **_LINE)
+    for row, name in enumerate(oscillators):
+        panel.axhline(row, color="0.8", linewidth=0.5)
+        panel.plot(signals.time, row + scale * signals.sel(oscillator=name), **_LINE)
     every = 1 + (len(oscillators) - 1) // _NAMED
     panel.set_yticks(range(0, len(oscillators), every), own_words(oscillators)[::every])
     panel.set_ylim(-0.6, len(oscillators) - 0.4)
@@ -138,7 +137,8 @@ def _draw_signals(panel: Axes, trajectory: xarray.Dataset, unit: Units) -> None:
 
 
 def _draw_stance(panel: Axes, stands: xarray.DataArray, rows: Mapping[str, float]) -> None:
-    """Stance bars; names and duty factors of each foot or, of many, names of bodies alone."""
+    """Draws stance bars. Each foot has its name and duty factor; with many feet, only bodies are
+    named."""
     each = len(rows) <= _NAMED
     times = stands.time.values
     by_body: dict[str, list[float]] = {}
@@ -184,7 +184,7 @@ def _draw_speed(panel: Axes, trajectory: xarray.Dataset, structure: Structure, u
 def _mark_cycles(
     panels: Iterable[Axes], times: np.ndarray, cycle: tuple[float, float] | None
 ) -> None:
-    """Lines where cycles begin."""
+    """Draws a line at the begin of each cycle."""
     if cycle is None:
         return
     start, end = cycle

@@ -1,4 +1,4 @@
-"""The figure of a run's map of gaits."""
+"""Figure of the map of gaits of a run."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _DISC: Any = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": 
 
 @figure_function
 def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
-    """The fittest gait in each cell of the map. White: cells without a gait.
+    """Map of gaits: the fittest gait in each cell. White cells have no gait.
 
-    If gaits were simulated on disturbed robots: a cross marks a gait that keeps its distance in
-    less than half of the draws, and the panel beside shows the share of draws in which it does.
-    Numbers: the fittest gait, and those nearest to the corners."""
+    If gaits were simulated on disturbed robots, the second panel shows the share of draws with
+    nearly the undisturbed distance. A cross marks gaits for which this share is below one half.
+    Numbers mark the fittest gait and the gaits nearest to the corners."""
     kind = cast(QualityDiversity, run.scenario.optimizer)
     gaits = elites(run)
     kept = robust(gaits)
@@ -72,7 +72,7 @@ def _draw_cells(
     title: str,
     **look: Any,
 ) -> None:
-    """Colours the cell of each gait by its value."""
+    """Colours the cell of each gait by the value of the gait."""
     grid = np.full([len(edge) - 1 for edge in edges], np.nan)
     across, up = CELLS
     grid[gaits[across], gaits[up]] = values
@@ -83,7 +83,7 @@ def _draw_cells(
 
 
 def _middles(gaits: Any, edges: Sequence[np.ndarray]) -> list[Any]:
-    """The middles of the cells of one gait or a table of gaits, along each axis."""
+    """Centres of the cells of one gait, or of a table of gaits, along each axis."""
     middles = []
     for edge, cell in zip(edges, CELLS, strict=True):
         middles.append((edge[:-1] + edge[1:])[gaits[cell]] / 2.0)

@@ -1,4 +1,4 @@
-"""Figures of a walking robot: distances, time lapses and one step."""
+"""Figures of a walking robot: distances, paths, time lapses and one step."""
 
 from __future__ import annotations
 
@@ -39,14 +39,12 @@ from tetra_drake.scenario.units import INCH
 
 X, Y, Z = range(3)
 
-# Metres of the robot's world.
-_MARGIN = 0.6 * INCH  # free space around a robot
-_PROFILE = 0.05 * INCH  # distance between points of the ground's profile
-
-_PANEL_NAME, _GAP = 0.27, 0.13  # height of the name of a panel, and between panels, in inches
+_MARGIN = 0.6 * INCH  # m; free space around a robot
+_PROFILE = 0.05 * INCH  # m; distance between points of the ground's profile
+_PANEL_NAME, _GAP = 0.27, 0.13  # inches; height of a panel's name, and gap between panels
 _PATHS = 6  # largest number of panels of paths side by side
 _STRAIGHT = 0.05  # a path is straight if it is narrower than this share of its length
-_CLEARANCE = 0.02  # from which on a body is off the ground, as a share of the robot's height
+_CLEARANCE = 0.02  # a body is off the ground above this share of the robot's height
 
 _ON_GROUND, _LIFTED = "0.2", OKABE_ITO["vermillion"]
 _PATH: Any = {"color": OKABE_ITO["blue"], "linewidth": 1.1, "linestyle": "-"}
@@ -68,9 +66,8 @@ def relative_distances(
     time: tuple[float, float] | None = None,
     units: str = "in",
 ) -> Drawn:
-    """Distances along x from the first body to each other, between centres of mass, over time.
-
-    Grey lines: the distances at the start."""
+    """Distance along x of each body from the first body, over time. Distances are between centres
+    of mass. Grey lines: the distances at the start."""
     unit, trajectory = units_named(units), shown_part(result.trajectory, time)
     distances = measures.relative_distances(trajectory) / unit.length
     first, *names = distances.body.values
@@ -96,8 +93,8 @@ def before_and_after(
     time: tuple[float, float] | None = None,
     units: str = "in",
 ) -> Drawn:
-    """Distance walked over time by a run's best gait, and by the best gait of the first iteration
-    of the same trial."""
+    """Distance walked over time, before and after evolution: the best initial gait and the best
+    gait of the best trial."""
     unit = units_named(units)
     page = page_of(figure, height_in=3.8)
     panel = page.subplots()
@@ -123,8 +120,8 @@ def time_lapse(
     units: str = "in",
     instants: int = 6,
 ) -> Drawn:
-    """The robot from above at some instants, to scale, with the distance walked. Forward is to the
-    right. The line is the path of its centre so far, with a dot at each full second."""
+    """Time lapse of the robot from above, to scale, with the distance walked. Forward is to the
+    right. The line is the path of the centre so far, with a dot at each full second."""
     structure, unit = result.robot.structure, units_named(units)
     trajectory = shown_part(result.trajectory, time)
     first, last = (float(trajectory.time[i]) for i in (0, -1))
@@ -164,8 +161,8 @@ def path_of_the_centre(
     units: str = "in",
     instants: int = 9,
 ) -> Drawn:
-    """The path of the robot's centre: from above and to scale, with arrows where a row heads; or,
-    if it is straight, its height along x."""
+    """Path of the robot's centre from above, to scale. Arrows show the heading. If the path is
+    straight, its height along x is shown instead."""
     structure, unit = result.robot.structure, units_named(units)
     trajectory = shown_part(result.trajectory, time)
     path = measures.path_of_centre(trajectory, structure)
@@ -193,7 +190,7 @@ def path_of_the_centre(
 
 
 def _draw_height(page: Page, points: np.ndarray, robot: Robot, unit: Units) -> Page:
-    """Heights of a path (samples, 3) along x, and of uneven ground below it."""
+    """Draws the height of a path (samples, 3) along x, and uneven ground below it."""
     panel = page.subplots()
     panel.plot(points[:, X], points[:, Z], **_PATH)
     if not robot.ground.flat:
@@ -214,12 +211,11 @@ def one_step(
     units: str = "in",
     instants: int = 6,
 ) -> Drawn:
-    """One step to scale, from above and, below that, from the side; bodies off the ground stand
-    out.
+    """One step to scale, from above and from the side. Bodies off the ground are red.
 
-    A body is off the ground if its feet are above it by 2 % of the robot's height. Below: the path
-    of one bottom node per body, or of the centre. If no signal has two periods in the second half,
-    the last quarter is shown."""
+    A body is off the ground if all its feet are higher than 2 % of the robot's height. The lower
+    panels show the path of one bottom node per body, or of the centre. If no signal has two periods
+    in the second half of the simulation, the last quarter is shown."""
     robot, unit = result.robot, units_named(units)
     structure = robot.structure
     ends, title = _shown_step(result, time)
@@ -228,7 +224,7 @@ def one_step(
     grounds = [_profile(step.p_WN.values, sample, robot) / unit.length for sample in samples]
     heights = np.concatenate([nodes[..., Z].ravel(), *(ground[:, Z] for ground in grounds)])
     wide, above, side = (_range(v, unit) for v in (nodes[..., X], nodes[..., Y], heights))
-    shifts = {Y: 0.0, Z: above[0] - side[1]}  # of the views up the page: the second is below
+    shifts = {Y: 0.0, Z: above[0] - side[1]}  # of each view along the page
     high = side[0] + shifts[Z], above[1]
     columns, height = _fit(instants, wide, high, figure, height_in=3.6)
     names = structure.bodies if structure.markers.size else (structure.followed,)
@@ -253,7 +249,7 @@ def one_step(
         _name_ends(panels[0], nodes[samples[0]], structure)
     else:
         lifted = np.all(lifted, axis=1, keepdims=True)
-    _draw_paths(lower, names, paths[:, ::2], lifted, robot, unit)  # of the left nodes
+    _draw_paths(lower, names, paths[:, ::2], lifted, robot, unit)  # every second node is a left one
     looks = {
         f"over {least / unit.length:.1g} {unit.length_name} off the ground": {"color": _LIFTED},
         "on the ground": {"color": _ON_GROUND},
@@ -267,7 +263,7 @@ def one_step(
 def _shown_step(
     result: SimulationResult, time: tuple[float, float] | None
 ) -> tuple[tuple[float, float], str]:
-    """Start and end (s) of the time shown, and what it is."""
+    """Start and end (s) of the time to show, and its title."""
     ends = time or measures.last_step(result.trajectory)
     if ends is not None:
         return ends, "One step"
@@ -276,7 +272,8 @@ def _shown_step(
 
 
 def _clear_of_ground(trajectory: xarray.Dataset, robot: Robot) -> tuple[np.ndarray, float]:
-    """(samples, bodies): whether all feet of a body are well above the ground; and how far (m)."""
+    """True if all feet of a body are off the ground (samples, bodies), and the least height (m)
+    that counts as off the ground."""
     structure = robot.structure
     start, contacts = node_positions(structure, structure.initial_state), structure.contacts
     feet, least = trajectory.p_WN.values[:, contacts], _CLEARANCE * float(np.ptp(start[:, Z]))
@@ -286,8 +283,10 @@ def _clear_of_ground(trajectory: xarray.Dataset, robot: Robot) -> tuple[np.ndarr
 
 
 def _profile(nodes: np.ndarray, sample: int, robot: Robot) -> np.ndarray:
-    """Points (points, 3) of the ground along x wherever nodes (samples, nodes, 3) are, at their
-    mean y in a sample; in m."""
+    """Profile of the ground along x, as points (points, 3) in m.
+
+    It spans the range of all nodes (samples, nodes, 3); y is their mean in one sample.
+    """
     x = np.arange(nodes[..., X].min() - _MARGIN, nodes[..., X].max() + _MARGIN, _PROFILE)
     y = np.full_like(x, nodes[sample, ..., Y].mean())
     return np.column_stack([x, y, ground_heights(np.column_stack([x, y]), robot.ground)])
@@ -301,7 +300,8 @@ def _draw_paths(
     robot: Robot,
     unit: Units,
 ) -> None:
-    """Paths (samples, names, 3), enlarged, and where they are `lifted` (samples, names)."""
+    """Draws paths (samples, names, 3) enlarged; parts that are `lifted` (samples, names) are
+    red."""
     columns, x_label = min(len(names), _PATHS), f"forward ({unit.length_name})"
     panels = panels_in_columns(page, len(names), columns, x_label=x_label, sharex=True, sharey=True)
     for i, (name, panel) in enumerate(zip(names, panels, strict=True)):
@@ -315,26 +315,26 @@ def _draw_paths(
         panel.plot(x, np.where(lifted[:, i], z, np.nan), color=_LIFTED, linewidth=1.6)
         panel.plot(x[0], z[0], "o", color="black")
         panel.margins(0.08)
-        least = _MARGIN / 6 / unit.length  # even if nothing moves
+        least = _MARGIN / 6 / unit.length  # a range even for a node that does not move
         panel.update_datalim([(-least, z.min()), (least, z.min() + least)])
         name_panel(panel, name)
     panels[0].set_ylabel(f"height ({unit.length_name})")
 
 
 def _distance_walked(result: SimulationResult, unit: Units) -> xarray.DataArray:
-    """(time,): distance walked since the start of the simulation."""
+    """Distance walked since the start of the simulation (time,)."""
     trajectory = result.trajectory
     walked = measures.distance_walked(trajectory, result.robot.structure) / unit.length
     return xarray.DataArray(walked, dims="time", coords={"time": trajectory.time})
 
 
 def _nearest(trajectory: xarray.Dataset, times: np.ndarray) -> np.ndarray:
-    """Indices of the samples nearest to times in s."""
+    """Indices of the samples nearest to the given times (s)."""
     return np.abs(trajectory.time.values - times[:, np.newaxis]).argmin(axis=1)
 
 
 def _range(values: np.ndarray, unit: Units) -> tuple[float, float]:
-    """Range of coordinates, with a margin."""
+    """Range of coordinates with a margin."""
     margin = _MARGIN / unit.length
     return float(values.min()) - margin, float(values.max()) + margin
 
@@ -347,23 +347,26 @@ def _fit(
     *,
     height_in: float,
 ) -> tuple[int, float]:
-    """Number of columns in which `count` pictures of these ranges are largest, in the caller's
-    figure or a page of this height; and the height (in) of all rows as wide as the page."""
-    room = (WIDTH_IN, height_in)
+    """Number of columns for which `count` pictures are largest, and the height (in) of all rows.
+
+    `wide` and `high` are the ranges that a picture shows. The pictures fill the caller's figure, or
+    a page of the height `height_in`.
+    """
+    page_width, page_height = WIDTH_IN, height_in
     if figure is not None:
-        room = (figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi)
+        page_width, page_height = figure.bbox.size / figure.dpi
     ratio = (high[1] - high[0]) / (wide[1] - wide[0])
 
     def width(columns: int) -> float:
-        return min(room[0] / columns, room[1] / math.ceil(count / columns) / ratio)
+        return min(page_width / columns, page_height / math.ceil(count / columns) / ratio)
 
     columns = max(range(1, count + 1), key=width)
-    row = (room[0] / columns - _GAP) * ratio + _PANEL_NAME
+    row = (page_width / columns - _GAP) * ratio + _PANEL_NAME
     return columns, row * math.ceil(count / columns)
 
 
 def _to_scale(panel: Axes, wide: tuple[float, float], high: tuple[float, float]) -> None:
-    """Shows ranges of x and up the page to one scale, without numbers on the y axis."""
+    """Sets the ranges of both axes, with the same scale and without numbers on the y axis."""
     panel.set(xlim=wide, ylim=high, aspect="equal", yticks=[])
     panel.tick_params(axis="y", length=0.0)
     panel.grid(visible=False, axis="y")
@@ -373,7 +376,7 @@ def _to_scale(panel: Axes, wide: tuple[float, float], high: tuple[float, float])
 def _draw_struts(
     panel: Axes, points: np.ndarray, structure: Structure, colours: Sequence[str]
 ) -> None:
-    """The struts between points (nodes, 2), in a colour for each body."""
+    """Draws the struts between points (nodes, 2); each body has its colour."""
     bodies = structure.carriers[structure.struts[:, 0]]
     lines = LineCollection(
         list(points[structure.struts]), colors=[colours[body] for body in bodies], linewidths=1.2
@@ -382,7 +385,8 @@ def _draw_struts(
 
 
 def _name_ends(panel: Axes, nodes: np.ndarray, structure: Structure) -> None:
-    """Names the first and the last body in the middle of its nodes (nodes, 3), from above."""
+    """Writes the names of the first and the last body at the centres of their nodes, as seen from
+    above. `nodes` (nodes, 3) are the positions of all nodes."""
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
     for body in (0, len(structure.bodies) - 1):
         x, y, _ = nodes[structure.carriers == body].mean(axis=0)

@@ -1,4 +1,4 @@
-"""The robustness of gaits as a figure and files."""
+"""Figure and files of the robustness of gaits."""
 
 from __future__ import annotations
 
@@ -59,8 +59,11 @@ _ROW = 0.22  # height of a row, in inches
 
 
 def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
-    """Writes draws.csv and alone.csv (all simulations, SI), summary.json and the figure to the
-    folder; returns the names. Raises InputError if a file cannot be written."""
+    """Writes draws.csv and alone.csv (all simulations, SI), summary.json and the figure to a
+    folder.
+
+    Returns the names of the files. Raises InputError if a file cannot be written.
+    """
     tables = {
         "draws": judgement.compared(judgement.draws),
         "alone": judgement.compared(judgement.alone),
@@ -71,13 +74,15 @@ def save_judgement(judgement: Judgement, folder: Path) -> list[str]:
 
 @figure_function
 def robustness(judgement: Judgement, *, figure: Page | None = None, units: str = "in") -> Drawn:
-    """Robustness of gaits. Above: distance in each disturbed draw over undisturbed distance, by
-    gait, those that keep most draws on top. Boxes are quartiles, whiskers 5 to 95 %. A gait keeps a
-    draw right of the dashed line; the share that it keeps is at the right.
+    """Robustness of gaits on disturbed robots.
 
-    Below, what hurts: the median change of distance by one change alone, with a line to the
-    greatest loss; and the size of the rank correlation of each change with distance if all act
-    together. A correlation in the grey may be chance."""
+    Above: the distance in each draw divided by the undisturbed distance. Boxes are quartiles,
+    whiskers 5 to 95 %. A gait keeps the draws to the right of the dashed line. Their share is at
+    the right; the gait with the largest share is on top.
+
+    Below left: one change alone. Bars are the median change of distance, lines the greatest loss.
+    Below right: all changes together. Bars are the rank correlation of each change with the
+    distance, without sign. A bar that ends in the grey may be chance."""
     unit = units_named(units)
     gaits = by_gait(judgement).sort_values("kept", kind="stable")
     changes, count = by_change(judgement).iloc[::-1], judgement.draws["draw"].nunique()
@@ -96,18 +101,18 @@ def robustness(judgement: Judgement, *, figure: Page | None = None, units: str =
 
 def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -> None:
     draws = judgement.compared(judgement.draws).dropna(subset=["distance", "undisturbed"])
-    for place, gait in enumerate(gaits.index):
-        walks = draws[draws["gait"] == gait]
-        shares = walks["distance"] / walks["undisturbed"]
-        # The golden ratio spreads any number of dots evenly.
-        heights = place + 0.6 * (walks["draw"] * 0.618034 % 1.0 - 0.5)
+    for row, gait in enumerate(gaits.index):
+        simulated = draws[draws["gait"] == gait]
+        shares = simulated["distance"] / simulated["undisturbed"]
+        # Multiples of the golden ratio spread any number of dots evenly.
+        heights = row + 0.6 * (simulated["draw"] * 0.618034 % 1.0 - 0.5)
         axes.plot(shares, heights, **_DOTS)
-        axes.boxplot(shares, positions=[place], **_BOX)
+        axes.boxplot(shares, positions=[row], **_BOX)
     axes.axvline(1.0 - LOSS, **REFERENCE)
     axes.axvline(1.0, color="black", linewidth=0.8)
-    for place, kept in enumerate(gaits["kept"]):
-        write_beside(axes, place, f"{fixed(100.0 * kept, 0)} %")
-    margin = max(0.7, 2.5 - len(gaits) / 2)  # else the box of a single gait fills the axes
+    for row, kept in enumerate(gaits["kept"]):
+        write_beside(axes, row, f"{fixed(100.0 * kept, 0)} %")
+    margin = max(0.7, 2.5 - len(gaits) / 2)  # a single gait has a thin box, too
     axes.set(
         xlabel="distance / undisturbed distance",
         yticks=range(len(gaits)),
@@ -121,9 +126,9 @@ def _draw_distances(axes: Axes, judgement: Judgement, gaits: pandas.DataFrame) -
 
 
 def _draw_alone(axes: Axes, changes: pandas.DataFrame, unit: Units) -> None:
-    places, worst = range(len(changes)), changes["worst"].clip(upper=0.0).abs() / unit.length
-    axes.hlines(places, 0.0, worst, **_GREATEST)
-    axes.barh(places, changes["median"] / unit.length, height=0.6, color=OKABE_ITO["orange"])
+    rows, worst = range(len(changes)), changes["worst"].clip(upper=0.0).abs() / unit.length
+    axes.hlines(rows, 0.0, worst, **_GREATEST)
+    axes.barh(rows, changes["median"] / unit.length, height=0.6, color=OKABE_ITO["orange"])
     axes.set_xlabel(f"change of distance ({unit.length_name})")
     name_panel(axes, "one change alone")
     _finish(axes, list(changes.index))

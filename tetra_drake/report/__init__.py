@@ -1,1 +1,1 @@
-"""Pages: the report of a run, and replays of results, gaits and runs."""
+"""Pages and texts: reports of runs, replays, tables for the terminal."""

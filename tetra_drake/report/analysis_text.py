@@ -1,4 +1,4 @@
-"""Texts that `robustness` and `compare` print: tables of an analysis, distances in inches."""
+"""Texts of the commands `robustness` and `compare`: tables with distances in inches."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tetra_drake.scenario.units import INCH, shown
 if TYPE_CHECKING:
     import pandas
 
-_LONGEST_NAME = 12  # largest number of letters of a gait's name; longer ones are cut
+_LONGEST_NAME = 12  # letters; a longer name of a gait is cut
 
 
 def robustness_text(judgement: Judgement) -> str:
@@ -65,7 +65,7 @@ def _changes_table(changes: pandas.DataFrame) -> Table:
 
 
 def comparison_text(compared: Compared) -> str:
-    """Tables of the fitness and the distances that runs reach, side by side."""
+    """Tables of the fitnesses and distances of compared runs."""
     distances = "Distance in inches of the best gait of each trial, also as interquartile mean."
     if compared.reach is not None:
         distances += (

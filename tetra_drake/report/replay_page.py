@@ -1,4 +1,4 @@
-"""The replay page of a result folder, a gait file or a run."""
+"""Replay page of a result folder, a gait file or a run."""
 
 from __future__ import annotations
 
@@ -23,11 +23,17 @@ def write_replay(
     viewer: Path | None = None,
     warn: Callable[[str], None] = lambda text: None,
 ) -> str:
-    """Writes the replay page of a result folder, a gait file or a run; returns the page's title.
+    """Writes the replay page of a result folder, a gait file or a run. Returns the page's title.
 
-    With `viewer`, a file, the page shares Meshcat's script with others (see save_replay); `warn`:
-    see load_source().
-    Raises InputError, before anything is simulated, if the files cannot be written.
+    Args:
+        source: the result folder, gait file or folder of a run.
+        out: the page to write.
+        scenario: the scenario for a gait file.
+        viewer: file with Meshcat's script, shared with other pages; see save_replay().
+        warn: see load_source().
+
+    Raises:
+        InputError: if a file cannot be written; nothing is simulated then.
     """
     for file in (out,) if viewer is None else (out, viewer):
         check_file(file)
@@ -39,11 +45,12 @@ def write_replay(
 def load_or_simulate(
     source: Path, *, scenario: str | None = None, warn: Callable[[str], None] = lambda text: None
 ) -> SimulationResult:
-    """The motion in a result folder, or of a gait file or a run's fittest gait, simulated.
+    """The result of a result folder; or simulates a gait file, or the fittest gait of a run.
 
-    `scenario` is for gait files only, as folders have scenarios; `warn`: see load_source().
-    Raises InputError if there is no motion, or if a scenario is given for a folder, and
-    SimulationFailure.
+    `scenario` is for gait files only: folders have their own. For `warn`, see load_source().
+
+    Raises InputError if the source cannot be used, or if a folder is given a scenario. Raises
+    SimulationFailure if the simulation fails.
     """
     if os.path.isdir(source) and scenario is not None:
         raise InputError("--scenario", "", f"is for gait files; {source} has one of its own")

@@ -1,9 +1,9 @@
-"""The folder of one simulation: written by `simulate`, read by `replay` and `figures`.
+"""Result folder of one simulation: written by `simulate`, read by `replay` and `figures`.
 
-scenario.yaml     the scenario in full, for `--scenario`; its height file, if any, beside it
-trajectory.nc     motion and forces over time, for xarray
-replay.html       a page that plays the motion
-result.json       the numbers, the gait, and the path of the centre
+scenario.yaml     the scenario with all settings; a file for `--scenario`; a height file is beside it
+trajectory.nc     motion and forces over time; a file for xarray
+replay.html       page that plays the motion
+result.json       metrics, gait, and path of the centre
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ def check_result_folder(folder: Path) -> None:
 
 
 def save_result_folder(folder: Path, result: SimulationResult) -> None:
-    """Writes the files of a simulation that recorded its trajectory; raises InputError if it did
-    not, or if the folder cannot be written to."""
+    """Writes the files of a simulation. Raises InputError if it has no trajectory, or if the folder
+    cannot be written to."""
     from tetra_drake.results.trajectory import save_dataset
 
     trajectory = result.trajectory
-    # Written last and removed first: where there is a result.json, the other files belong to it.
+    # result.json is removed first and written last: if it is there, the other files belong to it.
     if (folder / RESULT).is_file():
         (folder / RESULT).unlink()
     save_scenario(folder, result.scenario)
@@ -61,12 +61,12 @@ def save_result_folder(folder: Path, result: SimulationResult) -> None:
 
 
 def load_result(folder: str | Path) -> SimulationResult:
-    """Reads the folder of a simulation back, with its scenario, gait and trajectory.
+    """Reads a result folder of `simulate`: the result with scenario, gait and trajectory.
 
         >>> result = td.load_result("out")
         >>> signals = result.trajectory.signal.sel(oscillator="T1-T2")
 
-    Raises InputError, naming the file, if one is missing, damaged, or not of this scenario.
+    Raises InputError, naming the file, if a file is missing, damaged, or of another scenario.
     """
     folder = given_path(folder, "load_result", "folder")
     for name in (RESULT, SCENARIO, TRAJECTORY):
@@ -121,7 +121,7 @@ class _Path(Section):
 
 
 class _ResultFile(Section):
-    """What is read of result.json."""
+    """The keys of result.json that load_result() reads."""
 
     name: str
     metrics: dict[str, Any]
@@ -136,7 +136,7 @@ class _ResultFile(Section):
 
 
 def _read_result_file(path: Path) -> _ResultFile:
-    """The content of result.json; InputError if something is missing."""
+    """Reads result.json. Raises InputError if a key is missing."""
     content = read_json(path, "result")
     if isinstance(content, dict):
         content = {name: content[name] for name in _ResultFile.model_fields if name in content}
@@ -153,27 +153,27 @@ def _read_result_file(path: Path) -> _ResultFile:
 
 
 def _number(value: float | None) -> float:
-    """NaN for a number that JSON cannot hold."""
+    """A number of a JSON file; NaN for null."""
     return math.nan if value is None else value
 
 
 def _load_trajectory(path: Path, structure: Structure) -> xarray.Dataset:
-    """The trajectory in a file; InputError unless it holds the motion of this robot."""
+    """Reads a trajectory. Raises InputError if it is not a motion of this robot."""
     import xarray
 
     try:
         trajectory = xarray.load_dataset(path, engine="h5netcdf")
-    except Exception as error:  # what HDF5 raises for damaged files has no common ancestor
+    except Exception as error:  # errors of HDF5 for damaged files have no common class
         raise InputError(path, "", f"cannot be read as netCDF: {error}") from error
     for name, (_, expected) in labels(structure).items():
         if name not in trajectory.coords or trajectory[name].values.tolist() != expected:
-            raise InputError(path, name, f"is not that of the robot in {SCENARIO}")
+            raise InputError(path, name, f"differs from the robot in {SCENARIO}")
     for name, dimensions in {"time": ("time",), **DIMENSIONS}.items():
         if name not in trajectory or trajectory[name].dims != dimensions:
             raise InputError(path, name, f"is missing, or not over {', '.join(dimensions)}")
         values = trajectory[name].values
         if values.dtype.kind not in "iuf" or not np.isfinite(values).all():
-            raise InputError(path, name, "holds what is no finite number")
+            raise InputError(path, name, "has values that are not finite numbers")
     times = trajectory["time"].values
     if len(times) < 2 or not (np.diff(times) > 0.0).all():
         raise InputError(path, "time", "has fewer than two samples, or does not ascend")

@@ -1,6 +1,6 @@
-"""A run's best gaits simulated again, and the figures of a run and of one simulation.
+"""Figures of a run and of one simulation. For a run, its best gaits are simulated again.
 
-A figure's files are named after the function that draws it, whose docstring is its caption.
+A figure has the name of the function that draws it. The function's docstring is the caption.
 """
 
 from __future__ import annotations
@@ -24,37 +24,37 @@ from tetra_drake.results.result import SimulationResult
 
 @dataclass(frozen=True)
 class RecordedGait:
-    """A gait of a run, as recorded and simulated again.
+    """A gait of a run: its record, and a new simulation.
 
-    The two differ where other versions recorded it, or among disturbances, which are not simulated
-    again.
+    The numbers may differ if other versions recorded the gait. They differ for a run with
+    disturbances, because the new simulation has none.
     """
 
     recorded: pandas.Series
     """Row of the run's evaluations."""
     result: SimulationResult
-    """As simulated again, with its trajectory."""
+    """Result of the new simulation, with trajectory."""
 
     @property
     def label(self) -> str:
-        """Trial and number of the evaluation."""
+        """Trial and evaluation of the gait, as text."""
         return gait_label(self.recorded)
 
     @property
     def distance_in(self) -> float:
-        """Distance (in) as simulated again."""
+        """Distance (in) in the new simulation."""
         return self.result.metrics.distance_in
 
 
 @dataclass(frozen=True)
 class ShownGaits:
-    """A run with the gaits that its report shows."""
+    """A run and the two gaits that its report shows."""
 
     run: Run
     best: RecordedGait
     """Fittest gait of the run."""
     initial: RecordedGait
-    """Fittest gait of its trial's first iteration in which not all failed."""
+    """Fittest initial gait of the same trial; see Run.initial_best()."""
 
     @property
     def trial(self) -> int:
@@ -63,10 +63,10 @@ class ShownGaits:
 
 
 def simulate_shown_gaits(run: Run) -> ShownGaits:
-    """Simulates the fittest gait of the best trial, initially and of all.
+    """Simulates the fittest gait of a run and the fittest initial gait of the same trial.
 
-    Raises InputError if no gait of the run has a fitness, and SimulationFailure if other versions
-    than the run's make such a gait fail.
+    Raises InputError if no gait of the run has a fitness. Raises SimulationFailure if a simulation
+    fails; this can happen with versions other than the run's.
     """
     fittest = run.fittest()
     first = run.initial_best(fittest["trial"])
@@ -76,13 +76,13 @@ def simulate_shown_gaits(run: Run) -> ShownGaits:
 
 
 def simulate_again(run: Run, recorded: pandas.Series) -> RecordedGait:
-    """A gait of a run, one of `Run.evaluations`, simulated again. Raises SimulationFailure."""
+    """Simulates a gait of a run (a row of `Run.evaluations`) again. May raise SimulationFailure."""
     gait = run.gait(recorded["trial"], recorded["index"])
     return RecordedGait(recorded, simulate(run.scenario, gait, record=True))
 
 
 def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:
-    """Writes the figures of one simulation; returns their captions by name of file, no suffix.
+    """Writes the figures of one simulation. Returns captions by name of figure.
 
     Raises InputError if the folder cannot be written to.
     """
@@ -100,7 +100,7 @@ def draw_trajectory(result: SimulationResult, folder: Path) -> dict[str, str]:
 
 
 def draw_run(shown: ShownGaits, folder: Path) -> dict[str, str]:
-    """Writes the figures of a run and of its best gait; returns captions as draw_trajectory()."""
+    """Writes the figures of a run and of its best gait. Returns captions by name of figure."""
     run = shown.run
     pictures: list[tuple[Any, ...]] = [(fitness.fitness_of_trials, run)]
     trials = fitness.initial_extremes(run).index
@@ -116,7 +116,7 @@ def draw_run(shown: ShownGaits, folder: Path) -> dict[str, str]:
 
 
 def _save(folder: Path, *pictures: tuple[Any, ...]) -> dict[str, str]:
-    """Saves figures, each given as the function that draws it and its arguments."""
+    """Draws and saves figures. A picture is a figure function and its arguments."""
     captions = {}
     for draw, *data in pictures:
         save_figure(draw(*data), folder, draw.__name__)

@@ -1,4 +1,4 @@
-"""The report of a run: an HTML page with its numbers and figures, and the files it links to."""
+"""Report of a run: an HTML page with numbers and figures, and the files it links to."""
 
 from __future__ import annotations
 
@@ -46,17 +46,21 @@ _OF_EVOLUTION = (
     "initial_fitness",
     "map_of_gaits",
 )
-"""Figures by the part of the report that shows them; others show motion and forces."""
-
-_LONGEST_SETTING = 60  # largest number of letters of a setting that is shown
+"""Names of the figures in each part of the report; other figures are in the part "forces"."""
+_LONGEST_SETTING = 60  # letters; longer settings are not shown
 _NOT_SHOWN = ("robot.nodes.", "objective.", "require.", "simulation.duration")
 
 
 def write_figures(source: Path, out: Path | None = None) -> list[Path]:
-    """Writes the figures of a run or of a result folder into `out`; returns what was written.
+    """Writes the figures of a run or of a result folder. Returns the paths that were written.
 
-    Without `out`, they go to figures/ in the source, and a run's report and replay are written
-    anew, too. Raises InputError.
+    Args:
+        source: folder of a run, or result folder.
+        out: folder for the figures. By default figures/ in the source; then the report and the
+            replay of a run are written again, too.
+
+    Raises:
+        InputError: if `source` is neither, or `out` cannot be written to.
     """
     folder = out or source / FIGURES
     if os.path.exists(source / MANIFEST):
@@ -74,11 +78,10 @@ def write_figures(source: Path, out: Path | None = None) -> list[Path]:
 
 
 def write_report(directory: Path) -> list[Path]:
-    """Writes figures/, elites/, replay.html and report.html into a run's directory; returns the
-    paths of all but elites/, which a run with a map alone has.
+    """Writes figures/, replay.html and report.html into the folder of a run. Returns their paths.
 
-    Works for an unfinished run, too. Raises InputError if `directory` holds no run, a damaged
-    one, or one without any fitness, or cannot be written to.
+    A run with a map also gets elites/. The run may be unfinished. Raises InputError if there is no
+    run, if it is damaged or has no fitness yet, or if the folder cannot be written to.
     """
     figures, replay, report = (directory / name for name in (FIGURES, REPLAY, REPORT))
     shown = simulate_shown_gaits(load_run(directory))
@@ -90,8 +93,8 @@ def write_report(directory: Path) -> list[Path]:
 
 
 def _write_map(shown: ShownGaits, directory: Path) -> None:
-    """Writes all gaits of the run's map as a table, and the chosen ones as gait files and, but for
-    the run's best, replay pages."""
+    """Writes elites/: a table of all gaits of the map, and a gait file and a replay page for each
+    notable gait. The run's best gait has its replay page already."""
     run = shown.run
     on_map = distinct_gaits(chosen(run))
     if on_map:
@@ -105,14 +108,14 @@ def _write_map(shown: ShownGaits, directory: Path) -> None:
 
 
 def _map_files(names: Sequence[str], row: pandas.Series, shown: ShownGaits) -> tuple[Path, Path]:
-    """Gait file and replay page of a chosen gait of the map in a run's directory."""
+    """Gait file and replay page of a notable gait of the map, relative to the run's folder."""
     path = Path(ELITES) / names[0].replace(", ", "_").replace(" ", "_")
     page = Path(REPLAY) if gait_label(row) == shown.best.label else path.with_suffix(".html")
     return path.with_suffix(".json"), page
 
 
 def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Path) -> str:
-    """The report as HTML, with the pictures in `folder`, whose captions are given by name."""
+    """The report as HTML. The figures are in `folder`; `captions` are by name of figure."""
     run, manifest = shown.run, shown.run.manifest
     scenario = run.scenario
     best_gait = trial_folder(Path(), shown.trial) / BEST_GAIT
@@ -168,7 +171,8 @@ def render_report(shown: ShownGaits, captions: Mapping[str, str], *, folder: Pat
 
 
 def _settings(scenario: Scenario) -> list[tuple[str, str]]:
-    """Settings other than the thesis's; no long lists, nor what the report says elsewhere."""
+    """Settings that differ from the scenario `thesis`, without long lists and without settings that
+    the report shows elsewhere."""
     return [
         (key, value)
         for key, value in scenario.differences(load_scenario("thesis"))
@@ -177,7 +181,7 @@ def _settings(scenario: Scenario) -> list[tuple[str, str]]:
 
 
 def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str]) -> str:
-    """Weights or limits of metrics as text; `unit_of` makes their unit from the metric's."""
+    """Weights or limits of metrics as text. `unit_of` gives their unit from the metric's unit."""
     terms = [f"{name}: {shown(x, unit_of(METRICS[name]))}" for name, x in weights.items()]
     return ", ".join(terms)
 
@@ -187,7 +191,7 @@ def _metrics(gaits: Sequence[tuple[Sequence[str], pandas.Series]], scenario: Sce
 
 
 def _parameters(gait: Gait) -> str:
-    """The parameters of a gait beside its weights, in a line."""
+    """The parameters of a gait except its weights, as text."""
     texts = [f"Time constants τ_A {rounded(gait.tau_a)} s", f"τ_B {rounded(gait.tau_b)} s"]
     if gait.turn:
         texts.append(f"turn {rounded(gait.turn)}")
@@ -197,20 +201,20 @@ def _parameters(gait: Gait) -> str:
 
 @dataclass(frozen=True)
 class WeightMatrix:
-    """The weights between the neurons of one kind, for a heat map."""
+    """The weights between all extensors, or between all flexors, for a heat map."""
 
     kind: str
     rows: list[list[float | None]]
-    """A row for each oscillator, with a weight from each; None where there is no inhibition."""
+    """A row per oscillator with the weights from all oscillators; None where no weight is."""
 
     @property
     def largest(self) -> float:
-        """The largest weight; 1 if all are zero."""
+        """The largest weight; 1 if all weights are zero."""
         return max((weight for row in self.rows for weight in row if weight), default=1.0)
 
 
 def _weight_matrices(gait: Gait) -> list[WeightMatrix]:
-    """The weights of a gait: extensors, flexors. Empty for a single oscillator."""
+    """The weights of a gait as matrices: extensors, flexors. Empty for a single oscillator."""
     weights = dict(zip(gait.weight_names, gait.weights, strict=True))
     count = max((int(name.partition("->")[0]) for name in weights), default=0)
     numbers = range(1, count + 1)
@@ -222,7 +226,7 @@ def _weight_matrices(gait: Gait) -> list[WeightMatrix]:
 
 
 def _pictures(captions: Mapping[str, str], folder: Path) -> dict[str, list[tuple[str, str, str]]]:
-    """Pictures with their files and captions, by the part of the report that shows them."""
+    """The figures of each part of the report: image URL, file and caption."""
     parts: dict[str, list[tuple[str, str, str]]] = {"gait": [], "evolution": [], "forces": []}
     for name, caption in captions.items():
         part = "gait" if name in _OF_THE_GAIT else "forces"
@@ -234,6 +238,6 @@ def _pictures(captions: Mapping[str, str], folder: Path) -> dict[str, list[tuple
 
 
 def _embedded(picture: Path) -> str:
-    """A picture as the URL of an image, so that no two drawings share names within the page."""
+    """An SVG file as the URL of an image. Embedded directly, the ids of two SVGs would clash."""
     svg = " ".join(picture.read_text(encoding="utf-8").split())
     return "data:image/svg+xml," + quote(svg, safe=" /:=,;()!?*+@$")  # base64 is a fifth longer

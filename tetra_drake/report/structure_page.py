@@ -1,4 +1,4 @@
-"""What `structure` prints, and the page that shows a robot at rest."""
+"""Text and page of the command `structure`: a robot in equilibrium."""
 
 from __future__ import annotations
 
@@ -26,19 +26,21 @@ _FREQUENCIES = 5
 """Number of natural frequencies that are printed."""
 
 _SURROUNDINGS = "prism"
-"""The shipped scenario whose ground and friction a structure file gets."""
+"""Shipped scenario with the ground and friction for structure files."""
 
 
 def robot_of_file(name_or_file: str, *, unit: str | None = None) -> Robot:
-    """The robot of a structure file, or a file of NTRT with a `unit` of length, on flat ground with
-    Coulomb friction, for MuJoCo. Raises InputError that names file and key."""
+    """The robot of a structure file on flat ground with Coulomb friction, for MuJoCo.
+
+    A file of NTRT needs a `unit` of length. Raises InputError that names file and key.
+    """
     structure, name = read_structure(name_or_file, unit=unit), Path(name_or_file).stem
     surroundings = load_scenario(_SURROUNDINGS).with_changes({"friction.stiffness": "0 N/m"})
     return Robot.of(surroundings.with_sections(name=name, robot=structure, engine=Mujoco()))
 
 
 def structure_text(study: EquilibriumStudy) -> str:
-    """What a robot is, and how it rests: tables in g, in and lbf."""
+    """Description of a robot and its equilibrium, with tables in g, in and lbf."""
     robot, statics = study.robot, study.statics
     structure = robot.structure
     lowest = ", ".join(f"{frequency:.3g}" for frequency in study.frequencies[:_FREQUENCIES])
@@ -82,7 +84,8 @@ def _range(values: pandas.Series, write: Callable[[float], str] = rounded) -> st
 
 
 def save_structure_page(study: EquilibriumStudy, path: Path) -> None:
-    """Writes a page that shows the robot at rest; raises InputError if that cannot be written."""
+    """Writes a page that shows the robot in equilibrium. Raises InputError if the page cannot be
+    written."""
     robot = study.robot
     loads = study.nodes["load"].to_numpy()[robot.structure.contacts]
     modes = np.zeros((2, len(loads), MODE_COLUMNS))

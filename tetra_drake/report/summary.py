@@ -1,4 +1,4 @@
-"""Texts that `simulate` and `evolve` print: the numbers of a result, and those of a run."""
+"""Texts of the commands `simulate` and `evolve`: the numbers of a result or of a run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas
 
 _SHARES = ("lifted", "actuator_limited", "kept")
-"""Numbers that are shown in percent."""
+"""Names of the numbers that are shown in percent."""
 
 _TITLES = {"worst_distance_in": "distance in the worst draw (in)", "kept": "robust (%)"}
 """Titles of numbers that are no metrics."""
@@ -49,8 +49,10 @@ _NOTHING = 5e-4
 def metrics_table(
     gaits: Mapping[str, Mapping[str, Any] | pandas.Series], scenario: Scenario
 ) -> Table:
-    """Fitness and metrics of gaits, a column for each, given as rows of `Run.evaluations`; the
-    metric that the objective is about stands first. Numbers that are zero for all are left out."""
+    """Table of fitness and metrics, with a column per gait. A gait is a row of `Run.evaluations`.
+
+    The first row is the metric of the objective. Numbers that are zero for all gaits are left out.
+    """
     *_, last = gaits.values()
     first = headline_metric(scenario.objective, last)
     names = dict.fromkeys([first, "fitness", "worst_distance_in", *METRICS, "kept"])
@@ -65,7 +67,7 @@ def metrics_table(
 
 
 def _size_and_title(name: str) -> tuple[float, str]:
-    """Unit in which a number is shown, and its name with this unit."""
+    """Size of the unit for a number, and the title of its row."""
     title = name.replace("_", " ")
     if name in _SHARES:
         return 0.01, _TITLES.get(name, f"{title} (%)")
@@ -74,7 +76,7 @@ def _size_and_title(name: str) -> tuple[float, str]:
 
 
 def result_text(result: SimulationResult) -> str:
-    """The metrics of a simulation, what it missed, and how long it took."""
+    """Text about a simulation: metrics, requirements that are not met, wall time."""
     scenario, metrics = result.scenario, result.metrics
     lines = [result.title, f"scenario {scenario.name}, {ground_text(scenario)}"]
     lines.append(metrics_table({"": {"fitness": result.fitness} | vars(metrics)}, scenario).text())
@@ -88,7 +90,7 @@ def result_text(result: SimulationResult) -> str:
 
 
 def ground_text(scenario: Scenario) -> str:
-    """Terrain and friction in a line.
+    """Terrain and friction in one line.
 
     For example, "incline (slope 5 deg), Coulomb friction (static 0.5, kinetic 0.5)".
     """
@@ -96,7 +98,7 @@ def ground_text(scenario: Scenario) -> str:
 
 
 def run_text(run: Run) -> str:
-    """The lines printed at the end of a run."""
+    """Text about a run, printed at its end."""
     texts = [Table(["", ""], results(run), text_columns=(0, 1)).text().strip("\n")]
     if len(run.statuses) > 1:
         texts.append(trials_table(run).text())
@@ -111,9 +113,9 @@ def run_text(run: Run) -> str:
 
 
 def results(run: Run) -> list[tuple[str, str]]:
-    """The results of a run by their names, with units.
+    """The main results of a run: names and values with units.
 
-    They are of the metric that the run's objective is about. The best gait is the fittest.
+    Values are of the metric of the objective. The best gait is the fittest.
     """
     statuses, best = run.statuses, run.best()
     evaluations = sum(status.evaluations for status in statuses)
@@ -142,8 +144,11 @@ def results(run: Run) -> list[tuple[str, str]]:
 
 
 def trials_table(run: Run) -> Table:
-    """The trials of a run: the metric that its objective is about, of the best gait initially and
-    in the end, and in Drake if that gait was evaluated there, too; evaluations and state."""
+    """Table of the trials of a run: initial and final best gait, evaluations, state.
+
+    The gaits are shown by the metric of the objective. "in Drake" is the final best gait evaluated
+    again on the Drake diagram. Columns without values are left out.
+    """
     size, title = _size_and_title(_about(run))
     best = {row["trial"]: row for _, row in run.best().iterrows()}
     in_drake = run.reevaluations.set_index(["trial", "index"])
@@ -157,14 +162,15 @@ def trials_table(run: Run) -> Table:
         counts = [f"{status.evaluations}", f"{status.failures or ''}"]
         end = "not finished" if status.stop is None else status.stop.replace(ALL_DONE, "")
         rows.append([f"{status.number}", *cells, *counts, end])
-    shown = [place for place, cells in enumerate(zip(*rows, strict=True)) if {*cells} - {"-", ""}]
-    rows = [[row[place] for place in shown] for row in rows]
-    names = [columns[place] for place in shown]
+    shown = [i for i, cells in enumerate(zip(*rows, strict=True)) if {*cells} - {"-", ""}]
+    rows = [[row[i] for i in shown] for row in rows]
+    names = [columns[i] for i in shown]
     return Table(names, rows, text_columns=(0, names.index("end") if "end" in names else 0))
 
 
 def _course(run: Run, best: pandas.Series, in_drake: pandas.DataFrame) -> list[float]:
-    """What trials_table() shows of the best gait of a trial, in SI."""
+    """Metric of the objective for trials_table(), in SI: initial gait, best gait, and best gait
+    evaluated again on the Drake diagram."""
     name, key = _about(run), (best["trial"], best["index"])
     initial = run.initial_best(best["trial"])
     again = in_drake.loc[key, name] if key in in_drake.index else math.nan
@@ -172,16 +178,16 @@ def _course(run: Run, best: pandas.Series, in_drake: pandas.DataFrame) -> list[f
 
 
 def _about(run: Run) -> str:
-    """Metric that the run's objective is about."""
+    """Name of the metric that the objective of a run is about."""
     return headline_metric(run.scenario.objective, run.fittest())
 
 
 def _three(value: float, unit: str) -> str:
-    """A number of an SI unit with three digits, in the unit in which people read it."""
+    """A number given in an SI unit, as text with three digits in the customary unit."""
     size, name = customary(unit)
     return f"{rounded(value / size)} {name}".rstrip()
 
 
 def _time(seconds: float) -> str:
-    """A wall time, as "35 ms"."""
+    """A wall time as text, such as "35 ms"."""
     return f"{1e3 * seconds:.0f} ms" if seconds < 1.0 else f"{rounded(seconds)} s"

@@ -1,1 +1,1 @@
-"""The robot in Meshcat: scene, replay page, live view."""
+"""Meshcat: scene of the robot, replay page, live view."""

@@ -1,4 +1,4 @@
-"""A simulation shown in a browser while it runs."""
+"""Live view: a browser shows a simulation while it runs."""
 
 from __future__ import annotations
 
@@ -27,16 +27,15 @@ if TYPE_CHECKING:
 FRAMES_PER_SECOND = 30.0
 """Frames per second of motion, at most."""
 
-ROOM = 15.0 * INCH
-"""Length of floor shown before and behind the robot, as nobody knows yet where it goes."""
-
-_PATIENCE = 0.1  # s between two looks for a browser
+FREE_FLOOR = 15.0 * INCH
+"""Length of floor in front of the robot and behind it, because its path is not known yet."""
+_POLLING_PERIOD = 0.1  # s, while no browser is connected
 
 
 class LiveView:
-    """Shows a simulation in Meshcat, no faster than real time (see engines.interface.Viewer).
+    """Viewer that shows a simulation in Meshcat, not faster than real time.
 
-    It begins once a browser is there.
+    See engines.interface.Viewer. The simulation waits until a browser is connected.
     """
 
     def __init__(self, meshcat: Meshcat, scenario: Scenario) -> None:
@@ -46,36 +45,36 @@ class LiveView:
         self._due = 0.0
         structure = self._robot.structure
         p_WN = node_positions(structure, structure.initial_state)
-        room = np.array([ROOM, 0.0, 0.0])
-        # The tensions to come are unknown: those at the start are drawn at half of full size.
+        free = np.array([FREE_FLOOR, 0.0, 0.0])
+        # The greatest tension is not known yet. The greatest at the start has half of full size.
         cables = structure.cables
         lengths = np.linalg.norm(p_WN[cables["node_b"]] - p_WN[cables["node_a"]], axis=1)
         stretch = lengths - cables["free_length"]
         self._per_newton = radius_per_newton(structure, 2.0 * (cables["stiffness"] * stretch).max())
         add_robot(meshcat, structure)
-        around = np.stack([p_WN - room, p_WN + room])
+        around = np.stack([p_WN - free, p_WN + free])
         set_surroundings(meshcat, self._robot, around, seen=around)
 
     def wants(self, time: float) -> bool:
-        """True if the frame before is over at this time (s)."""
+        """True if a new frame is due at this time (s) of the simulation."""
         return time >= self._due
 
     def show(self, frame: xarray.Dataset) -> None:
-        """Moves everything to where it is in a trajectory's sample, once its time has come."""
+        """Shows a trajectory's sample. Waits until its time has come in real time."""
         now = float(frame["time"].values[0])
         if self._started is not None:
             time.sleep(max(0.0, self._started + now - time.monotonic()))
         place_robot(self._meshcat, self._robot.structure, frame, per_newton=self._per_newton)
         if self._started is None:
             while self._meshcat.GetNumActiveConnections() == 0:
-                time.sleep(_PATIENCE)
+                time.sleep(_POLLING_PERIOD)
             self._started = time.monotonic() - now
-        self._meshcat.SetSimulationTime(now)  # for the rate it shows
+        self._meshcat.SetSimulationTime(now)  # Meshcat shows the real-time rate
         self._due = (np.floor(now * FRAMES_PER_SECOND) + 1.0) / FRAMES_PER_SECOND
 
 
 def open_view(scenario: Scenario, *, say: Callable[[str], None]) -> LiveView:
-    """A view in a new Meshcat, whose address `say` is told."""
+    """Opens a view in a new Meshcat and passes its address to `say`."""
     meshcat = quiet_meshcat(MeshcatParams(host="localhost"))
     say(f"open {meshcat.web_url()} in a browser, which starts the simulation")
     return LiveView(meshcat, scenario)

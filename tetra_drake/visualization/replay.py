@@ -1,4 +1,4 @@
-"""The replay page: one HTML file that plays a trajectory in any browser, without a server."""
+"""Replay page: one HTML file that plays a trajectory in any browser, without a server."""
 
 from __future__ import annotations
 
@@ -41,23 +41,23 @@ if TYPE_CHECKING:
     import xarray
 
 FRAMES_PER_SECOND = 25.0
-"""Recorded frames per second of motion, at most."""
+"""Largest number of frames per second of motion."""
 
 RESOLUTION = 2.0**-16
-"""Step to which pages round positions and sizes (m) and quaternions; 15 s of the thesis's robot
-then take 0.1 MB, and Meshcat's script 0.9 MB."""
+"""Rounding step of positions and sizes (m) and quaternions. With it, 15 s of the thesis's robot
+take 0.1 MB; Meshcat's script takes 0.9 MB."""
 
 MOST_NAMES = 12
-"""Largest number of bodies whose names are shown, unless they are those of two nodes."""
+"""Largest number of bodies for which names are shown. Names made of two nodes are never shown."""
 
 LONG_ARROW = 0.8
-"""Length of the arrow of a great force, over the robot's height at the start."""
+"""Length of the arrow of a large force (percentile _USUAL), as a share of the robot's height."""
 
 _COMMAND = re.compile(r'fetch\(("data:application/octet-binary;base64,[^"]*")\)(\s*\.then\(.*\))+;')
-"""How Meshcat's page adds a part of the scene: at some time. The film needs them all at once."""
-
+"""Pattern of the asynchronous commands in Meshcat's page that add parts of the scene. The film runs
+them at once, because it needs the whole scene."""
 _USUAL = 99.0
-"""Percentile of tensions and forces that is drawn at full size: impacts are far greater."""
+"""Percentile of tensions and forces that is drawn at full size. Impacts are far larger."""
 
 
 def save_replay(
@@ -68,14 +68,17 @@ def save_replay(
     title: str,
     viewer: str | Path | None = None,
 ) -> None:
-    """Writes the page that replays a robot's trajectory.
+    """Writes a page that replays a trajectory.
 
-    The title is the gait's name, a colon, and what the robot does. Every frame is a sample of the
-    trajectory; the page interpolates between frames. With `viewer`, the page reads Meshcat's
-    script, which is most of it, from that file, so that pages can share it; it is written if it
-    does not exist.
+    Every frame is a sample of the trajectory; the page interpolates between frames.
 
-    Raises InputError if `path` or `viewer` cannot be written, or `viewer` holds anything else.
+    Args:
+        title: name of the gait, a colon, and a short result, such as "walks 14 in".
+        viewer: file for Meshcat's script. Pages can share it, which makes them much smaller. It is
+            written if it does not exist. By default the script is in the page.
+
+    Raises:
+        InputError: if a file cannot be written, or `viewer` has another content.
     """
     meshcat = quiet_meshcat(MeshcatParams(host="localhost", port=0))
     frames = trajectory.isel(time=frame_samples(trajectory["time"].values))
@@ -92,10 +95,10 @@ def save_replay(
 
 
 def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
-    """What film.js plays: objects of the scene, and how they move over samples of a trajectory.
+    """Data for film.js: the objects of the scene and their motion.
 
-    Motions are small when compressed: steps in RESOLUTION from frame to frame, the first one from
-    0, in a row for each number.
+    A motion has one row per number, with the differences from frame to frame in units of
+    RESOLUTION. The first difference is from 0. Such rows compress well.
     """
     structure = robot.structure
     bodies, contacts = structure.bodies, structure.contacts
@@ -140,7 +143,7 @@ def film_of(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
 
 
 def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
-    """Forces (frames, contacts, 3) of the ground on the robot in World, in N."""
+    """Forces (frames, contacts, 3) of the ground on the robot, in the world frame, in N."""
     forces = np.concatenate(
         [frames["friction_force"].values, frames["normal_force"].values[..., np.newaxis]], axis=-1
     )
@@ -153,14 +156,15 @@ def ground_forces(robot: Robot, frames: xarray.Dataset) -> np.ndarray:
 
 
 def round_force(force: float) -> float:
-    """The next larger 1, 2 or 5 times a power of ten in lbf, in N."""
+    """Rounds a force (N) up to 1, 2 or 5 times a power of ten in lbf; the result is in N."""
     pounds = max(force / POUND_FORCE, 1e-6)
     power = 10.0 ** math.floor(math.log10(pounds))
     return next(n for n in (1.0, 2.0, 5.0, 10.0) if n * power >= pounds) * power * POUND_FORCE
 
 
 def _progress(robot: Robot, frames: xarray.Dataset) -> dict[str, Any]:
-    """What the robot has reached in each frame: its distance, or its turn where that counts."""
+    """The robot's distance in each frame. If the objective is about turning, its change of
+    heading."""
     structure, objective = robot.structure, robot.scenario.objective
     turns = "heading_change" in objective and not looks_for_distance(objective)
     if structure.points_ahead and turns:
@@ -178,16 +182,17 @@ def _parts(path: str) -> list[str]:
 
 
 def _steps(values: np.ndarray) -> list[list[int]]:
-    """Steps in RESOLUTION of values (frames, ...), a row for each number of a frame."""
+    """Differences between frames of values (frames, ...), in units of RESOLUTION; a row per
+    number of a frame."""
     rows = np.rint(values.reshape(len(values), -1).T / RESOLUTION).astype(int)
     steps: list[list[int]] = np.diff(rows, prepend=0).tolist()
     return steps
 
 
 def frame_samples(times: np.ndarray) -> np.ndarray:
-    """Indices of the samples to show, the first and the last included.
+    """Indices of the samples to show, including the first and the last.
 
-    `times` (samples,) in s, evenly spaced.
+    `times` (samples,) are in s and evenly spaced.
     """
     frames = min(int((times[-1] - times[0]) * FRAMES_PER_SECOND + 1e-9) + 1, len(times))
     samples = np.linspace(0, len(times) - 1, max(frames, min(len(times), 2)))
@@ -195,7 +200,7 @@ def frame_samples(times: np.ndarray) -> np.ndarray:
 
 
 def quiet_meshcat(params: MeshcatParams) -> Meshcat:
-    """A Meshcat that does not announce its server in Drake's log."""
+    """A Meshcat that does not log the address of its server."""
     logger = logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.WARNING)
@@ -206,13 +211,13 @@ def quiet_meshcat(params: MeshcatParams) -> Meshcat:
 
 
 def pack_page(page: str, *, title: str) -> str:
-    """A page that holds `page` compressed and unpacks it in the browser; `title` is plain text."""
+    """A compressed page that unpacks itself in the browser. `title` is plain text."""
     packed = base64.b64encode(gzip.compress(page.encode("utf-8"), mtime=0)).decode("ascii")
     return render("visualization/packed_page.html.jinja", title=title, packed=packed)
 
 
 def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
-    """Meshcat's page that plays a film, with heading and legend over the scene and a bar below."""
+    """Adds the film, a heading, a legend and a control bar to Meshcat's page."""
     name, _, deed = title.rpartition(": ")
     overlay = render(
         "visualization/overlay.html.jinja",
@@ -222,24 +227,24 @@ def _with_overlay(page: str, title: str, film: Mapping[str, Any]) -> str:
         script=render("visualization/film.js"),
     )
     page = _COMMAND.sub(r"handle(\1);", page)
-    # Functions, as backslashes in a replacement text would mean something.
+    # The replacements are functions, because backslashes in a text would be interpreted.
     named = f"<title>{html.escape(title)}</title>"
     page = re.sub(r"<title>.*?</title>", lambda _: named, page, count=1)
     return re.sub(r"<body[^>]*>", lambda tag: tag[0] + overlay, page, count=1)
 
 
 def _without_viewer(page: str, *, address: str) -> tuple[str, str]:
-    """Meshcat's page with its script read from an address, and that script."""
+    """Splits Meshcat's page into a page that reads the script from `address`, and the script."""
     before, script, after = re.split(r"<script[^>]*>(.+?)</script>", page, maxsplit=1, flags=re.S)
     reader = render("visualization/viewer.html.jinja", address=address)
-    # Before the body, of which nothing is to be seen if the viewer is missing.
+    # The reader is before the body, so that nothing of the body is shown if the file is missing.
     return (before + after).replace("</head>", f"{reader}</head>", 1), script
 
 
 def _write_once(path: Path, text: str) -> None:
-    """Writes a file unless it holds the text already; raises InputError if it holds another."""
+    """Writes a file that does not exist yet. Raises InputError if it exists with another text."""
     if not path.exists():
         write_whole(path, text)
     elif not path.is_file() or path.read_bytes() != text.encode("utf-8"):
-        problem = "is not the viewer of this version of Drake, expected that or no file yet"
+        problem = "is not the viewer of this version of Drake; delete it or name another file"
         raise InputError(path, "", problem)

@@ -1,4 +1,4 @@
-"""The robot as a Meshcat scene: what is drawn, how it moves, floor, light and camera."""
+"""Meshcat scene of the robot: bodies, cables, floor, light and camera."""
 
 from __future__ import annotations
 
@@ -38,41 +38,38 @@ COLOURS = {
     "six_inches": "#8b929b",
     "sky": "#eef2f6",
 }
-"""Colours of what is drawn. Bodies go from `rear` to `lead`, uneven ground from `low` to `high`;
-a node on the ground has the colour `stance`."""
-
+"""Colours of the scene. Bodies range from `rear` to `lead`, uneven ground from `low` to `high`. A
+node on the ground has the colour `stance`."""
 SLENDERNESS = 60.0
-"""Longest strut over the least drawn radius of struts: thinner ones could hardly be seen."""
-
+"""Length of the longest strut divided by the least drawn radius. Thinner struts are hard to see."""
 THICKEST, THINNEST = 0.7, 0.15
-"""Drawn radius of the cable with the highest tension, and the least one, in radii of a strut."""
-
+"""Drawn radius of the cable with the highest tension, and least drawn radius of a cable, in radii
+of a strut."""
 MARGIN, UNEVEN_MARGIN = 4.5, 1.5
-"""Floor around the robot's way, in halves of its length. Uneven ground takes much of a page."""
-
+"""Margin of floor around the robot's path, in halves of the robot's length. Uneven ground has the
+smaller one, because it needs much space in a page."""
 MOST_POINTS = 5_000
-"""Largest number of points of uneven ground, about."""
+"""Approximate largest number of points of uneven ground."""
 
 _FINEST = 12  # points per inch of uneven ground, at most
-_BEND = 1e-6  # m: a second difference of heights below which the ground is straight
-_WALL = 0.5 * INCH  # height of the lowest wall around uneven ground
-_GAMMA = 2.2  # browsers take the colours of vertices as linear, others as sRGB
+_BEND = 1e-6  # m; the ground is straight if second differences of heights are smaller
+_WALL = 0.5 * INCH  # least height of the walls around uneven ground
+_GAMMA = 2.2  # in browsers, colours of vertices are linear; all other colours are sRGB
 
 FIELD_OF_VIEW, ASPECT = 30.0, 1.7
-"""Camera's degrees from top to bottom, and width over height of the window it is placed for."""
+"""Vertical field of view of the camera in degrees, and assumed width / height of the window."""
 
 VIEW = -0.45, 1.0, -0.45
 """Direction in which the camera looks: from the robot's right and front, down on it."""
 
 AMBIENT, SUN = 1.6, 3.2
-"""Intensities of the light from everywhere, and of the one that casts shadows."""
-
+"""Intensities of the ambient light and of the light that casts shadows."""
 TO_SUN = np.array([0.25, 0.35, 1.0])
-"""Direction in which the light comes from."""
+"""Direction to the light that casts shadows."""
 
 
 def add_robot(meshcat: Meshcat, structure: Structure) -> None:
-    """Adds the objects that place_robot() moves: bodies with struts and nodes, and cables."""
+    """Adds bodies (struts and nodes) and cables to the scene. place_robot() moves them."""
     names, p_BN = structure.node_names, structure.p_BN
     strut_radius, node_radius = drawn_radii(structure)
     shades = _mixed("rear", "lead", np.linspace(0.0, 1.0, len(structure.bodies)))
@@ -92,11 +89,11 @@ def add_robot(meshcat: Meshcat, structure: Structure) -> None:
 def place_robot(
     meshcat: Meshcat, structure: Structure, frame: xarray.Dataset, *, per_newton: float
 ) -> None:
-    """Moves everything to where it is in a trajectory's only sample."""
+    """Moves bodies and cables to a trajectory's sample. `frame` has one sample."""
     for body, name in enumerate(structure.bodies):
         turn = Quaternion(frame["q_WB"].values[0, body])
-        place = frame["p_WB"].values[0, body]
-        meshcat.SetTransform(f"/robot/{name}", RigidTransform(turn, place))
+        position = frame["p_WB"].values[0, body]
+        meshcat.SetTransform(f"/robot/{name}", RigidTransform(turn, position))
     p_WN, radii = frame["p_WN"].values[0], cable_radii(structure, frame, per_newton)[0]
     for cable, path, radius in zip(structure.cables, cable_paths(structure), radii, strict=True):
         p_WA, p_WB = p_WN[cable["node_a"]], p_WN[cable["node_b"]]
@@ -118,15 +115,15 @@ def node_paths(structure: Structure) -> list[str]:
 
 
 def cable_paths(structure: Structure) -> list[str]:
-    """Path of each cable in the scene, below its kind, "actuated" or "passive"."""
+    """Path of each cable in the scene: below /cables/actuated or /cables/passive."""
     named = zip(structure.cables["signal"], structure.cable_names, strict=True)
     kinds = {True: "actuated", False: "passive"}
     return [f"/cables/{kinds[bool(signal != PASSIVE)]}/{name}" for signal, name in named]
 
 
 def drawn_radii(structure: Structure) -> tuple[np.ndarray, np.ndarray]:
-    """Radii (struts,) and (nodes,) in m as drawn; a node is at least 1.8 times as thick as the
-    thinnest strut."""
+    """Drawn radii of struts (struts,) and nodes (nodes,), in m. A node is at least 1.8 times as
+    thick as the thinnest strut."""
     ends = structure.p_BN[structure.struts]
     least = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max() / SLENDERNESS
     strut_radius = structure.strut_radius.clip(min=least)
@@ -134,13 +131,14 @@ def drawn_radii(structure: Structure) -> tuple[np.ndarray, np.ndarray]:
 
 
 def radius_per_newton(structure: Structure, tension: float) -> float:
-    """Drawn radius of cables over their tension, so that `tension` (N) is drawn THICKEST."""
+    """Scale from tension to the drawn radius of a cable. The radius for `tension` (N) is
+    THICKEST."""
     return float(THICKEST * drawn_radii(structure)[0].min() / max(tension, 1e-9))
 
 
 def cable_radii(structure: Structure, frames: xarray.Dataset, per_newton: float) -> np.ndarray:
-    """Drawn radii (frames, cables) in m, proportional to tension but for a least and a greatest
-    one."""
+    """Drawn radii of cables (frames, cables) in m: proportional to tension, between a least and a
+    greatest radius."""
     strut = drawn_radii(structure)[0].min()
     radii: np.ndarray = (per_newton * frames["tension"].values).clip(
         min=THINNEST * strut, max=1.3 * THICKEST * strut
@@ -151,11 +149,11 @@ def cable_radii(structure: Structure, frames: xarray.Dataset, per_newton: float)
 def set_surroundings(
     meshcat: Meshcat, robot: Robot, points: np.ndarray, *, seen: np.ndarray
 ) -> None:
-    """Sets floor, light and camera for a robot whose nodes stay around `points` (..., 3), in m,
-    of which the camera sees `seen` (..., 3).
+    """Adds floor and light and sets the camera.
 
-    The floor is the ground lowered by the least drawn radius of a node, as the ground acts on node
-    centres.
+    The floor surrounds `points` (..., 3), and the camera sees all of `seen` (..., 3), both in m.
+    The ground acts on the centres of nodes. Therefore the floor is drawn lower than the ground, by
+    the least drawn radius of a node.
     """
     ground = robot.ground
     middle = (seen.reshape(-1, 3).min(axis=0) + seen.reshape(-1, 3).max(axis=0)) / 2
@@ -170,8 +168,8 @@ def set_surroundings(
     _add_grid(meshcat, floor, inch="inch" if ground.flat else "inch_on_relief")
     for unused in ("/Grid", "/Axes"):
         meshcat.SetProperty(unused, "visible", False)
-    for place in ("top_color", "bottom_color"):
-        meshcat.SetProperty("/Background/<object>", place, _rgb("sky").tolist())
+    for part in ("top_color", "bottom_color"):
+        meshcat.SetProperty("/Background/<object>", part, _rgb("sky").tolist())
     position = camera_position(seen.reshape(-1, 3), middle)
     meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW)
     meshcat.SetCameraPose(position, middle)
@@ -179,7 +177,7 @@ def set_surroundings(
 
 
 def _set_lights(meshcat: Meshcat, *, reach: float) -> None:
-    """Soft light from everywhere, and a sun that casts shadows within `reach` (m) of its target."""
+    """Sets an ambient light, and a light that casts shadows within `reach` (m) of its target."""
     for unused in ("PointLightPositiveX", "PointLightNegativeX", "SpotLight"):
         meshcat.SetProperty(f"/Lights/{unused}", "visible", False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", AMBIENT)
@@ -203,18 +201,20 @@ def _set_lights(meshcat: Meshcat, *, reach: float) -> None:
 
 
 def floor_corners(points: np.ndarray, margin: float) -> np.ndarray:
-    """Least and greatest x, y (2, 2) in inches of the floor around `points` (..., 3) in m, with a
-    margin (m): multiples of 6."""
+    """Corners of the floor: least and greatest x and y (2, 2) in inches, multiples of 6.
+
+    The floor surrounds `points` (..., 3) with a margin, both in m.
+    """
     x_y = points.reshape(-1, 3)[:, :2] / INCH
     low, high = x_y.min(axis=0) - margin / INCH, x_y.max(axis=0) + margin / INCH
     return np.array([6 * np.floor(low / 6), 6 * np.ceil(high / 6)], dtype=int)
 
 
 def floor_points(ground: Ground, corners: np.ndarray) -> np.ndarray:
-    """Points (rows, columns, 3) in m of the ground between corners (2, 2) in whole inches.
+    """Points of the ground (rows, columns, 3) in m, between corners (2, 2) in whole inches.
 
-    Rows along x, columns along y: at every inch, and between them where the ground bends, as
-    finely as MOST_POINTS allows.
+    Rows are along x, columns along y. There are points at every inch. Where the ground bends, there
+    are points in between, as many as MOST_POINTS allows.
     """
     (x_low, y_low), (x_high, y_high) = corners
     for per_inch in range(1 if ground.flat else _FINEST, 0, -1):
@@ -232,7 +232,7 @@ def floor_points(ground: Ground, corners: np.ndarray) -> np.ndarray:
 
 
 def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Position from which a camera aimed at `target` (3,) sees all `points` (points, 3)."""
+    """Position of a camera that looks at `target` (3,) and sees all `points` (points, 3)."""
     forward = np.array(VIEW) / np.linalg.norm(VIEW)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -246,7 +246,7 @@ def camera_position(points: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def rgba(name: str) -> Rgba:
-    """Colour of this name in COLOURS, opaque."""
+    """The opaque colour with this name in COLOURS."""
     return Rgba(*_rgb(name))
 
 
@@ -255,12 +255,12 @@ def _rgb(name: str) -> np.ndarray:
 
 
 def _mixed(first: str, second: str, share: np.ndarray) -> np.ndarray:
-    """Colours (..., 3) between two of COLOURS, for shares (...) of the second one."""
+    """Mixtures (..., 3) of two named colours. `share` (...) is the share of the second."""
     return _rgb(first) + share[..., np.newaxis] * (_rgb(second) - _rgb(first))
 
 
 def _add_slab(meshcat: Meshcat, floor: np.ndarray) -> None:
-    """A slab whose top is the flat floor (rows, columns, 3), in m."""
+    """Adds a slab; its top is the flat floor (rows, columns, 3), in m."""
     thickness = 0.002
     width, depth, _ = floor[-1, -1] - floor[0, 0]
     middle = (floor[-1, -1] + floor[0, 0]) / 2
@@ -269,8 +269,8 @@ def _add_slab(meshcat: Meshcat, floor: np.ndarray) -> None:
 
 
 def _add_relief(meshcat: Meshcat, floor: np.ndarray) -> None:
-    """The surface through the floor's points (rows, columns, 3), the lighter the higher, with walls
-    around it."""
+    """Adds the surface through the points of the floor (rows, columns, 3), with walls around it.
+    Higher points are lighter."""
     z = floor[..., 2]
     share = (z - z.min()) / max(np.ptp(z), 0.1 * INCH)
     colours = _mixed("low", "high", share)
@@ -291,18 +291,19 @@ def _add_relief(meshcat: Meshcat, floor: np.ndarray) -> None:
 
 
 def _add_grid(meshcat: Meshcat, floor: np.ndarray, *, inch: str) -> None:
-    """Lines along and across the floor (rows, columns, 3), of colour `inch` at every inch."""
+    """Adds lines along and across the floor (rows, columns, 3), one per inch. `inch` is their
+    colour; every sixth line is darker."""
     inches: list[np.ndarray] = []
     six_inches: list[np.ndarray] = []
     for axis in (0, 1):
         for line in np.moveaxis(floor, axis, 0):
-            place = line[0, axis] / INCH
-            if abs(place - round(place)) > 1e-6:
+            position = line[0, axis] / INCH
+            if abs(position - round(position)) > 1e-6:
                 continue
-            # In pieces also where it is straight: some browsers lose lines that pass the camera.
+            # A straight line has pieces, too: some browsers lose lines that pass the camera.
             points = line[::6] if np.ptp(line[:, 2]) == 0.0 else line
-            (six_inches if round(place) % 6 == 0 else inches).append(points)
-    # Lines float a little, else the floor shows through them.
+            (six_inches if round(position) % 6 == 0 else inches).append(points)
+    # Lines are a little above the floor. Otherwise the floor would hide parts of them.
     _add_lines(meshcat, "/floor/inch", inches, lift=0.0002, colour=rgba(inch))
     _add_lines(meshcat, "/floor/six_inches", six_inches, lift=0.0004, colour=rgba("six_inches"))
 
@@ -310,7 +311,7 @@ def _add_grid(meshcat: Meshcat, floor: np.ndarray, *, inch: str) -> None:
 def _add_lines(
     meshcat: Meshcat, path: str, lines: Sequence[np.ndarray], *, lift: float, colour: Rgba
 ) -> None:
-    """Lines through points (points, 3), raised by `lift`, in m."""
+    """Adds lines through points (points, 3), raised by `lift`; all in m."""
     raised = [line + np.array([0.0, 0.0, lift]) for line in lines]
     start = np.vstack([line[:-1] for line in raised])
     end = np.vstack([line[1:] for line in raised])
