@@ -9,25 +9,28 @@
     >>> result.show()  # in a notebook
     >>> metrics = td.sweep(scenario, run.gaits(), {"robot.cables.outer_stiffness": ["30 N/m"]})
 
-What there is, and what it offers:
+Functions, and the main attributes of their results:
 
     load_scenario       with_changes({key: value}), to_yaml()
-    load_gait, seeded_gait
-    simulate            metrics, recorded (the trajectory, for xarray), show(), save_replay(file)
-    simulate_many       the same for many gaits, on all cores
-    sweep               metrics of gaits with other values of the scenario, for xarray
-    load_result         what the command `tetra-drake simulate` wrote
-    evolve, load_run    best_gait(), gaits(), scenario; evaluations, iterations (for pandas)
-    load_command        a file of commands for actuators, for simulate(scenario, command=...)
-    figures             from tetra_drake.figures.gait_diagram import gait_diagram, and then
-                        gait_diagram(result), or gait_diagram(result, figure=own) with a Figure or a
-                        SubFigure of your own; other modules in tetra_drake.figures likewise
+    load_gait           a gait from a file
+    seeded_gait         a random gait
+    simulate            metrics, recorded (the trajectory, an xarray.Dataset), show(),
+                        save_replay(file)
+    simulate_many       simulates many gaits on all cores
+    sweep               metrics of gaits on a grid of changed scenarios, an xarray.Dataset
+    load_result         the result in a folder of the command `tetra-drake simulate`
+    evolve, load_run    best_gait(), gaits(), scenario; evaluations, iterations (pandas tables)
+    load_command        commands for actuators from a file, for simulate(scenario, command=...)
 
-print() shows the most important of a scenario, gait, run, result or result.metrics. Numbers are SI,
-unless the name says otherwise, as in result.metrics.distance_in. Input that cannot be used raises
-an InputError, a ValueError whose message is one line.
+Figures are functions in tetra_drake.figures: gait_diagram(result) from
+tetra_drake.figures.gait_diagram makes a figure, gait_diagram(result, figure=own) draws on your
+Figure or SubFigure.
 
-Each name is imported when it is first used, so `import tetra_drake` loads neither Drake nor numba.
+print() shows a summary of a scenario, gait, run, result or result.metrics. Numbers are in SI, except
+names with a unit, such as result.metrics.distance_in. Wrong input raises an InputError: a ValueError
+with a message of one line.
+
+Each name is imported at its first use, so `import tetra_drake` loads neither Drake nor numba.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`python -m tetra_drake`: the command line."""
+"""Entry point of `python -m tetra_drake`: the command line."""
 
 import sys
 

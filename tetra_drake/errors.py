@@ -1,5 +1,4 @@
-"""The ways things end that are not results: bad input, and a simulation that fails or takes too
-long."""
+"""Exceptions: bad input, failed simulations, exceeded time budgets."""
 
 from __future__ import annotations
 
@@ -8,27 +7,26 @@ import re
 from typing import Any
 
 _QUOTED, _LONGEST, _LONGEST_PATH = 200, 600, 4096
-"""Characters of anything quoted, of a problem and of a source, at most."""
+"""Largest number of characters of a quotation, of a problem, and of a source."""
 
 
 class InputError(ValueError):
-    """Input a person gave cannot be used; the message is one line made for that person.
+    """Input that cannot be used. The message is one line.
 
-    `source` is the file (or option) at fault, `key` the place in it, and the
-    message says what was found and what was expected.
+    `source` is the file, option or function, `key` the position in it. The message says what was
+    found and what was expected.
     """
 
     def __init__(self, source: object, key: str, problem: str) -> None:
         self.source = str(source)
         self.key = key
         self.problem = _shortened(problem)
-        place = f"{_cut(self.source, _LONGEST_PATH)}: {_cut(key, _QUOTED)}".removesuffix(": ")
-        super().__init__(_one_line(f"{place}: {self.problem}"))
+        origin = f"{_cut(self.source, _LONGEST_PATH)}: {_cut(key, _QUOTED)}".removesuffix(": ")
+        super().__init__(_one_line(f"{origin}: {self.problem}"))
 
 
 def _shortened(problem: str) -> str:
-    """The problem on one line, without most of what it quotes, if that is long: it may be a whole
-    file."""
+    """The problem on one line, with long quotations cut. A quotation may be a whole file."""
     problem = _one_line(problem)
     problem = re.sub(rf"'([^']{{{_QUOTED}}})[^']+'", r"'\1 ...'", problem)
     problem = re.sub(rf"([^\s']{{{_QUOTED}}})[^\s']+", r"\1 ...", problem)
@@ -36,7 +34,7 @@ def _shortened(problem: str) -> str:
 
 
 def _one_line(text: str) -> str:
-    """The text on one line, with escapes for control characters, which a terminal would obey."""
+    """The text on one line. Control characters are escaped, because a terminal would obey them."""
     line = " ".join(text.split())
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in line)
 
@@ -46,15 +44,15 @@ def _cut(text: str, length: int) -> str:
 
 
 class SimulationFailure(RuntimeError):
-    """A simulation ended before its duration: `time` (s) says when, `reason` why."""
+    """A simulation that failed at `time` (s) for a `reason`."""
 
     wall_time = 0.0
-    """Wall time of the simulation in s, if the engine says it."""
+    """Wall time of the simulation in s; 0 if the engine does not measure it."""
     scenario: Any = None
     gait: Any = None
-    """Scenario and gait that were simulated, of a failure among the outcomes of many."""
+    """Scenario and gait of the simulation; set by simulate_many() only."""
     name = ""
-    """Name of this gait."""
+    """Name of the gait."""
 
     def __init__(self, *, time: float, reason: str) -> None:
         self.time = time
@@ -66,25 +64,25 @@ class SimulationFailure(RuntimeError):
         return f"<{type(self).__name__} {gait}{self}>"
 
     def __reduce__(self) -> tuple[object, ...]:
-        # Keyword-only arguments defeat the default; failures must cross process borders.
+        # The default cannot pickle keyword-only arguments. Worker processes send failures.
         return functools.partial(type(self), time=self.time, reason=self.reason), ()
 
 
 MAX_SPEED = 10.16
-"""m/s (400 in/s): where a body is faster, a simulation has diverged."""
+"""Largest speed of a body in m/s (400 in/s). A simulation with a faster body has diverged."""
 
 
 class Diverged(SimulationFailure):
-    """The motion left the physical range: not finite, too fast, or beyond the integrator."""
+    """A motion beyond physics: not finite, too fast, or too hard for the integrator."""
 
 
 class StepBudgetExceeded(SimulationFailure):
-    """The integrator used up its allowance of derivative evaluations."""
+    """A simulation that used up its budget of derivative evaluations."""
 
 
 class TimeBudgetExceeded(Exception):
-    """A simulation took too long by the clock. No RuntimeError, as engines take those for
-    divergence."""
+    """A simulation that used up its wall time. It is not a RuntimeError, because engines treat a
+    RuntimeError as divergence."""
 
     wall_time = 0.0
-    """Wall time of the simulation in s, if the engine says it."""
+    """Wall time of the simulation in s; 0 if the engine does not measure it."""

@@ -1,4 +1,4 @@
-"""evolve(): a whole run, from its record's first line to its report."""
+"""Evolution of gaits as a whole: `evolve` makes a run, from its record to its report."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def evolve(
 
 
 def _check_counts(**given: tuple[int | None, int]) -> None:
-    """Raises InputError for an argument that is no integer or less than its least value."""
+    """Raises InputError for an argument that is no integer or below its least value."""
     for name, (value, least) in given.items():
         if value is not None and not (isinstance(value, Integral) and value >= least):
             problem = f"found {value!r}, expected an integer, {least} or more"
@@ -135,8 +135,8 @@ def _simulate_again(
     executor: MakeExecutor | None,
     progress: Progress,
 ) -> None:
-    """Evaluates the best gaits on the Drake diagram, unless that was the engine, and simulates
-    those of a map on disturbed robots."""
+    """Evaluates the best gaits on the Drake diagram, unless it was the engine of the run. Simulates
+    the gaits of a map on disturbed robots."""
     directory = record.directory
     if record.manifest.scenario.engine_name != "drake":
         with _completing(progress, "the best gaits were not evaluated on the Drake diagram"):
@@ -149,8 +149,8 @@ def _simulate_again(
 
 @contextlib.contextmanager
 def _completing(progress: Progress, failing: str) -> Iterator[None]:
-    """A block without which a run is complete: an error becomes a warning that begins with what is
-    missing."""
+    """Context manager for optional work at the end of a run: an error becomes a warning. `failing`
+    is the begin of the warning."""
     try:
         yield
     except Exception as error:
@@ -159,7 +159,7 @@ def _completing(progress: Progress, failing: str) -> Iterator[None]:
 
 
 def _introduction(directory: Path, manifest: Manifest, workers: int, *, report: bool) -> str:
-    """Introduction of a run: method, scenario, and where the results will be."""
+    """Introduction to a run: method, scenario, and the files to come."""
     text = f"{directory}: {manifest.method}, seed {manifest.seed}, {workers} workers\n"
     text += str(manifest.scenario)
     if report:
@@ -181,12 +181,12 @@ def _warn_of_versions(manifest: Manifest, progress: Progress) -> None:
     if changed:
         progress.warn(
             f"the run was begun with {', '.join(changed)}; with other versions its record may "
-            "not be that of an uninterrupted run"
+            "differ from the record of an uninterrupted run"
         )
 
 
 def _report(directory: Path, progress: Progress) -> None:
-    """Writes the report."""
+    """Writes the report of a run."""
     from tetra_drake.report.run_page import write_report
 
     again = f"try again with: {_draw_again(directory)}"

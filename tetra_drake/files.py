@@ -1,4 +1,4 @@
-"""Files: read with one-line errors, written whole or not at all; numbers for JSON."""
+"""Files: reading with one-line errors, writing by rename, numbers for JSON."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from typing import Any
 from tetra_drake.errors import InputError
 
 MOST_BYTES = 64 * 2**20
-"""Largest size of a file that is read whole, where nothing less is said."""
+"""Default limit for the size of a file that is read into memory."""
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""Error numbers of a disk that is full or broken."""
+"""Error numbers of a full or broken disk."""
 
 
 @contextlib.contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Yields the path of a temporary file that becomes `path` if the block succeeds.
+    """Context manager: yields a temporary file, which is renamed to `path` if the block succeeds.
 
-    Temporary files of the same file that a process left behind when it was killed are removed.
-    Raises InputError if `path` cannot be written.
+    Temporary files of killed processes for the same path are removed. Raises InputError if `path`
+    cannot be written.
     """
     path = Path(path)
     _check_no_other(path)
@@ -44,7 +44,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        os.umask(mask := os.umask(0))  # can be read by setting it only
+        os.umask(mask := os.umask(0))  # the mask can only be read by setting it
         temporary.chmod(0o666 & ~mask)
         temporary.replace(path)
     except OSError as error:
@@ -56,7 +56,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def _remove_stale(path: Path) -> None:
-    """Removes temporary files of `path` whose processes have ended."""
+    """Removes temporary files for `path` that belong to processes that have ended."""
     ours = re.compile(rf"\.{re.escape(path.stem)}\.(\d+)\.\w{{8}}{re.escape(path.suffix)}")
     for name in os.listdir(path.parent):
         match = ours.fullmatch(name)
@@ -69,20 +69,22 @@ def _is_alive(process: int) -> bool:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):
         return False
-    except PermissionError:  # somebody else's
+    except PermissionError:  # the process of another user
         return True
     return True
 
 
 def given_path(path: str | Path, source: str, what: str) -> Path:
-    """A path from Python; InputError of `source` and the argument `what` for anything else."""
+    """An argument as a Path. Raises InputError, naming function `source` and argument `what`, if it
+    is neither a text nor a Path."""
     if not isinstance(path, (str, Path)):
         raise InputError(source, what, f"found {path!r:.60}, expected a path")
     return Path(path)
 
 
 def make_folder(folder: Path, *, source: Path | None = None) -> None:
-    """Makes a folder unless it exists; InputError, of `source` if that is given, if it cannot."""
+    """Makes a folder if it does not exist. Raises InputError if that fails; the error names
+    `source`, by default the folder."""
     source = source or folder
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -94,20 +96,21 @@ def make_folder(folder: Path, *, source: Path | None = None) -> None:
 
 
 def check_file(path: str | Path) -> None:
-    """Raises InputError if `path` is not, and cannot become, a file to write."""
+    """Raises InputError if `path` cannot be written as a file."""
     _check_no_other(path)
     check_folder(Path(path).parent)
 
 
 def _check_no_other(path: str | Path) -> None:
-    """Raises InputError for a folder, and for a device, which a file would replace."""
+    """Raises InputError if `path` exists and is no file. Writing by rename would replace a
+    device."""
     if os.path.lexists(path) and not os.path.isfile(path):
         what = "directory" if os.path.isdir(path) else "device, a pipe or a broken link"
         raise InputError(path, "", f"is a {what}, expected a file to write")
 
 
 def check_folder(folder: str | Path) -> None:
-    """Raises InputError if `folder` is not, and cannot become, a folder to write to."""
+    """Raises InputError if `folder` is no writable folder and cannot be made."""
     folder = Path(folder)
     try:
         os.stat(folder)
@@ -126,17 +129,17 @@ def check_folder(folder: str | Path) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """What went wrong, without the path, which messages name already."""
+    """The reason of an error, without the path: messages name the path already."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def json_number(value: Any) -> Any:
-    """A value as JSON holds it: None for a number that is not finite."""
+    """A value for JSON: None in place of a number that is not finite."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def read_json(path: str | Path, what: str) -> Any:
-    """Content of a JSON file. Raises InputError as read_bytes(), also for a key given twice."""
+    """Content of a JSON file. Raises InputError like read_bytes(), and if a key is given twice."""
     try:
         return json.loads(read_text(path, what), object_pairs_hook=_unique_keys)
     except (ValueError, RecursionError) as error:
@@ -153,7 +156,7 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:
-    """Text of a file of at most so many bytes in UTF-8. Raises InputError as read_bytes()."""
+    """Text of a UTF-8 file with at most `most` bytes. Raises InputError like read_bytes()."""
     try:
         return read_bytes(path, what, most=most).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -161,14 +164,15 @@ def read_text(path: str | Path, what: str, *, most: int = MOST_BYTES) -> str:
 
 
 def read_bytes(path: str | Path, what: str, *, most: int = MOST_BYTES) -> bytes:
-    """Content of a file of at most so many bytes; `what` says in errors what was expected.
+    """Content of a file with at most `most` bytes. `what` names the expected content in errors.
 
-    Raises InputError, also for a device or a pipe, which may never end.
+    Raises InputError if the file cannot be read. Devices and pipes are refused, because they may
+    never end.
     """
     content = b""
     try:
         mode = os.stat(path).st_mode
-        if stat.S_ISREG(mode):  # others are not opened: a pipe would wait for a writer
+        if stat.S_ISREG(mode):  # opening a pipe would wait for a writer
             with open(path, "rb") as file:
                 content = file.read(most + 1)
     except FileNotFoundError as error:
@@ -185,6 +189,6 @@ def read_bytes(path: str | Path, what: str, *, most: int = MOST_BYTES) -> bytes:
 
 
 def write_whole(path: str | Path, content: str | bytes) -> None:
-    """Writes a file, a text as UTF-8, by rename, so that no reader ever sees half of it."""
+    """Writes a file by rename, so that no reader sees half of it. A text is written as UTF-8."""
     with whole_file(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)

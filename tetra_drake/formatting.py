@@ -9,7 +9,7 @@ from importlib import resources
 
 
 def fixed(value: float, digits: int = 2) -> str:
-    """A number with this many decimals; "-" where it is not finite, never "-0.00"."""
+    """A number with this many decimals, never "-0.00". "-" if it is not finite."""
     if not math.isfinite(value):
         return "-"
     text = f"{value:.{digits}f}"
@@ -17,13 +17,13 @@ def fixed(value: float, digits: int = 2) -> str:
 
 
 def signed(value: float, digits: int = 2) -> str:
-    """A number with this many decimals and a plus sign if it is positive; see fixed()."""
+    """A number like fixed(), with a plus sign if it is positive."""
     text = fixed(value, digits)
     return f"+{text}" if math.isfinite(value) and float(text) > 0.0 else text
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """A number with this many significant digits, never as 1e3; "-" where it is not finite."""
+    """A number with this many significant digits, without exponent. "-" if it is not finite."""
     if value == 0.0 or not math.isfinite(value):
         return fixed(value, 0)
     magnitude = int(f"{value:.{digits - 1}e}".partition("e")[2])
@@ -31,7 +31,7 @@ def rounded(value: float, digits: int = 3) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time as h:mm:ss; "-" where it is not finite."""
+    """A time as h:mm:ss; "-" if it is not finite."""
     if not math.isfinite(seconds):
         return "-"
     minutes, second = divmod(round(seconds), 60)
@@ -40,54 +40,54 @@ def duration(seconds: float) -> str:
 
 
 def listed(items: Sequence[object]) -> str:
-    """Items separated by commas, the last one by "and"; "none" if there are none."""
+    """A list of items as text, such as "a, b and c"; "none" if it is empty."""
     *head, last = [str(item) for item in items] or ["none"]
     return f"{', '.join(head)} and {last}" if head else last
 
 
 def ranged(value: float, low: float, high: float) -> str:
-    """A number with a range that belongs to it, unless that is unknown or has no width."""
+    """A number and its range in brackets. An unknown range, or one without width, is left out."""
     if math.isnan(low) or low == high:
         return rounded(value)
     return f"{rounded(value)} ({rounded(low)} to {rounded(high)})"
 
 
 def percents(share: float, low: float, high: float) -> str:
-    """A share in percent with a range that belongs to it, which is left out if it has no width."""
+    """A share in percent and its range in brackets. A range without width is left out."""
     text = f"{100.0 * share:.0f} %"
     return text if low == high else f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts under headings; report.html.jinja shows one on a page."""
+    """A table of texts with headings."""
 
     headings: Sequence[str]
     rows: Sequence[Sequence[str]]
     text_columns: Sequence[int] = (0,)
-    """Columns that are aligned to the left; the others, of numbers, to the right."""
+    """Indices of the columns that are aligned to the left; other columns have numbers."""
 
     def text(self) -> str:
         """The table as aligned lines."""
         lines = [self.headings, *self.rows]
         columns = []
-        for place, cells in enumerate(zip(*lines, strict=True)):
+        for column, cells in enumerate(zip(*lines, strict=True)):
             width = max(map(len, cells))
-            align = str.ljust if place in self.text_columns else str.rjust
+            align = str.ljust if column in self.text_columns else str.rjust
             columns.append([align(cell, width) for cell in cells])
         return "\n".join("  ".join(cells).rstrip() for cells in zip(*columns, strict=True))
 
     def markdown(self) -> str:
-        """The table in Markdown, without a line feed at its end."""
+        """The table in Markdown, without a line feed at the end."""
         rule = ["---" if i in self.text_columns else "---:" for i in range(len(self.headings))]
         lines = [self.headings, rule, *self.rows]
         return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
 def render(template: str, **values: object) -> str:
-    """A page from a Jinja template of the package, as "report/report.html.jinja".
+    """A page from a Jinja template of the package, such as "report/report.html.jinja".
 
-    Values are escaped; rounded() and duration() are filters.
+    Values are escaped. Templates may use rounded() and duration() as filters.
     """
     from jinja2 import Environment, StrictUndefined
 

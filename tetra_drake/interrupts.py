@@ -1,4 +1,4 @@
-"""Interrupts that are not lost: Ctrl-C and SIGTERM end a command wherever they arrive."""
+"""Interrupts: Ctrl-C and SIGTERM always end a command, even in the middle of a library."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import threading
 from collections.abc import Iterator
 
 _AGAIN = 0.1
-"""Time (s) after which an interrupt that was lost is raised again."""
+"""Time (s) after which a lost interrupt is raised again."""
 
 
 class Interrupt(KeyboardInterrupt):
-    """A Ctrl-C or SIGTERM. Python drops what is raised in a destructor or in a callback of a
-    library, such as the compiler's as it ends. Then another one follows."""
+    """Exception for Ctrl-C or SIGTERM. Python drops an exception that is raised in a destructor or
+    in a callback of a library, such as the compiler. A dropped interrupt is raised again."""
 
     heeded = True
-    """False while a block of heeding_interrupts() waits for it."""
+    """False in a block of heeding_interrupts(): a dropped interrupt must be raised again."""
 
     def __del__(self) -> None:
         if not Interrupt.heeded:
@@ -26,9 +26,9 @@ class Interrupt(KeyboardInterrupt):
 
 @contextlib.contextmanager
 def heeding_interrupts() -> Iterator[None]:
-    """A block that a Ctrl-C or SIGTERM certainly ends, by a KeyboardInterrupt."""
+    """Context manager: Ctrl-C and SIGTERM certainly end the block, by a KeyboardInterrupt."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # signals reach the main thread alone
+        yield  # only the main thread receives signals
         return
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)
     handlers = {number: signal.getsignal(number) for number in numbers}

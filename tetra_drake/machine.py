@@ -1,4 +1,4 @@
-"""The machine and the packages that results come from."""
+"""Machine and package versions, which results depend on."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from importlib import metadata
 
 
 def available_cores() -> int:
-    """The cores this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def versions(packages: Iterable[str] = ()) -> dict[str, str]:
-    """The versions of packages, and the kind of processor, on which the last digits of a result
-    depend; `packages` are those that only its engine needs."""
+    """Versions of packages and kind of processor. The last digits of results depend on them.
+
+    `packages` are additional ones, which only one engine needs.
+    """
     from llvmlite.binding import get_host_cpu_name
 
     names = ["tetra_drake", "drake", "numpy", "numba", *packages]

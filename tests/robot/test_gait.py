@@ -66,7 +66,7 @@ def test_a_gait_has_the_weights_of_its_robot(tmp_path, scenario, tetrahedra, ref
     gait = seeded_gait(scenario)
     assert len(gait.weights) == 2 * (tetrahedra - 1) * (tetrahedra - 2)
     save_gait(gait, tmp_path / "mine.json", scenario)
-    with refused(tmp_path / "mine.json", "weights", "misses"):
+    with refused(tmp_path / "mine.json", "weights", "lacks"):
         load_gait(tmp_path / "mine.json", scenario.with_changes({"robot.tetrahedra": 5}))
 
 
@@ -78,8 +78,16 @@ BAD: list[tuple[object, str, str]] = [
     (gait_file(weights=WEIGHTS | {"1->2 flexor": math.nan}), "weights.1->2 flexor", "nan"),
     (gait_file(weights=WEIGHTS | {"1->2 flexor": -0.1}), "weights.1->2 flexor", "-0.1"),
     (gait_file(weights=WEIGHTS | {"1->2 flexor": None}), "weights.1->2 flexor", "nothing"),
-    (gait_file(weights=without("2->1 extensor")), "weights", "misses 1, as '2->1 extensor'"),
-    (gait_file(weights=WEIGHTS | {"5->1 flexor": 1.0}), "weights", "1 others, as '5->1 flexor'"),
+    (
+        gait_file(weights=without("2->1 extensor")),
+        "weights",
+        "lacks 1 names, such as '2->1 extensor'",
+    ),
+    (
+        gait_file(weights=WEIGHTS | {"5->1 flexor": 1.0}),
+        "weights",
+        "1 unknown names, such as '5->1 flexor'",
+    ),
     (gait_file(weights=[1.0] * 23), "weights", "23"),
     (gait_file(weights=[1.0] * 23 + [-0.1]), "weights[23]", "-0.1"),
     (gait_file(tau_a_s=0), "tau_a_s", "0"),

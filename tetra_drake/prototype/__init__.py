@@ -1,1 +1,1 @@
-"""Commands for a prototype of the robot."""
+"""Commands for the actuators of a prototype, and the loads on them."""

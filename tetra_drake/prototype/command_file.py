@@ -1,4 +1,4 @@
-"""The file of a command: CSV with a column for the time, and one for each driven cable."""
+"""Command file: CSV with a column for the time and one for each driven cable."""
 
 from __future__ import annotations
 
@@ -22,48 +22,48 @@ TIME = "time_s"
 
 
 _UNEVEN = 0.05
-"""Largest error of the time between two samples, as a share of it: times may be rounded."""
+"""Tolerance for the time between two samples, as a share of it. Times in files may be rounded."""
 
 
 def command_columns(robot: Robot) -> list[str]:
-    """The columns of a robot's commands but for the time, such as "T1-T2 outer top tension_N"."""
+    """Columns of a robot's command file without the time, such as "T1-T2 outer top tension_N"."""
     quantity, names = robot.scenario.actuation.commanded, robot.structure.cable_names
     return [f"{names[cable]} {quantity}" for cable in robot.driven]
 
 
 def command_text(robot: Robot, command: Command) -> str:
-    """A command as the content of its file."""
+    """Content of the file of a command."""
     times = command.period * np.arange(len(command.samples))
     values = command.samples / robot.scenario.actuation.command_unit
     return table_text(command_columns(robot), times, values)
 
 
 def table_text(columns: Sequence[str], times: np.ndarray, values: np.ndarray) -> str:
-    """CSV with times (s) and values, a row for each time."""
+    """CSV with a row for each time (s) and its values."""
     table = pandas.DataFrame(values, columns=columns, index=pandas.Index(times, name=TIME))
     return table.reset_index().to_csv(index=False, float_format="%.6f")
 
 
 def scenario_beside(path: Path) -> Path | None:
-    """The scenario file in the folder of a command, which the command is for, if there is one."""
+    """The scenario file in the folder of a command file; None if there is none."""
     scenario = path.parent / SCENARIO
     return scenario if os.path.isfile(scenario) else None
 
 
 def load_command(path: str | Path, scenario: Scenario) -> Command:
-    """Reads the file of a command for a scenario's robot; columns may stand in any order.
+    """Reads a command file for a scenario's robot. Columns may be in any order.
 
         >>> scenario = td.load_scenario("quick")
         >>> command = td.load_command("lab/command.csv", scenario)
         >>> result = td.simulate(scenario, command=command)
 
-    Raises InputError, naming file and place, for whatever is wrong in the file or does not fit.
+    Raises InputError, naming file and line, if the file is wrong or does not fit the robot.
     """
     robot, text = Robot.of(scenario), read_text(path, "command file")
     try:
-        # Cells are read as texts, so that what is no number can be shown.
+        # Cells are read as texts, so that messages can show a cell that is no number.
         cells = pandas.read_csv(io.StringIO(text), dtype=str, na_filter=False)
-    except ValueError as error:  # also what pandas raises for ragged rows and an empty file
+    except ValueError as error:  # ragged rows and empty files are ValueErrors, too
         raise InputError(path, "", f"is no table: {error}") from error
     if not isinstance(cells.index, pandas.RangeIndex):
         raise InputError(path, "", "is no table: rows have more cells than the heading")
@@ -85,7 +85,7 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
 
 
 def _period(times: np.ndarray, least: float, source: str | Path) -> float:
-    """Time (s) between samples; InputError unless they are evenly spaced from 0 on."""
+    """Time (s) between samples. Raises InputError if times are uneven or do not begin at 0."""
     if len(times) < 2 or abs(times[0]) > 1e-6:
         raise InputError(source, TIME, "expected at least two samples, the first at 0")
     period = float(np.median(np.diff(times)))

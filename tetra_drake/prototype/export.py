@@ -1,4 +1,4 @@
-"""A gait as a folder for a prototype: commands, expected motion, and the load on each actuator."""
+"""Export of a gait for a prototype: commands, expected motion, loads on the actuators."""
 
 from __future__ import annotations
 
@@ -26,15 +26,23 @@ COMMAND, EXPECTED, LIMITS = "command.csv", "expected.csv", "limits.csv"
 README = "README.md"
 
 LEAST_RATE = 1000.0
-"""Hz: peaks are looked for at this rate at least, whatever the rate of the files."""
+"""Least sampling rate (Hz) for finding peaks. The rate of the files may be lower."""
 
 
 def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> str:
-    """Simulates a gait and writes the folder `out` with its commands, `rate` (Hz) samples a second.
+    """Simulates a gait and writes a folder for a prototype. Returns a verdict.
 
-    Returns the verdict: what the actuators have to do, whether they can, and how far the simulation
-    of exactly the written commands goes. With feedback, commands are the signals of this one walk.
-    Raises InputError, and SimulationFailure if the gait's own simulation fails.
+    The verdict has the loads on the actuators, whether the actuators can bear them, and the
+    distance when the written commands are simulated. With feedback, the commands are the signals of
+    this one simulation.
+
+    Args:
+        rate: samples per second (Hz) in the files.
+        out: the new folder.
+
+    Raises:
+        InputError: if an argument cannot be used.
+        SimulationFailure: if the simulation of the gait fails.
     """
     check_rate(rate, scenario)
     out = Path(out)
@@ -69,7 +77,7 @@ def export(scenario: Scenario, gait: Gait, *, rate: float, out: str | Path) -> s
 
 
 def check_rate(rate: float, scenario: Scenario) -> None:
-    """Raises InputError for a rate (Hz) at which the scenario's gaits cannot be exported."""
+    """Raises InputError if the scenario's gaits cannot be exported at a rate (Hz)."""
     most, duration = 1.0 / scenario.cpg.listing_step, scenario.simulation.duration
     in_range, periods = 0.0 < rate <= most * (1.0 + 1e-9), duration * rate
     if not in_range or abs(periods - round(periods)) > 1e-6 * periods:
@@ -78,7 +86,7 @@ def check_rate(rate: float, scenario: Scenario) -> None:
 
 
 def load_verdict(loads: Loads, result: SimulationResult) -> str:
-    """The greatest loads, the limits, and whether actuators can bear the loads in a simulation."""
+    """Text about the loads of a simulation: greatest loads, limits, and whether limits bind."""
     worst = loads.table.drop(columns="time_at_a_limit_percent").max()
     worst["least_length_mm"] = loads.table["least_length_mm"].min()
     table = worst.dropna().to_string(float_format=fixed)
@@ -96,7 +104,7 @@ def load_verdict(loads: Loads, result: SimulationResult) -> str:
 
 
 def _played(scenario: Scenario, file: Path) -> str:
-    """How far the simulation of a command file goes."""
+    """Sentence about the distance in a simulation of a command file."""
     try:
         result = simulate(scenario=scenario, command=load_command(file, scenario))
     except SimulationFailure as failure:

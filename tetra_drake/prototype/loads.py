@@ -1,4 +1,4 @@
-"""The loads on the actuators of a walk, beside what they can do."""
+"""Loads on the actuators in a simulation, and the actuators' limits."""
 
 from __future__ import annotations
 
@@ -15,25 +15,26 @@ from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.actuator_kinds import DrivenCables
 
-_HAIR = 1e-9
-"""m or N: a drive so near to a limit is at it, as the tension of a motor is never beyond."""
+_TOLERANCE = 1e-9
+"""Distance (m or N) from a limit that still counts as at the limit. Without it, the tension of a
+motor would never be at its limit."""
 
 
 class Loads(NamedTuple):
-    """What the actuators of the driven cables do in a walk."""
+    """Loads on the actuators of the driven cables in a simulation."""
 
     commands: np.ndarray
-    """(times, driven cables): the samples of a Command."""
+    """Setpoints (times, driven cables); samples of a Command."""
     limited: np.ndarray
-    """(times, driven cables): 1 where a limit binds, or else 0; NaN for forces without limits."""
+    """1 where a limit binds, otherwise 0 (times, driven cables); NaN without limits."""
     table: pandas.DataFrame
-    """Peaks at any time and means over the steady stretch, a row for each driven cable, with units
-    in the names; NaN where there is no limit. Lengths and speeds are those of physics.actuator's
-    wound()."""
+    """A row per driven cable, with units in the names of the columns: peaks, and means over the
+    steady stretch. Limits that do not exist are NaN. Lengths and speeds are as in
+    physics.actuator.wound()."""
 
 
 def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
-    """The loads in a trajectory of a robot that walks by a gait."""
+    """Loads on the actuators in a trajectory of a robot."""
     kind, constants = robot.scenario.actuation, robot.model.actuator
     cables, limits = robot.structure.cables[robot.driven], actuator.Limits(*constants.limits)
     walk = trajectory.isel(cable=robot.driven)
@@ -53,7 +54,7 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
         return actuator.actuator_force(constants, drive, length, rate, signal, CableLaw(*law))
 
     if actuator.has_drive(constants):
-        _, _, drive_rate, limited = pull(drives + _HAIR, length, rate, signal, *law)
+        _, _, drive_rate, limited = pull(drives + _TOLERANCE, length, rate, signal, *law)
         left = actuator.wound(constants, drives, length)
         rate = actuator.wound(constants, drive_rate, rate)
     power, steady = -tension * rate, trajectory.time.values >= steady_start(robot.scenario)
@@ -66,7 +67,7 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
         "least_length_mm": 1e3 * left.min(axis=0),
         "limit_of_length_mm": 1e3 * limits.least_length,
         "peak_power_W": power.max(axis=0),
-        "limit_of_power_W": 0.25 * limits.max_force * limits.max_speed,  # half of both
+        "limit_of_power_W": 0.25 * limits.max_force * limits.max_speed,  # at half of both
         "mean_power_W": _mean(np.maximum(power, 0.0)[steady]),
         "time_at_a_limit_percent": 100.0 * _mean(limited[steady]),
     }
@@ -75,6 +76,5 @@ def actuator_loads(robot: Robot, trajectory: xarray.Dataset) -> Loads:
 
 
 def _mean(samples: np.ndarray) -> np.ndarray:
-    """The mean of each column; NaN without samples, as in a simulation that ends before it is
-    steady."""
+    """Mean of each column. NaN without samples: a simulation may end before its steady stretch."""
     return samples.mean(axis=0) if len(samples) else np.full(samples.shape[1], math.nan)

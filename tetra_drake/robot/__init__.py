@@ -1,1 +1,1 @@
-"""The robot as data: structure, bodies, gaits, and the constants that the laws take."""
+"""Robot as data: structure, bodies, gaits, and the constants of the physical laws."""

@@ -11,19 +11,20 @@ from pydrake.multibody.tree import SpatialInertia, UnitInertia
 from tetra_drake.scenario.blueprint import Blueprint
 
 ROUNDING = 1e-12
-"""Share of a body's size, or of its moments, below which a distance, or a product, is rounding. Its
-last bits would break a robot's symmetry, and explicit schemes would amplify that."""
+"""Threshold for rounding errors: smaller coordinates (relative to the size of a body) and products
+of inertia (relative to its moments) become 0. Otherwise rounding errors would break the symmetry of
+a robot, and explicit integrators would amplify them."""
 
 
 def strut_pose(p_BA: np.ndarray, p_BC: np.ndarray) -> RigidTransform:
-    """X_BS of the frame of a strut from A to C: its origin in the middle, its z axis along it."""
+    """Pose X_BS of a strut from A to C. The origin is in the middle, the z axis along the strut."""
     return RigidTransform(RotationMatrix.MakeFromOneVector(p_BC - p_BA, 2), (p_BA + p_BC) / 2)
 
 
 def strut_inertia(
     p_BA: np.ndarray, p_BC: np.ndarray, *, radius: float, density: float
 ) -> SpatialInertia:
-    """M_SBo_B of a strut from A to C, a solid cylinder."""
+    """Spatial inertia M_SBo_B of a strut from A to C, a solid cylinder."""
     X_BS = strut_pose(p_BA, p_BC)
     M_SSo_S = SpatialInertia.SolidCylinderWithDensity(
         density=density,
@@ -35,14 +36,14 @@ def strut_inertia(
 
 
 def node_inertia(p_BN: np.ndarray, *, radius: float, density: float) -> SpatialInertia:
-    """M_NBo_B of the sphere at a node."""
+    """Spatial inertia M_NBo_B of the sphere at a node."""
     return SpatialInertia.SolidSphereWithDensity(density, radius).Shift(-p_BN)
 
 
 def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Masses (bodies,), centres of mass in the frames F (bodies, 3), and unit inertias (bodies, 6)
-    as in Structure."""
-    made: dict[tuple[bytes, ...], SpatialInertia] = {}  # of bodies that are alike, one
+    """Masses (bodies,), centres of mass in the frames F of the blueprint (bodies, 3), and unit
+    inertias (bodies, 6) as in Structure."""
+    made: dict[tuple[bytes, ...], SpatialInertia] = {}  # equal bodies share one
     inertias = []
     for first, end in itertools.pairwise(blueprint.first_node.tolist()):
         parts = _parts(blueprint, first, end)
@@ -51,13 +52,13 @@ def body_inertias(blueprint: Blueprint) -> tuple[np.ndarray, np.ndarray, np.ndar
             made[key] = _body_inertia(*parts)
         inertias.append(made[key])
     empty = np.array([inertia.get_mass() for inertia in inertias])
-    mass = empty + blueprint.payload  # which adds no inertia about the centre of mass
+    mass = empty + blueprint.payload  # a point mass at the centre of mass
     centres, units = zip(*map(_central, inertias), strict=True)
     return mass, np.array(centres), (empty / mass)[:, np.newaxis] * np.array(units)
 
 
 def _parts(blueprint: Blueprint, first: int, end: int) -> tuple[np.ndarray, ...]:
-    """The arguments of _body_inertia() for the body with the nodes from `first` to before `end`."""
+    """The arguments of _body_inertia() for the body with the nodes `first` to `end` - 1."""
     nodes, node_a = slice(first, end), blueprint.struts[:, 0]
     struts = (first <= node_a) & (node_a < end)
     return (
@@ -80,7 +81,7 @@ def _body_inertia(
     node_density: np.ndarray,
     node_mass: np.ndarray,
 ) -> SpatialInertia:
-    """M_BFo_F of a body of struts, and of spheres and point masses at nodes."""
+    """Spatial inertia M_BFo_F of a body: struts, and spheres and point masses at its nodes."""
     total = SpatialInertia.Zero()
     for (a, b), radius, density in zip(struts, strut_radius, strut_density, strict=True):
         total += strut_inertia(p_FN[a], p_FN[b], radius=radius, density=density)
@@ -93,7 +94,7 @@ def _body_inertia(
 
 
 def _central(M_BFo_F: SpatialInertia) -> tuple[np.ndarray, np.ndarray]:
-    """The centre of mass (3,), and the unit inertia (6,) about it; rounding counts as 0."""
+    """Centre of mass (3,), and unit inertia (6,) about it. Rounding errors become 0."""
     centre, unit = M_BFo_F.get_com(), M_BFo_F.get_unit_inertia()
     size = np.sqrt(unit.get_moments().max())
     centre = np.where(np.abs(centre) > ROUNDING * size, centre, 0.0)

@@ -1,4 +1,4 @@
-"""Commands of actuators: samples for each driven cable, in place of the signals of a network."""
+"""Commands for actuators: samples for each driven cable, in place of a network's signals."""
 
 from __future__ import annotations
 
@@ -15,30 +15,32 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
 _NONE_COUPLED = -1
-"""Reach of oscillators none of which inhibit each other."""
+"""Reach (see robot.weights) with which no oscillator inhibits another."""
 
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What actuators are commanded at evenly spaced times from 0 on; each sample is held until the
-    next one, the last one for ever."""
+    """Setpoints of actuators at evenly spaced times, beginning at 0.
+
+    A sample holds until the next one. The last sample holds for ever.
+    """
 
     name: str
     period: float
     """Time (s) between samples."""
     samples: np.ndarray
-    """(samples, driven cables): in SI units of the quantity that the kind of actuators says."""
+    """Setpoints (samples, driven cables). The kind of actuators defines the quantity; SI units."""
 
     @property
     def gait(self) -> Gait:
-        """A gait of the command's name, with a network that never acts."""
+        """A gait with the command's name. Its network has no effect."""
         return Gait(name=self.name, weights=(), tau_a=1.0, tau_b=1.0)
 
 
 def commanded_robot(scenario: Scenario, command: Command) -> Robot:
-    """The robot of a scenario that follows a command.
+    """The robot of a scenario, driven by a command in place of a network.
 
-    Raises InputError if the command is for another number of cables.
+    Raises InputError if the command has another number of cables.
     """
     robot = robot_without_network(scenario)
     driven = robot.driven
@@ -51,10 +53,10 @@ def commanded_robot(scenario: Scenario, command: Command) -> Robot:
 
 
 def robot_without_network(scenario: Scenario) -> Robot:
-    """The robot of a scenario in which each driven cable has a signal of its own.
+    """The robot of a scenario, with one signal for each driven cable.
 
-    There is no network, so no start-up and no feedback. Springs and dampers that actuators play are
-    in their commands, and missing here.
+    It has no network, no start-up and no feedback. Actuators that imitate springs and dampers do
+    not do so here, because the command contains their effect.
     """
     structure = Robot.of(scenario).structure.with_oscillator_per_cable(
         without_law=scenario.actuation.plays_cable
@@ -65,9 +67,10 @@ def robot_without_network(scenario: Scenario) -> Robot:
 
 
 def held_samples(command: Command, step: float, duration: float) -> np.ndarray:
-    """The command at 0, one `step` (s), two ... to beyond the duration (s).
+    """The setpoints of a command at multiples of `step` (s), until after `duration` (s).
 
-    Signals are linear between these times, so a change begins at its time and takes a step.
+    Signals are linear between these times. A change of setpoint begins at its time and takes one
+    step.
     """
     times = step * (np.arange(math.ceil(duration / step) + 2) - 1)
     latest = np.floor(times / command.period + 1e-6).astype(int)

@@ -1,4 +1,4 @@
-"""A gait, its file, and the space of parameters that evolution searches."""
+"""Gaits, gait files, and the parameter space that evolution searches."""
 
 import json
 import math
@@ -21,24 +21,24 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Section
 
 LARGEST_GAIN = 1.0
-"""Greatest absolute value of a feedback gain of random gaits."""
+"""Largest absolute value of a feedback gain in random gaits."""
 
 Vector = npt.NDArray[np.float64]
-"""The parameters of one gait in the order of ParameterSpace.names."""
+"""Parameters of a gait, in the order of ParameterSpace.names."""
 
 TAU_A, TAU_B = -2, -1
-"""Indices of the time constants in a vector."""
+"""Indices of the time constants in a parameter vector."""
 
 TAU_B_PER_TAU_A = 2.0
-"""The thesis keeps tau_B = 2 tau_A, so that the output resembles a sine wave."""
+"""Ratio of the time constants in the thesis. With it the output resembles a sine wave."""
 
 
 _MOST_COLUMNS = 8
-"""Oscillators of which a printed gait shows the weights: a line then has 100 characters."""
+"""Largest number of oscillators for which print() shows all weights, in lines of 100 characters."""
 
 
 class Gains(Section):
-    """Strength of each pathway of physics.feedback, in units of the input u0."""
+    """Gain of each feedback pathway (see physics.feedback), in units of the input u0."""
 
     length: float = 0.0
     load: float = 0.0
@@ -47,24 +47,24 @@ class Gains(Section):
 
 @dataclass(frozen=True)
 class Gait:
-    """The parameters of the oscillator network."""
+    """Gait: the parameters of an oscillator network."""
 
     name: str
     weights: tuple[float, ...]
-    """Weights in the order of robot.weights.Weights.couplings, which is the listing's (B.2)."""
+    """Weights in the order of robot.weights.Weights.couplings (listing B.2)."""
     tau_a: float
     tau_b: float
     """Time constant of self-inhibition, in s."""
     turn: float = 0.0
-    """Turn, -1 to 1. Left oscillators have the input u0 (1 + turn), right ones u0 (1 - turn)."""
+    """Steering, -1 to 1. Left oscillators get the input u0 (1 + turn), right ones u0 (1 - turn)."""
     gains: Gains = field(default_factory=Gains)
     scenario: str = field(default="", compare=False)
-    """Name of the scenario that the gait was made for; "" if that is not known."""
+    """Name of the scenario that the gait was made for; "" if it is unknown."""
     weight_names: tuple[str, ...] = field(default=(), repr=False, compare=False)
     """Names such as "3->1 extensor": from oscillator 3 onto oscillator 1. Empty if unknown."""
 
     def __str__(self) -> str:
-        """A few lines; the weights as a matrix, for as many oscillators as fit on a line."""
+        """Summary in a few lines. The weights are shown as a matrix if it fits."""
         lines = [f"{self.name}: tau_A {self.tau_a:.4g} s, tau_B {self.tau_b:.4g} s"]
         if self.turn:
             lines.append(f"turn {self.turn:.4g}")
@@ -87,8 +87,8 @@ class Gait:
         return f"<Gait {self.name}>"
 
     def to_json(self, scenario: Scenario) -> dict[str, Any]:
-        """The content of a gait file; `scenario` is one that the gait fits, and was made for unless
-        it says another."""
+        """Content of a gait file. The gait must fit `scenario`, which gives the names of the
+        weights, and the scenario's name if the gait has none."""
         names = Weights.of(scenario).names
         content: dict[str, Any] = {"schema": 2, "name": self.name}
         content["scenario"] = self.scenario or scenario.name
@@ -106,8 +106,8 @@ class Gait:
 
 @dataclass(frozen=True)
 class ParameterSpace:
-    """The parameters of a scenario's gaits as one vector: weights, feedback gains where the
-    scenario has them, tau_A, tau_B (s)."""
+    """Parameter space of a scenario's gaits. A vector has the weights, the feedback gains (if the
+    scenario has feedback), tau_A and tau_B (s)."""
 
     names: tuple[str, ...]
     """Names such as "weight 3->1 extensor", "gain length", "tau_A", "tau_B"."""
@@ -115,23 +115,23 @@ class ParameterSpace:
     high: Vector
     """Bounds of random gaits (Table 5)."""
     floors: Vector
-    """Mutation keeps each parameter above its floor (listing A.3.3, A.3.4)."""
+    """Lower limits of the search. Mutation keeps parameters above (listing A.3.3, A.3.4)."""
     couples_tau_b: bool
-    """True if tau_B is kept at 2 tau_A."""
+    """True if tau_B is always 2 tau_A."""
     weights: npt.NDArray[np.int64]
-    """(weights of a gait,): index of the parameter that gives each weight."""
+    """Index of the parameter that gives each weight of a gait (weights,)."""
     weight_names: tuple[str, ...]
-    """(weights of a gait,): names of the weights in gait files."""
+    """Name of each weight of a gait in gait files (weights,)."""
     pathways: tuple[str, ...]
-    """Pathways with a gain."""
+    """Names of the feedback pathways with a gain."""
     turn: float
-    """Turn of all gaits."""
+    """Steering of all gaits; see Gait.turn."""
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
-        """The space of a scenario.
+        """The parameter space of a scenario.
 
-        Equal bounds fix a parameter. The bounds of tau_B are twice those of tau_A.
+        A parameter with equal bounds is fixed. The bounds of tau_B are twice the bounds of tau_A.
         """
         weights, bounds = Weights.of(scenario), scenario.gait_bounds
         images = np.arange(len(weights.images))
@@ -159,7 +159,7 @@ class ParameterSpace:
         )
 
     def gait(self, vector: Vector, *, name: str) -> Gait:
-        """The gait of a vector."""
+        """The gait with the parameters of a vector."""
         first_gain = len(self.names) - 2 - len(self.pathways)
         gains = dict(zip(self.pathways, vector[first_gain:].tolist(), strict=False))
         return Gait(
@@ -173,14 +173,14 @@ class ParameterSpace:
         )
 
     def vector(self, gait: Gait) -> Vector:
-        """The vector of a gait; of mirrored weights, the first ones count."""
+        """The vector of a gait. If weights are mirrored, the first of each pair is used."""
         _, first = np.unique(self.weights, return_index=True)
         weights = np.array(gait.weights)[first]
         gains = [getattr(gait.gains, name) for name in self.pathways]
         return np.concatenate([weights, gains, [gait.tau_a, gait.tau_b]])
 
     def random(self, generator: np.random.Generator) -> Vector:
-        """A vector drawn uniformly within the bounds, with tau_B = 2 tau_A."""
+        """A random vector: uniform between the bounds, with tau_B = 2 tau_A."""
         drawn = generator.uniform(self.low[:TAU_B], self.high[:TAU_B])
         return np.append(drawn, TAU_B_PER_TAU_A * drawn[TAU_B])
 
@@ -197,12 +197,12 @@ WALKING_SEED = 80
 
 
 def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
-    """The random gait of a seed, drawn uniformly from the scenario's bounds (Table 5).
+    """The random gait with a seed, uniform between the scenario's bounds (Table 5).
 
     >>> td.seeded_gait("thesis", 80)
     <Gait random gait 80>
 
-    `scenario` may be a name, a file or a run. Raises InputError for what stands for no scenario,
+    `scenario` may be a scenario, its name or file, or a run. Raises InputError for anything else,
     and for a negative seed.
     """
     if not isinstance(seed, Integral) or seed < 0:
@@ -212,7 +212,7 @@ def seeded_gait(scenario: GivenScenario, seed: int = WALKING_SEED) -> Gait:
 
 
 def save_gait(gait: Gait, path: str | Path, scenario: Scenario) -> None:
-    """Writes a gait file; it loads back to the same numbers."""
+    """Writes a gait file. load_gait() reads the same numbers."""
     write_whole(path, json.dumps(gait.to_json(scenario), indent=1) + "\n")
 
 
@@ -220,13 +220,13 @@ Weight = Annotated[float, Field(ge=0)]
 
 
 class GaitFile(Section):
-    """The content of a gait file; see Gait."""
+    """Content of a gait file; see Gait."""
 
     version: Literal[1, 2] = Field(alias="schema")
     name: str = ""
     scenario: str = ""
     weights: dict[str, Weight] | list[Weight]
-    """Weights by Weights.names, in any order, or, as in schema 1 and the thesis, a list in
+    """Weights by name (see Weights.names), in any order. In schema 1, as in the thesis, a list in
     the order of Weights.couplings."""
     tau_a_s: float = Field(gt=0)
     tau_b_s: float | None = Field(default=None, gt=0)
@@ -235,11 +235,11 @@ class GaitFile(Section):
 
 
 def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
-    """Reads a gait file, or the gait under `key` of a JSON file, for the scenario's robot.
+    """Reads a gait for the scenario's robot from a gait file, or from `key` of a JSON file.
 
         >>> gait = td.load_gait("gait.json", td.load_scenario("quick"))
 
-    Raises InputError, naming file and key, for whatever is wrong in the file or does not fit.
+    Raises InputError, naming file and key, if the file is wrong or does not fit the scenario.
     """
     file = _read_file(given_path(path, "load_gait", "path"), key)
     own, weights = Weights.of(scenario), file.weights
@@ -262,17 +262,17 @@ def load_gait(path: str | Path, scenario: Scenario, *, key: str = "") -> Gait:
 
 
 class HasBestGait(Protocol):
-    """A run."""
+    """A run, seen only by its best gait."""
 
     def best_gait(self) -> Gait: ...
 
 
 GivenGait = Gait | HasBestGait | str | Path
-"""A gait, its file, or a run, which stands for its best gait."""
+"""A gait, its file, or a run; a run means its best gait."""
 
 
 def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
-    """The gait that an argument stands for; InputError for what stands for none."""
+    """The gait of an argument: a gait, a file or a run. Raises InputError for anything else."""
     if isinstance(gait, Gait):
         return gait
     if isinstance(gait, (str, Path)):
@@ -283,7 +283,7 @@ def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
 
 
 def _read_file(path: str | Path, key: str) -> GaitFile:
-    """Content of a gait file, or of a JSON file under `key`."""
+    """Reads a gait file, or the gait under `key` of a JSON file."""
     raw = read_json(path, "gait file")
     if key and isinstance(raw, dict):
         raw = raw.get(key)
@@ -293,7 +293,7 @@ def _read_file(path: str | Path, key: str) -> GaitFile:
 def check_gait(
     gait: Gait, scenario: Scenario, weights: Weights, *, source: object, key: str = ""
 ) -> None:
-    """Raises InputError, naming source and key, for what does not fit the scenario."""
+    """Raises InputError, naming source and key, if a gait does not fit the scenario."""
     prefix = f"{key}." if key else ""
     count, expected = len(gait.weights), len(weights.couplings)
     if count != expected:
@@ -302,22 +302,22 @@ def check_gait(
         raise InputError(source, f"{prefix}weights", problem)
     for name, gain in gait.gains:
         if gain and name not in scenario.cpg.feedback:
-            problem = f"found {gain}, expected 0, as cpg.feedback is {scenario.cpg.feedback}"
+            problem = f"found {gain}, expected 0: cpg.feedback is {scenario.cpg.feedback}"
             raise InputError(source, f"{prefix}gains.{name}", problem)
     if gait.turn and not weights.blueprint.sides.any():
-        problem = f"found {gait.turn}, expected 0, as no oscillator has a side"
+        problem = f"found {gait.turn}, expected 0: no oscillator is left or right"
         raise InputError(source, f"{prefix}turn", problem)
 
 
 def _check_names(given: Collection[str], wanted: tuple[str, ...], source: object, key: str) -> None:
-    """Raises InputError unless these are the names of a scenario's weights."""
+    """Raises InputError if names are missing or unknown."""
     missing = [name for name in wanted if name not in given]
     unknown = [name for name in given if name not in wanted]
     problems = []
     if missing:
-        problems.append(f"misses {len(missing)}, as '{missing[0]}'")
+        problems.append(f"lacks {len(missing)} names, such as '{missing[0]}'")
     if unknown:
-        problems.append(f"has {len(unknown)} others, as '{unknown[0]}'")
+        problems.append(f"has {len(unknown)} unknown names, such as '{unknown[0]}'")
     if problems:
         problem = f"found {len(given)}, expected the {len(wanted)} of the scenario"
         raise InputError(source, key, f"{problem}; {' and '.join(problems)}")

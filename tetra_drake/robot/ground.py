@@ -1,4 +1,4 @@
-"""The ground of a scenario as the kernels take it: laws, terrain, contact nodes."""
+"""Ground of a scenario in the form of the kernels: laws, terrain, contact nodes."""
 
 from __future__ import annotations
 
@@ -25,18 +25,17 @@ from tetra_drake.scenario.terrain_kinds import Flat, Grid
 from tetra_drake.scenario.units import INCH
 
 STEP_AHEAD = 1.0 * INCH
-"""Distance from the robot's foremost contact node to a terrain that begins ahead of it."""
-
+"""Distance from the robot's foremost contact node to a terrain that begins in front of it."""
 START_DEPTH = 1e-6
-"""Depth (m) in the ground from which on a node counts as placed there by mistake, beyond that to
-which the whole weight would press it: a robot may start at rest."""
+"""Tolerance (m) for the depth of a node in the ground at the start. A node may also be as deep as
+the robot's weight would press it, because a robot may start in equilibrium."""
 
 
 def make_ground(scenario: Scenario, structure: Structure) -> Ground:
-    """The ground as kernels take it.
+    """The ground of a scenario, under a structure.
 
-    Raises InputError if its heights cannot be had, or if the structure starts off their grid or
-    with a contact node in the ground.
+    Raises InputError if the terrain cannot be made, or if the structure starts outside the terrain
+    or with a contact node in the ground.
     """
     start = node_positions(structure, structure.initial_state)[structure.contacts]
     ahead = start[:, 0].max() + STEP_AHEAD
@@ -57,7 +56,7 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
 
 def _surface_grid(grid: Grid) -> SurfaceGrid:
     rows, columns = grid.heights.shape
-    inside = 1.5 + 1e-9  # so that rounding finds a control point beyond the last one's neighbour
+    inside = 1.5 + 1e-9  # keeps the spline's control points on the grid in spite of rounding
     return SurfaceGrid(
         corner_x=grid.corner[0],
         corner_y=grid.corner[1],
@@ -74,8 +73,8 @@ def _surface_grid(grid: Grid) -> SurfaceGrid:
 def _check_start(
     scenario: Scenario, structure: Structure, ground: Ground, grid: Grid, start: np.ndarray
 ) -> None:
-    """Raises InputError if a contact node, at `start` (contacts, 3), is off the grid or in the
-    ground."""
+    """Raises InputError if a contact node is outside the terrain or in the ground. `start`
+    (contacts, 3) are the positions of the contact nodes."""
     corner, cells = np.array(grid.corner), np.array(grid.heights.shape) - 1
     low, high = start[:, :2].min(axis=0), start[:, :2].max(axis=0)
     if (low < corner).any() or (high > corner + cells * grid.cell).any():
@@ -92,14 +91,15 @@ def _check_start(
 
 
 def ground_heights(x_y: np.ndarray, ground: Ground) -> np.ndarray:
-    """Heights (...) in m of the surface at x and y (..., 2) in m."""
+    """Heights (...) of the surface at x and y (..., 2), in m."""
     top = np.full((x_y.size // 2, 1), SurfaceGrid(*ground.grid).top)
     frames = ground_frames(np.hstack([x_y.reshape(-1, 2), top]), ground)
     return (top[:, 0] - frames[:, GAP] / frames[:, N_Z]).reshape(x_y.shape[:-1])
 
 
 def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
-    """(points, 3, 3): t1, t2 and n of physics.terrain in the rows, for points (points, 3) in m."""
+    """Axes of the surface below points (points, 3) in m: t1, t2 and n (see physics.terrain) as rows
+    of (points, 3, 3)."""
     frames = ground_frames(p_WN, ground)
     axes = np.zeros((len(p_WN), 3, 3))
     axes[:, 0], axes[:, 1, 1:] = frames[:, T1_X : T1_Z + 1], frames[:, T2_Y : T2_Z + 1]
@@ -108,7 +108,8 @@ def ground_axes(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
 
 
 def ground_frames(p_WN: np.ndarray, ground: Ground) -> np.ndarray:
-    """The frames (points, FRAME_COLUMNS) of physics.terrain for points (points, 3) in m."""
+    """Frames (points, FRAME_COLUMNS) of the surface below points (points, 3) in m; see
+    physics.terrain."""
     frames = np.empty((len(p_WN), FRAME_COLUMNS))
     nodes = np.zeros((len(p_WN), NODE_COLUMNS))
     nodes[:, P_WN : P_WN + 3] = p_WN

@@ -1,4 +1,4 @@
-"""The robot of a scenario, made once per simulation: what engines and results know of it."""
+"""Robot of a scenario: structure, constants of the kernels, network, start."""
 
 from __future__ import annotations
 
@@ -30,36 +30,32 @@ from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Flat
 
 AMPLITUDE = 0.5
-"""Amplitude of y_extensor - y_flexor, as a share of u0: 0.44 to 0.53 in random gaits."""
-
+"""Typical amplitude of y_extensor - y_flexor, as a share of u0; 0.44 to 0.53 in random gaits."""
 LEAST_MOTION = 0.01
-"""Share of a cable's length by which signals should be able to move it."""
-
+"""Least change of a cable's length that signals should cause, as a share of the length."""
 DEEPEST = 1e-3
-"""Depth in the ground, as a share of a structure's height, from which on a node counts as placed
-there by mistake."""
-
+"""Largest depth of a node in the ground at the start, as a share of the structure's height."""
 SteeringSignal = Callable[[float], float]
-"""The turn, from -1 to 1, at a time in s."""
+"""Function from time (s) to the turn, -1 to 1."""
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot on its ground."""
+    """A robot on its ground, ready to be simulated."""
 
     scenario: Scenario
     structure: Structure
     model: Model
-    """The numbers of its bodies, cables and ground, as kernels take them."""
+    """Constants of bodies, cables and ground, in the form of the kernels."""
     commanded: np.ndarray
-    """(samples, m): the signals in N at 0, one `cpg.listing_step`, two ... to beyond the duration,
-    if a command gives them (see robot.command). No samples if a network does."""
+    """Signals (samples, m) in N of a command, at multiples of `cpg.listing_step` (see
+    robot.command). Without samples if a network makes the signals."""
 
     @classmethod
     def of(cls, scenario: Scenario, structure: Structure | None = None) -> Self:
-        """The robot of a scenario, with another structure if one is given.
+        """The robot of a scenario, by default with the scenario's structure.
 
-        Raises InputError if it would start in the ground, or off its terrain.
+        Raises InputError if it would start in the ground or outside its terrain.
         """
         structure = structure or MakeStructure(scenario)
         model, no_command = make_model(scenario, structure), np.zeros((0, structure.signals))
@@ -72,7 +68,7 @@ class Robot:
 
     @property
     def driven(self) -> np.ndarray:
-        """(driven cables,): their indices."""
+        """Indices of the driven cables."""
         return np.flatnonzero(self.structure.cables["signal"] != PASSIVE)
 
     @property
@@ -82,22 +78,22 @@ class Robot:
 
     @property
     def weight(self) -> float:
-        """Weight of all bodies in N."""
+        """Weight of the robot in N."""
         return float(self.structure.mass.sum()) * self.scenario.robot.gravity
 
     @functools.cached_property
     def equilibrium(self) -> Equilibrium:
-        """Equilibrium of the robot on flat ground without actuation, whatever the scenario's
-        terrain and offsets; raises InputError if there is none."""
+        """Equilibrium of the robot on flat ground without actuation. The scenario's terrain and
+        offsets are ignored. Raises InputError if there is no equilibrium."""
         if self.structure.equilibrium is not None:
             return self.structure.equilibrium
         return equilibrium_of(self.scenario, undisturbed_structure(self.scenario))
 
     @functools.cached_property
     def senses(self) -> Senses:
-        """Constants of what the oscillators sense; raises InputError if there is no equilibrium."""
+        """Constants of the oscillators' sensors. Raises InputError if there is no equilibrium."""
         drivers, pathways = self.structure.drivers, self.scenario.cpg.feedback
-        sizes = np.bincount(drivers - PASSIVE)[drivers - PASSIVE]  # cables of each cable's group
+        sizes = np.bincount(drivers - PASSIVE)[drivers - PASSIVE]  # of each cable's group
         settled = self.equilibrium.lengths if "length" in pathways else np.ones(len(drivers))
         per_load = 1.0 / self.weight if "load" in pathways else 0.0
         return Senses(
@@ -110,7 +106,7 @@ class Robot:
         )
 
     def network(self, gait: Gait) -> Network:
-        """The network of a gait; raises InputError where the gait does not fit the scenario."""
+        """The network of a gait. Raises InputError if the gait does not fit the scenario."""
         cpg, weights = self.scenario.cpg, self.weights
         check_gait(gait, self.scenario, weights, source=f"gait {gait.name}")
         neurons = np.arange(2 * self.structure.signals)
@@ -125,9 +121,9 @@ class Robot:
         )
 
     def turns(self, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-        """The turns at 0, one `cpg.listing_step`, two ... to the duration; one alone if constant.
+        """The turns at multiples of `cpg.listing_step`. A single value without `steering`.
 
-        Raises InputError if a turn is not a number from -1 to 1, or where nothing can be steered.
+        Raises InputError if a turn is not between -1 and 1, or if the robot cannot be steered.
         """
         if steering is None:
             return np.array([gait.turn])
@@ -138,15 +134,16 @@ class Robot:
         return np.array([checked_turn(float(steering(time)), time=time) for time in times.tolist()])
 
     def tonic_input(self, turns: np.ndarray) -> np.ndarray:
-        """(..., 2m): u0 by neuron for turns (...); see physics.oscillator.steered_input."""
+        """Input u0 of each neuron (..., 2m), for turns (...); see
+        physics.oscillator.steered_input()."""
         sides = np.repeat(self.structure.sides, 2)
         u0 = self.scenario.cpg.external_input
         steered: np.ndarray = steered_input(u0, turns[..., np.newaxis], sides)
         return steered
 
     def gain_remark(self) -> str:
-        """Remark on a `cpg.gain` with which signals hardly move the cables, or ask more than the
-        actuators can; empty if neither."""
+        """Warning if signals with this `cpg.gain` hardly move the cables, or exceed the limits of
+        the actuators; empty if neither."""
         cpg, driven = self.scenario.cpg, self.structure.cables[self.driven]
         signal = abs(cpg.gain) * AMPLITUDE * cpg.external_input
         moved = signal / driven["stiffness"]
@@ -159,7 +156,7 @@ class Robot:
         return f"with cpg.gain {cpg.gain:.3g} N signals {problem}" if problem else ""
 
     def starting_drives(self) -> np.ndarray:
-        """(drives,): states of the actuators at t = 0; see physics.actuator."""
+        """States of the actuators at t = 0 (drives,); see physics.actuator."""
         driven, length = self.structure.cables[self.driven], self._starting_lengths()
         rate: Any = np.zeros(len(driven))
         law, signal = CableLaw.of(driven), rate
@@ -171,13 +168,14 @@ class Robot:
         return drives
 
     def _starting_lengths(self) -> Any:
-        """(driven cables,): lengths in m at t = 0."""
+        """Lengths of the driven cables (driven cables,) in m at t = 0."""
         driven = self.structure.cables[self.driven]
         p_WN = node_positions(self.structure, self.structure.initial_state)
         return np.linalg.norm(p_WN[driven["node_b"]] - p_WN[driven["node_a"]], axis=1)
 
     def starting_modes(self) -> np.ndarray:
-        """The `modes` of physics.contact at t = 0: what touches the ground sticks there."""
+        """Modes of the contact nodes at t = 0 (see physics.contact). A node that touches the ground
+        sticks."""
         modes = np.zeros((len(self.structure.contacts), MODE_COLUMNS))
         parts = self.model, Forces.of(self.model)
         modes_after_step(parts, self.structure.initial_state, modes)
@@ -185,8 +183,8 @@ class Robot:
 
 
 def MakeStructure(scenario: Scenario) -> Structure:
-    """The structure of a scenario's robot where it starts, displaced by `robot.offsets` and turned
-    with an incline. Raises InputError if it cannot start."""
+    """The structure of a scenario's robot at its start: displaced by `robot.offsets`, and turned
+    with an incline. Raises InputError if it cannot start there."""
     structure = undisturbed_structure(scenario)
     p_WB, slope = structure.p_WB, scenario.terrain.plane_slope or 0.0
     if scenario.robot.offsets:
@@ -196,7 +194,7 @@ def MakeStructure(scenario: Scenario) -> Structure:
 
 
 def undisturbed_structure(scenario: Scenario) -> Structure:
-    """The structure of a scenario's robot as it starts on flat ground."""
+    """The structure of a scenario's robot at its start on flat ground, without offsets."""
     blueprint = scenario.robot.blueprint()
     placed = Structure.of(blueprint)
     if not blueprint.settles:
@@ -210,7 +208,8 @@ def undisturbed_structure(scenario: Scenario) -> Structure:
 
 
 def _lift(scenario: Scenario, placed: Structure) -> float:
-    """How far (m) a structure is moved up to stand on the ground; InputError if it is in it."""
+    """Distance (m) to move a structure up so that it stands on the ground. Raises InputError if the
+    structure is clearly below the ground."""
     heights = placed.p_WN[:, 2]
     lowest = placed.contacts[heights[placed.contacts].argmin()]
     depth = -heights[lowest]
@@ -224,15 +223,16 @@ def _lift(scenario: Scenario, placed: Structure) -> float:
 def equilibrium_of(
     scenario: Scenario, structure: Structure, start: np.ndarray | None = None
 ) -> Equilibrium:
-    """Equilibrium of a structure on flat ground without actuation, let go at `start` (13 bodies,)
-    or, without it, where the structure starts; raises InputError if there is none."""
+    """Equilibrium of a structure on flat ground without actuation. The search begins at the state
+    `start` (13 bodies,), by default the structure's initial state. Raises InputError if there is no
+    equilibrium."""
     model = make_model(scenario.with_sections(terrain=Flat()), structure)
     start = structure.initial_state if start is None else start
     return find_equilibrium(model, start, bodies=structure.bodies, source=scenario.name)
 
 
 def make_model(scenario: Scenario, structure: Structure) -> Model:
-    """A structure and its laws as the kernels of every engine take them."""
+    """Constants of a structure and its laws, in the form of the kernels."""
     distances = np.linalg.norm(structure.p_BN, axis=1)
     return Model(
         p_BN=structure.p_BN,
@@ -254,7 +254,7 @@ def make_model(scenario: Scenario, structure: Structure) -> Model:
 
 
 def constant_steering(turn: float) -> SteeringSignal:
-    """The signal of a constant turn; InputError if it is not a number."""
+    """Steering with a constant turn. Raises InputError if it is not a number."""
     if isinstance(turn, bool) or not isinstance(turn, numbers.Real):
         expected = "a number from -1 to 1, or a function of the time in s"
         raise InputError("steering", "", f"found {turn!r}, expected {expected}")
@@ -262,14 +262,15 @@ def constant_steering(turn: float) -> SteeringSignal:
 
 
 def checked_turn(turn: float, *, time: float) -> float:
-    """The turn at a time (s); InputError if it is not a number from -1 to 1."""
+    """The turn, if it is between -1 and 1. Raises InputError otherwise; `time` (s) is for the
+    message."""
     if not abs(turn) <= 1.0:
         raise InputError("steering", f"at {time:g} s", f"found {turn}, expected -1 to 1")
     return turn
 
 
 def initial_neurons(cpg: CpgSection, oscillators: int) -> np.ndarray:
-    """(4n,): u, then v, of all neurons at t = 0 (Table 4)."""
+    """State of the neurons at t = 0 (4n,): u of all neurons, then v (Table 4)."""
     inner_state, extensor_self_inhibition, flexor_self_inhibition = cpg.initial_state
     u = np.full(2 * oscillators, inner_state)
     v = np.tile([extensor_self_inhibition, flexor_self_inhibition], oscillators)

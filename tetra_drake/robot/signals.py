@@ -1,7 +1,7 @@
-"""The actuation signals of a gait, computed before the robot is simulated.
+"""Actuation signals of a gait, computed before the simulation.
 
-Without feedback the network does not depend on the robot, so its output can be computed alone
-and fed to the cables, as the thesis does.
+Without feedback the network does not depend on the robot. So its signals can be computed before the
+robot is simulated, as in the thesis.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ from tetra_drake.scenario.units import POUND_FORCE
 
 
 def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-    """y_extensor - y_flexor (samples, m) at 0, one `listing_step`, two ... from `cpg.signals`.
+    """Output of the network, y_extensor - y_flexor (samples, m), at multiples of `listing_step`.
 
-    `listing`: forward Euler as in listing B, which stamps the state after i + 1 steps with the
-    time of i steps; the last sample is one step before the end. `live`: the classical Runge-Kutta
-    method of order 4, whose error is 1e-5, to the end or beyond. Within a step the turn is that of
-    its middle. Raises InputError for a gait that does not fit, or one
-    with feedback, whose signals depend on the robot.
+    With `cpg.signals: listing`, forward Euler as in listing B: sample i is the state after i + 1
+    steps, and the last sample is one step before the end. With `live`, the classical Runge-Kutta
+    method of order 4, with an error of 1e-5. The turn within a step is the turn at its middle.
+
+    Raises InputError if the gait does not fit. Raises InputError for a gait with feedback, because
+    its signals depend on the robot's motion.
     """
     cpg, oscillators = robot.scenario.cpg, robot.structure.signals
     if any(gain for _, gain in gait.gains):
@@ -43,7 +44,7 @@ def raw_output(robot: Robot, gait: Gait, steering: SteeringSignal | None = None)
 
 
 def sample_count(robot: Robot) -> int:
-    """Number of samples of a robot's command or else of raw_output(); the signals keep the last."""
+    """Number of samples of a robot's command, or of raw_output() if there is no command."""
     if len(robot.commanded):
         return len(robot.commanded)
     scenario = robot.scenario
@@ -52,10 +53,10 @@ def sample_count(robot: Robot) -> int:
 
 
 def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = None) -> np.ndarray:
-    """The signals (samples, m) in N at 0, one `cpg.listing_step`, two ... to beyond the duration.
+    """Signals (samples, m) in N at multiples of `cpg.listing_step`, until after the duration.
 
-    Between samples the signals are linear. Start-up is not applied. If the robot follows a
-    command, the signals are those, and the gait has no part in them.
+    Between samples the signals are linear. They are not set to zero before the start-up time. The
+    signals of a command do not depend on the gait.
     """
     if len(robot.commanded):
         return robot.commanded
@@ -66,7 +67,7 @@ def signal_samples(robot: Robot, gait: Gait, steering: SteeringSignal | None = N
 def signals_at(
     robot: Robot, gait: Gait, times: np.ndarray, *, steering: SteeringSignal | None = None
 ) -> np.ndarray:
-    """The signals (times, m) in N that cables are fed at `times` (s), zero before the start-up."""
+    """Signals of the cables (times, m) in N at `times` (s); zero before the start-up time."""
     samples, cpg = signal_samples(robot, gait, steering), robot.scenario.cpg
     grid = cpg.listing_step * np.arange(len(samples))
     signals = np.empty((len(times), samples.shape[1]))
@@ -77,22 +78,22 @@ def signals_at(
 
 
 UNITS = {"lbf": POUND_FORCE, "N": 1.0}
-"""Units of force in which save_signals() writes."""
+"""Units of force for save_signals()."""
 
 
 def save_signals(
     path: str | Path, robot: Robot, gait: Gait, *, unit: str = "lbf", rate: float | None = None
 ) -> None:
-    """Writes the signals that the cables of a gait are fed as CSV: time_s, signal_1 ... signal_m.
+    """Writes the signals of a gait as CSV with the columns time_s, signal_1 ... signal_m.
 
-    The first lines, which begin with #, say what the columns are.
+    The first lines begin with # and describe the columns.
 
     Args:
         unit: one of UNITS.
         rate: samples per second (Hz); one per `cpg.listing_step` by default.
 
     Raises:
-        InputError: where the rate is beyond its default, or the file cannot be written.
+        InputError: if the rate is above its default, or the file cannot be written.
     """
     scenario, cpg = robot.scenario, robot.scenario.cpg
     duration = scenario.simulation.duration

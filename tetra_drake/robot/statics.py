@@ -1,7 +1,8 @@
-"""Statics of a tensegrity: self-stress states, and the mechanisms that cables do not hinder.
+"""Statics of a tensegrity: self-stress states, and mechanisms that the cables allow.
 
-See S. Pellegrino, "Structural computations with the singular value decomposition of the equilibrium
-matrix", International Journal of Solids and Structures 30 (1993), here for rigid bodies.
+The method is from S. Pellegrino, "Structural computations with the singular value decomposition of
+the equilibrium matrix", International Journal of Solids and Structures 30 (1993). Here the joined
+parts are rigid bodies.
 """
 
 from __future__ import annotations
@@ -11,22 +12,22 @@ from typing import NamedTuple
 import numpy as np
 
 TOLERANCE = 1e-6
-"""Greatest singular value that counts as zero, as a share of the greatest, where lengths are
-measured in the size of the structure. Coordinates with six digits are exact enough."""
+"""Singular values below this share of the greatest count as zero. Lengths are in units of the
+structure's size. Coordinates need at least six digits."""
 
 
 class Statics(NamedTuple):
-    """Self-stress states and mechanisms where the nodes are."""
+    """Self-stress states and mechanisms of a structure."""
 
     self_stresses: np.ndarray
-    """(s, cables): tensions that balance without loads, an orthonormal basis."""
+    """Orthonormal basis (s, cables) of the tensions that are in balance without loads."""
     mechanisms: int
-    """Number of infinitesimal motions that change no cable's length, to first order. Motions of
-    the structure as a whole do not count, nor the spin of straight bodies about themselves."""
+    """Number of infinitesimal motions that change no cable's length to first order. Motions of the
+    whole structure do not count, nor does the spin of a straight body about its axis."""
 
 
 def find_statics(*, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.ndarray) -> Statics:
-    """Statics of bodies joined by cables; for the arguments see cable_wrenches()."""
+    """Statics of rigid bodies joined by cables. For the arguments see cable_wrenches()."""
     bodies = int(body_of_node.max()) + 1
     p_WN = (p_WN - p_WN.mean(axis=0)) / np.linalg.norm(np.ptp(p_WN, axis=0))
     wrenches = cable_wrenches(p_WN=p_WN, body_of_node=body_of_node, cable_ends=cable_ends)
@@ -34,7 +35,7 @@ def find_statics(*, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.n
     greatest = singular_values.max(initial=0.0)
     rank = int(np.count_nonzero(singular_values > TOLERANCE * greatest))
     straight = sum(_is_straight(p_WN[body_of_node == body]) for body in range(bodies))
-    # The spin of a structure on one line is the spin of its bodies.
+    # A structure on one line has 5 motions as a whole: its spin is the spin of its bodies.
     of_whole = 5 if _is_straight(p_WN) else 6
     mechanisms = 6 * bodies - of_whole - straight - rank
     return Statics(self_stresses=tensions[rank:], mechanisms=mechanisms)
@@ -43,11 +44,15 @@ def find_statics(*, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.n
 def cable_wrenches(
     *, p_WN: np.ndarray, body_of_node: np.ndarray, cable_ends: np.ndarray
 ) -> np.ndarray:
-    """Wrenches of cables of unit tension on B bodies, (6 B, cables).
+    """Wrenches (6 B, cables) of cables with unit tension on B bodies.
 
-    p_WN: (nodes, 3), in m. body_of_node: (nodes,), numbers of bodies. cable_ends: (cables, 2),
-    numbers of nodes. The six rows of a body are torque about World's origin (N m per N), then
-    force, in World.
+    The six rows of a body are the torque about the world's origin (N m per N), then the force, both
+    in the world frame.
+
+    Args:
+        p_WN: positions of the nodes (nodes, 3) in m.
+        body_of_node: index of the body of each node (nodes,).
+        cable_ends: indices of the two nodes of each cable (cables, 2).
     """
     cables, (node_a, node_b) = np.arange(len(cable_ends)), cable_ends.T
     force = p_WN[node_b] - p_WN[node_a]

@@ -1,4 +1,4 @@
-"""The structure of a robot: its blueprint with inertia, and where its bodies are at t = 0."""
+"""Structure of a robot: its blueprint, with the inertia and the initial poses of its bodies."""
 
 from __future__ import annotations
 
@@ -23,25 +23,28 @@ from tetra_drake.scenario.blueprint import Blueprint
 
 @dataclass(frozen=True)
 class Structure(Blueprint):
-    """Rigid bodies, each of struts that meet in nodes, tied together by cables; SI units."""
+    """Rigid bodies joined by cables; SI units. A body consists of struts between nodes."""
 
     p_BN: np.ndarray
-    """(nodes, 3): the nodes in the frames of their bodies, whose origins are centres of mass."""
+    """Positions of the nodes (nodes, 3) in the frames of their bodies. The origin of a frame is the
+    body's centre of mass."""
     mass: np.ndarray
-    """(bodies,)."""
+    """Masses (bodies,)."""
     unit_inertia: np.ndarray
-    """(bodies, 6): moments and products xx, yy, zz, xy, xz, yz of each body about its origin, in
-    its frame, over its mass (m²)."""
+    """Unit inertias (bodies, 6) in m²: xx, yy, zz, xy, xz, yz of each body about its origin, in its
+    frame, divided by its mass."""
     p_WB: np.ndarray
-    """(bodies, 3): the bodies at t = 0."""
+    """Positions of the bodies (bodies, 3) at t = 0."""
     q_WB: np.ndarray
-    """(bodies, 4): their quaternions then, w first."""
+    """Quaternions of the bodies (bodies, 4) at t = 0, w first."""
     equilibrium: Equilibrium | None = None
-    """The equilibrium where it starts, but for offsets and slope; None if it starts as placed."""
+    """Equilibrium in which the structure starts, before offsets and slope. None if it starts where
+    its blueprint places it."""
 
     @classmethod
     def of(cls, blueprint: Blueprint) -> Self:
-        """The structure where its blueprint places it; its bodies' frames have World's axes."""
+        """The structure of a blueprint, at the blueprint's positions. The frames of the bodies have
+        the axes of the world."""
         mass, p_FB, unit_inertia = body_inertias(blueprint)
         given = {one.name: getattr(blueprint, one.name) for one in dataclasses.fields(Blueprint)}
         return cls(
@@ -55,7 +58,7 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def drivers(self) -> np.ndarray:
-        """(cables,): the oscillator that drives each cable, PASSIVE if none does."""
+        """Index of the oscillator that drives each cable (cables,); PASSIVE if there is none."""
         drivers = np.full(len(self.cable_names), PASSIVE)
         for oscillator, cables in enumerate(self.groups):
             drivers[list(cables)] = oscillator
@@ -63,7 +66,7 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def cables(self) -> np.ndarray:
-        """(cables,) of dtype CABLE."""
+        """Cables with their constants: records (cables,) of dtype CABLE."""
         cables = np.zeros(len(self.cable_names), dtype=CABLE)
         cables["node_a"], cables["node_b"] = self.cable_ends.T
         cables["signal"] = self.drivers
@@ -73,7 +76,7 @@ class Structure(Blueprint):
 
     @property
     def strut_table(self) -> Struts:
-        """The struts as kernels take them."""
+        """The struts in the form of the kernels."""
         node_a, node_b = self.struts.T
         first = np.searchsorted(self.carriers[node_a], np.arange(len(self.bodies) + 1))
         along = self.p_BN[node_b] - self.p_BN[node_a]
@@ -81,7 +84,8 @@ class Structure(Blueprint):
 
     @property
     def couplings(self) -> Couplings:
-        """The pairs of bodies in the order of the cables; ValueError if these are in no order."""
+        """Pairs of bodies that cables join, in the order of the cables. Raises ValueError if the
+        cables of a pair are not next to each other."""
         pairs = self.carriers[self.cable_ends]
         begins = np.flatnonzero(np.any(np.diff(pairs, axis=0, prepend=-1), axis=1))
         first, second = pairs[begins].T
@@ -91,11 +95,11 @@ class Structure(Blueprint):
 
     @functools.cached_property
     def node_shares(self) -> np.ndarray:
-        """(nodes,): the shares with which the nodes make up the centre of mass, wherever the bodies
-        are."""
+        """Weights of the nodes (nodes,): the weighted sum of node positions is the centre of mass
+        in every pose of the bodies."""
         shares = []
         for p_BN, mass in zip(np.split(self.p_BN, self.first_node[1:-1]), self.mass, strict=True):
-            # Each body's origin is its centre of mass, in the hull of its nodes.
+            # The weighted sum of the nodes of a body is its origin, the centre of mass.
             conditions = np.vstack([p_BN.T, np.full(len(p_BN), np.abs(p_BN).max())])
             origin = [0.0, 0.0, 0.0, conditions[3, 0]]
             shares.append(mass * np.linalg.lstsq(conditions, origin)[0])
@@ -103,14 +107,14 @@ class Structure(Blueprint):
 
     @property
     def isotropic(self) -> bool:
-        """True if each body has the same moment of inertia about all axes, but for rounding."""
+        """True if each body has the same moment of inertia about all axes, except for rounding."""
         moments, products = self.unit_inertia[:, :3], self.unit_inertia[:, 3:]
         allowed = 1e-12 * moments.max()
         return bool(np.ptp(moments, axis=1).max() <= allowed and abs(products).max() <= allowed)
 
     @property
     def initial_state(self) -> np.ndarray:
-        """(13 bodies,): [q; v] at t = 0, at rest."""
+        """State [q; v] (13 bodies,) at t = 0. Velocities are zero."""
         poses = np.hstack([self.q_WB, self.p_WB]).ravel()
         return np.concatenate([poses, np.zeros(6 * len(self.bodies))])
 
@@ -118,9 +122,11 @@ class Structure(Blueprint):
 def turn_with_slope(
     p_WB: np.ndarray, q_WB: np.ndarray, slope: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (bodies, 3) and quaternions (bodies, 4), w first, of bodies that are turned about
-    World's y axis with ground that rises by `slope` (rad) along x."""
-    # Written out, as a product of matrices is rounded differently on different processors.
+    """Positions (bodies, 3) and quaternions (bodies, 4), w first, of bodies turned with an incline.
+
+    The ground rises by `slope` (rad) along x; bodies turn about the world's y axis.
+    """
+    # Written out, because processors round a product of matrices differently.
     s, c = math.sin(slope), math.cos(slope)
     forward, left, up = p_WB.T
     turned_p_WB = np.stack([c * forward - s * up, left, s * forward + c * up], axis=1)
@@ -131,27 +137,27 @@ def turn_with_slope(
 
 
 def followed_nodes(p_WN: np.ndarray, structure: Structure) -> np.ndarray:
-    """Positions (..., markers, 3) of the markers among nodes p_WN (..., nodes, 3), or (..., 1, 3)
-    of the centre of mass."""
+    """Positions of the points whose motion is shown: the markers (..., markers, 3) among the nodes
+    p_WN (..., nodes, 3). A structure without markers is shown by its centre of mass (..., 1, 3)."""
     if structure.markers.size:
         return p_WN[..., structure.markers, :]
     return (structure.node_shares @ p_WN)[..., np.newaxis, :]
 
 
 def node_positions(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """p_WN (nodes, 3) in m from the state (13 n,) of the bodies."""
+    """Positions p_WN (nodes, 3) of the nodes in m, for a state (13 n,) of the bodies."""
     return moved_nodes(structure, state)[:, P_WN : P_WN + 3]
 
 
 def moved_nodes(structure: Structure, state: np.ndarray) -> np.ndarray:
-    """The `nodes` of physics.kinematics, without forces, for a state (13 n,) of the bodies."""
+    """Table `nodes` of physics.kinematics for a state (13 n,) of the bodies; without forces."""
     nodes = np.empty((len(structure.node_names), NODE_COLUMNS))
     move_nodes(state, structure.p_BN, structure.first_node, nodes)
     return nodes
 
 
 def AddBodies(plant: MultibodyPlant, structure: Structure) -> list[RigidBody]:
-    """Adds the free bodies of a structure to a plant that is not finalized yet."""
+    """Adds the bodies of a structure, as free bodies, to a plant that is not finalized."""
     return [
         plant.AddRigidBody(name, SpatialInertia(mass, np.zeros(3), UnitInertia(*unit)))
         for name, mass, unit in zip(

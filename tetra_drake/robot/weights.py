@@ -1,4 +1,4 @@
-"""The weights of a network: which oscillators inhibit each other, and the names of the weights."""
+"""Weights of a network: which oscillators inhibit each other, and names of the weights."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tetra_drake.scenario.blueprint import Blueprint
 from tetra_drake.scenario.scenario import Scenario
 
 KINDS = "extensor", "flexor"
-"""Kinds of neurons, by their number modulo 2."""
+"""Kinds of neurons, by index modulo 2."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Weights:
 
     blueprint: Blueprint
     reach: int | None
-    """The greatest distance between oscillators that inhibit each other; None for any."""
+    """Largest distance between oscillators that inhibit each other; None for no limit."""
 
     @classmethod
     def of(cls, scenario: Scenario) -> Self:
@@ -30,8 +30,11 @@ class Weights:
 
     @functools.cached_property
     def couplings(self) -> np.ndarray:
-        """(weights, 2): the neurons, inhibited and inhibiting, of each weight, in the order of
-        listing B.2: onto each neuron in turn, from the neurons of its own kind in turn."""
+        """Neurons of each weight (weights, 2): the inhibited one, then the inhibiting one.
+
+        The order is from listing B.2: by inhibited neuron, then by inhibiting neuron. Both neurons
+        have the same kind.
+        """
         kind = np.arange(2 * self.blueprint.signals) % 2
         coupled = (kind[:, np.newaxis] == kind) & ~np.eye(len(kind), dtype=bool)
         if self.reach is not None:
@@ -40,16 +43,16 @@ class Weights:
 
     @functools.cached_property
     def images(self) -> np.ndarray:
-        """(weights,): the weight that is the mirror image of each; itself where there is none."""
+        """Index of the mirror image of each weight (weights,); the weight itself if it has none."""
         images = self.blueprint.images
         opposite = [k if image is None else image for k, image in enumerate(images)]
         neurons = (2 * np.array(opposite, dtype=int)[:, np.newaxis] + [0, 1]).ravel()
-        place = {(i, j): weight for weight, (i, j) in enumerate(self.couplings.tolist())}
+        index = {(i, j): weight for weight, (i, j) in enumerate(self.couplings.tolist())}
         pairs = neurons[self.couplings].tolist()
-        return np.array([place.get((i, j), w) for w, (i, j) in enumerate(pairs)], dtype=int)
+        return np.array([index.get((i, j), w) for w, (i, j) in enumerate(pairs)], dtype=int)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of `couplings`: "3->1 extensor" is from oscillator 3 onto 1, counting from 1."""
+        """Names of the weights: "3->1 extensor" is from oscillator 3 onto 1, counted from 1."""
         pairs = self.couplings.tolist()
         return tuple(f"{j // 2 + 1}->{i // 2 + 1} {KINDS[i % 2]}" for i, j in pairs)

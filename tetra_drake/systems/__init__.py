@@ -1,4 +1,4 @@
-"""The LeafSystems of the diagram: ports, state and events around the laws in `physics`."""
+"""LeafSystems of the diagram: ports, state and events. The laws are in `physics`."""
 
 from tetra_drake.systems.actuators import Actuators
 from tetra_drake.systems.cable_feedback import Feedback

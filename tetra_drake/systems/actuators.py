@@ -1,4 +1,4 @@
-"""The actuators of all driven cables as a system."""
+"""Actuators of all driven cables as a LeafSystem."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from tetra_drake.robot.robot import Robot
 
 
 class Actuators(LeafSystem):
-    """The states of actuators, their drives (see physics.actuator).
+    """States of the actuators (drives, see physics.actuator).
 
     | port   | shape     | unit       | meaning                                                   |
     |--------|-----------|------------|-----------------------------------------------------------|
     | rates  | (drives,) | m/s or N/s | rate of each drive, from the cables                       |
     | drives | (drives,) | m or N     | state of each actuator                                    |
 
-    Continuous state: the drives. The output depends on it alone, so the cables, which know lengths
-    and tensions, compute the rates without an algebraic loop.
+    The continuous state is the drives. The output depends only on the state, so there is no
+    algebraic loop with the cables, which compute the rates.
     """
 
     def __init__(self, robot: Robot) -> None:

@@ -1,4 +1,4 @@
-"""The feedback to the oscillators as a system."""
+"""Feedback to the oscillators as a LeafSystem."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from tetra_drake.robot.robot import Robot
 
 
 class Feedback(LeafSystem):
-    """Feedback that the oscillators sense (see physics.feedback); no state.
+    """Feedback from cables, ground and bodies to the oscillators (see physics.feedback). It has no
+    state.
 
     | port          | shape        | unit | meaning                                          |
     |---------------|--------------|------|--------------------------------------------------|
@@ -22,7 +23,8 @@ class Feedback(LeafSystem):
     """
 
     def __init__(self, robot: Robot, *, gains: npt.ArrayLike) -> None:
-        """`gains` of length, load and pitch. Raises InputError if there is no equilibrium."""
+        """`gains` are for length, load and pitch. Raises InputError if the robot has no
+        equilibrium."""
         super().__init__()
         structure = robot.structure
         self._senses = robot.senses

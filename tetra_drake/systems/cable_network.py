@@ -1,4 +1,4 @@
-"""All cables of the robot as a system."""
+"""Cables of the robot as a LeafSystem."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tetra_drake.simd.packed import Packed
 
 
 class CableNetwork(LeafSystem):
-    """The cables between the bodies (thesis Eq. 6); no state.
+    """Cables between the bodies (thesis Eq. 6). The system has no state.
 
     | port              | shape          | unit   | meaning                                  |
     |-------------------|----------------|--------|------------------------------------------|
@@ -25,15 +25,15 @@ class CableNetwork(LeafSystem):
     | lengths           | (cables,)      | m      | length of each cable                     |
     | rates             | (drives,)      | 1/s    | rate of each drive, in its unit per s    |
 
-    With `robot.cables.slack`, a cable that would have to push goes slack. Ports of drives are there
-    if actuators have states, as `!Force` has not.
+    With `robot.cables.slack`, a cable goes slack instead of pushing. The ports `drives` and `rates`
+    exist only if the kind of actuators has states.
     """
 
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         structure = robot.structure
         bodies, count = len(structure.bodies), len(structure.cables)
-        # Room for the kernel, which writes all of it at every call.
+        # The kernel writes to these arrays at every call.
         self._forces, self._force = Forces.of(robot.model), np.empty(6 * bodies)
         self._parts = Packed((robot.model, self._forces))
         state, signals = np.empty(13 * bodies), np.empty(structure.signals)
@@ -53,7 +53,7 @@ class CableNetwork(LeafSystem):
         self.DeclareVectorOutputPort("lengths", count, self._calc_lengths, inputs)
 
     def _compute(self, context: Context, force: np.ndarray) -> None:
-        """Writes the generalized force and the `cable_forces`."""
+        """Writes the generalized force to `force`, and the table `cable_forces`."""
         if self._drives is not None:
             self._forces.drives[:, actuator.DRIVE] = self._drives.Eval(context)
         state, signals = self._state.Eval(context), self._signals.Eval(context)

@@ -1,4 +1,4 @@
-"""The wiring: the robot as one Drake diagram, after the thesis's Simulink model (appendix C)."""
+"""Wiring of the robot as one Drake diagram, after the thesis's Simulink model (appendix C)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tetra_drake.systems import (
 def MakeTensegrityDiagram(
     robot: Robot, gait: Gait, *, steering: SteeringSignal | None = None
 ) -> Diagram:
-    """The robot walking by a gait; its default context is the scenario's start.
+    """Diagram of a robot that walks with a gait. Its default context is the scenario's start.
 
         steering ──→ cpg ──→ start_up ──→ cables ──┬──→ forces ──→ plant ──┬──→ state
                       ↑                     ↑  │   │                       │
@@ -39,15 +39,17 @@ def MakeTensegrityDiagram(
 
         actuators ←──→ cables
 
-    With `cpg.signals: live`, cpg is the network, else its signals, computed beforehand; feedback is
-    there if `cpg.feedback` is not empty, actuators if they have states. `steering` acts
-    in place of the gait's turn. Without oscillators, start_up is a source of no signals, and there
-    is no cpg.
+    Subsystems:
 
-    Input port: turn (steering, of a live network). Output ports: state (plant), signals
-    (start_up), drives (actuators), tensions and lengths (cables), normal_forces, friction_forces
-    and modes (ground); the systems' docstrings give shapes and units. There is no SceneGraph:
-    pictures are made from trajectories.
+    - cpg: with `cpg.signals: live` the network, otherwise its signals, computed beforehand. A robot
+      without oscillators has no cpg.
+    - feedback: only if `cpg.feedback` is not empty
+    - actuators: only if the kind of actuators has states, as winches have
+
+    `steering` replaces the gait's turn. Input port: turn (of a live network). Output ports: state
+    (from plant), signals (start_up), drives (actuators), tensions and lengths (cables),
+    normal_forces, friction_forces and modes (ground). For shapes and units, see the systems. There
+    is no SceneGraph: pages and films are made from trajectories.
     """
     scenario, structure = robot.scenario, robot.structure
     builder = DiagramBuilder()
@@ -101,7 +103,7 @@ def MakeTensegrityDiagram(
 def _AddSignals(
     builder: DiagramBuilder, robot: Robot, gait: Gait, steering: SteeringSignal | None
 ) -> System:
-    """Adds `start_up`, whose output port has the signals of the cables, and what drives it."""
+    """Adds `start_up` and the systems before it. Its output port has the signals of the cables."""
     size = robot.structure.signals
     if not size:
         return builder.AddNamedSystem("start_up", ConstantVectorSource(np.zeros(0)))
@@ -115,8 +117,8 @@ def _AddSignals(
 def _AddCpg(
     builder: DiagramBuilder, robot: Robot, gait: Gait, steering: SteeringSignal | None
 ) -> System:
-    """Adds `cpg`, whose first output port has the signals: a live network with its `steering`, or
-    the signals computed beforehand."""
+    """Adds `cpg`: a live network with its `steering`, or a source of signals that were computed
+    beforehand. Its first output port has the signals."""
     cpg = robot.scenario.cpg
     if cpg.signals != "live":
         samples = signal_samples(robot, gait, steering)

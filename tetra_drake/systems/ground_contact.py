@@ -1,4 +1,4 @@
-"""The ground under the robot as a system: normal force and friction."""
+"""Ground under the robot as a LeafSystem: normal forces and friction."""
 
 from __future__ import annotations
 
@@ -33,24 +33,25 @@ class GroundContact(LeafSystem):
     | normal_forces     | (m,)    | N      | along the normal of the surface, by contact node  |
     | friction_forces   | (2 m,)  | N      | along its tangents t1 and t2, by contact node     |
     | modes             | (3 m,)  | 1      | contact (0, 1), then friction mode along t1 and   |
-    |                   |         |        | t2: where it slips to, 0 sticks, by contact node  |
+    |                   |         |        | t2: direction of slip, 0 sticks, by contact node  |
 
-    On flat ground t1 and t2 are x and y; else see `physics.terrain`. The law of friction is the
-    scenario's (see `physics.friction`): the reset integrator of the thesis (Eq. 3-5), whose modes
-    are 0 or ±1 along each tangent, or Coulomb's, whose mode is a unit vector or 0.
+    On flat ground t1 and t2 are x and y; otherwise see `physics.terrain`. The scenario chooses the
+    law of friction (see `physics.friction`). For the reset integrator of the thesis (Eq. 3-5),
+    friction modes are 0 or ±1 along each tangent. For Coulomb's law, the mode is a unit vector, or
+    0.
 
-    Discrete state: `modes` of `physics.contact`; deflections follow from the stick points, so no
-    continuous state has to be reset. The modes are frozen within a step, which keeps the forces
-    smooth there, and updated at its end; Initialize() sets them from the pose.
+    The discrete state is `modes` of `physics.contact`. Deflections follow from the stick points, so
+    no continuous state has to be reset. Modes are constant within a step, so forces are smooth
+    there. They are updated at the end of the step; Initialize() sets them from the pose.
 
-    With `witness`, steps also end where a mode is due to change, to within Drake's isolation
-    window: 0.01 s times the accuracy set by Context.SetAccuracy.
+    With `witness`, a step also ends where a mode changes, to within Drake's isolation window:
+    0.01 s times the accuracy of Context.SetAccuracy().
     """
 
     def __init__(self, robot: Robot, *, witness: bool = False) -> None:
         super().__init__()
         bodies, count = len(robot.structure.bodies), len(robot.structure.contacts)
-        # Room for the kernels, which write what they need of it at every call.
+        # The kernels write to these arrays at every call.
         self._forces, self._force = Forces.of(robot.model), np.empty(6 * bodies)
         self._parts = Packed((robot.model, self._forces))
         state, modes = np.empty(13 * bodies), np.empty((count, contact.MODE_COLUMNS))
@@ -65,8 +66,8 @@ class GroundContact(LeafSystem):
         self.DeclareDiscreteState(modes.size)
         self.DeclareInitializationDiscreteUpdateEvent(self._start)
         self.DeclarePerStepDiscreteUpdateEvent(self._update)
-        # It carries no event of its own: it ends the step, and the update follows there.
-        # (A bound method in its place would keep the system alive for ever.)
+        # The witness function has no event: it only ends the step, and the per-step update follows.
+        # A bound method in place of the lambda would keep the system alive for ever.
         this, falls = weakref.proxy(self), WitnessFunctionDirection.kPositiveThenNonPositive
         margin = self.MakeWitnessFunction("mode margin", falls, lambda c: this._margin(c))
         self._witnesses = [margin] if witness else []
@@ -79,23 +80,24 @@ class GroundContact(LeafSystem):
     def NextModeChange(
         self, context: Context, *, acceleration: np.ndarray, horizon: float
     ) -> tuple[bool, float]:
-        """Mode change due if a step ends here, and the predicted time (s) from here to
+        """Predicts mode changes: True if a mode changes when a step ends here, and the time (s) to
         the next change after that, at most `horizon` (s).
 
-        `acceleration`, (6 n,), is dv/dt of the bodies; each node's is taken as constant.
+        `acceleration` (6 n,) is dv/dt of the bodies. The prediction assumes that the acceleration
+        of each node is constant.
         """
         state, modes = self._state.Eval(context), self._modes(context).copy()
         return self._next_change(self._parts, state, acceleration, modes, horizon)
 
     def DoGetWitnessFunctions(self, context: Context) -> list[WitnessFunction]:
-        """The one witness, if asked for."""
+        """The witness function; none without `witness`."""
         return self._witnesses
 
     def _modes(self, context: Context) -> np.ndarray:
         return context.get_discrete_state_vector().value().reshape(-1, contact.MODE_COLUMNS)
 
     def _start(self, context: Context, values: DiscreteValues) -> EventStatus:
-        # From "nowhere in contact", an update makes every node in the ground stick where it is.
+        # Zero modes mean no contact. The update makes every node in the ground stick.
         values.set_value(np.zeros(values.value().size))
         self._update(context, values)
         return EventStatus.Succeeded()
@@ -105,13 +107,13 @@ class GroundContact(LeafSystem):
         changed = self._update_modes(self._parts, self._state.Eval(context), modes)
         if changed:
             return EventStatus.Succeeded()
-        return EventStatus.DidNothing()  # so that what was computed at this state stays valid
+        return EventStatus.DidNothing()  # Drake keeps the values cached at this state
 
     def _margin(self, context: Context) -> float:
         return mode_margin(self._parts, self._state.Eval(context), self._modes(context))
 
     def _compute(self, context: Context, force: np.ndarray) -> None:
-        """Writes the generalized force and the `ground_forces`."""
+        """Writes the generalized force to `force`, and the table `ground_forces`."""
         state, modes = self._state.Eval(context), self._modes(context)
         self._compute_forces(self._parts, state, modes, force)
 

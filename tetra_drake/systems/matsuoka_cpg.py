@@ -1,4 +1,4 @@
-"""The central pattern generator as a system."""
+"""Central pattern generator as a LeafSystem."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from tetra_drake.physics.oscillator import (
 
 
 class MatsuokaCpg(LeafSystem):
-    """A network of n Matsuoka oscillators (thesis Eq. 7-9).
+    """Network of n Matsuoka oscillators (thesis Eq. 7-9).
 
     | port     | shape | unit | meaning                                                      |
     |----------|-------|------|--------------------------------------------------------------|
-    | tonic    | (2n,) | 1    | u0 of Eq. 7, by neuron; if not connected, as constructed     |
-    | feedback | (2n,) | 1    | f of Eq. 7, by neuron; zero where nothing is connected       |
+    | tonic    | (2n,) | 1    | u0 of Eq. 7, by neuron; default from the constructor         |
+    | feedback | (2n,) | 1    | f of Eq. 7, by neuron; default 0                             |
     | signals  | (n,)  | N    | gain (y_extensor - y_flexor), by oscillator                  |
     | neurons  | (2n,) | 1    | y = max(0, u); neurons 2k, 2k+1: extensor, flexor of the k-th |
 
-    Continuous state: u (2n,), then v (2n,), the inner states and the self-inhibitions. Outputs
-    depend on it alone, so what they drive may feed back without an algebraic loop. The signals are
-    those of the network from t = 0 on. The robot's network is `Robot.network`;
-    diagrams/entrainment.py closes a loop around an oscillator of its own.
+    The continuous state is u (2n,), then v (2n,): inner states and self-inhibitions. The outputs
+    depend only on the state, so a feedback loop around the network is not algebraic. The signals
+    begin at t = 0, without a start-up time. See `Robot.network` for the robot's network, and
+    diagrams/entrainment.py for a loop around a single oscillator.
     """
 
     def __init__(
@@ -41,7 +41,8 @@ class MatsuokaCpg(LeafSystem):
         initial_state: npt.ArrayLike,
         gain: float = 1.0,
     ) -> None:
-        """`tonic` for all neurons or each, `initial_state` (4n,), `gain` per unit of y."""
+        """`tonic` is a number or has a value per neuron. `initial_state` is u and v (4n,). `gain`
+        is the force (N) per unit of y."""
         super().__init__()
         neurons = len(network.inhibition)
         self._network, self._gain = network, gain
@@ -58,7 +59,7 @@ class MatsuokaCpg(LeafSystem):
         self.DeclareVectorOutputPort("neurons", neurons, self._calc_neurons, sources)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
-        """Eq. 7."""
+        """Rates of u and v (Eq. 7)."""
         neurons = self._neurons(context)
         tonic, feedback = self._default_tonic, 0.0
         if self._tonic.HasValue(context):
@@ -69,7 +70,7 @@ class MatsuokaCpg(LeafSystem):
         derivatives.SetFromVector(neurons[:, U_RATE : V_RATE + 1].T.ravel())
 
     def _neurons(self, context: Context) -> np.ndarray:
-        """The `neurons` of physics.oscillator."""
+        """Table `neurons` of physics.oscillator, from the state."""
         return make_neurons(context.get_continuous_state_vector().value())
 
     def _calc_signals(self, context: Context, output: BasicVector) -> None:

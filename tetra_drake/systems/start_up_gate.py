@@ -1,4 +1,4 @@
-"""The gate that keeps the actuation off at first."""
+"""Gate that keeps the actuation off until the start-up time, as a Diagram."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import ConstantVectorSource, PortSwitch
 
-_LONGER_THAN_ANY_SIMULATION = 1e9  # s; Drake has no one-time event, so its period is long
+_LONGER_THAN_ANY_SIMULATION = 1e9  # s; the period of an event that happens once
 
 
 class StartUpGate(Diagram):
-    """Passes signals on from the start-up time on, and zeros before it (thesis listing B.1).
+    """Gate with zeros as output before the start-up time, and signals after it (listing B.1).
 
     | port    | shape | unit | meaning                       |
     |---------|-------|------|-------------------------------|
     | ungated | (m,)  | N    | signals of the oscillators    |
     | signals | (m,)  | N    | zeros, later the same signals |
 
-    A timer changes over Drake's PortSwitch by an event at the start-up time. So an integration
-    step ends exactly at the jump, no step smears it, and no Python runs between such events.
+    An event at the start-up time switches Drake's PortSwitch. So an integration step ends exactly
+    at the jump. Without events no Python code runs.
     """
 
     def __init__(self, size: int, *, start_up: float) -> None:
@@ -45,7 +45,7 @@ class StartUpGate(Diagram):
 
 
 class _Timer(LeafSystem):
-    """The port that a PortSwitch passes on: `before` the start-up time, and `after` it.
+    """Selector for a PortSwitch: port `before` until the start-up time, then port `after`.
 
     | port     | type           | meaning            |
     |----------|----------------|--------------------|

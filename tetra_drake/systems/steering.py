@@ -1,4 +1,4 @@
-"""Steering as a system."""
+"""Steering as a LeafSystem."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from tetra_drake.robot.robot import checked_turn
 
 
 class Steering(LeafSystem):
-    """The tonic input of the oscillators by the turn asked for; no state.
+    """Tonic input of the oscillators as a function of the turn. The system has no state.
 
     | port  | shape | unit | meaning                                                         |
     |-------|-------|------|-----------------------------------------------------------------|
-    | turn  | (1,)  | 1    | from -1 to 1, how much stronger the left is; if not connected,  |
-    |       |       |      | as constructed; InputError if it is beyond                      |
+    | turn  | (1,)  | 1    | -1 to 1; at 1 only the left oscillators have input; default     |
+    |       |       |      | from the constructor; other values raise InputError             |
     | tonic | (2m,) | 1    | u0 of Eq. 7 for the neurons of m oscillators                    |
     """
 
@@ -26,7 +26,7 @@ class Steering(LeafSystem):
         *,
         turn: float | Callable[[float], float],
     ) -> None:
-        """`tonic_input` gives (2m,) for a turn, `turn` may depend on the time in s."""
+        """`tonic_input` gives u0 (2m,) for a turn. `turn` is a number or a function of time (s)."""
         super().__init__()
         self._tonic_input, self._default = tonic_input, turn
         self._turn = self.DeclareVectorInputPort("turn", 1)
