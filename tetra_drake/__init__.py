@@ -26,9 +26,9 @@ Figures are functions in tetra_drake.figures: gait_diagram(result) from
 tetra_drake.figures.gait_diagram makes a figure, gait_diagram(result, figure=own) draws on your
 Figure or SubFigure.
 
-print() shows a summary of a scenario, gait, run, result or result.metrics. Numbers are in SI, except
-names with a unit, such as result.metrics.distance_in. Wrong input raises an InputError: a ValueError
-with a message of one line.
+print() shows a summary of a scenario, gait, run, result or result.metrics. Numbers are in SI, if
+their names have no other unit, such as result.metrics.distance_in. Wrong input raises an
+InputError: a ValueError with a message of one line.
 
 Each name is imported at its first use, so `import tetra_drake` loads neither Drake nor numba.
 """
