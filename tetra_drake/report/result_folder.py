@@ -1,6 +1,6 @@
 """Result folder of one simulation: written by `simulate`, read by `replay` and `figures`.
 
-scenario.yaml     the scenario with all settings; a file for `--scenario`; with its height file, if any
+scenario.yaml     the scenario with all settings, for `--scenario`; and its height file, if any
 trajectory.nc     motion and forces over time; a file for xarray
 replay.html       page that plays the motion
 result.json       metrics, gait, and path of the centre
