@@ -354,7 +354,8 @@ def _fit(
     """
     page_width, page_height = WIDTH_IN, height_in
     if figure is not None:
-        page_width, page_height = figure.bbox.size / figure.dpi
+        page_width = figure.bbox.width / figure.dpi
+        page_height = figure.bbox.height / figure.dpi
     ratio = (high[1] - high[0]) / (wide[1] - wide[0])
 
     def width(columns: int) -> float:
