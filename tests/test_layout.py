@@ -15,7 +15,7 @@ import tetra_drake
 PACKAGE = Path(tetra_drake.__file__).parent
 ORDER = (
     *("errors", "files", "formatting", "interrupts", "machine"),
-    *("simd", "physics", "scenario", "robot"),
+    *("simd", "physics", "scenario", "options", "robot"),
     *("systems", "visualization", "results", "engines", "prototype", "optimizers", "evolution"),
     *("analysis", "figures", "report", "experiment", "cli"),
 )
@@ -83,7 +83,7 @@ HEAVY = {"pydrake", "numba", "scipy", "cma", "ribs", "pandas", "xarray", "matplo
     ("module", "absent"),
     [
         ("tetra_drake", HEAVY | {"numpy"}),
-        ("tetra_drake.cli", HEAVY),
+        ("tetra_drake.cli", HEAVY | {"numpy", "pydantic"}),
         ("tetra_drake.evolution.trials", HEAVY),  # and so evaluators, which every worker imports
     ],
 )

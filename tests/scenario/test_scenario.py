@@ -12,16 +12,13 @@ from tetra_drake.errors import InputError
 from tetra_drake.scenario.common_sections import CpgSection, Disturbances
 from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.scenario.friction_kinds import Coulomb
-from tetra_drake.scenario.load import (
-    dump_scenario,
-    load_scenario,
-    shipped_scenarios,
-)
+from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs, SteadyState
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.robot_tetrahedra import Tetrahedra
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Section
+from tetra_drake.scenario.shipped import shipped_scenarios
 from tetra_drake.scenario.yaml_text import parse_yaml
 
 # Exact by definition

@@ -11,7 +11,8 @@ from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.structure_files import read_structure, shipped_structures
+from tetra_drake.scenario.shipped import shipped_structures
+from tetra_drake.scenario.structure_files import read_structure
 
 BAR = """
 unit: cm

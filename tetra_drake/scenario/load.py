@@ -11,6 +11,7 @@ from tetra_drake.files import write_whole
 from tetra_drake.scenario.refusals import no_such
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Tree, keys_of, written
+from tetra_drake.scenario.shipped import SCENARIOS, shipped_scenarios
 from tetra_drake.scenario.structure_files import structure_file
 from tetra_drake.scenario.yaml_text import dump_yaml, read_mapping
 
@@ -19,11 +20,6 @@ SCENARIO = "scenario.yaml"
 
 MOST_BYTES = 2**20
 """Upper limit of the size of a scenario file."""
-
-
-def shipped_scenarios() -> list[str]:
-    """The names of the scenarios that come with the package."""
-    return sorted(file.stem for file in Path(__file__).parent.glob("*.yaml"))
 
 
 def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
@@ -86,7 +82,7 @@ def save_scenario(folder: Path, scenario: Scenario) -> str:
 def _file(name: str, folder: Path) -> Path:
     """The file of a shipped scenario, or of a path from `folder`."""
     if name in shipped_scenarios():
-        return Path(__file__).parent / f"{name}.yaml"
+        return SCENARIOS / f"{name}.yaml"
     return folder / name
 
 

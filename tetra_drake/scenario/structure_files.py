@@ -12,20 +12,14 @@ from tetra_drake.scenario.ntrt import MOST_BYTES, NtrtFile, ntrt_tree
 from tetra_drake.scenario.refusals import TAG, described, no_such
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.section import Tree, keys_of
+from tetra_drake.scenario.shipped import STRUCTURES, shipped_structures
 from tetra_drake.scenario.units import quantity_to_si
 from tetra_drake.scenario.yaml_text import read_mapping
-
-FOLDER = Path(__file__).parent / "structures"
 
 _KIND = StructureFile.tag
 
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 """Keys that only files of NTRT have."""
-
-
-def shipped_structures() -> list[str]:
-    """The names of the structures that come with the package."""
-    return sorted(file.stem for file in FOLDER.glob("*.yaml"))
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
@@ -42,7 +36,7 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
 
 def structure_file(name: str, folder: Path) -> Path:
     """The file of a shipped structure, or of a path from `folder`."""
-    return FOLDER / f"{name}.yaml" if name in shipped_structures() else folder / name
+    return STRUCTURES / f"{name}.yaml" if name in shipped_structures() else folder / name
 
 
 def names_structure(tree: Tree) -> bool:

@@ -1,0 +1,121 @@
+"""Commands as functions: each parameter of a function is an option of its command.
+
+    Seed = Annotated[int, Option("random seed", metavar="N", type=integer(0))]
+
+    def play(gait: File, *, seed: Seed = 0) -> None:
+
+A keyword-only parameter is an option of its name, another one a positional argument. What has no
+default is required. The help of an option is what its type says, and then what the function's
+docstring says under `Args:`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import inspect
+import re
+import typing
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
+
+BAD_INPUT = 2  # exit status
+
+
+class Option:
+    """What the type of a parameter says about its option, with arguments of argparse's
+    add_argument(). Options of one `group` exclude each other."""
+
+    def __init__(self, help: str = "", *, group: str = "", **arguments: Any) -> None:
+        self.arguments = {"help": help, "group": group, **arguments}
+
+
+class Command(argparse.ArgumentParser):
+    """The parser of a command's options, whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Ends the process."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+    def add_commands(self, functions: Sequence[Callable[..., None]]) -> None:
+        """Adds a command for each function, by its name without an underscore in front.
+
+        Its docstring has four paragraphs: a line for the list of commands, a description, `Args:`,
+        and an example.
+        """
+        commands = self.add_subparsers(metavar="COMMAND", required=True)
+        for function in functions:
+            name = function.__name__.removeprefix("_")
+            what, description, about, example = (inspect.getdoc(function) or "").split("\n\n")
+            command = commands.add_parser(
+                name, help=what.rstrip("."), description=description, epilog=example
+            )
+            command.set_defaults(function=function, parser=command)
+            texts = dict(re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", about, re.M))
+            groups: dict[str, Any] = {"": command}
+            for parameter in inspect.signature(function, eval_str=True).parameters.values():
+                text = " ".join(texts.get(parameter.name, "").split())
+                name, group, more = _argument(parameter, text)
+                if group not in groups:
+                    groups[group] = command.add_mutually_exclusive_group()
+                groups[group].add_argument(name, **more)
+
+    def call_of(self, argv: Sequence[str] | None) -> Callable[[], None]:
+        """The call of a command's function that arguments ask for."""
+        options, unknown = self.parse_known_args(argv)
+        values = vars(options)
+        function, parser = values.pop("function"), values.pop("parser")
+        if unknown:
+            from tetra_drake.scenario.refusals import hint
+
+            names = re.findall(r"--[\w-]+", parser.format_usage())
+            parser.error(f"there is no {unknown[0]}; {hint(unknown[0], names)}")
+        return functools.partial(function, **values)
+
+
+def _argument(parameter: inspect.Parameter, text: str) -> tuple[str, str, dict[str, Any]]:
+    """Name, group, and arguments of add_argument() for a parameter, with more text for its help."""
+    name, kind, default = parameter.name, parameter.annotation, parameter.default
+    more: dict[str, Any] = {"help": "", "group": ""}
+    for part in (kind, *typing.get_args(kind)):
+        for option in getattr(part, "__metadata__", ()):
+            more |= option.arguments
+    more["help"] = f"{more['help']} {text}".strip()
+    group = more.pop("group")
+    is_required = default is parameter.empty
+    if not is_required:
+        more["default"] = default
+    if typing.get_origin(kind) is list:
+        more["nargs"] = "+"
+    if parameter.kind is not parameter.KEYWORD_ONLY:
+        return name, group, more if is_required else more | {"nargs": "?"}
+    more |= {"dest": name, "required": is_required}
+    if kind is bool:
+        more["action"] = "store_false" if default else "store_true"
+    return f"--no-{name}" if default is True else f"--{name}", group, more
+
+
+def integer(least: int) -> Callable[[str], int]:
+    """A reader of integers that are not less than `least`."""
+
+    def read(text: str) -> int:
+        if text.isascii() and text.isdecimal() and int(text) >= least:
+            return int(text)
+        problem = f"found '{text}', expected an integer, {least} or more"
+        raise argparse.ArgumentTypeError(problem)
+
+    return read
+
+
+def quantity(unit: str) -> Callable[[str], float]:
+    """A reader of quantities, such as "14 in", that converts to an SI unit."""
+
+    def read(text: str) -> float:
+        from tetra_drake.scenario.units import quantity_to_si
+
+        try:
+            return quantity_to_si(text, unit)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return read
