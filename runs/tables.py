@@ -23,7 +23,7 @@ from tetra_drake.evolution.manifest import MANIFEST
 from tetra_drake.files import read_text, write_whole
 from tetra_drake.formatting import Table, fixed, listed, percents
 from tetra_drake.report.result_folder import REPLAY
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.units import INCH, customary
 
 HERE = Path(__file__).parent
@@ -65,7 +65,7 @@ def gallery_table(runs: Runs) -> str:
 def trials_table(run: Analysis) -> str:
     """The fittest gait of each trial on all engines and on disturbed robots; below, in which trials
     the engines differ."""
-    units = {name: customary(METRICS[name]) for name in SHOWN}
+    units = {name: customary(UNITS[name]) for name in SHOWN}
     rows, apart = [], []
     for trial, gait in run.best_gaits.iterrows():
         compiled, tight = run.undisturbed(trial), run.again(trial, TIGHT)

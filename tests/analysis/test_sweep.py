@@ -13,7 +13,7 @@ from tetra_drake.engines.simulate import simulate
 from tetra_drake.robot.gait import save_gait, seeded_gait
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.scenario import Scenario
 
 STIFFNESS = "robot.cables.outer_stiffness"
@@ -38,7 +38,7 @@ def test_each_key_is_a_labelled_axis_of_the_numbers_of_single_simulations(short:
     assert alone.scenario.robot.spacing != short.robot.spacing, "balanced anew"
     assert (one.distance, one.fitness) == (alone.metrics.distance, alone.fitness)
     assert {name: array.units for name, array in found.items()} == {
-        "fitness": "1", **{name: unit or "1" for name, unit in METRICS.items()}
+        "fitness": "1", **{name: unit or "1" for name, unit in UNITS.items()}
     }  # fmt: skip
 
 

@@ -7,7 +7,8 @@ from tetra_drake.engines.mujoco import installed
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.clearance import least_strut_distance
-from tetra_drake.results.measures import lifted, travelling_index
+from tetra_drake.physics.curves import travelling_index
+from tetra_drake.results.measures import lifted
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import moved_nodes
@@ -85,13 +86,14 @@ def test_engines_agree_in_all_metrics(short, walk, engine):
         pytest.skip("mujoco is not installed")
     other = short.with_changes({"engine": Drake(accuracy=1e-3) if engine == "drake" else "!Mujoco"})
     found = simulate(scenario=other, gait=seeded_gait(short, 3)).metrics
-    for name, unit in METRICS.items():
-        if name in short.actuation.lacking:
+    for name, metric in METRICS.items():
+        if metric.needs in short.lacking:
             continue
         if engine == "mujoco" and name in ("lifted", "path_curvature"):
             continue  # its feet chatter: they leave the ground for a step every few
         ours, theirs = getattr(walk.metrics, name), getattr(found, name)
         # On MuJoCo's ground with constant damping, the robot settles and slides a little otherwise.
-        absolute = {"m": 1e-5, "1/m": 1e-2}.get(unit, 1e-3) * (50 if engine == "mujoco" else 1)
+        absolute = {"m": 1e-5, "1/m": 1e-2}.get(metric.unit, 1e-3)
+        absolute *= 50 if engine == "mujoco" else 1
         relative = 0.03 if engine == "mujoco" else 2e-3
         assert theirs == pytest.approx(ours, rel=relative, abs=absolute), name

@@ -3,20 +3,18 @@
 import numpy as np
 
 from tetra_drake.physics.tally import Tally
+from tetra_drake.simd.allocation import allocate
 
 
 def make_totals(bodies: int = 5) -> Tally:
     """That of twelve steady seconds, in which each tetrahedron is lifted one second longer than
     the one behind it; the struts are 1 cm apart."""
-    tally = Tally(*(np.zeros(1) for _ in Tally._fields))
-    return tally._replace(
-        begins=np.array([3.0]),
-        time=np.array([15.0]),
-        work=np.array([0.3]),
-        peaks=np.array([4.0, 0.2, 0.5]),
-        sums=np.array([96.0, 4.8, 24.0, 9.6]),
-        roughness=np.array([48.0]),
-        lifted=np.arange(float(bodies)),
-        tension=np.array([1.0]),
-        clearance=np.array([0.01]),
-    )
+    tally = allocate(Tally, {"signals": 4, "cables": 0, "bodies": bodies})
+    numbers = {"peak_force": 4.0, "peak_speed": 0.2, "peak_power": 0.5, "work": 0.3}
+    numbers |= {"impulse": 96.0, "wound": 4.8, "pulled": 24.0, "limited": 9.6}
+    for name, number in numbers.items():
+        getattr(tally.effort, name)[0] = number
+    tally.begins[0], tally.time[0], tally.clearance[0] = 3.0, 15.0, 0.01
+    tally.roughness.total[0], tally.tension.of_all[0] = 48.0, 1.0
+    tally.lifted.time[:] = np.arange(bodies)
+    return tally

@@ -15,12 +15,13 @@ from tetra_drake.physics.actuator import (
     WINCH,
 )
 from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS, LENGTH, PASSIVE, TENSION
-from tetra_drake.physics.tally import LIMITED_TIME, Tally, observe
+from tetra_drake.physics.tally import Tally, observe
+from tetra_drake.simd.allocation import allocate
 
 CABLES = SimpleNamespace(signal=[0, PASSIVE])
 """The first is driven."""
 
-NO_DRIVES = np.zeros((0, DRIVE_COLUMNS))
+NO_DRIVES, NO_STATE = np.zeros((0, DRIVE_COLUMNS)), np.zeros(0)
 
 CARRIERS = np.array([0, 0, 1])
 """Two contacts of the first body and one of the second."""
@@ -31,11 +32,8 @@ def tallied(
 ) -> Tally:
     """The tally of the motion of both cables' length (k,), their tension and the contacts' loads
     (k, 3) at times (k,); `drives` (k, drives, DRIVE_COLUMNS) are those of actuators of a kind."""
-    columns = [np.zeros(1) for _ in Tally._fields]
-    tally = Tally(*columns)._replace(
-        begins=np.array([begins]), lengths=np.zeros(2), lifted=np.zeros(2), tension=np.full(1, 99.0)
-    )
-    tally = tally._replace(peaks=np.zeros(3), sums=np.zeros(4))
+    tally = allocate(Tally, {"signals": 1, "cables": 2, "bodies": 2})
+    tally.begins[0] = begins
     cable_forces, ground_forces = np.zeros((2, CABLE_FORCE_COLUMNS)), np.zeros((3, 3))
     ground, actuator = SimpleNamespace(carriers=CARRIERS), SimpleNamespace(kind=kind)
     robot = SimpleNamespace(cables=CABLES, ground=ground, actuator=actuator)
@@ -50,7 +48,7 @@ def tallied(
             forces = SimpleNamespace(
                 drives=driven, cable_forces=cable_forces, ground_forces=ground_forces
             )
-            observe(tally, robot, time, signal, forces)
+            observe(tally, robot, time, NO_STATE, signal, forces)
     return tally
 
 
@@ -61,42 +59,43 @@ def test_a_constant_pull_works_along_the_way_by_which_its_cable_shortens():
     # 1 + 0.1 sin t shortens by 0.2 m in a period; an actuator takes no work back, and the cable
     # that is not driven does not count.
     tally = tallied(TIMES, lengths=1.0 + 0.1 * np.sin(TIMES), signals=np.full(1001, 2.0))
-    assert tally.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
+    assert tally.effort.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
     result = tallied(TIMES, lengths=1.0 + 0.1 * np.sin(TIMES), signals=np.full(1001, -2.0))
-    assert result.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
+    assert result.effort.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
 
 
 def test_a_pull_in_phase_with_the_shortening_does_the_work_of_its_circle():
     # S = 2 cos t and -dl/dt = 0.1 cos t: the integral of 0.2 cos² over a period.
     tally = tallied(TIMES, lengths=1.0 - 0.1 * np.sin(TIMES), signals=2.0 * np.cos(TIMES))
-    assert tally.work[0] == pytest.approx(0.2 * math.pi, rel=1e-4)
+    assert tally.effort.work[0] == pytest.approx(0.2 * math.pi, rel=1e-4)
     # A quarter of a period apart, 0.2 sin t cos t is positive half of the time: twice 0.2 / 2.
     apart = tallied(TIMES, lengths=1.0 - 0.1 * np.sin(TIMES), signals=2.0 * np.sin(TIMES))
-    assert apart.work[0] == pytest.approx(0.2, rel=1e-4)
+    assert apart.effort.work[0] == pytest.approx(0.2, rel=1e-4)
 
 
 def test_the_rate_of_signals_is_integrated_as_its_square():
     tally = tallied(TIMES, lengths=np.ones(1001), signals=2.0 * np.sin(TIMES))
-    assert tally.roughness[0] == pytest.approx(4.0 * math.pi, rel=1e-4)
+    assert tally.roughness.total[0] == pytest.approx(4.0 * math.pi, rel=1e-4)
 
 
 def test_sums_begin_with_the_first_step_that_is_whole_and_least_values_at_once():
     times, lengths = np.arange(6.0), np.array([5.0, 4.0, 3.0, 2.0, 1.0, 0.0])
     signals, tensions = np.ones(6), np.array([3.0, -1.0, 2.0, 1.0, 1.0, 1.0])
     tally = tallied(times, lengths=lengths, signals=signals, tensions=tensions, begins=1.5)
-    assert (tally.work[0], tally.tension[0]) == (3.0, -1.0), "the steps from 2 s on work"
-    assert tallied(times, lengths=lengths, signals=signals, begins=2.0).work[0] == 3.0
+    assert tally.effort.work[0] == 3.0, "the steps from 2 s on work"
+    assert tally.tension.of_all[0] == -1.0
+    assert tallied(times, lengths=lengths, signals=signals, begins=2.0).effort.work[0] == 3.0
     # What is seen twice counts once: a step that was rejected.
     twice = np.repeat(np.arange(6), 2)
     tally = tallied(times[twice], lengths=lengths[twice], signals=signals[twice])
-    assert tally.work[0] == 5.0
+    assert tally.effort.work[0] == 5.0
 
 
 def test_a_body_is_lifted_while_none_of_its_contacts_bears():
     loads = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0], [0, 1, 1], [0, 0, 0.5], [0, 0, 0]])
     times = np.array([0.0, 1.0, 3.0, 6.0, 10.0, 15.0])  # a step is as its end
     tally = tallied(times, lengths=np.ones(6), signals=np.ones(6), loads=loads)
-    assert tally.lifted.tolist() == [3.0 - 1.0 + 10.0 - 6.0 + 5.0, 1.0 + 2.0 + 5.0]
+    assert tally.lifted.time.tolist() == [3.0 - 1.0 + 10.0 - 6.0 + 5.0, 1.0 + 2.0 + 5.0]
 
 
 EFFORT = {
@@ -115,7 +114,9 @@ PEAKS_AND_SUMS = {"peaks": [9.0, 0.2, 0.6], "sums": [12.0, 0.7, 1.4]}
 
 
 def effort_of(tally: Tally) -> dict[str, list[float]]:
-    return {"peaks": tally.peaks.tolist(), "sums": tally.sums[:LIMITED_TIME].tolist()}
+    effort = tally.effort
+    peaks = [effort.peak_force[0], effort.peak_speed[0], effort.peak_power[0]]
+    return {"peaks": peaks, "sums": [effort.impulse[0], effort.wound[0], effort.pulled[0]]}
 
 
 @pytest.mark.parametrize("kind", [DIRECT, TENSION_MOTOR])
@@ -125,7 +126,7 @@ def test_actuators_without_a_winch_wind_what_their_cables_shorten(kind):
     found = effort_of(tally)
     assert found["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
     assert found["sums"] == pytest.approx(PEAKS_AND_SUMS["sums"])
-    assert tally.sums[LIMITED_TIME] == 0.0
+    assert tally.effort.limited[0] == 0.0
 
 
 def test_winches_wind_their_free_length_and_are_limited_for_a_time():
@@ -135,8 +136,8 @@ def test_winches_wind_their_free_length_and_are_limited_for_a_time():
     found = effort_of(tally)
     assert found["peaks"] == pytest.approx(PEAKS_AND_SUMS["peaks"])
     assert found["sums"] == pytest.approx(PEAKS_AND_SUMS["sums"])
-    assert tally.sums[LIMITED_TIME] == pytest.approx(2.0 + 1.0)
-    assert tally.work[0] == pytest.approx(1.4), "of the tension"
+    assert tally.effort.limited[0] == pytest.approx(2.0 + 1.0)
+    assert tally.effort.work[0] == pytest.approx(1.4), "of the tension"
 
 
 def test_only_peaks_count_before_the_steady_stretch():
@@ -148,6 +149,6 @@ def test_only_peaks_count_before_the_steady_stretch():
 
 def test_a_peak_of_speed_counts_in_either_direction():
     tally = tallied(lengths=WOUND[::-1], **EFFORT)
-    assert tally.peaks.tolist() == pytest.approx([9.0, 0.2, 0.4])
+    assert effort_of(tally)["peaks"] == pytest.approx([9.0, 0.2, 0.4])
     paid_out = tallied(lengths=np.array([0.0, 0.1, 0.2, 0.9]), **EFFORT)
-    assert paid_out.peaks.tolist() == pytest.approx([9.0, 0.7, 0.0])
+    assert effort_of(paid_out)["peaks"] == pytest.approx([9.0, 0.7, 0.0])

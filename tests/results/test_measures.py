@@ -7,6 +7,7 @@ import pytest
 from helpers import prism
 from helpers.made_up_walk import HEIGHT, PERIOD, make_row, make_walk
 
+from tetra_drake.physics.curves import travelling_index
 from tetra_drake.results.measures import (
     distance_walked,
     dominant_frequency,
@@ -15,7 +16,6 @@ from tetra_drake.results.measures import (
     lifted,
     relative_distances,
     share_of_time,
-    travelling_index,
 )
 
 TIMES = np.linspace(0.0, 15.0, 1501)

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from helpers.totals import make_totals
 
+from tetra_drake.formatting import Table
 from tetra_drake.results.metrics import (
     compute_fitness,
     compute_metrics,
@@ -45,9 +45,9 @@ def steady_after(robot: Robot, time: float) -> Robot:
 
 def metrics_of(robot: Robot, path: CentrePath, steady_from: float) -> Metrics:
     """Those of a robot whose feet are at their start all the time."""
-    nodes = node_positions(robot.structure, robot.structure.initial_state)
-    robot = steady_after(robot, steady_from)
-    return compute_metrics(robot, start=nodes, steady=nodes, end=nodes, path=path, **STEADY)
+    start = node_positions(robot.structure, robot.structure.initial_state)
+    nodes, robot = np.array([start] * 3), steady_after(robot, steady_from)
+    return compute_metrics(robot, nodes=nodes, path=path, **STEADY)
 
 
 def test_metrics_are_the_displacements_of_figure_13(robot: Robot) -> None:
@@ -57,8 +57,8 @@ def test_metrics_are_the_displacements_of_figure_13(robot: Robot) -> None:
     end[0] += [0.5, -0.025, 0.0]  # x1, y1 at the end
     end[1, 0] += 0.45  # x2
     end[19, 0] += 0.6  # x3, the tip of T5
-    robot = steady_after(robot, 0.0)
-    metrics = compute_metrics(robot, start=start, steady=steady, end=end, path=CIRCLE, **STEADY)
+    robot, nodes = steady_after(robot, 0.0), np.array([start, steady, end])
+    metrics = compute_metrics(robot, nodes=nodes, path=CIRCLE, **STEADY)
     assert metrics.distance == pytest.approx(0.5)
     assert metrics.steady_distance == pytest.approx(0.4)
     assert metrics.twist == pytest.approx(0.05)
@@ -86,10 +86,10 @@ def test_turning_and_bending_count_from_their_instants(robot: Robot) -> None:
 def walked(robot: Robot, way: float, **given: Any) -> Metrics:
     """Those of a robot all of whose nodes have moved forward by a way (m) in 12 steady seconds."""
     start = node_positions(robot.structure, robot.structure.initial_state)
-    end = start + np.array([way, 0.0, 0.0])
+    nodes = np.array([start, start, start + np.array([way, 0.0, 0.0])])
     path = CentrePath(np.linspace(0.0, 15.0, 61), np.zeros((61, 3)), np.zeros(61))
     robot = steady_after(robot, 3.0)
-    return compute_metrics(robot, start=start, steady=start, end=end, path=path, **STEADY | given)
+    return compute_metrics(robot, nodes=nodes, path=path, **STEADY | given)
 
 
 def test_totals_become_metrics(robot: Robot) -> None:
@@ -127,12 +127,15 @@ def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(robot: Robot) -
     assert weightless.to_json()["actuator_work"] == 0.3
 
 
-def test_the_page_of_scenarios_lists_each_metric() -> None:
+def test_the_page_of_scenarios_has_the_table_of_metrics() -> None:
     page = Path(scenario_module.__file__).with_name("README.md").read_text(encoding="utf-8")
     section = page.split("## Objective")[1].split("\n## ")[0]
-    listed = [line for line in section.splitlines() if line.startswith(("- ", "  "))]
-    names = set(re.findall(r"`([a-z_]+)`", " ".join(listed)))
-    assert names == set(METRICS)
+    rows = []
+    for name, metric in METRICS.items():
+        limit = "at most" if metric.most else "at least"
+        rows.append([f"`{name}`", metric.unit or "1", metric.note, limit, metric.needs or "any"])
+    headings = ["metric", "unit", "note", "`require`", "robots"]
+    assert Table(headings, rows, text_columns=range(5)).markdown() in section
 
 
 def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ COLUMNS = 4
 
 class Part(NamedTuple):
     counts: Annotated[Table, "bodies", int]
+    least: Annotated[Table, 1, math.inf]
 
 
 class Whole(NamedTuple):
@@ -33,11 +35,12 @@ def test_tables_have_the_shapes_and_kinds_of_their_annotations():
     assert whole.part.counts.shape == (3,)
     assert (whole.state.dtype, whole.part.counts.dtype) == (np.float64, np.int64)
     assert not whole.state.any() and not whole.rows.any()
+    assert whole.part.least.tolist() == [math.inf]
     assert whole.part.counts is not whole.other.counts
 
 
 def test_a_given_field_is_kept():
-    part = Part(np.ones(2, dtype=np.int64))
+    part = Part(np.ones(2, dtype=np.int64), np.ones(1))
     assert allocate(Whole, SIZES, other=part).other is part
 
 

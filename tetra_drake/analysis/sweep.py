@@ -14,7 +14,7 @@ from tetra_drake.engines.simulate import simulate_many
 from tetra_drake.errors import InputError, SimulationFailure
 from tetra_drake.robot.gait import GivenGait, given_gait
 from tetra_drake.scenario.load import GivenScenario, given_scenario
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import flattened
 
@@ -74,7 +74,7 @@ def sweep(
     shape = [len(values) for values, _ in labels.values()]
     rows = [_numbers(outcome) for outcome in outcomes]
     variables = {}
-    for name, unit in {"fitness": "", **METRICS}.items():
+    for name, unit in {"fitness": "", **UNITS}.items():
         numbers = np.reshape([row[name] for row in rows], shape)
         variables[name] = list(labels), numbers, {"units": unit or "1"}
     coordinates = {name: (name, *given) for name, given in labels.items()}

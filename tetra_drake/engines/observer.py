@@ -1,4 +1,4 @@
-"""The observer of a simulation: its tally from states, for engines that keep none as they run."""
+"""The observer of a Drake or MuJoCo simulation, which makes the tally from recorded states."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tetra_drake.physics.contact import MODE_COLUMNS, update_modes
 from tetra_drake.physics.forces import Forces, compute_forces, move_robot
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.tally import Tally, look, observe
-from tetra_drake.results.metrics import empty_tally
+from tetra_drake.results.metrics import steady_start
 from tetra_drake.robot.robot import Robot
 from tetra_drake.simd.compiling import compiled
 from tetra_drake.simd.lanes import Table
@@ -24,7 +24,8 @@ class Observer:
     """
 
     def __init__(self, robot: Robot) -> None:
-        self._model, self._tally = robot.model, empty_tally(robot)
+        self._model, begins = robot.model, steady_start(robot.scenario)
+        self._tally = Tally.of(robot.model, signals=robot.structure.signals, begins=begins)
         self._modes = np.zeros((len(robot.structure.contacts), MODE_COLUMNS))
         self._forces = Forces.of(robot.model)
         self._waiting: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []
@@ -61,12 +62,12 @@ def observe_states(
 ) -> None:
     """Observes states (k, 13 bodies), signals (k, m) and drives at times (k,); `modes`, (contacts,
     MODE_COLUMNS), is room. What is tallied does not depend on whether contacts stick."""
-    generalized = np.empty(6 * tally.lifted.size)
+    generalized = np.empty(6 * robot.bodies.mass.size)
     for k in range(times.size):
         modes[:] = 0.0
         move_robot(robot, states[k], forces)
         update_modes(states[k], forces.nodes, robot.ground, forces.frames, modes)
         forces.drives[:, DRIVE] = drives[k]
         compute_forces(robot, states[k], modes, signals[k], True, forces, generalized)
-        observe(tally, robot, times[k], signals[k], forces)
+        observe(tally, robot, times[k], states[k], signals[k], forces)
         look(tally, robot, states[k], forces.nodes)

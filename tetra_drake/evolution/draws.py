@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tetra_drake.optimizers.base import Evaluation
-from tetra_drake.scenario.metrics import LEAST, MOST
+from tetra_drake.scenario.metrics import METRICS
 
 
 def combine(draws: Sequence[Evaluation], share: float) -> Evaluation:
@@ -38,9 +38,9 @@ def combine_metrics(draws: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def _combined(name: str, values: Sequence[Any]) -> Any:
     if None in values:  # an infinite metric is recorded as null
         return None
-    if name in LEAST:
+    if name in METRICS and METRICS[name].least:
         return min(values)
-    if name in MOST:
+    if name in METRICS and METRICS[name].most:
         return max(values)
     return np.mean(values, axis=0).tolist()
 

@@ -14,7 +14,7 @@ from tetra_drake.analysis.elites import CELLS, LUCKY, chosen, distinct_gaits, el
 from tetra_drake.evolution.run import Run, gait_label
 from tetra_drake.figures.style import Drawn, Page, figure_function, name_panel, page_of, set_title
 from tetra_drake.formatting import listed
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
 from tetra_drake.scenario.units import customary
 
@@ -36,7 +36,7 @@ def map_of_gaits(run: Run, *, figure: Page | None = None) -> Drawn:
     judged = bool(gaits["kept"].notna().any())
     count = 2 if judged else 1
     edges = [
-        np.linspace(low, high, cells + 1) / customary(METRICS[name])[0]
+        np.linspace(low, high, cells + 1) / customary(UNITS[name])[0]
         for (name, (low, high)), cells in zip(kind.measures.items(), kind.cells, strict=True)
     ]
     named = distinct_gaits(chosen(run))
@@ -91,6 +91,6 @@ def _middles(gaits: Any, edges: Sequence[np.ndarray]) -> list[Any]:
 
 
 def _label(name: str) -> str:
-    unit = customary(METRICS[name])[1]
+    unit = customary(UNITS[name])[1]
     title = name.replace("_", " ")
     return f"{title} ({unit})" if unit else title

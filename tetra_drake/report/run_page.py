@@ -31,7 +31,7 @@ from tetra_drake.results.metrics import headline
 from tetra_drake.robot.gait import Gait, save_gait
 from tetra_drake.robot.weights import KINDS
 from tetra_drake.scenario.load import SCENARIO, load_scenario
-from tetra_drake.scenario.metrics import METRICS, inverse
+from tetra_drake.scenario.metrics import UNITS, inverse
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import shown
 
@@ -182,7 +182,7 @@ def _settings(scenario: Scenario) -> list[tuple[str, str]]:
 
 def _terms(weights: Mapping[str, float], unit_of: Callable[[str], str]) -> str:
     """Weights or limits of metrics as text. `unit_of` gives their unit from the metric's unit."""
-    terms = [f"{name}: {shown(x, unit_of(METRICS[name]))}" for name, x in weights.items()]
+    terms = [f"{name}: {shown(x, unit_of(UNITS[name]))}" for name, x in weights.items()]
     return ", ".join(terms)
 
 

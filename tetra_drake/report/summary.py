@@ -11,36 +11,23 @@ from tetra_drake.evolution.trials import ALL_DONE
 from tetra_drake.formatting import Table, fixed, rounded
 from tetra_drake.results.metrics import headline_metric, unmet_requirements
 from tetra_drake.results.result import SimulationResult
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metrics import METRICS, UNITS
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import customary
 
 if TYPE_CHECKING:
     import pandas
 
-_SHARES = ("lifted", "actuator_limited", "kept")
+_SHARES = ("kept", *(name for name, metric in METRICS.items() if metric.is_share))
 """Names of the numbers that are shown in percent."""
 
 _TITLES = {"worst_distance_in": "distance in the worst draw (in)", "kept": "robust (%)"}
 """Titles of numbers that are no metrics."""
 
-_NOTES = {
-    "steady_distance": "without the start",
-    "twist": "one rear foot ahead of the other",
-    "lead": "front tip ahead of rear foot",
-    "lateral_drift": "sideways",
-    "heading_change": "left positive",
-    "path_curvature": "1 / radius, left positive",
-    "cost_of_transport": "work / (weight x distance)",
-    "signal_rate": "how fast signals change",
-    "lifted": "time off the ground",
-    "clearance": "smallest gap of struts' axes",
-    "tension": "smallest of any cable",
-    "travelling_index": "0: standing wave, 1: travelling",
-    "actuator_limited": "time at a limit of an actuator",
-    "kept": "draws that cost at most a tenth",
+_NOTES = {name: metric.note for name, metric in METRICS.items()} | {
+    "kept": "draws that cost at most a tenth"
 }
-"""What a number is, where its name does not say it."""
+"""What a number is."""
 
 _NOTHING = 5e-4
 """A table has no row for numbers that are all smaller, in the units in which it shows them."""
@@ -71,7 +58,7 @@ def _size_and_title(name: str) -> tuple[float, str]:
     title = name.replace("_", " ")
     if name in _SHARES:
         return 0.01, _TITLES.get(name, f"{title} (%)")
-    size, unit = customary(METRICS.get(name, ""))
+    size, unit = customary(UNITS.get(name, ""))
     return size, _TITLES.get(name, f"{title} ({unit})" if unit else title)
 
 
@@ -131,7 +118,7 @@ def results(run: Run) -> list[tuple[str, str]]:
     starts = [run.initial_best(trial) for trial in best["trial"]]
     initial = max(starts, key=lambda gait: gait["fitness"])
     name = _about(run)
-    title, unit = name.replace("_", " "), METRICS[name]
+    title, unit = name.replace("_", " "), UNITS[name]
     rows = [
         (title, f"{_three(fittest[name], unit)}, {gait_label(fittest)}"),
         ("best initial gait", f"{_three(initial[name], unit)}, {gait_label(initial)}"),

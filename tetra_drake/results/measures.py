@@ -87,25 +87,6 @@ def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
     return float(frequencies[spectrum.argmax()])
 
 
-def travelling_index(waves: np.ndarray) -> float:
-    """Travelling index of waves (samples, places): 0 if they stand, 1 if they travel.
-
-    At fewer than two places nothing travels.
-
-    Of the strongest complex orthogonal mode, the ratio of the singular values of its real and
-    imaginary parts (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Evenly sampled.
-    """
-    if waves.shape[1] < 2:
-        return 0.0
-    # The mode is that of the analytic signals, whose spectrum has no negative frequencies.
-    spectrum = np.fft.rfft(waves, axis=0)[1:]
-    mode = np.linalg.eigh(spectrum.T @ spectrum.conj())[1][:, -1]
-    # Its parts have the Gram matrix [[a, c], [c, b]], a + b = 1.
-    a, c = float(mode.real @ mode.real), float(mode.real @ mode.imag)
-    spread = math.hypot(2.0 * a - 1.0, 2.0 * c)
-    return math.sqrt(max(0.0, 1.0 - spread) / (1.0 + spread))
-
-
 def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:
     """Start and end (s) of one period of the signals, late in the trajectory.
 

@@ -22,7 +22,7 @@ from tetra_drake.robot.path import PERIOD, CentrePath, follow
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.common_sections import SimulationSection
-from tetra_drake.scenario.metrics import METRICS, Metrics
+from tetra_drake.scenario.metrics import UNITS, Metrics
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.section import Section
 from tetra_drake.scenario.units import INCH
@@ -155,12 +155,9 @@ def make_result(
         samples = sample_times(simulation.duration, simulation.sample_period)
         trajectory = make_dataset(robot, motion.at(samples))
     path = follow(instants, _poses(way.states, structure), structure)
-    start, steady, end = (node_positions(structure, state) for state in ends.states)
     metrics = compute_metrics(
         robot,
-        start=start,
-        steady=steady,
-        end=end,
+        nodes=np.array([node_positions(structure, state) for state in ends.states]),
         path=path,
         totals=totals,
         signals=way.signals[instants >= simulation.steady_from],
@@ -192,7 +189,7 @@ def save_result(path: str | Path, result: SimulationResult) -> None:
     the centre as columns. There is no gait if a command was played."""
     scenario, gait = result.scenario, result.gait
     way, metrics, radius = result.path, vars(result.metrics), result.metrics.path_radius
-    lengths = [name for name, unit in METRICS.items() if unit == "m"]
+    lengths = [name for name, unit in UNITS.items() if unit == "m"]
     content = {
         "schema": SCHEMA,
         "name": result.name,

@@ -1,4 +1,4 @@
-"""Path of the robot's centre of mass: positions, heading, curvature."""
+"""Path of the robot's centre of mass: positions and heading."""
 
 from __future__ import annotations
 
@@ -12,8 +12,6 @@ from tetra_drake.robot.structure import Structure
 PERIOD = 0.25
 """Time (s) between points of a result's path. It is at most half of the fastest gait's period. The
 robot turns by far less than half a turn in this time, so its heading can be unwrapped."""
-_SWAY = 2e-3
-"""Size (m) of a path that may be swaying on the spot. Such a path counts as straight."""
 
 
 @dataclass(frozen=True)
@@ -54,30 +52,3 @@ def centre_of_mass(p_WB: np.ndarray, structure: Structure) -> np.ndarray:
     shares = structure.mass / structure.mass[0]
     weighted = shares[:, np.newaxis] * np.ascontiguousarray(p_WB.T)
     return weighted.sum(axis=1).T / shares.sum()
-
-
-def curvature(points: np.ndarray) -> float:
-    """Curvature (1/m) of a path: of the circle fitted to its points (k, 2) in m.
-
-    The curvature is positive if the path bends to the left, and 0 on a line. Taubin's fit (IEEE
-    Trans. PAMI 13, 1991, 1115), with p relative to the mean of the points: the circle is
-    bend / (2 size) (p . p - size^2) + normal . p = 0. The unit vector (bend, normal) minimises the
-    mean square of the left side. A term is added that keeps the curvature of a path small if the
-    path is hardly larger than _SWAY. For a path of 10 cm the term has no effect.
-    """
-    (x, y), count = points.T, len(points)
-    x, y = x - x.sum() / count, y - y.sum() / count
-    square = x * x + y * y
-    size = math.sqrt(square.sum() / count)
-    if size < 1e-3 * _SWAY:
-        return 0.0
-    table = np.array([(square - size * size) / (2.0 * size), x, y])
-    moments = table @ table.T / count
-    moments[0, 0] += (_SWAY * _SWAY / size) ** 2
-    # (bend, normal) is the eigenvector with the smallest eigenvalue.
-    bend, normal_x, normal_y = np.linalg.eigh(moments)[1][:, 0].tolist()
-    bend /= size
-    # Twice the area swept by the ray from the circle's centre, times +-1 / radius.
-    swept = bend * (x[:-1] @ y[1:] - y[:-1] @ x[1:])
-    swept += normal_x * (y[-1] - y[0]) - normal_y * (x[-1] - x[0])
-    return math.copysign(bend, bend * swept)

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from tetra_drake.errors import InputError
 from tetra_drake.scenario import quantities
+from tetra_drake.scenario.metrics import LIMITS
 from tetra_drake.scenario.quantities import Length, Speed, Time
 from tetra_drake.scenario.section import Kinds, Section
 
@@ -37,7 +38,7 @@ class ActuatorKind(Section):
     """A kind of actuators: one on each driven cable."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
-    """Metrics that walks with such actuators do not have."""
+    """What some metrics need and such actuators do not have."""
     commanded: ClassVar[str]
     """Quantity that an actuator is commanded, with its unit: the end of a column's name."""
     command_unit: ClassVar[float] = 1.0
@@ -75,7 +76,7 @@ class ActuatorKind(Section):
 class Force(ActuatorKind):
     """Signals are forces, superimposed on cables without limits (thesis section 2.1.3)."""
 
-    lacking = ("actuator_limited",)
+    lacking = (LIMITS,)
     commanded = "force_N"
 
     def law(self) -> Actuator:

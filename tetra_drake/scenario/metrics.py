@@ -1,17 +1,23 @@
-"""The metrics of a simulation: their names, SI units and definitions."""
+"""The metrics of a simulation: each with its unit, what it says, and how it is computed."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
 
 from tetra_drake.files import json_number
 from tetra_drake.formatting import Table
+from tetra_drake.physics.curves import curvature, travelling_index
 from tetra_drake.scenario.units import INCH, customary, shown
+
+if TYPE_CHECKING:
+    from tetra_drake.physics.tally import Tally
 
 STRAIGHT = 0.01
 """Curvature (1/m) below which a path counts as straight: over the thesis's fifteen inches, it bends
@@ -20,87 +26,235 @@ by a fifth of a millimetre."""
 LEAST_WAY = 1e-3
 """m: a robot that goes less far counts as gone so far in its cost of transport."""
 
+ROW, LIMITS = "row of tetrahedra", "limited actuators"
+"""What only some robots have, and some metrics need."""
 
-def _metric(unit: str, *, least: bool = False, most: bool = False, of_a_row: bool = False) -> Any:
-    """A field of Metrics in the SI unit `unit`, "" for none.
 
-    least: True if of several simulations the least value is recorded, in place of the mean.
-    most: True if it is the greatest value, and a requirement is an upper limit.
-    of_a_row: True if only the row of tetrahedra has the metric.
+@dataclass(frozen=True)
+class Walk:
+    """The numbers of a walk from which metrics are computed, in SI units.
+
+    A row of three positions in World is of 0, of `simulation.steady_from` and of the end. What a
+    robot lacks is NaN.
     """
-    return field(metadata={"unit": unit, "least": least, "most": most, "of_a_row": of_a_row})
+
+    followed: np.ndarray
+    """(3, 3): T1's bottom left node, or the centre of mass of a robot that is no row."""
+    centre: np.ndarray
+    """(3, 3): the centre of mass."""
+    right_foot: np.ndarray
+    """(3, 3): T1's bottom right node."""
+    tip: np.ndarray
+    """(3, 3): the foremost node."""
+    path: np.ndarray
+    """(k, 2): the centre of mass in the plane from `simulation.steady_from` on."""
+    heading: np.ndarray
+    """(k,): the robot's direction in the whole walk; see robot.path."""
+    signals: np.ndarray
+    """(k, m): at evenly spaced times from `simulation.steady_from` on."""
+    since_steady_from: float
+    """Time from `simulation.steady_from` to the end."""
+    weight: float
+    actuators: int
+    """The number of driven cables."""
+    tally: Tally
+    """The tally of the whole walk, as plain arrays."""
+
+    @property
+    def followed_way(self) -> np.ndarray:
+        """(3,): the way of what is followed."""
+        return np.asarray(self.followed[2] - self.followed[0])
+
+    @property
+    def steady_centre_way(self) -> np.ndarray:
+        """(3,): the way of the centre from `simulation.steady_from` on."""
+        return np.asarray(self.centre[2] - self.centre[1])
+
+    @property
+    def per_steady_time(self) -> float:
+        """1 / the length of the steady stretch."""
+        steady_time = max(0.0, self.tally.time[0] - self.tally.begins[0])
+        return 1.0 / float(steady_time or 1)
+
+    @property
+    def per_actuator_time(self) -> float:
+        """1 / (the length of the steady stretch times the number of actuators)."""
+        return self.per_steady_time / max(self.actuators, 1)
+
+    @property
+    def lifted_shares(self) -> tuple[float, ...]:
+        """The share of the steady stretch in which each body is off the ground."""
+        return tuple((self.per_steady_time * self.tally.lifted.time).tolist())
+
+
+@dataclass(frozen=True)
+class Metric:
+    """The declaration of a metric."""
+
+    unit: str
+    """In SI; "" for none."""
+    note: str
+    """What it says, for tables."""
+    compute: Callable[[Walk], float]
+    least: bool = False
+    """True if of several simulations the least value is recorded, in place of the mean."""
+    most: bool = False
+    """True if the greatest value is recorded; a requirement is an upper limit then."""
+    is_share: bool = False
+    """True for a share of time, which is shown in percent."""
+    needs: str = ""
+    """What a robot must have, ROW or LIMITS, for this metric; "" if every robot has it."""
+
+
+def _metric(unit: str, note: str, compute: Callable[[Walk], float], **more: Any) -> Any:
+    """A field of Metrics."""
+    return field(metadata={"metric": Metric(unit, note, compute, **more)})
+
+
+def _cost_of_transport(walk: Walk) -> float:
+    x, y, _ = walk.steady_centre_way.tolist()
+    carried = walk.weight * max(math.hypot(x, y), LEAST_WAY)
+    return float(walk.tally.effort.work[0]) / carried if carried else math.inf
+
+
+def _signal_rate(walk: Walk) -> float:
+    mean_square = walk.per_steady_time * float(walk.tally.roughness.total[0])
+    return math.sqrt(mean_square / max(walk.signals.shape[1], 1))
 
 
 @dataclass(frozen=True)
 class Metrics:
-    """Metrics of a simulation, each number in the SI unit of its field's metadata.
+    """Metrics of a simulation, each number in the SI unit of its declaration.
 
     x₁ and y₁ are those of T1's bottom left node, or of the centre of a robot that is no row. x₂ is
     that of T1's bottom right node, x₃ that of the lead tetrahedron's tip. The steady stretch is
     from `simulation.steady_from`, or from `cpg.start_up` where that is later, to the end. The
-    centre is that of mass. What a robot lacks is NaN. Values come from results.metrics.
+    centre is that of mass. What a robot lacks is NaN.
     """
 
-    distance: float = _metric("m")
+    distance: float = _metric("m", "along x", lambda walk: walk.followed_way[0])
     """Way along x, of x₁."""
-    steady_distance: float = _metric("m")
+    steady_distance: float = _metric(
+        "m", "without the start", lambda walk: walk.followed[2, 0] - walk.followed[1, 0]
+    )
     """Distance from `simulation.steady_from` on: Δx₁ of Eq. 10."""
-    speed: float = _metric("m/s")
+    speed: float = _metric(
+        "m/s", "of the centre", lambda walk: walk.steady_centre_way[0] / walk.since_steady_from
+    )
     """Mean speed of the centre along x from `simulation.steady_from` on."""
-    twist: float = _metric("m", of_a_row=True)
+    twist: float = _metric(
+        "m",
+        "one rear foot ahead of the other",
+        lambda walk: abs(walk.followed[2, 0] - walk.right_foot[2, 0]),
+        needs=ROW,
+    )
     """abs(x₁ - x₂) at the end."""
-    lead: float = _metric("m", of_a_row=True)
+    lead: float = _metric(
+        "m",
+        "front tip ahead of rear foot",
+        lambda walk: walk.tip[2, 0] - walk.followed[2, 0],
+        needs=ROW,
+    )
     """x₃ - x₁ at the end."""
-    lateral_drift: float = _metric("m")
+    lateral_drift: float = _metric("m", "sideways", lambda walk: abs(walk.followed_way[1]))
     """Sideways way, abs(y₁)."""
-    heading_change: float = _metric("rad", of_a_row=True)
+    heading_change: float = _metric(
+        "rad", "left positive", lambda walk: walk.heading[-1] - walk.heading[0], needs=ROW
+    )
     """Angle by which the robot has turned to the left at the end. Whole turns count. See
     robot.path."""
-    path_curvature: float = _metric("1/m")
-    """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive to
-    the left of the direction in which the centre moves, be that backward. See robot.path."""
-    actuator_work: float = _metric("J")
+    path_curvature: float = _metric(
+        "1/m", "1 / radius, left positive", lambda walk: curvature(walk.path)
+    )
+    """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive if
+    the path bends left as seen along the motion, even if the robot walks backward."""
+    actuator_work: float = _metric("J", "of all actuators", lambda walk: walk.tally.effort.work[0])
     """Integral of max(0, -S dl/dt) in the steady stretch, for driven cables with signal S and
     length l: the work of actuators that cannot take any back."""
-    cost_of_transport: float = _metric("")
+    cost_of_transport: float = _metric("", "work / (weight x distance)", _cost_of_transport)
     """Actuator work / (weight times the centre's way over the ground) in the steady stretch. The
     way is LEAST_WAY at least. Infinite without gravity."""
-    signal_rate: float = _metric("N/s")
+    signal_rate: float = _metric("N/s", "how fast signals change", _signal_rate)
     """Root mean square of dS/dt in the steady stretch, over all oscillators' signals S: the less,
     the smoother the drive."""
-    lifted: float = _metric("")
+    lifted: float = _metric(
+        "",
+        "time off the ground",
+        lambda walk: sum(walk.lifted_shares) / len(walk.lifted_shares),
+        is_share=True,
+    )
     """Share of the steady stretch in which a body is off the ground, mean of all. Off the ground
     is one none of whose contact nodes bears a normal force. It says little in MuJoCo."""
-    clearance: float = _metric("m", least=True)
+    clearance: float = _metric(
+        "m", "smallest gap of struts' axes", lambda walk: walk.tally.clearance[0], least=True
+    )
     """Least distance, at any time, between the axes of struts of two bodies. Less than a
     strut's diameter is overlap: nothing in the model keeps struts apart."""
-    tension: float = _metric("N", least=True)
+    tension: float = _metric(
+        "N", "smallest of any cable", lambda walk: walk.tally.tension.of_all[0], least=True
+    )
     """Least tension of any cable at any time. Below 0 the cable would have to push."""
-    travelling_index: float = _metric("")
-    """0 if the signals stand along the robot, 1 if they travel, in the steady stretch. See
-    results.measures."""
-    peak_actuator_force: float = _metric("N", most=True)
+    travelling_index: float = _metric(
+        "", "0: standing wave, 1: travelling", lambda walk: travelling_index(walk.signals)
+    )
+    """0 if the signals stand along the robot, 1 if they travel, in the steady stretch."""
+    peak_actuator_force: float = _metric(
+        "N", "at any time", lambda walk: walk.tally.effort.peak_force[0], most=True
+    )
     """Greatest tension of a driven cable at any time."""
-    mean_actuator_force: float = _metric("N")
+    mean_actuator_force: float = _metric(
+        "N",
+        "of all driven cables",
+        lambda walk: walk.per_actuator_time * walk.tally.effort.impulse[0],
+    )
     """Mean tension of the driven cables in the steady stretch."""
-    peak_actuator_speed: float = _metric("m/s", most=True)
+    peak_actuator_speed: float = _metric(
+        "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True
+    )
     """Greatest speed of an actuator at any time, winding or paying out: a winch its free length,
     another one its cable."""
-    mean_actuator_speed: float = _metric("m/s")
+    mean_actuator_speed: float = _metric(
+        "m/s",
+        "winding or paying out",
+        lambda walk: walk.per_actuator_time * walk.tally.effort.wound[0],
+    )
     """Mean speed in the steady stretch, winding or paying out."""
-    peak_actuator_power: float = _metric("W", most=True)
+    peak_actuator_power: float = _metric(
+        "W", "at any time", lambda walk: walk.tally.effort.peak_power[0], most=True
+    )
     """Greatest product of an actuator's tension and winding speed, at any time."""
-    mean_actuator_power: float = _metric("W", most=True)
+    mean_actuator_power: float = _metric(
+        "W",
+        "effort of an actuator",
+        lambda walk: walk.per_actuator_time * walk.tally.effort.pulled[0],
+        most=True,
+    )
     """Mean positive power of an actuator in the steady stretch: the effort of a gait."""
-    actuator_limited: float = _metric("", most=True)
+    actuator_limited: float = _metric(
+        "",
+        "time at a limit of an actuator",
+        lambda walk: walk.per_actuator_time * walk.tally.effort.limited[0],
+        most=True,
+        is_share=True,
+        needs=LIMITS,
+    )
     """Share of the steady stretch in which a limit binds, mean of all winches or tension motors."""
     lifted_shares: tuple[float, ...] = ()
     """The share of `lifted` of each body, from T1 on."""
 
+    @classmethod
+    def of(cls, walk: Walk, *, lacking: Collection[str]) -> Self:
+        """The metrics of a walk; NaN where one needs what the robot is `lacking`."""
+        numbers = {
+            name: math.nan if metric.needs in lacking else float(metric.compute(walk))
+            for name, metric in METRICS.items()
+        }
+        return cls(**numbers, lifted_shares=walk.lifted_shares)
+
     def __str__(self) -> str:
         """A table of the metrics that the robot has, in SI and in the units that people read."""
         rows = []
-        for name, unit in METRICS.items():
+        for name, unit in UNITS.items():
             value = round(getattr(self, name), 9) + 0.0  # neither -0 nor rounding errors
             if not math.isnan(value):
                 read = shown(value, unit) if customary(unit)[1] != unit else ""
@@ -128,19 +282,12 @@ class Metrics:
         return numbers | {"lifted_shares": list(self.lifted_shares)}
 
 
-_FIELDS = [field for field in dataclasses.fields(Metrics) if field.metadata]
+METRICS: dict[str, Metric] = {
+    field.name: field.metadata["metric"] for field in dataclasses.fields(Metrics) if field.metadata
+}
+"""The declarations of all metrics that are numbers, by name."""
 
-METRICS: dict[str, str] = {field.name: field.metadata["unit"] for field in _FIELDS}
-"""The SI unit of each metric that is a number, by name."""
-
-METRICS_OF_A_ROW = tuple(field.name for field in _FIELDS if field.metadata["of_a_row"])
-"""Metrics that only the row of tetrahedra has."""
-
-LEAST = tuple(field.name for field in _FIELDS if field.metadata["least"])
-"""Metrics of which the least of several simulations is recorded, in place of their mean."""
-
-MOST = tuple(field.name for field in _FIELDS if field.metadata["most"])
-"""Metrics of which the greatest is recorded; their requirements are upper limits."""
+UNITS = {name: metric.unit for name, metric in METRICS.items()}
 
 
 def inverse(unit: str) -> str:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from tetra_drake.scenario.metrics import METRICS
+from tetra_drake.scenario.metrics import UNITS
 from tetra_drake.scenario.quantities import Time, UnitsByName
 from tetra_drake.scenario.refusals import refuse
 from tetra_drake.scenario.section import Kinds, Section
@@ -69,7 +69,7 @@ class QualityDiversity(Section):
     gaits above the levels of cells. A level follows the fittest gait of its cell slowly.
     """
 
-    measures: Annotated[dict[str, Range], UnitsByName(METRICS)] = Field(
+    measures: Annotated[dict[str, Range], UnitsByName(UNITS)] = Field(
         default={"travelling_index": [0.0, 1.0], "lifted": [0.4, 0.6]}
     )
     """Two metrics with their ranges on the map. Values outside count to the cells at the edge."""

@@ -16,7 +16,7 @@ import pydantic
 from pydantic import Field
 
 from tetra_drake.scenario.blueprint import Blueprint
-from tetra_drake.scenario.metrics import METRICS_OF_A_ROW
+from tetra_drake.scenario.metrics import ROW
 from tetra_drake.scenario.quantities import (
     Acceleration,
     Density,
@@ -116,8 +116,8 @@ class StructureFile(Section):
     """
 
     tag: ClassVar[str] = "Structure"
-    lacking: ClassVar[tuple[str, ...]] = METRICS_OF_A_ROW
-    """Metrics that the robot does not have."""
+    lacking: ClassVar[tuple[str, ...]] = (ROW,)
+    """What some metrics need and the robot is not."""
     slack: ClassVar[bool] = True
     """Cables never push."""
 
@@ -379,7 +379,7 @@ Robot = Annotated[Tetrahedra | StructureFile, Kinds()]
 """The tagged kinds of robots; without a tag it is the first.
 
 All have `gravity`, `offsets` (one for each body), `body_count`, `slack`, `size`, `lacking`
-(metrics), `blueprint()` and `implied_changes()`.
+(see scenario.metrics), `blueprint()` and `implied_changes()`.
 """
 
 

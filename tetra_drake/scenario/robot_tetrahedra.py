@@ -120,7 +120,7 @@ class Tetrahedra(Section):
     """The tetrahedra and where they stand (thesis section 2.1, appendix C.1)."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
-    """Metrics that the robot does not have."""
+    """What some metrics need and the robot is not."""
 
     tetrahedra: int = Field(ge=2, le=200)
     strut_length: Length = Field(gt=0)

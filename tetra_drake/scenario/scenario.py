@@ -26,7 +26,7 @@ from tetra_drake.scenario.common_sections import (
 )
 from tetra_drake.scenario.engine_kinds import Compiled, Drake, Engine, Mujoco
 from tetra_drake.scenario.friction_kinds import Friction
-from tetra_drake.scenario.metrics import METRICS, inverse
+from tetra_drake.scenario.metrics import METRICS, UNITS, inverse
 from tetra_drake.scenario.optimizer_kinds import OptimizerKind, SteadyState
 from tetra_drake.scenario.quantities import UnitsByName
 from tetra_drake.scenario.refusals import TAG, hint, refuse
@@ -65,11 +65,11 @@ class Scenario(Section):
     simulation: SimulationSection
     engine: Engine = Drake()
     objective: Annotated[
-        dict[str, float], UnitsByName({name: inverse(unit) for name, unit in METRICS.items()})
+        dict[str, float], UnitsByName({name: inverse(unit) for name, unit in UNITS.items()})
     ] = Field(min_length=1)
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
-    require: Annotated[dict[str, float], UnitsByName(METRICS)] = Field(default={})
+    require: Annotated[dict[str, float], UnitsByName(UNITS)] = Field(default={})
     """Least values of metrics: a gait with less counts as failed. Replaced as a whole."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
@@ -142,6 +142,11 @@ class Scenario(Section):
         if not isinstance(self.engine, engine):
             raise TypeError(f"the engine is !{type(self.engine).__name__}")
         return self.engine
+
+    @property
+    def lacking(self) -> tuple[str, ...]:
+        """What some metrics need and the robot does not have; see scenario.metrics."""
+        return *self.robot.lacking, *self.actuation.lacking
 
     @property
     def draws(self) -> int:
@@ -225,7 +230,7 @@ class Scenario(Section):
         ):
             for name in metrics:
                 for section in (self.robot, self.actuation):
-                    if name in section.lacking:
+                    if METRICS[name].needs in section.lacking:
                         kind = f"!{section.tag}"
                         problem = f"{kind} does not have this metric; give `{key}` without it"
                         refuse(f"{key}.{name}", problem)

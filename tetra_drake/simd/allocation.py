@@ -4,6 +4,7 @@ class Motion(NamedTuple):
     state: Annotated[Table, "13 * bodies"]
     rows: Annotated[Table, "bodies", 6, "width"]
     passed: Annotated[Table, "bodies", int]
+    least: Annotated[Table, 1, math.inf]
 
 motion = allocate(Motion, {"bodies": 5, "width": 12})
 """
@@ -21,12 +22,12 @@ Record = TypeVar("Record", bound=tuple)
 
 
 def allocate(kind: type[Record], sizes: Mapping[str, int], **given: object) -> Record:
-    """A NamedTuple of tables of zeros.
+    """A NamedTuple of tables.
 
     Args:
-        kind: The NamedTuple. An annotated table has the lengths of its dimensions: numbers, names
-            of sizes, or their products. With `int`, its numbers are whole. Any other field is a
-            NamedTuple of tables.
+        kind: The NamedTuple. An annotated table has the lengths of its dimensions: whole numbers,
+            names of sizes, or their products. With `int`, its numbers are whole. With a float, they
+            are all that number; else they are 0. Any other field is a NamedTuple of tables.
         sizes: The sizes by name.
         given: Fields that exist already.
     """
@@ -35,10 +36,10 @@ def allocate(kind: type[Record], sizes: Mapping[str, int], **given: object) -> R
         if name in given:
             fields[name] = given[name]
         elif get_origin(hint) is Annotated:
-            lengths = [length for length in hint.__metadata__ if length is not int]
-            whole = len(lengths) < len(hint.__metadata__)
-            shape = [_length(length, sizes) for length in lengths]
-            fields[name] = np.zeros(shape, dtype=np.int64 if whole else np.float64)
+            marks = hint.__metadata__
+            shape = [_length(mark, sizes) for mark in marks if isinstance(mark, (int, str))]
+            start = next((mark for mark in marks if isinstance(mark, float)), 0.0)
+            fields[name] = np.full(shape, start, dtype=np.int64 if int in marks else np.float64)
         else:
             fields[name] = allocate(hint, sizes)
     return kind(**fields)

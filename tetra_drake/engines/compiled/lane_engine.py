@@ -33,7 +33,6 @@ from tetra_drake.engines.compiled.loop import (
 from tetra_drake.engines.compiled.prepared import Prepared
 from tetra_drake.errors import MAX_SPEED, Diverged, SimulationFailure, StepBudgetExceeded
 from tetra_drake.physics.actuator import DRIVE
-from tetra_drake.physics.tally import Tally
 from tetra_drake.physics.terrain import SurfaceGrid
 from tetra_drake.results.result import IntegratorWork, SimulationResult, make_result
 from tetra_drake.results.trajectory import Motion
@@ -148,7 +147,7 @@ class LaneEngine:
             prepared.robot,
             prepared.gait,
             self.motion(lane),
-            totals=Tally(*(table.array[..., lane].copy() for table in self._lanes.tally)),
+            totals=of_lane(self._lanes.tally, lane),
             work=IntegratorWork(
                 scheme="ros2",
                 accuracy=prepared.robot.scenario.settings_of(Compiled).tolerance,
@@ -232,3 +231,10 @@ def fill_lane(tables: Any, values: Any, lane: int) -> None:
             fill_lane(table, value, lane)
     elif isinstance(values, np.ndarray) and values.dtype == np.float64:
         tables.array[..., lane] = values
+
+
+def of_lane(tables: Any, lane: int) -> Any:
+    """A copy of the numbers in a lane of tables in NamedTuples."""
+    if isinstance(tables, tuple):
+        return type(tables)(*(of_lane(table, lane) for table in tables))
+    return tables.array[..., lane].copy()

@@ -12,7 +12,7 @@ from tetra_drake.engines.compiled.loop import Constants, LaneState
 from tetra_drake.physics.actuator import DRIVE, Limits
 from tetra_drake.physics.forces import sizes_of
 from tetra_drake.physics.oscillator import make_neurons
-from tetra_drake.results.metrics import empty_tally
+from tetra_drake.results.metrics import steady_start
 from tetra_drake.results.result import motion_times
 from tetra_drake.robot.gait import Gait
 from tetra_drake.robot.robot import Robot, SteeringSignal, initial_neurons
@@ -145,8 +145,8 @@ def _jumps(robot: Robot) -> np.ndarray:
 
 
 def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> LaneState:
-    start = allocate(LaneState, sizes_in_lanes(robot, solver), tally=empty_tally(robot))
-    signals = robot.structure.signals
+    start, signals = allocate(LaneState, sizes_in_lanes(robot, solver)), robot.structure.signals
+    start.tally.begins[0] = steady_start(robot.scenario)
     start.step.state[:] = robot.structure.initial_state
     start.modes[:] = robot.starting_modes()
     if len(robot.commanded):

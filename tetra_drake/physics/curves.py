@@ -1,0 +1,56 @@
+"""Numbers that describe curves: how a path bends, whether waves travel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+_SWAY = 2e-3
+"""Size (m) of a path that may be swaying on the spot. Such a path counts as straight."""
+
+
+def curvature(points: np.ndarray) -> float:
+    """Curvature (1/m) of a path: of the circle fitted to its points (k, 2) in m.
+
+    The curvature is positive if the path bends to the left, and 0 on a line. Taubin's fit (IEEE
+    Trans. PAMI 13, 1991, 1115), with p relative to the mean of the points: the circle is
+    bend / (2 size) (p . p - size^2) + normal . p = 0. The unit vector (bend, normal) minimises the
+    mean square of the left side. A term is added that keeps the curvature of a path small if the
+    path is hardly larger than _SWAY. For a path of 10 cm the term has no effect.
+    """
+    (x, y), count = points.T, len(points)
+    x, y = x - x.sum() / count, y - y.sum() / count
+    square = x * x + y * y
+    size = math.sqrt(square.sum() / count)
+    if size < 1e-3 * _SWAY:
+        return 0.0
+    table = np.array([(square - size * size) / (2.0 * size), x, y])
+    moments = table @ table.T / count
+    moments[0, 0] += (_SWAY * _SWAY / size) ** 2
+    # (bend, normal) is the eigenvector with the smallest eigenvalue.
+    bend, normal_x, normal_y = np.linalg.eigh(moments)[1][:, 0].tolist()
+    bend /= size
+    # Twice the area swept by the ray from the circle's centre, times +-1 / radius.
+    swept = bend * (x[:-1] @ y[1:] - y[:-1] @ x[1:])
+    swept += normal_x * (y[-1] - y[0]) - normal_y * (x[-1] - x[0])
+    return math.copysign(bend, bend * swept)
+
+
+def travelling_index(waves: np.ndarray) -> float:
+    """Travelling index of waves (samples, places): 0 if they stand, 1 if they travel.
+
+    At fewer than two places nothing travels.
+
+    Of the strongest complex orthogonal mode, the ratio of the singular values of its real and
+    imaginary parts (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Evenly sampled.
+    """
+    if waves.shape[1] < 2:
+        return 0.0
+    # The mode is that of the analytic signals, whose spectrum has no negative frequencies.
+    spectrum = np.fft.rfft(waves, axis=0)[1:]
+    mode = np.linalg.eigh(spectrum.T @ spectrum.conj())[1][:, -1]
+    # Its parts have the Gram matrix [[a, c], [c, b]], a + b = 1.
+    a, c = float(mode.real @ mode.real), float(mode.real @ mode.imag)
+    spread = math.hypot(2.0 * a - 1.0, 2.0 * c)
+    return math.sqrt(max(0.0, 1.0 - spread) / (1.0 + spread))
