@@ -23,10 +23,20 @@ from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 _WITNESS_WINDOW = 2e-5  # s: how closely a witness localises, where the accuracy is 1e-3 or more
 _WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; how Drake's Simulator derives the isolation window
-_AIM_FACTOR, _AIM_BEYOND = 1.02, 5e-5  # and s: a step shall end just after the change it aims at
-_APPROACH = 0.8, 1e-3  # share and s: a change that is farther away is approached, then aimed at
-_FIRST_STEP, _GROWTH = 3e-4, 3.0  # s, and factor per step: how steps begin again after a change
-_RENEW_FROM = 8e-4  # s: shorter steps converge with any Jacobian, most often
+
+_NEAR = 1e-3
+"""Time (s) to a mode change from which on a step aims at it."""
+_AIM_FACTOR = 1.02
+_AIM_BEYOND = 5e-5
+"""A step aims at this factor of the time to a mode change, and this time (s) beyond it."""
+_APPROACH = 0.8
+"""Share of the time to a farther mode change that a step takes."""
+_FIRST_STEP = 3e-4
+"""Longest step (s) after a mode change."""
+_GROWTH = 3.0
+"""Factor by which the longest step grows with each step until the next mode change."""
+_RENEW_FROM = 8e-4
+"""Step (s) that needs a new Jacobian after a mode change; shorter ones mostly converge without."""
 
 
 class DrakeEngine(Engine):
@@ -153,16 +163,21 @@ def _check(settings: SimulationSection, now: float, velocities: np.ndarray, work
 
 
 class _StepAimer:
-    """Lets steps end where the next mode change is predicted, and begin anew after it.
+    """Chooses the longest next step, by the time to the next mode change.
 
-    The prediction takes the mean acceleration of the last step, which costs nothing. That of the
-    instant is no better: what follows a change dies out at rates of 1e4 /s.
+    | mode change             | longest step                                                    |
+    |-------------------------|-----------------------------------------------------------------|
+    | in max_step or later    | max_step                                                        |
+    | later than _NEAR        | _APPROACH of the time: over a long step the prediction is poor  |
+    | in _NEAR or sooner      | to just after it, but at least look_ahead                       |
+    | at the end of this step | _FIRST_STEP, which then grows: long steps mostly fail at first  |
 
-    Over a long step the mean is not good enough, so such a step only approaches the change. A
-    change of mode changes the Jacobian. The integrator would keep the old one as long as its Newton
-    iterations converge at all: slowly then, and stopped farther from the solution, always on the
-    same side. So it gets a new one, unless the next change is so near that it does not pay. And it
-    would try the step it took before the change, which mostly fails: so steps begin again, short.
+    The prediction uses the mean acceleration of the last step, which costs nothing. The present
+    acceleration is no better: the vibrations after a mode change decay at rates of 1e4 /s.
+
+    A mode change also changes the Jacobian. The integrator would keep the old one while its Newton
+    iterations converge, slowly and with an error of one sign. So it gets a new one, unless the
+    next step is shorter than _RENEW_FROM.
     """
 
     def __init__(
@@ -206,9 +221,9 @@ class _StepAimer:
 
     def _step_towards(self, time_to_change: float) -> float:
         """The step (s) towards a mode change that is predicted in a time (s)."""
-        look_ahead, (share, near) = self._settings.look_ahead, _APPROACH
-        if near < time_to_change < self._settings.max_step:
-            return share * time_to_change
+        look_ahead = self._settings.look_ahead
+        if _NEAR < time_to_change < self._settings.max_step:
+            return _APPROACH * time_to_change
         margin = min(_AIM_BEYOND, 0.25 * look_ahead)
         return max(look_ahead, _AIM_FACTOR * time_to_change + margin)
 

@@ -9,6 +9,9 @@ opposite and loads with equal signs).
     load    the share of the robot's weight on the feet of the body ahead, the last one that the
             oscillator's cables join: + on both
     pitch   the sine of the angle by which that body's x axis points up: + and -
+
+What a sense reads must be smooth within a step of an integrator. What jumps, such as touching the
+ground, is read from `modes`, which are constant within a step (see `friction`).
 """
 
 from __future__ import annotations
@@ -21,7 +24,11 @@ from tetra_drake.simd.lanes import Table
 
 
 class Senses(NamedTuple):
-    """Constants of what m oscillators can sense."""
+    """Constants of what m oscillators can sense.
+
+    All tables have one axis. Kernels know every length but the first (see simd.lanes), so with two
+    axes they would be compiled anew for robots of another size.
+    """
 
     drivers: Table
     """(cables,): the oscillator that drives each cable, PASSIVE if none does."""

@@ -3,6 +3,11 @@
 The reset integrator (Eq. 3-5) acts along each tangent by itself. Coulomb friction, regularised,
 acts in the plane and is limited by the normal force.
 
+A node on the ground sticks or slips: its *mode* is STICK, or the direction in which it broke free.
+With the reset integrator that is +1 or -1 on each tangent, with Coulomb friction a unit vector. A
+node that sticks may creep, as its bristle bends. Modes are constant within a step of an integrator,
+so forces are smooth there; they change at its end. A law without stiction always sticks.
+
 Both laws have the same functions of a Slide: force, damping, stuck, next mode, margin and time to
 the next change. The last section calls those of a ground's law. A further law takes its constants,
 these functions, and a branch in each function of that section.
@@ -29,8 +34,7 @@ from tetra_drake.simd.lanes import (
 )
 
 STICK = 0.0
-"""The friction mode that sticks. One that slips is the direction in which the node broke free:
-with the reset integrator +1 or -1 on each tangent, with Coulomb friction a unit vector."""
+"""The mode of a node that sticks."""
 
 Pair = tuple[Real, Real]
 """Components along the tangents t1 and t2."""

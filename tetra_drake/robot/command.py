@@ -11,7 +11,7 @@ import numpy as np
 from tetra_drake.errors import InputError
 from tetra_drake.physics.cable import CableLaw
 from tetra_drake.robot.gait import Gait
-from tetra_drake.robot.robot import Robot
+from tetra_drake.robot.robot import MakeStructure, Robot
 from tetra_drake.scenario.scenario import Scenario
 
 _NONE_COUPLED = -1
@@ -58,9 +58,8 @@ def robot_without_network(scenario: Scenario) -> Robot:
     It has no network, no start-up and no feedback. Actuators that imitate springs and dampers do
     not do so here, because the command contains their effect.
     """
-    structure = Robot.of(scenario).structure.with_oscillator_per_cable(
-        without_law=scenario.actuation.plays_cable
-    )
+    without_law = scenario.actuation.plays_cable
+    structure = MakeStructure(scenario).with_oscillator_per_cable(without_law=without_law)
     without_network = {"signals": "listing", "feedback": [], "start_up": 0.0}
     cpg = scenario.cpg.model_copy(update=without_network | {"reach": _NONE_COUPLED})
     return Robot.of(scenario.with_sections(cpg=cpg), structure)

@@ -36,13 +36,11 @@ class GroundContact(LeafSystem):
     |                   |         |        | t2: direction of slip, 0 sticks, by contact node  |
 
     On flat ground t1 and t2 are x and y; otherwise see `physics.terrain`. The scenario chooses the
-    law of friction (see `physics.friction`). For the reset integrator of the thesis (Eq. 3-5),
-    friction modes are 0 or ±1 along each tangent. For Coulomb's law, the mode is a unit vector, or
-    0.
+    law of friction, and `physics.friction` explains modes.
 
     The discrete state is `modes` of `physics.contact`. Deflections follow from the stick points, so
-    no continuous state has to be reset. Modes are constant within a step, so forces are smooth
-    there. They are updated at the end of the step; Initialize() sets them from the pose.
+    no continuous state has to be reset. Modes are updated at the end of a step; Initialize() sets
+    them from the pose.
 
     With `witness`, a step also ends where a mode changes, to within Drake's isolation window:
     0.01 s times the accuracy of Context.SetAccuracy().

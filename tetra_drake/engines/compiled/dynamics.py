@@ -27,11 +27,16 @@ from tetra_drake.physics.inertia import XX, XY, XZ, YY, YZ, ZZ, over_inertia, ti
 from tetra_drake.physics.kinematics import P_BN_W
 from tetra_drake.physics.model import Model
 from tetra_drake.physics.terrain import to_world
+from tetra_drake.physics.vectors import cross, put_vector, vector_at
 from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, any_lane, named, select
 
-CABLES_AT_ONCE, LINE_COLUMNS = 6, 9
-"""The cables of a pair of bodies whose damping is summed at once, and the numbers of each."""
+CABLES_AT_ONCE = 6
+"""The cables of a pair of bodies whose damping is summed at once."""
+
+U, W, D, WEIGHT, LINE_COLUMNS = 0, 3, 6, 9, 10
+"""Columns of `lines`, a row per cable: u, w and d as in add_cables(), damping times time; and their
+number."""
 
 
 class Solver(NamedTuple):
@@ -132,17 +137,15 @@ def implicit_matrix(
             for c in range(r, BLOCK):
                 rows[body, r, c] = 0.0
     for k in range(solver.fill_bodies.size):
-        body, column = solver.fill_bodies[k], solver.fill_columns[k]
+        body, first = solver.fill_bodies[k], solver.fill_columns[k]
         for r in range(BLOCK):
-            for c in range(column, column + BLOCK):
+            for c in range(first, first + BLOCK):
                 rows[body, r, c] = 0.0
     couplings = robot.couplings
     for pair in range(solver.columns.size):
-        column = solver.columns[pair]
-        last = couplings.first_cable[pair + 1]
-        for cable in range(couplings.first_cable[pair], last, CABLES_AT_ONCE):
-            adds = cable > couplings.first_cable[pair]
-            add_cables(robot, forces, time, pair, cable, last, adds, column, lines, rows)
+        first, last = couplings.first_cable[pair], couplings.first_cable[pair + 1]
+        for cable in range(first, last, CABLES_AT_ONCE):
+            add_cables(robot, solver, forces, time, pair, cable, lines, rows)
     add_masses(robot, forces.inertia, rows)
     for i in range(robot.ground.contacts.size):
         if any_lane(modes[i, CONTACT] != 0.0):
@@ -172,75 +175,70 @@ def add_masses(robot: Model, inertia: Table, rows: Table) -> None:
 @inlined
 def add_cables(
     robot: Model,
+    solver: Solver,
     forces: Forces,
     time: Real,
     pair: int,
     first: int,
-    last: int,
-    adds: bool,
-    column: int,
     lines: Table,
     rows: Table,
 ) -> None:
-    """Adds time * damping * l lᵀ for the cables of a pair of bodies from `first` on, before `last`
-    and at most CABLES_AT_ONCE.
+    """Adds time * damping * l lᵀ for the cables of a pair of bodies from `first` on, at most
+    CABLES_AT_ONCE.
 
     l, of 12 numbers, times the velocities of both bodies is the rate of the cable's length: the
     ends at p_a and p_b move apart along d, so l = (u, -d, w, d) with u = d x p_a and w = p_b x d.
-    All cables are summed at once, a product of two columns of `lines`: u, w, d.
+    All cables are summed at once, a product of two columns of `lines`.
     """
-    for j in range(CABLES_AT_ONCE):
-        i = first + j
-        if i >= last:
-            for c in range(LINE_COLUMNS):
-                lines[j, c] = 0.0
-            continue
-        d_x, d_y = forces.cable_forces[i, DIRECTION], forces.cable_forces[i, DIRECTION + 1]
-        d_z = forces.cable_forces[i, DIRECTION + 2]
-        a, b = robot.cables.node_a[i], robot.cables.node_b[i]
-        p_x, p_y = forces.nodes[a, P_BN_W], forces.nodes[a, P_BN_W + 1]
-        p_z = forces.nodes[a, P_BN_W + 2]
-        lines[j, 0] = d_y * p_z - d_z * p_y
-        lines[j, 1] = d_z * p_x - d_x * p_z
-        lines[j, 2] = d_x * p_y - d_y * p_x
-        p_x, p_y = forces.nodes[b, P_BN_W], forces.nodes[b, P_BN_W + 1]
-        p_z = forces.nodes[b, P_BN_W + 2]
-        lines[j, 3] = p_y * d_z - p_z * d_y
-        lines[j, 4] = p_z * d_x - p_x * d_z
-        lines[j, 5] = p_x * d_y - p_y * d_x
-        lines[j, 6], lines[j, 7], lines[j, 8] = d_x, d_y, d_z
-    cable_forces = forces.cable_forces
-    weights = (
-        time * cable_forces[first, TENSION_PER_RATE],
-        time * cable_forces[min(first + 1, last - 1), TENSION_PER_RATE],
-        time * cable_forces[min(first + 2, last - 1), TENSION_PER_RATE],
-        time * cable_forces[min(first + 3, last - 1), TENSION_PER_RATE],
-        time * cable_forces[min(first + 4, last - 1), TENSION_PER_RATE],
-        time * cable_forces[min(first + 5, last - 1), TENSION_PER_RATE],
-    )
+    write_lines(robot, forces, time, pair, first, lines)
     rear, front = robot.couplings.first[pair], robot.couplings.second[pair]
-    turn, shift = column, column + 3  # the columns of the front body's rotation and translation
+    adds = first > robot.couplings.first_cable[pair]  # the block holds a sum already
+    turn = solver.columns[pair]  # the columns of the front body's rotation and translation
+    shift = turn + 3
+    weights = column(lines, WEIGHT)
     for r in range(3):
-        u = weighted(lines, r, weights)
-        w = weighted(lines, 3 + r, weights)
-        d = weighted(lines, 6 + r, weights)
+        u = weighted(weights, column(lines, U + r))
+        w = weighted(weights, column(lines, W + r))
+        d = weighted(weights, column(lines, D + r))
         for c in range(r, 3):
-            rows[rear, r, c] += product(u, lines, c)
-            rows[front, r, c] += product(w, lines, 3 + c)
-            dd = product(d, lines, 6 + c)
+            rows[rear, r, c] += product(u, column(lines, U + c))
+            rows[front, r, c] += product(w, column(lines, W + c))
+            dd = product(d, column(lines, D + c))
             rows[rear, 3 + r, 3 + c] += dd
             rows[front, 3 + r, 3 + c] += dd
             put(-dd, adds, rear, 3 + r, shift + c, rows)
             if c > r:
                 put(-dd, adds, rear, 3 + c, shift + r, rows)
         for c in range(3):
-            put(product(u, lines, 3 + c), adds, rear, r, turn + c, rows)
-            ud = product(u, lines, 6 + c)
+            put(product(u, column(lines, W + c)), adds, rear, r, turn + c, rows)
+            ud = product(u, column(lines, D + c))
             rows[rear, r, 3 + c] -= ud
             put(ud, adds, rear, r, shift + c, rows)
-            wd = product(w, lines, 6 + c)
+            wd = product(w, column(lines, D + c))
             rows[front, r, 3 + c] += wd
             put(-wd, adds, rear, 3 + c, turn + r, rows)
+
+
+@inlined
+def write_lines(
+    robot: Model, forces: Forces, time: Real, pair: int, first: int, lines: Table
+) -> None:
+    """Writes `lines`, (CABLES_AT_ONCE, LINE_COLUMNS), of the cables that add_cables() takes; zeros
+    after the last cable of the pair."""
+    last, cable_forces = robot.couplings.first_cable[pair + 1], forces.cable_forces
+    for j in range(CABLES_AT_ONCE):
+        i = first + j
+        if i >= last:
+            for c in range(LINE_COLUMNS):
+                lines[j, c] = 0.0
+            continue
+        direction = vector_at(cable_forces, i, DIRECTION)
+        p_a = vector_at(forces.nodes, robot.cables.node_a[i], P_BN_W)
+        p_b = vector_at(forces.nodes, robot.cables.node_b[i], P_BN_W)
+        put_vector(cross(direction, p_a), j, U, lines)
+        put_vector(cross(p_b, direction), j, W, lines)
+        put_vector(direction, j, D, lines)
+        lines[j, WEIGHT] = time * cable_forces[i, TENSION_PER_RATE]
 
 
 @inlined
@@ -255,30 +253,27 @@ def put(value: Real, adds: bool, body: int, r: int, c: int, rows: Table) -> None
         rows[body, r, c] = value
 
 
-@inlined
-def weighted(lines: Table, c: int, weights: tuple[Real, ...]) -> tuple[Real, ...]:
-    """Column c of `lines`, times weights."""
-    return (
-        weights[0] * lines[0, c],
-        weights[1] * lines[1, c],
-        weights[2] * lines[2, c],
-        weights[3] * lines[3, c],
-        weights[4] * lines[4, c],
-        weights[5] * lines[5, c],
-    )
+# Columns of `lines` are tuples, as registers are not filled from loops over six numbers.
+
+Column = tuple[Real, Real, Real, Real, Real, Real]
 
 
 @inlined
-def product(column: tuple[Real, ...], lines: Table, c: int) -> Real:
-    """The product of a column and column c of `lines`."""
-    return (
-        column[0] * lines[0, c]
-        + column[1] * lines[1, c]
-        + column[2] * lines[2, c]
-        + column[3] * lines[3, c]
-        + column[4] * lines[4, c]
-        + column[5] * lines[5, c]
-    )
+def column(lines: Table, c: int) -> Column:
+    """Column c of `lines`."""
+    return lines[0, c], lines[1, c], lines[2, c], lines[3, c], lines[4, c], lines[5, c]
+
+
+@inlined
+def weighted(w: Column, x: Column) -> Column:
+    """The numbers of a column, times weights."""
+    return w[0] * x[0], w[1] * x[1], w[2] * x[2], w[3] * x[3], w[4] * x[4], w[5] * x[5]
+
+
+@inlined
+def product(x: Column, y: Column) -> Real:
+    """The scalar product."""
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2] + x[3] * y[3] + x[4] * y[4] + x[5] * y[5]
 
 
 @inlined

@@ -4,8 +4,8 @@ All lanes go through the same iteration: forces, prediction of the next mode cha
 step. A lane whose step is rejected repeats it with a shorter one in the next iteration.
 
 The listing's network does not depend on the robot: it runs ahead in steps of its own, and its
-signals are interpolated. (A table of them made beforehand, one lane at a time, costs a tenth of the
-speed of one lane, and more in several.) A `live` network takes the robot's steps by Heun's method,
+signals are interpolated. (To compute them all before, one lane at a time, costs a tenth of the
+speed of one lane, and a fifth in eight.) A `live` network takes the robot's steps by Heun's method,
 which is explicit, as its rates are slow, and what ROS2 is without its matrix: both are of order 2
 together.
 """
@@ -70,8 +70,8 @@ of samples of the signals that exist, steps tried, steps taken."""
 
 CLOCK_ROWS = 11
 
-ACCEPTED, STEPS_NETWORK, TURN_INDEX = range(3)
-"""Rows of `scratch`: whether the step is accepted, whether the network takes a step (0 or 1), and a
+ACCEPTED, NETWORK_STEPS, TURN_INDEX = range(3)
+"""Rows of `scratch`: 1 if the step is accepted, 1 if the network takes a step, or else 0; and a
 place among the turns."""
 
 SCRATCH_ROWS = 3
@@ -324,25 +324,34 @@ def fate(constants: Constants, lanes: LaneState) -> Real:
 def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> None:
     """Lets the listing's networks run until every walking lane has the samples around a time (s).
 
-    Others go along as far as there is room, so that few steps are taken for one lane alone.
+    All lanes whose samples have room in `log.recent` take part, so that few steps are taken for
+    one lane alone.
     """
-    clock, period = lanes.clock, constants.period[0]
-    gain, output, scratch = by_lane(constants.gain), by_lane(lanes.output), by_lane(lanes.scratch)
-    needed, room = until / period + 1.0, clock[TIME] / period + (log.recent.shape[1] - 1.0)
-    grows = clock[STATUS] == WALKING
-    while any_lane(grows & (clock[SAMPLES] < constants.samples[0]) & (clock[SAMPLES] <= needed)):
-        goes = grows & (clock[SAMPLES] < constants.samples[0]) & (clock[SAMPLES] < room)
-        step = select(goes, period, 0.0)
+    clock, period, is_walking = lanes.clock, constants.period[0], lanes.clock[STATUS] == WALKING
+    last_needed = until / period + 1.0
+    end_of_room = clock[TIME] / period + (log.recent.shape[1] - 1.0)
+    is_unfinished = is_walking & (clock[SAMPLES] < constants.samples[0])
+    while any_lane(is_unfinished & (clock[SAMPLES] <= last_needed)):
+        takes_step = is_unfinished & (clock[SAMPLES] < end_of_room)
         steer(constants, lanes, log, clock[SAMPLES] + 0.5)
-        euler_step(constants.network, lanes.tonic, step, lanes.neurons)
+        euler_step(constants.network, lanes.tonic, select(takes_step, period, 0.0), lanes.neurons)
         oscillator_output(lanes.neurons, lanes.output)
-        lanes.scratch[STEPS_NETWORK] = select(goes, 1.0, 0.0)
-        for lane in range(log.kept.size):
-            if scratch[STEPS_NETWORK, lane] != 0.0:
-                row = row_of(int(by_lane(clock)[SAMPLES, lane]), log)
-                for k in range(lanes.output.size):
-                    log.recent[lane, row, k] = gain[0, lane] * output[k, lane]
-        clock[SAMPLES] += lanes.scratch[STEPS_NETWORK]
+        lanes.scratch[NETWORK_STEPS] = select(takes_step, 1.0, 0.0)
+        keep_outputs(constants, lanes, log)
+        clock[SAMPLES] += lanes.scratch[NETWORK_STEPS]
+        is_unfinished = is_walking & (clock[SAMPLES] < constants.samples[0])
+
+
+@inlined
+def keep_outputs(constants: Constants, lanes: LaneState, log: Log) -> None:
+    """Writes the next sample of the signals, N, in each lane whose network took a step."""
+    clock, scratch = by_lane(lanes.clock), by_lane(lanes.scratch)
+    gain, output = by_lane(constants.gain), by_lane(lanes.output)
+    for lane in range(log.kept.size):
+        if scratch[NETWORK_STEPS, lane] != 0.0:
+            row = row_of(int(clock[SAMPLES, lane]), log)
+            for k in range(lanes.output.size):
+                log.recent[lane, row, k] = gain[0, lane] * output[k, lane]
 
 
 @inlined
