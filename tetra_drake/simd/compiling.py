@@ -97,6 +97,15 @@ class KernelCache(NullCache):
     saved at once. Here a digest of the signature names the file, and the file begins with a digest
     of its content and of all that the content depends on. A file that is damaged, out of date or
     another kernel's is replaced.
+
+    Numba asks it at the first call of a kernel with arguments of other types than before:
+
+        load_overload(sig) ──→ machine code, read from the file of this signature
+              │
+              ↓ None: there is no such file, and the timer of the announcement starts
+        numba compiles
+              ↓
+        save_overload(sig, data): the timer stops, the file is written
     """
 
     def __init__(self, function: Callable[..., object]) -> None:
