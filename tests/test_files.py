@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray
 
+from tetra_drake.errors import InputError
 from tetra_drake.files import check_file, check_folder, read_text, whole_file, write_whole
 from tetra_drake.results.trajectory import save_dataset
 
@@ -54,6 +55,8 @@ def test_what_cannot_be_written_is_refused(tmp_path, place, refused):
     (tmp_path / "a.txt").write_text("old")
     with refused(tmp_path / place, "", ""):
         write_whole(tmp_path / place, "new")
+    with pytest.raises(InputError):  # before anything is simulated for it
+        check_file(tmp_path / place)
     assert (tmp_path / "a.txt").read_text() == "old"
     assert os.listdir(tmp_path) == ["a.txt"]
 

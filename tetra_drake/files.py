@@ -97,8 +97,19 @@ def make_folder(folder: Path, *, source: Path | None = None) -> None:
 
 def check_file(path: str | Path) -> None:
     """Raises InputError if `path` cannot be written as a file."""
+    _check_name(path)
     _check_no_other(path)
     check_folder(Path(path).parent)
+
+
+def _check_name(path: str | Path) -> None:
+    """Raises InputError if no file can have this name, such as one that is too long."""
+    try:
+        os.stat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", f"cannot be written: {_reason(error)}") from error
 
 
 def _check_no_other(path: str | Path) -> None:
@@ -112,12 +123,7 @@ def _check_no_other(path: str | Path) -> None:
 def check_folder(folder: str | Path) -> None:
     """Raises InputError if `folder` is no writable folder and cannot be made."""
     folder = Path(folder)
-    try:
-        os.stat(folder)
-    except (FileNotFoundError, NotADirectoryError):
-        pass
-    except (OSError, ValueError) as error:  # such as a name that is too long
-        raise InputError(folder, "", f"cannot be written: {_reason(error)}") from error
+    _check_name(folder)
     existing = folder
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent

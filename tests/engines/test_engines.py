@@ -79,7 +79,7 @@ WALKS = {
 )
 def test_recording_and_watching_change_nothing(walk, engine):
     name, changes, _ = WALKS[walk]
-    short = shortly(load_scenario(name), engine).with_changes(changes)
+    short = shortly(load_scenario(name), engine, duration="0.6 s").with_changes(changes)
     drive = {"command": WAVES} if walk == "command" else {"gait": seeded_gait(short)}
     plain = simulate(short, **drive)
     recorded = simulate(short, **drive, record=True)

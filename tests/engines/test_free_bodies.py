@@ -52,7 +52,7 @@ def bent_body_and_bar() -> Scenario:
     return flying.with_changes(changes)
 
 
-def turned_by_euler(structure: Structure, w_WB: np.ndarray, steps: int = 20_000) -> np.ndarray:
+def turned_by_euler(structure: Structure, w_WB: np.ndarray, steps: int = 5_000) -> np.ndarray:
     """(bodies, 4): quaternions after DURATION by Euler's equations in the frames of the bodies,
     I w' = I w x w, by the classical Runge-Kutta method."""
     inertia = unit_inertias(structure)

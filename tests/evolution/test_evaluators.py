@@ -64,7 +64,7 @@ class Dying:
 @pytest.mark.parametrize(
     ("make", "once"),
     [
-        (InProcesses, (0, 3, 9)),
+        (InProcesses, (0, 9)),
         (on_processes, (0,)),
     ],
 )

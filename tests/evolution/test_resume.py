@@ -38,7 +38,7 @@ def a_small_map(monkeypatch):
     monkeypatch.setattr(quality_diversity, "BATCH", 4)
 
 
-@pytest.mark.parametrize("robot", ["row", "prism"])
+@pytest.mark.parametrize("robot", ["row", "pair"])
 @pytest.mark.parametrize("optimizer", OPTIMIZERS)
 def test_an_interrupted_run_ends_like_one_that_was_not_and_makes_no_evaluation_again(
     optimizer, robot, tmp_path
@@ -46,10 +46,10 @@ def test_an_interrupted_run_ends_like_one_that_was_not_and_makes_no_evaluation_a
     if robot == "row":
         trials, evaluations = 2, 40
         scenario, evaluate = small_scenario(), Bowl()
-    else:  # simulated
+    else:  # simulated, by the kernels of the row
         trials, evaluations = 1, 12
         times = {"simulation.duration": "0.6 s", "simulation.steady_from": "0.3 s"}
-        scenario = load_scenario("prism").with_changes({"cpg.start_up": "0.1 s", **times})
+        scenario = load_scenario("pair").with_changes({"cpg.start_up": "0.1 s", **times})
         evaluate = GaitEvaluation(scenario)
     sizes = {"evolution.evaluations": evaluations, "evolution.trials": trials}
     scenario = scenario.with_changes({"optimizer": optimizer, **sizes})

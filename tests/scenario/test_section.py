@@ -153,9 +153,9 @@ def test_errors_name_the_key_and_what_was_found(text, key, found, refused):
 def test_a_mapping_of_many_keys_is_read_as_fast_as_many_mappings():
     def time_of(text: str) -> float:
         started = time.process_time()
-        assert len(parse_yaml(text, "file")) == 30_000
+        assert len(parse_yaml(text, "file")) == 8_000
         return time.process_time() - started
 
-    keys = [f"k{i}: 1\n" for i in range(30_000)]
+    keys = [f"k{i}: 1\n" for i in range(8_000)]
     # Comparing all pairs of keys would take four times as long.
     assert time_of("".join(keys)) < 2.0 * time_of("".join(f"- {key}" for key in keys))

@@ -182,7 +182,7 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
 
 def test_robots_that_differ_in_numbers_alone_share_an_engine(short):
     """Else disturbed robots would walk one after another."""
-    engine = LaneEngine(prepared(short), width=2)
+    engine = LaneEngine(prepared(short), width=1)
     stiff = {"robot.cables.outer_stiffness": "0.21 lbf/in", "robot.cables.damping": "0.04 lbf*s/in"}
     wide = {"robot.spacing": "3 in", "ground.stiffness": "20 lbf/in"}
     moved = {"robot.offsets": [[f"{i} mm", 0.0, "1 mm"] for i in range(5)]}
