@@ -173,12 +173,6 @@ def test_a_run_may_replace_another_but_nothing_else(tiny, tmp_path, refused):
     assert (tmp_path / "run" / "trial_00").is_dir()
 
 
-def test_an_empty_folder_may_be_overwritten(tiny, tmp_path):
-    (tmp_path / "run").mkdir()
-    options = {"overwrite": True, "reevaluate": False, "report": False}
-    assert len(tetra_drake.evolve(tiny, tmp_path / "run", **options).evaluations) == 8
-
-
 WRONG = {
     "workers": (0, -1, 1.5),
     "seed": (-1, "1"),
@@ -198,18 +192,6 @@ def test_a_wrong_argument_is_refused_before_anything_is_written(
     for out in (run, tmp_path / "new"):
         with refused("evolve", key, "expected"):
             tetra_drake.evolve(tiny, out, overwrite=True, **{key: value})
-    assert read_record(run) == before
-    assert not (tmp_path / "new").exists()
-
-
-def test_a_call_that_fails_before_its_first_line_leaves_the_old_run(tiny, tmp_path, run_small):
-    run = run_small()
-    before = read_record(run)
-    failing = [{"optimizer": lambda space: None}, {"objective": lambda result: result.nothing}]
-    for options in failing:
-        for out in (run, tmp_path / "new"):
-            with pytest.raises((TypeError, AttributeError)):
-                tetra_drake.evolve(tiny, out, overwrite=True, workers=1, **options)
     assert read_record(run) == before
     assert not (tmp_path / "new").exists()
 

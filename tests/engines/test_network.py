@@ -8,11 +8,9 @@ import pytest
 import xarray
 from helpers.converged import CONVERGED, shortly
 
-from tetra_drake.engines.drake import MakeSimulator
 from tetra_drake.engines.simulate import simulate, simulate_many
-from tetra_drake.errors import InputError
 from tetra_drake.robot.gait import Gains, Gait, load_gait, seeded_gait
-from tetra_drake.robot.robot import Robot, SteeringSignal
+from tetra_drake.robot.robot import SteeringSignal
 from tetra_drake.robot.weights import Weights
 from tetra_drake.scenario.common_sections import PATHWAYS
 from tetra_drake.scenario.engine_kinds import Compiled, Drake
@@ -20,7 +18,6 @@ from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.units import INCH
-from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 BOTH = pytest.mark.parametrize("engine", ["drake", "compiled"])
 SIDES = {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]}
@@ -121,21 +118,6 @@ def test_a_steering_signal_acts_when_it_changes(signals):
     assert np.abs(left - right)[-1] > 0.01
 
 
-def test_a_signal_at_the_diagrams_port_steers_as_a_function_does():
-    scenario = load_scenario("turning")
-    short = shortly(scenario, 0.2)
-    gait = seeded_gait(short)
-    states = []
-    for steering in (None, lambda time: -0.5):
-        diagram = MakeTensegrityDiagram(Robot.of(short), gait, steering=steering)
-        simulator = MakeSimulator(diagram, Drake())
-        if steering is None:
-            diagram.GetInputPort("turn").FixValue(simulator.get_mutable_context(), [-0.5])
-        simulator.AdvanceTo(0.2)
-        states.append(simulator.get_context().get_continuous_state_vector().CopyToVector())
-    np.testing.assert_array_equal(*states)
-
-
 def test_a_constant_number_steers_as_the_gaits_turn_does(refused):
     changes = {"engine": "!Compiled", "simulation.duration": "0.4 s"}
     short = load_scenario("turning").with_changes(changes | {"simulation.steady_from": "0.2 s"})
@@ -148,20 +130,6 @@ def test_a_constant_number_steers_as_the_gaits_turn_does(refused):
             simulate(scenario=short, gait=gait, steering=wrong)
     with refused("steering", "at 0 s", "1.5"):
         simulate(scenario=short, gait=gait, steering=1.5)
-
-
-def test_a_scenario_is_simulated_by_its_name_and_by_its_file(tmp_path):
-    file = tmp_path / "short.yaml"
-    times = "{duration: 0.2 s, steady_from: 0.1 s}"
-    file.write_text(f"base: turning\nname: short\nsimulation: {times}\n")
-    short = load_scenario(file)
-    gait = seeded_gait(short)
-    expected = simulate(scenario=short, gait=gait).metrics
-    assert simulate(scenario=file, gait=gait).metrics == expected
-    (found,) = simulate_many(scenario=str(file), gaits=[gait])
-    assert found.metrics == expected
-    with pytest.raises(InputError, match="missing"):
-        simulate(scenario="missing", gait=gait)
 
 
 def test_one_gait_walks_straight_on_and_turns_either_way(data):
@@ -189,8 +157,3 @@ def test_lanes_with_other_gains_and_turns_keep_their_numbers(scenario):
     many = simulate_many(scenario=short, gaits=gaits, workers=1)
     assert [each.metrics for each in many] == alone
     assert len({metrics.distance for metrics in alone}) == len(gaits)
-
-
-def test_feedback_is_refused_where_signals_are_computed_beforehand(scenario, refused):
-    with refused("scenario thesis", "cpg.signals", "live"):
-        scenario.with_changes({"cpg.signals": "listing", "cpg.feedback": ["load"]})

@@ -187,14 +187,15 @@ def with_one_more(content):
     return content + json_line(entry | {"index": 42}).encode()
 
 
-VALUES = [("genome", [2.0] * 26), ("placed", 7)]
+COUNTED = ("evaluations", "best_fitness", "best_evaluation")
 
 
 @pytest.mark.parametrize(
     ("name", "line", "problem", "damage"),
     [
         ("evaluations", 3, "checksum", with_line(3, lambda _: b"{nonsense")),
-        *(("evaluations", 20, key, with_value(20, key, value)) for key, value in VALUES),
+        ("evaluations", 20, "genome", with_value(20, "genome", [2.0] * 26)),
+        ("evaluations", 20, "placed", with_value(20, "placed", 7)),
         ("evaluations", 43, "ends before", with_one_more),
         ("iterations", 2, "evaluations", with_value(2, "evaluations", 15)),
     ],
@@ -246,22 +247,6 @@ def test_no_value_that_was_changed_is_taken_over(run_small, refused):
         assert read_record(run) == whole
 
 
-def test_a_line_without_checksum_is_neither_read_nor_resumed(run_small, refused):
-    path = run_small(trials=1) / "trial_00" / "iterations.jsonl"
-    path.write_text(re.sub(', "crc": "\\w+"', "", path.read_text()))
-    for use in (lambda: load_run(path.parents[1]), lambda: run_small(resume=True)):
-        with refused(path, "line 1", "checksum"):
-            use()
-
-
-def test_a_line_taken_out_is_reported(run_small, refused):
-    path = run_small(trials=1) / "trial_00" / "evaluations.jsonl"
-    lines = path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(b"".join(lines[:6] + lines[7:]))
-    with refused(path, "line 7", "index is 7, expected 6"):
-        load_run(path.parents[1])
-
-
 def test_a_folder_where_a_file_belongs_is_reported(run_small, refused):
     run = run_small(population=4, iterations=1, trials=1)
     for name in ("trial_00/evaluations.jsonl", "manifest.json"):
@@ -280,53 +265,44 @@ def test_a_folder_where_a_file_belongs_is_reported(run_small, refused):
 # Lines of other runs and trials, lines that contradict each other
 
 
-def both(run, run_small):
-    """The ways to read a run, by which a line is refused alike."""
-    return (lambda: load_run(run), lambda: run_small(run.name, resume=True))
-
-
 @pytest.mark.parametrize("name", ["evaluations", "iterations"])
 def test_files_of_another_run_or_trial_are_refused(run_small, refused, name):
     run = run_small()
     path = run / "trial_00" / f"{name}.jsonl"
-    ours = path.read_bytes()
+    lines = path.read_bytes().splitlines(keepends=True)
     strangers = {
         "run ": run_small("other", changes={"simulation.duration": "14 s"}) / "trial_00",
         "trial 1": run / "trial_01",
         "": run_small("longer", oscillators=5) / "trial_00",
     }
     for whose, folder in strangers.items():
-        theirs = (folder / path.name).read_bytes()
-        path.write_bytes(theirs)
-        for read in both(run, run_small):
-            with refused(path, "line 1", whose):
-                read()
-        lines = ours.splitlines(keepends=True)
-        lines[8] = theirs.splitlines(keepends=True)[8]
-        path.write_bytes(b"".join(lines))
-        for read in both(run, run_small):
-            with refused(path, "line 9", whose):
-                read()
+        theirs = (folder / path.name).read_bytes().splitlines(keepends=True)
+        for mixed, number in ((theirs, 1), ([*lines[:8], theirs[8], *lines[9:]], 9)):
+            path.write_bytes(b"".join(mixed))
+            for read in (lambda: load_run(run), lambda: run_small(resume=True)):
+                with refused(path, f"line {number}", whose):
+                    read()
 
 
-@pytest.mark.parametrize("key", ["evaluations", "best_fitness", "best_evaluation"])
-def test_iterations_that_contradict_evaluations_are_refused(run_small, refused, key):
+@pytest.mark.parametrize(
+    ("name", "number", "key", "change"),
+    [
+        ("evaluations", 7, "index", lambda index: index + 1),
+        ("evaluations", 7, "genome", lambda genome: genome[:20]),
+        *(("iterations", 5, key, lambda value: value + 1) for key in COUNTED),
+    ],
+)
+def test_lines_that_contradict_others_are_refused(run_small, refused, name, number, key, change):
     run = run_small(trials=1)
-    path = run / "trial_00" / "iterations.jsonl"
-    value = json.loads(path.read_text().splitlines()[4])[key] + 1
-    path.write_bytes(with_value(5, key, value)(path.read_bytes()))
-    for read in both(run, run_small):
-        with refused(path, "line 5", key):
+    path = run / "trial_00" / f"{name}.jsonl"
+    value = change(json.loads(path.read_text().splitlines()[number - 1])[key])
+    path.write_bytes(with_value(number, key, value)(path.read_bytes()))
+    for read in (lambda: load_run(run), lambda: run_small(resume=True)):
+        with refused(path, f"line {number}", key):
             read()
-
-
-def test_a_genome_of_another_length_is_refused(run_small, refused):
-    run = run_small(trials=1)
-    path = run / "trial_00" / "evaluations.jsonl"
-    path.write_bytes(with_value(7, "genome", [2.0] * 20)(path.read_bytes()))
-    for read in both(run, run_small):
-        with refused(path, "line 7", "genome"):
-            read()
+    path.write_text(re.sub(', "crc": "\\w+"', "", path.read_text()))
+    with refused(path, "line 1", "checksum"):
+        load_run(run)
 
 
 def test_a_line_that_is_there_twice_is_refused(run_small, refused):

@@ -101,14 +101,6 @@ def test_a_run_in_which_everything_fails_goes_to_its_end(run_small):
     assert not (trial / "best_gait.json").exists()
 
 
-def test_an_error_in_the_program_is_no_failed_evaluation(run_small):
-    def evaluate(vector):
-        raise TypeError("a bug")
-
-    with pytest.raises(TypeError, match="a bug"):
-        run_small(evaluate=evaluate)
-
-
 def test_another_optimiser_reports_its_own_numbers(tmp_path):
     statuses = record_run(tmp_path / "run", small_scenario(), seed=2, optimizer=RandomSearch)
     assert [(status.evaluations, status.stop) for status in statuses] == [(8, "done")] * 2
@@ -125,3 +117,11 @@ def test_the_last_batch_is_cut_to_the_evaluations_that_are_left(tmp_path):
     statuses = record_run(tmp_path / "run", scenario, optimizer=RandomSearch)
     ends = [(status.evaluations, status.stop) for status in statuses]
     assert ends == [(6, "all evaluations done")] * 2
+
+
+def test_an_error_in_the_program_is_no_failed_evaluation(run_small):
+    def evaluate(vector):
+        raise TypeError("a bug")
+
+    with pytest.raises(TypeError, match="a bug"):
+        run_small(evaluate=evaluate)

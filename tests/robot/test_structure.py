@@ -1,6 +1,5 @@
 """The robot's structure, its inertia and its bodies in a plant."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -84,57 +83,6 @@ def test_a_payload_adds_mass_and_weight_but_no_inertia_about_the_centre(scenario
     assert loaded.model.bodies.inertia == pytest.approx(moments, rel=1e-14)
     assert loaded.structure.p_BN == pytest.approx(structure.p_BN, abs=0.0)
     assert loaded.structure.isotropic
-
-
-def test_inertia_about_the_centre_is_by_the_parallel_axis_theorem(scenario):
-    """About any point it is greater by the mass times the square of the distance: a tetrahedron
-    that is placed elsewhere in its frame has the same inertia and stands at the same place."""
-    blueprint, shift = scenario.robot.blueprint(), np.array([0.3, -0.2, 0.1])
-    moved = dataclasses.replace(blueprint, p_FN=blueprint.p_FN + shift, p_WF=blueprint.p_WF - shift)
-    here, there = Structure.of(blueprint), Structure.of(moved)
-    assert there.mass == pytest.approx(here.mass, rel=1e-14)
-    for name in ("unit_inertia", "p_WB", "p_BN"):
-        expected = getattr(here, name)
-        np.testing.assert_allclose(getattr(there, name), expected, rtol=1e-11, atol=1e-15)
-
-
-def test_a_rod_and_a_point_mass_have_the_inertia_of_a_dumbbell(scenario):
-    """A rod of mass m and length l along x, and a point mass M at one end."""
-    length, radius, density, heavy = 0.5, 1e-3, 7800.0, 0.02
-    rod = math.pi * radius**2 * length * density
-    names = ["cable_names", "cable_groups", "cable_laws", "oscillators", "groups"]
-    dumbbell = dataclasses.replace(
-        scenario.robot.blueprint(),
-        bodies=("rod",),
-        node_names=("a", "b"),
-        first_node=np.array([0, 2]),
-        p_WF=np.zeros((1, 3)),
-        p_FN=np.array([[0.1, 0.2, 0.3], [0.6, 0.2, 0.3]]),
-        struts=np.array([[0, 1]]),
-        strut_radius=np.array([radius]),
-        strut_density=np.array([density]),
-        node_radius=np.zeros(2),
-        node_density=np.full(2, 1.0),
-        node_mass=np.array([0.0, heavy]),
-        payload=np.zeros(1),
-        cable_ends=np.zeros((0, 2), dtype=int),
-        **dict.fromkeys(names, ()),
-    )
-    structure, total = Structure.of(dumbbell), rod + heavy
-    centre = (rod * length / 2 + heavy * length) / total
-    assert structure.mass == pytest.approx([total])
-    assert structure.p_WB[0] == pytest.approx([0.1 + centre, 0.2, 0.3])
-    across = rod * (radius**2 / 4 + length**2 / 12 + (centre - length / 2) ** 2)
-    across += heavy * (length - centre) ** 2
-    inertia = structure.mass[0] * structure.unit_inertia[0]
-    assert inertia[:3] == pytest.approx([rod * radius**2 / 2, across, across], rel=1e-9)
-    assert inertia[3:].tolist() == [0.0, 0.0, 0.0]
-
-
-def test_a_payload_of_nothing_changes_no_digit(scenario, structure):
-    loaded = MakeStructure(scenario.with_changes({"robot.payload": [0.0] * 5}))
-    assert np.array_equal(loaded.mass, structure.mass)
-    assert np.array_equal(loaded.unit_inertia, structure.unit_inertia)
 
 
 # Any number of tetrahedra

@@ -10,7 +10,6 @@ from helpers.structures import statics_of
 from tetra_drake.errors import InputError
 from tetra_drake.scenario.ntrt import ntrt_tree
 from tetra_drake.scenario.robot_structure import StructureFile
-from tetra_drake.scenario.structure_files import read_structure
 
 # Height 2, radius 1, the upper triangle twisted by 30 deg about the vertical, which is y.
 PRISM = """
@@ -22,21 +21,10 @@ nodes:
   high2: [-0.8660254037844386, 2, -0.5]
   high3: [0, 2, 1]
 pair_groups:
-  prism_rod:
-    - [low1, high2]
-    - [low2, high3]
-    - [low3, high1]
+  prism_rod: [[low1, high2], [low2, high3], [low3, high1]]
   horizontal string:
-    - [low1, low2]
-    - [low2, low3]
-    - [low3, low1]
-    - [high1, high2]
-    - [high2, high3]
-    - [high3, high1]
-  vertical string:
-    - [low1, high1]
-    - [low2, high2]
-    - [low3, high3]
+    [[low1, low2], [low2, low3], [low3, low1], [high1, high2], [high2, high3], [high3, high1]]
+  vertical string: [[low1, high1], [low2, high2], [low3, high3]]
 builders:
   prism_rod:
     class: tgRodInfo
@@ -48,19 +36,9 @@ builders:
 
 # Struts of 4 units in three parallel pairs, half a strut apart.
 SIX_BAR = """
-nodes:
-  x1: [-2, 0, -1]
-  x2: [2, 0, -1]
-  x3: [-2, 0, 1]
-  x4: [2, 0, 1]
-  y1: [-1, -2, 0]
-  y2: [-1, 2, 0]
-  y3: [1, -2, 0]
-  y4: [1, 2, 0]
-  z1: [0, -1, -2]
-  z2: [0, -1, 2]
-  z3: [0, 1, -2]
-  z4: [0, 1, 2]
+nodes: {x1: [-2, 0, -1], x2: [2, 0, -1], x3: [-2, 0, 1], x4: [2, 0, 1], y1: [-1, -2, 0],
+  y2: [-1, 2, 0], y3: [1, -2, 0], y4: [1, 2, 0], z1: [0, -1, -2], z2: [0, -1, 2], z3: [0, 1, -2],
+  z4: [0, 1, 2]}
 pair_groups:
   rod: [[x1, x2], [x3, x4], [y1, y2], [y3, y4], [z1, z2], [z3, z4]]
   string:
@@ -111,11 +89,11 @@ def test_a_prism_in_decimetres(tmp_path: Path) -> None:
     assert (len(statics.self_stresses), statics.mechanisms) == (1, 1)
 
 
-def test_a_builder_has_no_pretension_unless_it_says_so(tmp_path: Path) -> None:
-    for text in ("stiffness: 800", "pretension: 0"):
-        rest = ", damping: 5, pretension: 1200, radius: 2, history: true"
-        file = write(tmp_path, PRISM.replace("stiffness: 800", text).replace(rest, ""))
-        assert read(file).cables["vertical/string"].tension == 0.0
+@pytest.mark.parametrize("text", ["stiffness: 800", "pretension: 0"])
+def test_a_builder_has_no_pretension_unless_it_says_so(tmp_path: Path, text: str) -> None:
+    rest = ", damping: 5, pretension: 1200, radius: 2, history: true"
+    file = write(tmp_path, PRISM.replace("stiffness: 800", text).replace(rest, ""))
+    assert read(file).cables["vertical/string"].tension == 0.0
 
 
 def test_y_is_up_and_the_frame_stays_right_handed(tmp_path: Path) -> None:
@@ -213,22 +191,6 @@ def test_problems_name_file_key_and_facts(text: str, key: str, fact: str, tmp_pa
         read(file)
     assert (caught.value.source, caught.value.key) == (str(file), key)
     assert fact in caught.value.problem
-
-
-SECRET = "r00t"
-OTHER_FILES = {"key.pem": f"-----\n{SECRET}\n-----", "shadow": f"{SECRET}:*:7:::\nd:*:7:::\n"}
-"""Files that are no structure: one of YAML's texts, and one of its mappings."""
-
-
-@pytest.mark.parametrize(("name", "text"), OTHER_FILES.items())
-def test_nothing_is_shown_of_a_file_that_is_no_structure(name, text, tmp_path) -> None:
-    other = write(tmp_path, text, name)
-    whole = write(tmp_path, f"substructures: {{v: {{path: {name}}}}}")
-    for file in (other, whole):
-        with pytest.raises(InputError) as caught:
-            read_structure(file, unit="dm")
-        assert caught.value.source == str(other)
-        assert SECRET not in str(caught.value)
 
 
 ROD = "pair_groups.rod[0]"

@@ -73,11 +73,6 @@ def test_the_thesis_objective_is_equation_10(scenario):
     assert (scenario.require, scenario.disturbances) == ({}, None)
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
-def test_a_shipped_scenario_has_the_name_of_its_file(name):
-    assert load_scenario(name).name == name
-
-
 LEFT = ["outer bottom_left"]
 LOAD = {"cpg.feedback": ["load"]}
 BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
@@ -96,6 +91,8 @@ BAD_CHANGES: list[tuple[dict[str, object], str, str]] = [
     (LOAD | {"cpg.signals": "live", "robot.gravity": 0.0}, "robot.gravity", "0 m/s^2"),
     ({"cpg.listing_step": "16 s"}, "cpg.listing_step", "16.0 s"),
     ({"gait_bounds.turn": 0.5}, "gait_bounds.turn", "0.5"),
+    ({"robot.strut_length": "1e-15 m"}, "robot.strut_length", "1e-06 m to 10000 m"),
+    ({"robot.strut_length": "20 km"}, "robot.strut_length", "1e-06 m to 10000 m"),
     # What no memory holds
     ({"cpg.listing_step": "1e-6 s", "simulation.duration": "100 s"}, "cpg.listing_step", "1e-06 s"),
     ({"simulation.sample_period": "1e-9 s"}, "simulation.sample_period", "1e-09 s"),
@@ -129,27 +126,6 @@ def test_a_base_file_is_found_beside_the_file_that_names_it(tmp_path, scenario):
     file = write(tmp_path, "base: ../middle.yaml\nname: top\n", "mine/top.yaml")
     changes = {"name": "top", "robot.spacing": "2.0 m", "robot.gravity": "1.0 m/s^2"}
     assert load_scenario(str(file)) == scenario.with_changes(changes)
-
-
-# Friction: the thesis's, which needs no tag, or another kind
-
-
-@pytest.mark.parametrize(
-    ("base", "given", "expected"),
-    [
-        ("", "!ResetIntegrator {stiction_range: 1 mm}", None),
-        ("", "!Coulomb {static: 0.6}", Coulomb(static=0.6)),
-        ("!Coulomb {static: 0.6}", "!Coulomb {kinetic: 0.4}", Coulomb(static=0.6, kinetic=0.4)),
-        ("!Coulomb {static: 0.6}", "!Coulomb", Coulomb(static=0.6)),
-    ],
-)
-def test_friction_is_merged_with_that_of_the_base(tmp_path, scenario, base, given, expected):
-    write(tmp_path, f"base: thesis\n{base and f'friction: {base}'}\n", "low.yaml")
-    loaded = load_scenario(write(tmp_path, f"base: low.yaml\nfriction: {given}\n"))
-    assert loaded.friction == (
-        expected or scenario.friction.model_copy(update={"stiction_range": 1e-3})
-    )
-    assert load_scenario(write(tmp_path, dump_scenario(loaded))) == loaded
 
 
 def test_another_kind_of_the_base_is_replaced_whole(tmp_path, refused):
@@ -201,7 +177,6 @@ def test_differences_are_keys_and_readable_values(scenario):
 
 
 DISTURBED = {"draws": 4, "spreads": {"ground.damping": 0.1}}
-PAIRS = ["outer bottom_left"], ["outer bottom_right"]
 CHANGES: list[dict[str, object]] = [
     {"name": "other"},
     {"disturbances": DISTURBED},
@@ -219,7 +194,7 @@ CHANGES: list[dict[str, object]] = [
     {"friction": "!Coulomb"},
     {"optimizer": "!CmaEs"},
     {"robot.offsets": [["1 mm", 0, 0]] * 5},
-    {"robot.actuation": [*PAIRS]},
+    {"robot.actuation": [["outer bottom_left"], ["outer bottom_right"]]},
     {"ground.stiffness": "4378.170881161912 N/m"},  # the last digit
 ]
 
@@ -295,13 +270,6 @@ def test_differences_are_seen_from_both_sides(scenario, changes, there, back):
         return [(key.removeprefix("disturbances."), text) for key, text in one.differences(other)]
 
     assert (found(changed, scenario), found(scenario, changed)) == (there, back)
-
-
-def test_another_order_of_oscillators_is_a_difference():
-    prism = load_scenario("prism")
-    reversed_ = prism.with_changes({"robot.actuated": dict([*prism.robot.actuated.items()][::-1])})
-    (difference,) = reversed_.differences(prism)
-    assert difference[0] == "robot.actuated"
 
 
 def every_default(section, tree, key=""):
@@ -448,12 +416,6 @@ def test_a_fault_names_the_file_that_has_it(tmp_path, refused):
         load_scenario(file)
 
 
-@pytest.mark.parametrize("length", ["1e-15 m", "20 km"])
-def test_struts_of_no_size_that_can_be_computed_with_are_refused(scenario, length, refused):
-    with refused("scenario thesis", "robot.strut_length", "expected 1e-06 m to 10000 m"):
-        scenario.with_changes({"robot.strut_length": length, "robot.spacing": "3 in"})
-
-
 def test_what_is_no_text_file_is_refused(tmp_path, refused):
     (tmp_path / "binary.yaml").write_bytes(b"\x89PNG\r\n\x1a\n\x00\xff")
     (tmp_path / "large.yaml").write_text("#" * (2**20 + 1))
@@ -474,17 +436,9 @@ def test_a_name_that_is_nearly_right_leads_to_the_scenario(tmp_path, refused, na
 PRIVATE = [
     "root:x:0:0:secret:/root:/bin/sh\ndaemon:x:1:1:secret:/:/bin/sh\n",  # YAML: a text
     "root:$6$secret:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n",  # YAML: a mapping
-    "a: [1, 2\nsecret: {x: 1\n  secret\n",
-    "*secret\n",
-    "&secret 1\n&secret 2\n",
-    "!secret {a: 1}\n",
-    "!$6$secret text\n",
-    "!secret!name text\n",
-    "secret one: 1\nsecret one: 2\n",
-    "name: !!int secret\n",
-    "name: !!bool secret\n",
-    "name: !!timestamp secret\n",
-    "- secret\n",
+    *("a: [1, 2\nsecret: {x: 1\n  secret\n", "*secret\n", "&secret 1\n&secret 2\n", "- secret\n"),
+    *("!secret {a: 1}\n", "!$6$secret text\n", "!secret!name text\n", "name: !!int secret\n"),
+    *("name: !!bool secret\n", "name: !!timestamp secret\n", "secret one: 1\nsecret one: 2\n"),
 ]
 
 
@@ -529,8 +483,6 @@ def test_a_printed_scenario_tells_what_differs_from_the_thesis(tmp_path):
     assert str(load_scenario(write(tmp_path, dump_scenario(loaded)))) == str(loaded)
 
 
-def test_a_kind_is_changed_with_its_settings_as_in_a_file(scenario, refused):
+def test_a_kind_is_changed_with_its_settings_as_in_a_file(scenario):
     changed = scenario.with_changes({"friction": "!Coulomb {static: 0.3, kinetic: 0.2}"})
     assert changed.friction == Coulomb(static=0.3, kinetic=0.2)
-    with refused("!Coulomb {static:", "", "YAML"):
-        scenario.with_changes({"friction": "!Coulomb {static:"})
