@@ -2,14 +2,12 @@
 
 import dataclasses
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from helpers.totals import make_totals
 
-from tetra_drake.formatting import Table
 from tetra_drake.results.metrics import (
     compute_fitness,
     compute_metrics,
@@ -19,7 +17,6 @@ from tetra_drake.results.metrics import (
 from tetra_drake.robot.path import CentrePath
 from tetra_drake.robot.robot import Robot
 from tetra_drake.robot.structure import node_positions
-from tetra_drake.scenario import scenario as scenario_module
 from tetra_drake.scenario.metrics import LEAST_WAY, METRICS, Metrics
 from tetra_drake.scenario.scenario import Scenario
 from tetra_drake.scenario.terrain_kinds import Incline, Rough
@@ -125,17 +122,6 @@ def test_a_cost_of_transport_is_finite_unless_there_is_no_weight(robot: Robot) -
     assert weightless.cost_of_transport == math.inf
     assert weightless.to_json()["cost_of_transport"] is None
     assert weightless.to_json()["actuator_work"] == 0.3
-
-
-def test_the_page_of_scenarios_has_the_table_of_metrics() -> None:
-    page = Path(scenario_module.__file__).with_name("README.md").read_text(encoding="utf-8")
-    section = page.split("## Objective")[1].split("\n## ")[0]
-    rows = []
-    for name, metric in METRICS.items():
-        limit = "at most" if metric.most else "at least"
-        rows.append([f"`{name}`", metric.unit or "1", metric.note, limit, metric.needs or "any"])
-    headings = ["metric", "unit", "note", "`require`", "robots"]
-    assert Table(headings, rows, text_columns=range(5)).markdown() in section
 
 
 def test_fitness_is_equation_10_with_the_constants_of_table_7(scenario: Scenario) -> None:

@@ -1,7 +1,24 @@
 """The laws of friction of a node on the ground, in the plane that is tangent to it.
 
-The reset integrator (Eq. 3-5) acts along each tangent by itself. Coulomb friction, regularised,
-acts in the plane and is limited by the normal force.
+With v the velocity and x the deflection from the stick point, the reset integrator (Eq. 3-5) acts
+along each tangent by itself:
+
+    in stick  F = -(sigma_0 |v| (1 + a_c) x + sigma_1 v)
+    in slip   F = -sigma_0 |v| x, where x is held at p0 or -p0
+
+A node breaks free where |x| >= p0 moving outward. It sticks again, with x = 0, where v changes
+sign.
+
+Coulomb friction, regularised, acts in the plane and is limited by the normal force F_N:
+
+    u = c v + k x, with x in stick only
+    F = -u min(1, mu F_N / s(u)), with mu static in stick and kinetic in slip
+    s(u) = sqrt((u_f / a_f)^2 + (u_l / a_l)^2)
+
+u_f is along the body's heading at touchdown, where a_f is `forward` or `backward` by the sign of
+u_f. u_l is sideways, where a_l is `lateral`. A node breaks free where s(u) > static F_N moving
+outward. It sticks again, with x = 0, where s(c v) <= kinetic F_N. With k = 0 and static = kinetic
+the law has no memory: it is MuJoCo's soft friction.
 
 A node on the ground sticks or slips: its *mode* is STICK, or the direction in which it broke free.
 With the reset integrator that is +1 or -1 on each tangent, with Coulomb friction a unit vector. A

@@ -1,5 +1,12 @@
 """The Matsuoka network (Eq. 7-9): 2n neurons, of which neurons 2k and 2k + 1 (counting from
-0) are the extensor and the flexor of oscillator k."""
+0) are the extensor and the flexor of oscillator k. Neuron i, with y = max(0, u) and weights w:
+
+    tau_A du_i/dt = u0_i + f_i - u_i - beta v_i - sum_j w_ij y_j
+    tau_B dv_i/dt = y_i - v_i
+
+u0 is the tonic input, f the feedback. The signal of an oscillator is `cpg.gain` times
+y_extensor - y_flexor.
+"""
 
 from __future__ import annotations
 

@@ -98,16 +98,15 @@ class LimitedActuator(ActuatorKind):
     """An actuator of limited force and speed on each driven cable, which then never pushes."""
 
     max_force: quantities.Force = Field(gt=0)
+    """Tension at which the actuator stalls."""
     max_speed: Speed = Field(gt=0)
+    """Speed without tension."""
     time_constant: Time = Field(gt=0)
     """Time constant of the lag with which the actuator follows its command."""
 
 
 class Winch(LimitedActuator):
-    """A winch on each driven cable: signals command its free length.
-
-    It winds at most at max_speed (1 - tension / max_force); above max_force it is driven backward.
-    """
+    """A winch on each driven cable: signals command its free length. See physics.actuator."""
 
     commanded = "free_length_mm"
     command_unit = 1e-3
@@ -141,11 +140,7 @@ class Winch(LimitedActuator):
 
 class TensionMotor(LimitedActuator):
     """A motor on each driven cable that controls its tension: signals, spring and damper of the
-    cable together command it.
-
-    It pulls at most with max_force (1 - winding speed / max_speed), and never with more than
-    max_force.
-    """
+    cable together command it. See physics.actuator."""
 
     commanded = "tension_N"
     plays_cable = True

@@ -24,6 +24,7 @@ class GroundSection(Section):
     """The normal force (Table 1)."""
 
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
+    """Normal force per penetration of a node."""
     damping: Annotated[DampingPerLength, Varied()] = Field(ge=0)
     """lambda = 3/2 alpha stiffness, where alpha (s/m) lowers the restitution of an impact at the
     speed v: e = 1 - alpha v (Eq. 2)."""
@@ -33,9 +34,9 @@ class CpgSection(Section):
     """The Matsuoka oscillators (Table 4) and how their signal reaches the cables."""
 
     self_inhibition_weight: float = Field(ge=0)
-    """beta."""
+    """Weight beta of the self-inhibition v."""
     external_input: float
-    """u0."""
+    """Tonic input u0 of all neurons."""
     initial_state: Annotated[list[float], Field(min_length=3, max_length=3)]
     """At t = 0: u of every neuron, v of extensors, v of flexors."""
     partner_weight: float = Field(ge=0)
@@ -48,6 +49,7 @@ class CpgSection(Section):
     """`listing`: forward Euler beforehand, as in the thesis's listing. `live`: the network is
     integrated with the robot. Feedback needs `live`."""
     listing_step: Time = Field(ge=1e-6)
+    """Time step of signals that are computed beforehand."""
     reach: int | None = Field(default=None, ge=0)
     """Oscillators at most this far apart inhibit each other (see Blueprint.distances); all if not
     given."""
@@ -65,9 +67,13 @@ class GaitBounds(Section):
     """Bounds of random gaits (Table 5). Equal bounds fix a parameter."""
 
     weight_min: float = Field(ge=0)
+    """Least weight of the inhibition between oscillators."""
     weight_max: float = Field(ge=0)
+    """Greatest weight of the inhibition between oscillators."""
     tau_a_min: Time = Field(gt=0)
+    """Least time constant tau_A of u."""
     tau_a_max: Time = Field(gt=0)
+    """Greatest time constant tau_A of u."""
     turn: float = Field(default=0.0, ge=-1, le=1)
     """The turn of all gaits that are drawn or evolved."""
     mirrored: bool = False
@@ -90,6 +96,7 @@ class SimulationSection(Section):
     """Duration of a simulation, and when to give up."""
 
     duration: Time = Field(gt=0, le=1e5)
+    """Simulated time."""
     steady_from: Time = Field(ge=0)
     """Time from which the fitness counts (section 2.3)."""
     max_evaluations: int = Field(ge=1)
@@ -109,6 +116,7 @@ class EvolutionSection(Section):
     """Amount of evolution, for any optimiser."""
 
     trials: int = Field(ge=1, le=1000)
+    """Independent trials, each with a seed of its own."""
     evaluations: int = Field(ge=1)
     """Gaits of a trial that does not end early. !SteadyState evaluates its population, then two in
     each iteration."""
@@ -127,6 +135,7 @@ class Disturbances(Section):
     """
 
     draws: int = Field(ge=1, le=10_000)
+    """Simulations of each gait, each in another draw."""
     spreads: dict[str, Spread] = Field(default={})
     """Spreads by scenario keys. Each draw multiplies the number by a factor from 1 - spread to
     1 + spread. Keys joined by commas get the same factor."""

@@ -28,15 +28,18 @@ class EngineSettings(Section):
 class Drake(EngineSettings):
     """The Drake diagram with an error-controlled integrator.
 
-    Contact and stiction (modes) change at the end of steps, or are localised by a witness function.
+    Modes are contact and stiction of the nodes.
     """
 
     scheme: Literal["radau3", "runge_kutta3"] = "radau3"
+    """Integrator: implicit (radau3) or explicit."""
     accuracy: float = Field(default=0.005, gt=0)
     """Target accuracy per step."""
     max_step: Time = Field(default=0.008, gt=0)
+    """Longest step."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
-    """`witness` needs short steps, as of runge_kutta3."""
+    """Where modes change: at the end of steps, or where a witness function is zero. `witness` needs
+    short steps, such as those of runge_kutta3."""
     look_ahead: Time = Field(default=2e-5, ge=0)
     """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none."""
 
@@ -47,6 +50,7 @@ class Compiled(EngineSettings):
     tolerance: Speed = Field(default=1e-4, gt=0)
     """Error of a body's velocity, or of its strut tips' by rotation, allowed per step."""
     max_step: Time = Field(default=0.003, gt=SHORTEST_STEP, le=1)
+    """Longest step."""
 
     @property
     def look_ahead(self) -> float:
@@ -59,6 +63,7 @@ class Mujoco(EngineSettings):
     """MuJoCo with its own contact, on planes."""
 
     step: Time = Field(default=0.125e-3, ge=1e-7, le=1)
+    """Time step."""
 
     packages: ClassVar[tuple[str, ...]] = ("mujoco",)
 

@@ -60,20 +60,17 @@ class FrictionKind(Section):
 class ResetIntegrator(FrictionKind):
     """The friction of the thesis (Table 2, Eq. 3-5), which does not know the load.
 
-    For each contact and each of two tangents of the ground, with x the deflection from the stick
-    point and v the velocity: F = -(sigma_0 |v| (1 + a_c) x + sigma_1 v) in stick and
-    F = -sigma_0 |v| x in slip, where x is held at +-p0. A contact breaks free where |x| >= p0
-    moving outward, and sticks again, with x = 0, where v changes sign.
+    A bristle holds a node until it is bent by `stiction_range`. See physics.friction.
     """
 
     stiction_range: Annotated[Length, Varied()] = Field(gt=0)
-    """p0: deflection at which a node breaks free."""
+    """Deflection p0 at which a node breaks free."""
     stiction_damping: Annotated[Damping, Varied()] = Field(ge=0)
-    """sigma_1."""
+    """Friction per velocity in stick, sigma_1."""
     stiction_switch: Annotated[float, Varied()] = Field(ge=0)
-    """a_c."""
+    """Further share a_c of the force of the bristle in stick."""
     proportional_stiction: Annotated[DampingPerLength, Varied()] = Field(ge=0)
-    """sigma_0."""
+    """Friction sigma_0 per deflection and velocity."""
 
     def law(self) -> FrictionLaw:
         from tetra_drake.physics.friction import FrictionLaw, ResetConstants
@@ -93,31 +90,25 @@ class ResetIntegrator(FrictionKind):
 
 
 class Coulomb(FrictionKind):
-    """Friction that grows with the load F_N, and may depend on the direction of travel.
+    """Friction that grows with the load, and may depend on the direction of travel.
 
-    In the tangent plane u = c v + k x, with x the deflection from the stick point (in stick only)
-    and v the velocity. F = -u min(1, mu F_N / s(u)), mu static in stick and kinetic in slip, and
-    s(u) = sqrt((u_f / a_f)^2 + (u_l / a_l)^2): u_f is along the body's heading at touchdown and
-    a_f is `forward` or `backward` by its sign, u_l is sideways and a_l is `lateral`. A contact
-    breaks free where s(u) > static F_N moving outward, and sticks again, with x = 0, where
-    s(c v) <= kinetic F_N. Without stiffness, and with static = kinetic, the law has no memory: it
-    is MuJoCo's soft friction.
+    A bristle holds a node until its force exceeds `static` times the load. See physics.friction.
     """
 
     static: Annotated[float, Varied("coefficients")] = Field(default=0.5, gt=0)
-    """mu in stick."""
+    """Coefficient in stick."""
     kinetic: Annotated[float, Varied("coefficients")] = Field(default=0.5, gt=0)
-    """mu in slip; at most `static`."""
+    """Coefficient in slip, at most `static`."""
     stiffness: Stiffness = Field(default=0.0, ge=0)
-    """k."""
+    """Stiffness of the bristle; 0 lets a robot creep on a slope."""
     damping: Annotated[Damping, Varied()] = Field(default=0.4 * POUND_FORCE / INCH, gt=0)
-    """c."""
+    """Friction per velocity below the limit."""
     forward: float = Field(default=1.0, gt=0)
-    """Factor on mu for slip along the heading."""
+    """Factor on the coefficients for slip along the body's heading."""
     backward: float = Field(default=1.0, gt=0)
-    """Factor on mu for slip against the heading."""
+    """Factor on the coefficients for slip against the body's heading."""
     lateral: float = Field(default=1.0, gt=0)
-    """Factor on mu for sideways slip."""
+    """Factor on the coefficients for sideways slip."""
 
     @model_validator(mode="after")
     def _check(self) -> Coulomb:

@@ -173,7 +173,7 @@ class Metrics:
     length l: the work of actuators that cannot take any back."""
     cost_of_transport: float = _metric("", "work / (weight x distance)", _cost_of_transport)
     """Actuator work / (weight times the centre's way over the ground) in the steady stretch. The
-    way is LEAST_WAY at least. Infinite without gravity."""
+    way is 1 mm at least. Infinite without gravity."""
     signal_rate: float = _metric("N/s", "how fast signals change", _signal_rate)
     """Root mean square of dS/dt in the steady stretch, over all oscillators' signals S: the less,
     the smoother the drive."""

@@ -14,16 +14,16 @@ MOST_GAITS = 100_000
 
 
 class SteadyState(Section):
-    """The thesis's evolutionary algorithm (Table 6, section 2.3, appendix A).
-
-    A trial ends early when the mean fitness rose by less than `stop_rise` over `stop_window`
-    iterations, not before iteration `stop_after`.
-    """
+    """The thesis's evolutionary algorithm (Table 6, section 2.3, appendix A)."""
 
     population: int = Field(default=50, ge=2, le=MOST_GAITS)
+    """Gaits that compete."""
     tournament: int = Field(default=5, ge=1, le=MOST_GAITS)
+    """Gaits drawn to select a parent, or a gait that a child replaces."""
     crossover_probability: float = Field(default=0.2, ge=0, le=1)
+    """Probability that two children swap a parameter."""
     mutation_probability: float = Field(default=0.7, ge=0, le=1)
+    """Probability that a parameter mutates."""
     weight_mutation: float = Field(default=0.2, ge=0)
     """Largest change of a weight in one mutation."""
     tau_mutation: Literal["intended", "listing"] = "intended"
@@ -31,8 +31,11 @@ class SteadyState(Section):
     tau_mutation_range: Time = Field(default=0.05, ge=0)
     """Largest change of tau_A in one mutation."""
     stop_rise: float = Field(default=0.03, ge=0)
+    """A trial ends early if the mean fitness rises by less over `stop_window` iterations."""
     stop_window: int = Field(default=100, ge=1)
+    """Iterations over which the rise counts."""
     stop_after: int = Field(default=200, ge=0)
+    """Iteration before which no trial ends early."""
 
 
 class CmaEs(Section):

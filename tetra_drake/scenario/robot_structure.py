@@ -62,8 +62,11 @@ class StrutGroup(Section):
     """Struts of one make: solid cylinders with a sphere of the same density at each end."""
 
     pairs: Pairs
+    """The nodes that each strut joins."""
     diameter: Length = Field(gt=0)
+    """Diameter of a strut."""
     density: Density = Field(gt=0)
+    """Density of struts and spheres."""
     node_diameter: Length = Field(ge=0)
     """Diameter of the spheres; 0 for none. A node has one, that of its first strut in the file."""
 
@@ -72,10 +75,13 @@ class CableGroup(CableConstants):
     """Cables of one make, which never push."""
 
     pairs: Pairs
+    """The nodes that each cable joins."""
     stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
+    """Tension per elongation."""
     free_length: Length | None = Field(default=None, ge=0)
+    """Length without tension. A group has a free length or a tension."""
     tension: Force | None = Field(default=None, ge=0)
-    """Tension where the nodes are as given, instead of a free length."""
+    """Tension where the nodes are as given."""
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> CableGroup:
@@ -122,6 +128,7 @@ class StructureFile(Section):
     """Cables never push."""
 
     nodes: dict[Name, Position] = Field(max_length=MOST_NODES)
+    """Coordinates [x, y, z] of each node, near an equilibrium."""
     struts: dict[Name, StrutGroup] = Field(min_length=1)
     cables: dict[Name, CableGroup] = Field(default={})
     actuated: dict[Name, Annotated[list[str], Field(min_length=1)]] = Field(default={})
@@ -131,6 +138,7 @@ class StructureFile(Section):
     contacts: Literal["all"] | list[str] = "all"
     """Nodes that the ground can touch."""
     gravity: Acceleration = Field(default=9.80665, ge=0)
+    """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each body at t = 0; none if empty."""
 

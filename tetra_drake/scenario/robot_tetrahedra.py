@@ -96,6 +96,7 @@ class CableConstants(Section):
     """Constants of the cable law that any robot's cables have."""
 
     damping: Damping = Field(ge=0)
+    """Tension per rate of the length."""
 
     def constants(self, **others: float) -> dict[str, float]:
         """These constants and others, by the names of physics.cable.CableLaw."""
@@ -103,12 +104,16 @@ class CableConstants(Section):
 
 
 class RowCables(CableConstants):
-    """The cables of a row (Table 3). A slack cable has tension 0 where it would push."""
+    """The cables of a row (Table 3)."""
 
     outer_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
+    """Stiffness of outer cables, which join base nodes of the same name."""
     inner_stiffness: Annotated[Stiffness, Varied()] = Field(gt=0)
+    """Stiffness of inner cables, from a tip to base nodes."""
     free_length: Length = Field(ge=0)
+    """Length without tension."""
     slack: bool
+    """True if a cable that would push has no tension."""
 
     def law(self, cable: str) -> dict[str, float]:
         """The constants of a cable of a junction."""
@@ -123,16 +128,22 @@ class Tetrahedra(Section):
     """What some metrics need and the robot is not."""
 
     tetrahedra: int = Field(ge=2, le=200)
+    """Number of tetrahedra; T1 is the rearmost."""
     strut_length: Length = Field(gt=0)
+    """Length of a strut from node to node."""
     strut_diameter: Length = Field(gt=0)
+    """Diameter of a strut."""
     node_diameter: Length = Field(gt=0)
+    """Diameter of the sphere at a node."""
     density: Density = Field(gt=0)
+    """Density of struts and spheres."""
     cables: RowCables
     spacing: Annotated[Length, Varied()] = Field(ge=0)
     """Distance of base triangles at t = 0. `balanced`, or 0, is the one at which outer and inner
     cables balance. So is the spacing of a file that changes strut length or the cables' stiffness
     or free length of its base and gives no spacing."""
     gravity: Acceleration = Field(ge=0)
+    """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
     """Displacement [x, y, z] of each tetrahedron at t = 0; none if empty."""
     payload: list[Annotated[Mass, Field(ge=0)]] = Field(default=[])
@@ -152,7 +163,7 @@ class Tetrahedra(Section):
 
     @property
     def body_names(self) -> tuple[str, ...]:
-        """The names of the bodies, T1 being the front one."""
+        """The names of the bodies, T1 being the rearmost."""
         return tuple(f"T{i + 1}" for i in range(self.tetrahedra))
 
     @property

@@ -55,6 +55,7 @@ class Scenario(Section):
     has_base: ClassVar[bool] = True
 
     name: str
+    """Label of the scenario; equal scenarios may have different names."""
     robot: Robot
     ground: GroundSection
     friction: Friction
@@ -70,7 +71,7 @@ class Scenario(Section):
     """Weights of metrics whose weighted sum evolution maximises, such as `speed: 2 s/in`.
     Lengths count in inches. A file replaces its base's objective as a whole."""
     require: Annotated[dict[str, float], UnitsByName(UNITS)] = Field(default={})
-    """Least values of metrics: a gait with less counts as failed. Replaced as a whole."""
+    """Limits of metrics: a gait beyond one counts as failed. Replaced as a whole."""
     disturbances: Disturbances | None = None
     evolution: EvolutionSection
     optimizer: OptimizerKind = SteadyState()

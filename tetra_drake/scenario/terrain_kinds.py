@@ -1,9 +1,7 @@
 """The kinds of ground that is not flat, and the grid of heights that each of them is simulated as.
 
 The ground is the surface z = h(x, y) in the world: x forward, y left, z up. The robot starts around
-the origin, T1's base at x = 0, and walks along +x. The surface is the uniform biquadratic B-spline
-whose control points are the heights of a grid: smooth, exact on planes, nowhere above the highest
-height around, with edges rounded by a cell; outside the grid it goes on as it is at the edge.
+the origin, T1's base at x = 0, and walks along +x. physics.terrain says how heights make a surface.
 """
 
 import math
@@ -86,7 +84,8 @@ class Incline(Relief):
     The robot starts on it, turned with it.
     """
 
-    slope: Angle = Field(ge=-STEEPEST, le=STEEPEST)  # 60 deg either way
+    slope: Angle = Field(ge=-STEEPEST, le=STEEPEST)
+    """Angle by which the ground rises along +x."""
 
     @property
     def plane_slope(self) -> float:
@@ -101,15 +100,18 @@ class Incline(Relief):
 class Steps(Relief):
     """Stairs across the way: h = height min(count, floor((x - start) / depth) + 1) from `start` on.
 
-    The first step begins at `start`, 1 in ahead of the robot if not given. A negative height goes
-    down. A step rises over a cell before and after its edge: the height of a step, or a quarter of
-    its depth if that is less.
+    A step rises over a cell before and after its edge: the height of a step, or a quarter of its
+    depth if that is less.
     """
 
-    height: Length  # of each step above the one before
-    depth: Length = Field(gt=0)  # of each step along x
+    height: Length
+    """Height of each step above the one before; negative goes down."""
+    depth: Length = Field(gt=0)
+    """Length of each step along x."""
     count: int = Field(ge=1)
+    """Number of steps."""
     start: Length | None = None
+    """x of the first step; 1 in ahead of the robot if not given."""
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         start = ahead if self.start is None else self.start
@@ -125,13 +127,15 @@ class Steps(Relief):
 class Rough(Relief):
     """Heights drawn uniformly between -2 amplitude and 0, independent, every half wavelength.
 
-    So the mean is -amplitude, and a robot that stands at 0 touches but does not sink in. The same
-    seed is the same ground.
+    So the mean is -amplitude, and a robot that stands at 0 touches but does not sink in.
     """
 
     amplitude: Length = Field(ge=0)
+    """Half the range of heights."""
     wavelength: Length = Field(gt=0)
+    """Twice the distance between heights."""
     seed: int = Field(ge=0, default=0)
+    """Seed of the random heights. The same seed is the same ground."""
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         half = 0.5 * self.wavelength
@@ -145,16 +149,20 @@ class Rough(Relief):
 class Obstacles(Relief):
     """Round bumps, h = height max(0, 1 - (r / radius)^2), the highest where two overlap.
 
-    One stands at a random place in each square of side `spacing`, none reaches before `start`, 1 in
-    ahead of the robot if not given. The grid lowers a bump's top by about an eighth. The same seed
-    is the same ground.
+    One stands at a random place in each square of side `spacing`, none reaches before `start`. The
+    grid lowers a bump's top by about an eighth.
     """
 
     height: Length = Field(gt=0)
+    """Height of a bump."""
     radius: Length = Field(gt=0)
+    """Radius of a bump."""
     spacing: Length = Field(gt=0)
+    """Side of the squares that have a bump each."""
     seed: int = Field(ge=0, default=0)
+    """Seed of the random places. The same seed is the same ground."""
     start: Length | None = None
+    """x before which there are no bumps; 1 in ahead of the robot if not given."""
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         cell, spacing = 0.5 * self.radius, self.spacing
@@ -188,7 +196,9 @@ class HeightField(Relief):
     """
 
     file: HeightFile
-    cell: Length = Field(gt=0)  # between neighbours, along x and y
+    """File of heights in m."""
+    cell: Length = Field(gt=0)
+    """Distance between neighbours, along x and y."""
 
     @property
     def paths(self) -> dict[str, str]:
