@@ -76,28 +76,14 @@ def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
     """What a gait does, by its scenario's objective, such as "walks 14.3 inches in 15 s"."""
     seconds = f"in {scenario.simulation.duration:g} s"
     inches = metrics["distance"] / INCH
-    backward = " backward" if inches < 0.0 else ""
-    walk = f"walks {fixed(abs(inches), 1)} inches{backward}{_ground(scenario)} {seconds}"
+    way = [f"walks {fixed(abs(inches), 1)} inches", "backward" if inches < 0.0 else ""]
+    walk = " ".join(filter(None, [*way, scenario.terrain.where, seconds]))
     name = headline_metric(scenario.objective, metrics)
     if name == "distance":
         return walk
     if name == "heading_change":
         return f"turns {fixed(abs(math.degrees(metrics[name])), 0)} degrees {seconds}"
     return f"{name.replace('_', ' ')} {shown(metrics[name], UNITS[name])}, {walk}"
-
-
-_GROUNDS = {"Rough": "on rough ground", "Steps": "over steps", "Obstacles": "over obstacles"}
-"""How one says where the robot walks, by kind of terrain."""
-
-
-def _ground(scenario: Scenario) -> str:
-    """Where the robot walks unless the ground is level, as " on rough ground"."""
-    slope = scenario.terrain.plane_slope
-    if slope is None:
-        return f" {_GROUNDS.get(type(scenario.terrain).__name__, 'on uneven ground')}"
-    if slope == 0.0:
-        return ""
-    return f" {'up' if slope > 0.0 else 'down'} {abs(math.degrees(slope)):.3g} degrees"
 
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:

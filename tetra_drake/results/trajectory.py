@@ -93,7 +93,6 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
     poses = motion.states[:, : 7 * bodies].reshape(-1, bodies, 7)
     cable_forces, ground_forces = _forces(robot, motion)
     modes = np.sign(motion.modes[:, :, :STICK_POINT]).astype(np.int8)
-    slip = "0 sticks, +1 or -1 slips in that direction"
     variables = {
         "p_WN": (nodes[..., P_WN : P_WN + 3], "m", "node position"),
         "v_WN": (nodes[..., V_WN : V_WN + 3], "m/s", "node velocity"),
@@ -106,7 +105,7 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
         "normal_force": (ground_forces[..., 2], "N", "force along the normal of the ground"),
         "friction_force": (ground_forces[..., :2], "N", "friction force"),
         "in_contact": (modes[..., 0], "1", "1 on the ground"),
-        "friction_mode": (modes[..., 1:], "1", slip),
+        "friction_mode": (modes[..., 1:], "1", robot.scenario.friction.modes),
     }
     dataset = xarray.Dataset(
         {

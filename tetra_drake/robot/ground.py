@@ -21,7 +21,7 @@ from tetra_drake.physics.terrain import (
 )
 from tetra_drake.robot.structure import Structure, node_positions
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import Flat, Grid
+from tetra_drake.scenario.terrain_kinds import Grid
 from tetra_drake.scenario.units import INCH
 
 STEP_AHEAD = 1.0 * INCH
@@ -45,7 +45,7 @@ def make_ground(scenario: Scenario, structure: Structure) -> Ground:
         carriers=structure.carriers[structure.contacts],
         normal=np.array(NormalForce(scenario.ground.stiffness, scenario.ground.damping)),
         friction=scenario.friction.law(),
-        flat=isinstance(scenario.terrain, Flat),
+        flat=scenario.terrain.is_flat,
         grid=np.array(_surface_grid(grid)),
         heights=np.ascontiguousarray(grid.heights, dtype=float).ravel(),
     )

@@ -6,7 +6,7 @@ The kernels of each, which need numba, are imported only where a law is asked fo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field, model_validator
 
@@ -37,6 +37,9 @@ class Cone:
 class FrictionKind(Section):
     """A kind of friction."""
 
+    modes: ClassVar[str]
+    """What the signs of a contact's friction modes say, which trajectories record."""
+
     def law(self) -> FrictionLaw:
         """Law as the kernels take it."""
         raise NotImplementedError
@@ -62,6 +65,8 @@ class ResetIntegrator(FrictionKind):
 
     A bristle holds a node until it is bent by `stiction_range`. See physics.friction.
     """
+
+    modes = "0 sticks, +1 or -1 slips in that direction along the tangent"
 
     stiction_range: Annotated[Length, Varied()] = Field(gt=0)
     """Deflection p0 at which a node breaks free."""
@@ -94,6 +99,8 @@ class Coulomb(FrictionKind):
 
     A bristle holds a node until its force exceeds `static` times the load. See physics.friction.
     """
+
+    modes = "0 sticks, else the signs of the direction of slip"
 
     static: Annotated[float, Varied("coefficients")] = Field(default=0.5, gt=0)
     """Coefficient in stick."""

@@ -7,7 +7,7 @@ the origin, T1's base at x = 0, and walks along +x. physics.terrain says how hei
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -40,10 +40,25 @@ class Grid:
 class Relief(Section):
     """A kind of terrain."""
 
+    is_flat: ClassVar[bool] = False
+    """True if h = 0 everywhere, which the kernels compute faster."""
+    uneven: ClassVar[str] = "on uneven ground"
+    """Where a robot walks on ground that is no plane."""
+
     @property
     def plane_slope(self) -> float | None:
         """Slope (rad) along +x of a plane through the origin; None for what is no such plane."""
         return None
+
+    @property
+    def where(self) -> str:
+        """Where a robot walks, such as "up 5 degrees"; empty on level ground."""
+        slope = self.plane_slope
+        if slope is None:
+            return self.uneven
+        if slope == 0.0:
+            return ""
+        return f"{'up' if slope > 0.0 else 'down'} {abs(math.degrees(slope)):.3g} degrees"
 
     @property
     def text(self) -> str:
@@ -69,6 +84,8 @@ class Relief(Section):
 
 class Flat(Relief):
     """h = 0 everywhere: the thesis's floor, and the default."""
+
+    is_flat = True
 
     @property
     def plane_slope(self) -> float:
@@ -104,6 +121,8 @@ class Steps(Relief):
     depth if that is less.
     """
 
+    uneven = "over steps"
+
     height: Length
     """Height of each step above the one before; negative goes down."""
     depth: Length = Field(gt=0)
@@ -130,6 +149,8 @@ class Rough(Relief):
     So the mean is -amplitude, and a robot that stands at 0 touches but does not sink in.
     """
 
+    uneven = "on rough ground"
+
     amplitude: Length = Field(ge=0)
     """Half the range of heights."""
     wavelength: Length = Field(gt=0)
@@ -152,6 +173,8 @@ class Obstacles(Relief):
     One stands at a random place in each square of side `spacing`, none reaches before `start`. The
     grid lowers a bump's top by about an eighth.
     """
+
+    uneven = "over obstacles"
 
     height: Length = Field(gt=0)
     """Height of a bump."""
