@@ -13,6 +13,7 @@ from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot, equilibrium_of
 from tetra_drake.robot.structure import node_positions
 from tetra_drake.scenario.friction_kinds import Coulomb
+from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.robot_tetrahedra import BOTTOM_LEFT, TIP
 from tetra_drake.scenario.terrain_kinds import Incline
 from tetra_drake.scenario.units import INCH, POUND_FORCE
@@ -151,7 +152,29 @@ def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
     assert rest.feet
 
 
-def test_a_robot_that_finds_no_rest_is_refused_by_name(robot, refused, monkeypatch):
-    monkeypatch.setattr(equilibrium, "ITERATIONS", 2)
-    with refused("thesis", "robot", "no equilibrium"):
+@pytest.mark.parametrize(
+    ("limits", "steps"),
+    [
+        ({"MOST_STEPS": 3, "LEAST_STEPS": 1}, 3),
+        ({"MOST_WORK": 2.5 * 30**3, "LEAST_STEPS": 1}, 2),  # 5 bodies
+        ({"MOST_WORK": 0.0, "LEAST_STEPS": 1}, 1),
+    ],
+)
+def test_a_search_ends_after_steps_that_depend_on_the_robot_alone(
+    robot, refused, monkeypatch, limits, steps
+):
+    for name, value in limits.items():
+        monkeypatch.setattr(equilibrium, name, value)
+    taken, displaced = [], equilibrium.displaced
+    monkeypatch.setattr(equilibrium, "displaced", lambda *a: taken.append(a) or displaced(*a))
+    with refused("thesis", "robot", f"no equilibrium until step {steps};"):
         _ = robot.equilibrium
+    assert len(taken) == steps
+
+
+def test_a_search_over_hills_seldom_tries_more_than_two_shifts(monkeypatch):
+    solve, tries, steps, displaced = equilibrium.solve_convex, [], [], equilibrium.displaced
+    monkeypatch.setattr(equilibrium, "solve_convex", lambda *a: tries.append(a) or solve(*a))
+    monkeypatch.setattr(equilibrium, "displaced", lambda *a: steps.append(a) or displaced(*a))
+    assert Robot.of(load_scenario("prism")).equilibrium.feet == 3
+    assert len(steps) > 10 and len(tries) <= 3 * len(steps)

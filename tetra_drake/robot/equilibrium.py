@@ -25,7 +25,12 @@ TOLERANCE = 1e-11
 LEAST_FORCE = 1e-9
 """N: forces beside which no tension and no weight count."""
 
-ITERATIONS = 1000
+MOST_STEPS, LEAST_STEPS = 1000, 10
+"""Upper limit of the steps of a search, for few bodies and for as many as a structure can have."""
+
+MOST_WORK = 5e10
+"""Upper limit of steps times the cube of their unknowns, between these: a minute or so."""
+
 FIRST_REACH, LONGEST_REACH = 0.05, 0.2
 """Largest step of Newton's method for a body, as a share of its radius."""
 
@@ -86,8 +91,10 @@ def find_equilibrium(
     """
     robot, state = Unactuated.of(model), start
     weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
+    descent = _Descent(robot)
     reach, announce_at = FIRST_REACH * radius, math.inf
-    for iteration in range(ITERATIONS):
+    most = max(LEAST_STEPS, min(MOST_STEPS, int(MOST_WORK / (6 * len(bodies)) ** 3)))
+    for count in range(most):
         force = force_at_rest(robot, state)
         if not np.isfinite(force).all():
             break
@@ -98,12 +105,12 @@ def find_equilibrium(
             feet = int(np.count_nonzero(robot.forces.ground_forces[:, NORMAL]))
             return Equilibrium(state, lengths, feet)
         now = time.perf_counter()
-        if iteration == 1:  # kernels are compiled by now
+        if count == 1:  # kernels are compiled by now
             announce_at = now + LONG
         if now > announce_at:
             _LOG.warning("%s: finding the robot's equilibrium takes a while", source)
             announce_at = math.inf
-        step = _newton_step(robot, state, force)
+        step = descent.step(state, force)
         if step is None:
             break
         step *= min(1.0, reach / np.abs(step).max())
@@ -115,24 +122,47 @@ def find_equilibrium(
     left = np.abs(force.reshape(-1, 6)).max(axis=1)
     body = int(left.argmax())  # the first one with NaN, if there is any
     amount = f"{left[body]:.3g} N" if np.isfinite(left[body]) else "which is not finite"
-    problem = f"finds no equilibrium; the greatest force left, {amount}, is on '{bodies[body]}'"
+    found = f"finds no equilibrium until step {count + 1}"
+    problem = f"{found}; the greatest force left, {amount}, is on '{bodies[body]}'"
     raise InputError(source, "robot", problem)
 
 
-def _newton_step(robot: Unactuated, state: np.ndarray, force: np.ndarray) -> np.ndarray | None:
-    """Displacements (6 n,) that bring the force to zero where the potential energy is convex, and
-    lead downhill where it is not; the robot as a whole stays where it is. None if the derivatives
-    of the forces are not finite."""
-    stiffness, held = stiffness_at_rest(robot, state), _free_motions(robot, state)
-    hard, shift = NormalForce(*robot.model.ground.normal).stiffness, 0.0
-    stiffness = 0.5 * (stiffness + stiffness.T) + hard * held @ held.T
-    step = np.empty_like(force)
-    while shift < np.inf:
-        shifted = stiffness + shift * np.eye(len(force))
-        if solve_convex(shifted, force, LEAST_STIFFNESS * hard, step):
-            return step
-        shift = max(10.0 * shift, LEAST_STIFFNESS * hard)
-    return None
+class _Descent:
+    """Steps of Newton's method to a minimum of the potential energy."""
+
+    def __init__(self, robot: Unactuated) -> None:
+        self._robot = robot
+        self._hard = float(NormalForce(*robot.model.ground.normal).stiffness)
+        self._shifts = [0.0, LEAST_STIFFNESS * self._hard]
+        """Stiffnesses (N/m): the least one that makes the potential energy convex is added."""
+        while self._shifts[-1] < math.inf:
+            self._shifts.append(10.0 * self._shifts[-1])
+        self._index = 0
+        """Index of the last step's shift, which is most often the next one's, too."""
+
+    def step(self, state: np.ndarray, force: np.ndarray) -> np.ndarray | None:
+        """Displacements (6 n,) that bring the force to zero where the potential energy is convex,
+        and lead downhill where it is not; the robot as a whole stays where it is. None if the
+        derivatives of the forces are not finite."""
+        stiffness, held = stiffness_at_rest(self._robot, state), _free_motions(self._robot, state)
+        stiffness = 0.5 * (stiffness + stiffness.T) + self._hard * held @ held.T
+        before = self._index
+        while (step := self._solved(stiffness, force, self._index)) is None:
+            self._index += 1
+            if self._index == len(self._shifts):
+                return None
+        while 0 < self._index <= before:
+            longer = self._solved(stiffness, force, self._index - 1)
+            if longer is None:
+                break
+            self._index, step = self._index - 1, longer
+        return step
+
+    def _solved(self, stiffness: np.ndarray, force: np.ndarray, index: int) -> np.ndarray | None:
+        """The step with a shift; None if the potential energy is not convex with it."""
+        shifted, step = stiffness + self._shifts[index] * np.eye(len(force)), np.empty_like(force)
+        is_convex = solve_convex(shifted, force, LEAST_STIFFNESS * self._hard, step)
+        return step if is_convex else None
 
 
 def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
