@@ -6,8 +6,9 @@ import functools
 import re
 from typing import Any
 
-_QUOTED, _LONGEST, _LONGEST_PATH = 200, 600, 4096
-"""Largest number of characters of a quotation, of a problem, and of a source."""
+_LONGEST, _QUOTED, _LONGEST_PATH = 300, 80, 4096
+"""Largest number of characters of key and problem, of a quotation if they have more, and of a
+source."""
 
 
 class InputError(ValueError):
@@ -20,17 +21,18 @@ class InputError(ValueError):
     def __init__(self, source: object, key: str, problem: str) -> None:
         self.source = str(source)
         self.key = key
-        self.problem = _shortened(problem)
-        origin = f"{_cut(self.source, _LONGEST_PATH)}: {_cut(key, _QUOTED)}".removesuffix(": ")
+        self.problem = _one_line(problem)
+        if len(key) + len(self.problem) > _LONGEST:
+            key, self.problem = _cut(key, _QUOTED), _shortened(self.problem)
+        origin = f"{_cut(self.source, _LONGEST_PATH)}: {key}".removesuffix(": ")
         super().__init__(_one_line(f"{origin}: {self.problem}"))
 
 
 def _shortened(problem: str) -> str:
-    """The problem on one line, with long quotations cut. A quotation may be a whole file."""
-    problem = _one_line(problem)
+    """The problem with long quotations cut. A quotation may be a whole file."""
     problem = re.sub(rf"'([^']{{{_QUOTED}}})[^']+'", r"'\1 ...'", problem)
     problem = re.sub(rf"([^\s']{{{_QUOTED}}})[^\s']+", r"\1 ...", problem)
-    return problem if len(problem) <= _LONGEST else _cut(problem, _QUOTED)
+    return _cut(problem, _LONGEST - _QUOTED)
 
 
 def _one_line(text: str) -> str:

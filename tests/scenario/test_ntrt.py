@@ -123,11 +123,13 @@ def test_a_spine_by_substructures(tmp_path: Path) -> None:
     assert names[:5:4] == ["string v1/front v2/front", "string v2/front v3/front"]
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("entry", "front"),
     [
         ("translation: [1, 2, 3]", [2, 4, 4]),
         ("rotation: {axis: [0, 2, 0], angle: 90}", [1, 2, -1]),
+        ("rotation: {axis: [0, 5e-324, 0], angle: 90}", [1, 2, -1]),
         ("rotation: {axis: [0, 0, 1], angle: 90, reference: [1, 0, 0]}", [-1, 0, 1]),
         ("scale: 3", [3, 4, 3]),
         ("scale: 3, translation: [1, 0, 0], rotation: {axis: [0, 1, 0], angle: 90}", [4, 4, -3]),
@@ -166,6 +168,7 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
     assert given.cables["string"].stiffness == 9.0
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("text", "key", "fact"),
     [
@@ -173,7 +176,14 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
         (PRISM.replace("[low1, high2]", "[low1, hihg2]"), "pair_groups.prism_rod[0]", "'high2'"),
         (PRISM.replace("tgRodInfo", "tgBoxInfo"), "builders.prism_rod.class", "'tgBoxInfo'"),
         (PRISM.replace("density", "dens"), "builders.prism_rod.parameters.dens", "'density'"),
-        (PRISM.replace("low1: [1,", "low1: [1e200,"), "nodes.low1[1]", "1e+15"),
+        (PRISM.replace("low1: [1,", "low1: [1e200,"), "nodes.low1[0]", "1e+15"),
+        (
+            PRISM.replace("pretension: 1", "pretension: -1"),
+            "builders.vertical.parameters.pretension",
+            "at least 0",
+        ),
+        (SPINE.replace("1.5]", "1e308]"), "substructures.v1/v2/v3.offset[2]", "1e+308"),
+        (SPINE.replace("1.5]", "9e14]"), "substructures", "'v3'"),
         (PRISM.replace("prism_rod:\n    class", "rods:\n    class"), "builders", "'prism_rod'"),
         (PRISM + "  string: {class: tgBasicActuatorInfo}", "builders", "vertical and string"),
         (SPINE.replace("v3/node_node", "node_edge"), "bond_groups.string.v1/v2/node_edge", "'A/B"),

@@ -29,6 +29,7 @@ from tetra_drake.scenario.robot_structure import (
     StrutGroup,
 )
 from tetra_drake.scenario.section import Section, Tree, keys_of, written
+from tetra_drake.scenario.units import LARGEST
 from tetra_drake.scenario.yaml_text import read_mapping
 
 MOST_BYTES = 2**20
@@ -45,7 +46,8 @@ UNUSED = (
 """Parameters of NTRT's builders that are allowed and not used."""
 
 
-Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Point = Annotated[list[Number], Field(min_length=3, max_length=3)]
 
 
 class Rotation(Section):
@@ -53,7 +55,7 @@ class Rotation(Section):
 
     axis: Point
     """A vector of any length but 0."""
-    angle: float
+    angle: Number
     """In degrees."""
     reference: Point | None = None
 
@@ -69,7 +71,7 @@ class Substructure(Section):
 
     path: str | None = None
     rotation: Rotation | None = None
-    scale: float = Field(default=1.0, gt=0)
+    scale: float = Field(default=1.0, gt=0, le=LARGEST)
     offset: Point = Field(default=[0.0, 0.0, 0.0])
     """Displacement from each of several parts to the next."""
     translation: Point = Field(default=[0.0, 0.0, 0.0])
@@ -159,7 +161,7 @@ class Assembly:
                 raise InputError(file, "substructures", problem)
             start = f"{prefix}{name}."
             self.add_file(file.parent / paths[0], prefix=start, above=(*above, file.resolve()))
-            self._place(start, entries)
+            self._place(start, entries, file)
         self.nodes |= {prefix + name: np.array(p) for name, p in given.nodes.items()}
         _check_size(len(self.nodes), MOST_NODES, file, "nodes")
         self.builders |= given.builders
@@ -180,7 +182,7 @@ class Assembly:
             self._read[file] = NtrtFile.from_tree(content, file)
         return self._read[file]
 
-    def _place(self, start: str, entries: list[tuple[int, Substructure]]) -> None:
+    def _place(self, start: str, entries: list[tuple[int, Substructure]], file: Path) -> None:
         """Turns the nodes that begin with `start`, then scales them about their centre, then moves
         them."""
         names = [name for name in self.nodes if name.startswith(start)]
@@ -193,6 +195,9 @@ class Assembly:
         for place, entry in entries:
             centre, shift = p.mean(axis=0), place * np.array(entry.offset) + entry.translation
             p = centre + entry.scale * (p - centre) + shift
+        if (farthest := np.abs(p).max()) > LARGEST:
+            problem = f"'{start[:-1]}' reaches {farthest:g}, expected at most {LARGEST:g}"
+            raise InputError(file, "substructures", problem)
         self.nodes |= dict(zip(names, p, strict=True))
 
     def _add_pairs(
@@ -233,7 +238,8 @@ def _bonded_parts(bond: str, parts: list[str], file: Path, key: str) -> Iterable
 def _turned(p: np.ndarray, rotation: Rotation) -> np.ndarray:
     """Points (n, 3) turned by Rodrigues' formula."""
     about = p.mean(axis=0) if rotation.reference is None else np.array(rotation.reference)
-    axis = np.array(rotation.axis) / np.linalg.norm(rotation.axis)
+    axis = np.array(rotation.axis) / np.abs(rotation.axis).max()  # so that its square is no 0
+    axis /= np.linalg.norm(axis)
     angle = math.radians(rotation.angle)
     along = np.outer((p - about) @ axis, axis)
     across = p - about - along

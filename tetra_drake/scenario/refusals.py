@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import itertools
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any, NoReturn
 
@@ -11,6 +12,9 @@ from pydantic_core import PydanticCustomError
 
 TAG = "_tag"
 """Key of the name of a tagged kind in a tree."""
+
+_LONGEST_LIST = 200
+"""Characters of a list of names."""
 
 _MOST_NAMES, _LONGEST_NAME = 2000, 100
 """Upper limits of what is compared with a misspelt name, which takes a while."""
@@ -40,7 +44,8 @@ def hint(name: Any, names: Iterable[str]) -> str:
     close = difflib.get_close_matches(str(name)[:_LONGEST_NAME], names, n=1)
     if close:
         return f"did you mean '{close[0]}'?"
-    return f"expected one of {', '.join(names)}" if names else "expected none"
+    listed = textwrap.shorten(", ".join(names), _LONGEST_LIST, placeholder=" ...")
+    return f"expected one of {listed}" if names else "expected none"
 
 
 def no_such(what: str, name: str, shipped: Sequence[str]) -> str:

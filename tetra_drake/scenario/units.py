@@ -21,7 +21,7 @@ _SMALL = {
 }
 """Other units of which settings may be round numbers: size in SI, name."""
 
-_LARGEST = 1e15
+LARGEST = 1e15
 """Upper limit of the size of a number in SI units, so that products of a few do not overflow."""
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -49,8 +49,8 @@ def quantity_to_si(text: str, unit: str) -> float:
         raise ValueError(f"found '{text}', {example}") from error
     except Exception as error:  # pint raises tokenizer, syntax and type errors of many kinds
         raise ValueError(f"found '{text}', whose unit is unknown; {example}") from error
-    if not abs(number) <= _LARGEST:
-        raise ValueError(f"found '{text}', expected at most {_LARGEST:g} {unit}")
+    if not abs(number) <= LARGEST:
+        raise ValueError(f"found '{text}', expected at most {LARGEST:g} {unit}")
     return number
 
 
