@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import os
 from collections.abc import Sequence
@@ -60,20 +61,9 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
     Raises InputError, naming file and line, if the file is wrong or does not fit the robot.
     """
     robot, text = Robot.of(scenario), read_text(path, "command file")
-    try:
-        # Cells are read as texts, so that messages can show a cell that is no number.
-        cells = pandas.read_csv(io.StringIO(text), dtype=str, na_filter=False)
-    except ValueError as error:  # ragged rows and empty files are ValueErrors, too
-        raise InputError(path, "", f"is no table: {error}") from error
-    if not isinstance(cells.index, pandas.RangeIndex):
-        raise InputError(path, "", "is no table: rows have more cells than the heading")
     wanted = [TIME, *command_columns(robot)]
-    for name in cells.columns:
-        if name not in wanted:
-            raise InputError(path, name, f"is no column of this robot; {hint(name, wanted)}")
+    cells = _cells(text, wanted, path)
     for name in wanted:
-        if name not in cells.columns:
-            raise InputError(path, name, "is missing")
         numbers = pandas.to_numeric(cells[name], errors="coerce")
         for row in np.flatnonzero(~np.isfinite(numbers)):
             problem = f"found '{cells[name][row]}', expected a number"
@@ -82,6 +72,25 @@ def load_command(path: str | Path, scenario: Scenario) -> Command:
     table = cells[wanted].to_numpy(dtype=float)
     period = _period(table[:, 0], scenario.cpg.listing_step, path)
     return Command(Path(path).name, period, scenario.actuation.command_unit * table[:, 1:])
+
+
+def _cells(text: str, wanted: Sequence[str], path: str | Path) -> pandas.DataFrame:
+    """Cells of a table as texts, so that messages can show them. InputError unless the columns are
+    the wanted ones."""
+    try:
+        heading, *rows = csv.reader(io.StringIO(text.rstrip()), strict=True)
+    except (csv.Error, ValueError) as error:  # an empty file, too
+        raise InputError(path, "", "is no table with commas between cells") from error
+    for name in [*heading, *wanted]:
+        if name not in wanted:
+            raise InputError(path, name, f"is no column of this robot; {hint(name, wanted)}")
+        if (count := heading.count(name)) != 1:
+            raise InputError(path, name, "is missing" if count == 0 else "is given twice")
+    for line, row in enumerate(rows, start=2):
+        if len(row) != len(heading):
+            problem = f"found {len(row)} cells, expected {len(heading)}"
+            raise InputError(path, f"line {line}", problem)
+    return pandas.DataFrame(rows, columns=heading, dtype=str)
 
 
 def _period(times: np.ndarray, least: float, source: str | Path) -> float:
