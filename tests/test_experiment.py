@@ -10,17 +10,15 @@ from helpers.meshcat_page import commands, read_page
 
 import tetra_drake
 from tetra_drake import cli
-from tetra_drake.analysis.elites import elites
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluators import OnExecutor
 from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run_record import RunRecord
-from tetra_drake.optimizers import quality_diversity
 from tetra_drake.optimizers.steady_state import SteadyState
 from tetra_drake.scenario.load import load_scenario
-from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity
+from tetra_drake.scenario.optimizer_kinds import CmaEs
 from tetra_drake.scenario.terrain_kinds import Steps
 
 
@@ -273,19 +271,6 @@ def test_the_scenarios_optimiser_is_used_and_recorded(tiny, tmp_path, refused):
     assert evolved.manifest.method.optimizer == "CmaEs"
     with refused(run, "optimizer", ""):
         tetra_drake.evolve(None, run, resume=True, optimizer=SteadyState, **quick)
-
-
-def test_the_gaits_of_a_map_are_simulated_on_disturbed_robots(tiny, tmp_path, monkeypatch):
-    monkeypatch.setattr("tetra_drake.evolution.reevaluation.reevaluate", lambda *_, **__: None)
-    monkeypatch.setattr(quality_diversity, "EMITTERS", 2)
-    monkeypatch.setattr(quality_diversity, "BATCH", 2)
-    monkeypatch.setattr(quality_diversity, "FLOOR", -1e3)
-    monkeypatch.setattr("tetra_drake.analysis.elites.FLOOR", -1e3)
-    kind = QualityDiversity(draws=2)
-    scenario = tiny.with_changes({"optimizer": kind, "evolution.evaluations": 10})
-    table = elites(tetra_drake.evolve(scenario, tmp_path / "run", report=False, workers=1))
-    assert len(table) > 1
-    assert table["kept"].isin([0.0, 0.5, 1.0]).all()
 
 
 def test_a_report_that_fails_is_no_failed_run_and_other_versions_are_told(

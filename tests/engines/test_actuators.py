@@ -17,7 +17,6 @@ from helpers.quantities import with_unit
 from helpers.states import body_velocities
 
 from tetra_drake.engines.interface import engine_of
-from tetra_drake.engines.simulate import simulate
 from tetra_drake.physics.cable import PASSIVE
 from tetra_drake.physics.inertia import XX
 from tetra_drake.robot.gait import seeded_gait
@@ -223,13 +222,3 @@ def test_a_robot_in_the_air_gains_the_work_of_its_winches(scenario, engine):
     work = np.append(0.0, works.sum(axis=1).cumsum())
     assert np.ptp(work) > 0.01, "J"
     np.testing.assert_allclose(energy - energy[0], work, atol=1e-4 * np.ptp(work))
-
-
-@pytest.mark.parametrize("kind", LIMITED)
-def test_mujoco_refuses_actuators(kind, refused):
-    scenario = load_scenario("coulomb").with_changes({"engine": "!Mujoco"})
-    with refused("coulomb", "actuation", LIMITED[kind].__class__.__name__):
-        simulate(
-            scenario=scenario.with_sections(actuation=LIMITED[kind]),
-            gait=seeded_gait(scenario),
-        )

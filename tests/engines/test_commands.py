@@ -1,19 +1,13 @@
 """Robots that follow commands, on every engine: the same samples give the same walk."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tetra_drake.engines.simulate import simulate
-from tetra_drake.prototype.command_file import load_command
-from tetra_drake.prototype.export import COMMAND, export
 from tetra_drake.robot.command import Command
-from tetra_drake.robot.gait import load_gait, seeded_gait
+from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.load import load_scenario
-
-RECORDED = Path(__file__).parents[2] / "runs/coulomb/trial_00/best_gait.json"
 
 DRIVEN = 8
 
@@ -71,15 +65,3 @@ def test_a_robot_follows_a_gait_or_a_command(brief, what, key, refused):
     chosen = {"gait": seeded_gait(brief), "command": waves(0.0, 1.0), "steering": 0.5}
     with refused("simulate", key, ""):
         simulate(scenario=brief, **{name: chosen[name] for name in what})
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not RECORDED.exists(), reason="the recorded runs are not here")
-def test_the_diagram_walks_by_the_file_of_a_recorded_gait(tmp_path):
-    scenario = load_scenario("coulomb")
-    gait = load_gait(RECORDED, scenario)
-    export(scenario, gait, rate=100.0, out=tmp_path / "lab")
-    command = load_command(tmp_path / "lab" / COMMAND, scenario)
-    own = simulate(scenario=scenario, gait=gait).metrics.distance_in
-    diagram = scenario.with_changes({"engine": "!Drake"})
-    assert distance(diagram, command) == pytest.approx(own, rel=0.02)

@@ -83,17 +83,10 @@ def test_contact_never_gives_energy(scenario, friction):
 
 def test_the_robot_stands_on_what_is_under_it(scenario):
     # Settled on rough ground: contacts press by their depth, and together bear the weight.
-    times = {
-        "simulation.duration": "2.5 s",
-        "simulation.steady_from": "2.0 s",
-        "cpg.start_up": "2.5 s",
-    }
-    rough = {
-        "terrain": Rough(amplitude=0.25 * INCH, wavelength=6.0 * INCH),
-        "friction": FIRM,
-        "robot.contacts": "all",
-    }
-    resting = scenario.with_changes({**times, **rough})
+    times = {"simulation.duration": "2.5 s", "simulation.steady_from": "2.0 s"}
+    rough = {"terrain": Rough(amplitude=0.25 * INCH, wavelength=6.0 * INCH), "friction": FIRM}
+    changes = {"cpg.start_up": "2.5 s", "robot.contacts": "all"}
+    resting = scenario.with_changes({**times, **rough, **changes})
     end = trajectory(resting, Compiled()).isel(time=-1)
     robot = Robot.of(resting)
     p_WN = end.p_WN.values.reshape(-1, 3)[robot.structure.contacts]

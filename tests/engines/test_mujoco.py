@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray
+from helpers.actuations import LIMITED
 
 from tetra_drake.cli import main
 from tetra_drake.engines import mujoco as engine
@@ -26,23 +27,13 @@ needs_mujoco = pytest.mark.skipif(not engine.installed(), reason=engine.INSTALL)
 @pytest.fixture
 def short(scenario: Scenario) -> Scenario:
     """0.4 s on the engine `mujoco`, driven from between the samples at 0.10 and 0.11 s on."""
-    times = {
-        "simulation.duration": "0.4 s",
-        "simulation.steady_from": "0.2 s",
-        "cpg.start_up": "0.105 s",
-    }
-    return scenario.with_changes({"engine": "!Mujoco", **times})
+    times = {"simulation.duration": "0.4 s", "simulation.steady_from": "0.2 s"}
+    return scenario.with_changes({"engine": "!Mujoco", "cpg.start_up": "0.105 s", **times})
 
 
 def trajectory_of(scenario: Scenario) -> xarray.Dataset:
     """Of the seeded gait."""
-    result = simulate(scenario=scenario, gait=seeded_gait(scenario), record=True)
-    return result.trajectory
-
-
-def weight_of(scenario: Scenario) -> float:
-    """Of the robot, in N."""
-    return Robot.of(scenario).weight
+    return simulate(scenario=scenario, gait=seeded_gait(scenario), record=True).trajectory
 
 
 @needs_mujoco
@@ -155,7 +146,7 @@ def test_forces_on_an_incline_are_along_its_tangents_and_normal(short, structure
     creeping = {"terrain": Incline(slope=angle), "friction": Coulomb(), **times}
     scenario = short.with_changes(creeping)
     end = trajectory_of(scenario).isel(time=-1)
-    weight = weight_of(scenario)
+    weight = Robot.of(scenario).weight
     normal, friction = end["normal_force"].values, end["friction_force"].values
     assert normal.sum() == pytest.approx(weight * math.cos(angle), rel=1e-4)
     uphill = [weight * math.sin(angle), 0.0]
@@ -196,6 +187,8 @@ def test_a_robot_that_mujoco_refuses_is_an_error_of_one_line(short, refused):
         ("friction.backward", 0.5),
         ("friction.lateral", 2.0),
         ("terrain", Steps(height=INCH, depth=6.0 * INCH, count=2)),
+        ("actuation", LIMITED["winch"]),
+        ("actuation", LIMITED["motor"]),
     ],
 )
 def test_what_mujoco_cannot_simulate_is_refused(short, key, value, monkeypatch):

@@ -2,7 +2,6 @@
 
 import math
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from tetra_drake.evolution.evaluation import GaitEvaluation
 from tetra_drake.evolution.evaluators import InLanes, InProcesses
 from tetra_drake.optimizers.base import Task
 from tetra_drake.robot.gait import ParameterSpace
-from tetra_drake.scenario.common_sections import Disturbances
 
 
 @pytest.fixture
@@ -109,23 +107,6 @@ def test_time_budgets_hold_in_any_thread_and_end_with_their_evaluation(tiny, vec
         failed = thread.submit(late, Task(vectors[0])).result()
         assert failed.failure == "time budget: not done after 0.01 s"
         assert thread.submit(check_time).exception() is None
-
-
-def test_many_gaits_in_lanes_are_those_gaits_one_by_one(tiny, vectors):
-    compiled = tiny.with_changes({"engine": "!Compiled"})
-    draws = Disturbances(draws=2, start=0.1)
-    among = compiled.with_changes({"disturbances": draws})
-    for scenario, tasks in (
-        (compiled, tasks_of(vectors)),
-        (among, tasks_of(vectors, (1, 2, 3))),
-    ):
-        evaluate = GaitEvaluation(scenario)
-        alone = [evaluate(task) for task in tasks]
-        with InLanes(evaluate, LanePool(1)) as lanes:
-            together = evaluated(lanes, tasks)
-        for i, one in enumerate(alone):
-            assert replace(one, wall_time=0.0) == replace(together[i], wall_time=0.0)
-            assert together[i].wall_time > 0.0
 
 
 def test_an_error_of_an_objective_in_lanes_ends_the_run(tiny, vectors):

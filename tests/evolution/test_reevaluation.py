@@ -32,15 +32,11 @@ def slope(monkeypatch):
     return evaluate
 
 
-def again(directory, **options):
-    return reevaluate(directory, **options)
-
-
 def test_the_five_best_of_each_trial_are_evaluated_again(run_small, slope):
     directory = run_small()
     run = load_run(directory)
     assert run.reevaluations.empty
-    run = again(directory)
+    run = reevaluate(directory)
     assert list(run.reevaluations.groupby("trial").size()) == [5, 5]
     best = run.best(5).set_index(["trial", "index"])
     chosen = run.reevaluations.set_index(["trial", "index"])
@@ -62,11 +58,11 @@ class Stages(Progress):
 def test_what_is_recorded_whole_is_not_evaluated_again(run_small, slope):
     directory = run_small()
     shown, not_shown = Stages(), Stages()
-    again(directory, progress=shown)
-    assert len(again(directory, progress=not_shown).reevaluations) == slope.asked == 10
+    reevaluate(directory, progress=shown)
+    assert len(reevaluate(directory, progress=not_shown).reevaluations) == slope.asked == 10
     assert not_shown.titles == [] and shown.titles
     path = directory / "trial_01" / "reevaluations.jsonl"
     path.write_bytes(path.read_bytes()[:-9])
     assert len(load_run(directory).reevaluations) == 9
-    assert len(again(directory).reevaluations) == 10
+    assert len(reevaluate(directory).reevaluations) == 10
     assert slope.asked == 11

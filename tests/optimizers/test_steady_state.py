@@ -183,14 +183,6 @@ def run(scenario):
     return optimise(make(scenario), evaluate, scenario.evolution.evaluations)
 
 
-def test_first_the_population_then_two_children_per_iteration():
-    budget = {"evolution.evaluations": 12 + 2 * 15 + 1}
-    batches, iterations = run(small_scenario(population=12).with_changes(budget))
-    assert [len(batch) for batch in batches] == [12] + [2] * 15 + [1]
-    assert list(iterations[0].placed) == list(range(12))
-    assert len(iterations[-1].placed) == 1
-
-
 def test_the_mean_fitness_never_falls_and_rises_much():
     _, iterations = run(small_scenario(population=20, iterations=200))
     means = np.array([iteration.report["mean_fitness"] for iteration in iterations])
@@ -202,15 +194,6 @@ def vectors_of(changes):
     """The initial population and the children of a trial of a changed scenario."""
     batches, _ = run(small_scenario(iterations=100).with_changes(changes))
     return np.array(batches[0]), np.concatenate(batches[1:])
-
-
-def test_tau_b_is_twice_tau_a_unless_it_is_independent():
-    for vectors in vectors_of({}):
-        np.testing.assert_array_equal(vectors[:, TAU_B], 2.0 * vectors[:, TAU_A])
-        assert (vectors[:, :-2] > 0.0).all()
-        assert (vectors[:, TAU_A] >= 0.2).all()
-    _, children = vectors_of({"gait_bounds.independent_tau_b": True})
-    assert (children[:, TAU_B] != 2.0 * children[:, TAU_A]).mean() > 0.5
 
 
 def test_with_the_listings_slip_tau_a_is_only_ever_passed_on():

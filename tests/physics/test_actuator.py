@@ -26,42 +26,28 @@ def pull(drive: float, length: float, *, rate: float = 0.0, signal: float = 0.0)
     return motor_force(drive, length, rate, signal, CABLE, MOTOR)
 
 
-def test_a_free_winch_follows_its_command_with_a_lag():
-    # Commanded: 0.2 m - 1.5 N / (100 N/m) = 0.185 m, 5 mm below the drive: 5 mm / 50 ms.
-    # Tension: 100 N/m (0.23 m - 0.19 m) + 5 N s/m (0.01 m/s + 0.1 m/s).
-    found = wind(0.19, 0.23, rate=0.01, signal=1.5)
-    assert found == pytest.approx((4.0 + 0.55, 5.0, -0.1, 0.0))
-
-
-def test_a_winch_pays_out_at_its_speed_at_most():
-    # Commanded: 0.2 m + 10 N / (100 N/m) = 0.3 m; 0.11 m / 50 ms would be 2.2 m/s.
-    found = wind(0.19, 0.26, signal=-10.0)
-    assert found == pytest.approx((7.0 - 5.0 * 0.4, 5.0, 0.4, 1.0))
-
-
-def test_a_winch_winds_a_slack_cable_at_its_speed():
-    # 5 N s/m * 0.4 m/s cannot make up for the 10 cm that the cable is too long.
-    assert wind(0.3, 0.2, signal=20.0) == pytest.approx((0.0, 0.0, -0.4, 1.0))
-    # One that the winch pulls taut by winding at its speed would be: 5 * 0.4 > 100 * 0.01.
-    assert wind(0.21, 0.2, signal=20.0).tension > 0.0
-
-
-def test_under_tension_winding_is_on_the_force_speed_line():
-    # By hand: x' = -0.4 (1 - T / 20) and T = 100 * 0.06 + 5 (0.02 - x'):
-    # T = 6.1 + 2 - T / 10, so T = 8.1 / 1.1 and the slope is 5 / 1.1.
-    found = wind(0.14, 0.2, rate=0.02, signal=20.0)
-    tension = 8.1 / 1.1
-    assert found == pytest.approx((tension, 5.0 / 1.1, -0.4 * (1.0 - tension / 20.0), 1.0))
-
-
-def test_above_its_force_a_winch_is_driven_backward():
-    # T = 100 * 0.3 + 2 - T / 10 = 32 / 1.1 > 20, whether it shall wind or hold.
-    tension = 32.0 / 1.1
-    for signal in (20.0, 0.0):
-        found = wind(0.2, 0.5, signal=signal)
-        assert found.tension == pytest.approx(tension)
-        assert found.rate == pytest.approx(-0.4 * (1.0 - tension / 20.0))
-        assert found.rate > 0.0 and found.limited == 1.0
+@pytest.mark.parametrize(
+    ("drive", "length", "rate", "signal", "tension", "slope", "winding", "limited"),
+    [
+        # Free: commanded 0.2 m - 1.5 N / (100 N/m) = 0.185 m, 5 mm below the drive: 5 mm / 50 ms.
+        # Tension: 100 N/m (0.23 m - 0.19 m) + 5 N s/m (0.01 m/s + 0.1 m/s).
+        (0.19, 0.23, 0.01, 1.5, 4.0 + 0.55, 5.0, -0.1, 0.0),
+        # It pays out at its speed at most: 0.11 m / 50 ms would be 2.2 m/s.
+        (0.19, 0.26, 0.0, -10.0, 7.0 - 5.0 * 0.4, 5.0, 0.4, 1.0),
+        # A slack cable is wound at its speed: 5 N s/m * 0.4 m/s do not make up for 10 cm; for 1 cm
+        # they do, and winding is on the force-speed line: T = -1 + 2 - T / 10.
+        (0.3, 0.2, 0.0, 20.0, 0.0, 0.0, -0.4, 1.0),
+        (0.21, 0.2, 0.0, 20.0, 1.0 / 1.1, 5.0 / 1.1, -0.4 * (1.0 - 1.0 / 22.0), 1.0),
+        # x' = -0.4 (1 - T / 20) and T = 100 * 0.06 + 5 (0.02 - x'), so T = 6.1 + 2 - T / 10.
+        (0.14, 0.2, 0.02, 20.0, 8.1 / 1.1, 5.0 / 1.1, -0.4 * (1.0 - 8.1 / 22.0), 1.0),
+        # T = 100 * 0.3 + 2 - T / 10 > 20: driven backward, whether commanded to wind or to hold.
+        (0.2, 0.5, 0.0, 20.0, 32.0 / 1.1, 5.0 / 1.1, -0.4 * (1.0 - 32.0 / 22.0), 1.0),
+        (0.2, 0.5, 0.0, 0.0, 32.0 / 1.1, 5.0 / 1.1, -0.4 * (1.0 - 32.0 / 22.0), 1.0),
+    ],
+)
+def test_a_winch_by_hand(drive, length, rate, signal, tension, slope, winding, limited):
+    found = wind(drive, length, rate=rate, signal=signal)
+    assert found == pytest.approx((tension, slope, winding, limited))
 
 
 def test_a_winch_slows_down_before_the_least_length():
@@ -125,21 +111,22 @@ def test_the_slope_is_the_derivative_of_the_tension_by_the_rate():
     assert sorted(slopes) == pytest.approx([0.0, 5.0 / 1.1, 5.0, 50.0])
 
 
-def test_a_tension_motor_follows_the_whole_law_with_a_lag():
-    # Commanded: 100 (0.23 - 0.2) + 5 * 0.1 + 1.5 = 5 N; it has 4.5 N: 0.5 N / 50 ms.
-    assert pull(4.5, 0.23, rate=0.1, signal=1.5) == pytest.approx((4.5, 0.0, 10.0, 0.0))
-
-
-def test_a_tension_motor_never_pushes():
-    # Commanded: 100 (0.1 - 0.2) = -10 N, so that it goes to 0.
-    assert pull(2.0, 0.1) == pytest.approx((2.0, 0.0, -2.0 / 0.05, 0.0))
-    assert pull(0.0, 0.1) == pytest.approx((0.0, 0.0, 0.0, 0.0))
-
-
-def test_a_tension_motor_pulls_with_its_force_at_most():
-    # Commanded: 40 N.
-    assert pull(19.0, 0.6) == pytest.approx((19.0, 0.0, 1.0 / 0.05, 1.0))
-    assert pull(20.0, 0.6, rate=0.3) == pytest.approx((20.0, 0.0, 0.0, 1.0))
+@pytest.mark.parametrize(
+    ("drive", "length", "rate", "signal", "winding", "limited"),
+    [
+        # Commanded: 100 (0.23 - 0.2) + 5 * 0.1 + 1.5 = 5 N; it has 4.5 N: 0.5 N / 50 ms.
+        (4.5, 0.23, 0.1, 1.5, 10.0, 0.0),
+        # Commanded: 100 (0.1 - 0.2) = -10 N, so that it goes to 0: it never pushes.
+        (2.0, 0.1, 0.0, 0.0, -2.0 / 0.05, 0.0),
+        (0.0, 0.1, 0.0, 0.0, 0.0, 0.0),
+        # Commanded: 40 N, of which it pulls 20 N at most.
+        (19.0, 0.6, 0.0, 0.0, 1.0 / 0.05, 1.0),
+        (20.0, 0.6, 0.3, 0.0, 0.0, 1.0),
+    ],
+)
+def test_a_tension_motor_by_hand(drive, length, rate, signal, winding, limited):
+    found = pull(drive, length, rate=rate, signal=signal)
+    assert found == pytest.approx((drive, 0.0, winding, limited))
 
 
 @pytest.mark.parametrize(("rate", "most"), [(-0.1, 15.0), (-0.3, 5.0), (-0.4, 0.0), (-0.7, 0.0)])

@@ -15,12 +15,6 @@ from tetra_drake.results.metrics import headline
 from tetra_drake.scenario.load import dump_scenario
 
 
-def test_a_result_folder_holds_what_its_replay_needs(folder, tiny, gait, result):
-    stored = load_or_simulate(folder.rename(folder.with_name("elsewhere")))
-    assert (stored.scenario, stored.gait) == (tiny, gait)
-    xarray.testing.assert_equal(stored.trajectory, result.trajectory)
-
-
 def test_the_title_is_by_the_scenarios_objective(folder, tiny, gait, result):
     assert load_or_simulate(folder).title == f"{gait.name}: {headline(tiny, vars(result.metrics))}"
     (folder / "scenario.yaml").write_text(

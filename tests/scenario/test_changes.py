@@ -78,15 +78,6 @@ def test_a_dataclass_replaces_its_section_as_a_whole(scenario):
     assert mapped.with_changes({"optimizer": twist}).optimizer == twist
 
 
-def test_a_metric_joins_the_objective_where_a_mapping_replaces_it(scenario):
-    joined = scenario.with_changes({"objective.lead": "2 /m"}).objective
-    assert joined == scenario.objective | {"lead": 2.0}
-    replaced = scenario.with_changes({"objective": {"lead": "2 /m"}})
-    assert replaced.objective == {"lead": 2.0}
-    both = scenario.with_changes({"objective": {"lead": "2 /m"}, "objective.twist": "1 /m"})
-    assert both.objective == {"lead": 2.0, "twist": 1.0}
-
-
 BASE = {"objective": {"speed": 1, "twist": 2}, "friction": {TAG: "A", "x": 1, "y": 2}, "list": [1]}
 
 

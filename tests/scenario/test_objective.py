@@ -65,14 +65,6 @@ def test_a_draw_changes_what_it_names_within_its_spread(load_text):
     assert changed.disturbances is None
 
 
-def test_every_draw_has_another_terrain(load_text):
-    text = "terrain: !Rough {amplitude: 0.1 in, wavelength: 2 in}\ndisturbances: {draws: 2}"
-    scenario = load_text(text)
-    seeds = {disturbed(scenario, draw_disturbances(scenario, (k,))).terrain.seed for k in range(9)}
-    assert len(seeds) == 9
-    assert scenario.terrain.seed == 0
-
-
 DAMPING, RANGE, OTHER = "robot.cables.damping", "friction.stiction_range", "robot.density"
 ROUGH = {"terrain": "!Rough {amplitude: 0.1 in, wavelength: 2 in}"}
 

@@ -347,6 +347,7 @@ BAD = [
     ("robot: {spacing: &own [*own]}", "", "alias of what holds it"),
     ("robot: &own {cables: *own}", "", "alias of what holds it"),
     ("terrain: !Rough {amplitude: 1 in, wavelength: 1 um}", "terrain.wavelength", "5e-07 m"),
+    ("terrain: !Steps {height: 1 in, depth: 0.1 um, count: 2}", "terrain.depth", "4000000"),
     ("objective: {}", "objective", "at least 1"),
     ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
     ("optimizer: !CmaEs {population: 3}", "optimizer.population", "3"),

@@ -86,37 +86,9 @@ def test_defaults_are_not_shared():
     assert load("").weights == {"distance": 1.0}
 
 
-def test_a_tree_is_full():
-    full = parse_yaml(shown(load("")), "file")
-    assert full.keys() == Settings.model_fields.keys()
-    assert full["inner"] == {"slope": "0.0 rad", "surface": "rough"}
-
-
-def test_sections_of_the_same_values_are_equal_and_have_the_same_hash():
-    one, same = load("limits: {a: 1 kN, share: 1}"), load("limits: {a: 1000 N, share: 1.0}")
-    assert one == same and hash(one) == hash(same)
-    others = [
-        load("limits: {share: 1, a: 1 kN}"),  # names number things
-        load("limits: {a: 1 kN}"),
-        load("probes: [{at: [0 m, 0 m, 0 m]}]"),
-        load("terrain: !Incline {slope: 0 rad}"),
-    ]
-    assert len({one, same, *others}) == 5
-    assert one != one.model_dump()
-
-
 def test_values_cannot_be_changed_in_place():
     with pytest.raises(ValidationError):
         load("").count = 3
-
-
-def test_kinds_are_dumped_with_their_tags_and_all_their_values():
-    settings = load("ramps: [!Flat , !Incline {slope: 1 rad}], terrain: !Incline {slope: 1 rad}")
-    assert [line for line in shown(settings).splitlines() if "!" in line] == [
-        "terrain: !Incline",
-        "- !Flat {}",
-        "- !Incline",
-    ]
 
 
 BAD = [

@@ -3,11 +3,9 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from pytest import approx
 
-from tetra_drake.scenario.disturbances import disturbed, draw_disturbances
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
@@ -125,27 +123,6 @@ def test_numbers_of_groups_have_dotted_keys(folder: Path) -> None:
     assert scenario.robot.free_lengths == approx([0.02, 0.02, 0.08, 0.08])
 
 
-SPREADS = """
-disturbances:
-  draws: 2
-  start: 0.1
-  spreads: {"robot.cables.side.stiffness, robot.cables.rise.stiffness": 0.2}
-"""
-
-
-def test_a_draw_changes_groups_and_moves_every_body(folder: Path) -> None:
-    scenario = load(folder, "!Structure {file: bar.yaml}", more=SPREADS)
-    draw = draw_disturbances(scenario, (3,))
-    (factor,) = draw.factors.values()
-    assert draw.moves is not None
-    assert draw.moves.shape == (3, 3)
-    assert 0.005 < np.abs(draw.moves).max() <= 0.01
-    changed = disturbed(scenario, draw).robot
-    stiffness = [changed.cables[group].stiffness for group in ("side", "rise")]
-    assert stiffness == approx([200.0 * factor, 100.0 * factor])
-    assert changed.offsets == draw.moves.tolist()
-
-
 def test_a_file_of_ntrt_needs_a_unit(folder: Path) -> None:
     robot = "!Structure {file: ntrt.yaml, unit: dm, actuated: {one: [fast/string b d]}}"
     given = load(folder, robot).robot
@@ -203,20 +180,6 @@ def test_a_structure_that_is_not_there_is_one_line(tmp_path: Path, name: str, re
     parts.write_text(f"substructures: {{part: {{path: {json.dumps(name)}}}}}")
     with refused(tmp_path / name, "", ""):
         read_structure(parts, unit="m")
-
-
-def test_too_many_nodes_are_counted(refused) -> None:
-    nodes = {f"n{i}": [0.0, 0.0, float(i)] for i in range(1001)}
-    with refused("scenario prism", "robot.nodes", "at most 1000 items, not 1001"):
-        load_scenario("prism").with_changes({"robot": {"nodes": nodes, "unit": "m"}})
-
-
-def test_only_a_scenario_is_told_of_a_base(folder: Path) -> None:
-    file = folder / "bar.yaml"
-    file.write_text(BAR.replace("density: 1.2 g/cm^3", ""))
-    with pytest.raises(ValueError) as caught:
-        read_structure(file)
-    assert "base" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

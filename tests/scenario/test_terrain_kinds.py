@@ -124,19 +124,6 @@ def test_as_many_bumps_stand_as_there_are_squares():
     assert volume == pytest.approx(rows * columns * one, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("terrain", "key"),
-    [
-        (Steps(height=0.1, depth=1e-7, count=2), "depth"),
-        (Rough(amplitude=0.1, wavelength=1e-3), "wavelength"),
-    ],
-    ids=repr,
-)
-def test_a_terrain_of_too_many_cells_is_refused(terrain, key, refused):
-    with refused("file", f"terrain.{key}", "4000000"):
-        grid_of(terrain)
-
-
 # Height files
 
 HEIGHTS = np.array([[0.0, 1.0, 2.0, 3.0], [0.5, -1.0, 2.5, 1e-3], [4.0, 5.0, 6.0, 7.0]])

@@ -29,11 +29,6 @@ def test_quantities_convert_by_the_exact_definitions(text, unit, expected):
     assert quantity_to_si(text, unit) == pytest.approx(expected, rel=1e-14)
 
 
-@pytest.mark.parametrize("value", [0.1 / 3, 5e-324, 9.876543210987654e14])
-def test_an_si_number_written_with_its_unit_reads_back_to_the_last_bit(value):
-    assert quantity_to_si(f"{value!r} N*s/m^2", "N*s/m^2") == value
-
-
 @pytest.mark.parametrize(
     ("unit", "read"),
     [
@@ -76,20 +71,9 @@ def test_a_setting_is_shown_in_the_unit_in_which_it_is_a_round_number(text, unit
 REFUSED = [
     "6 lbf",  # not a length
     "25 lb/in",  # a pound is a mass
-    "6",
-    "in",
-    "",
-    "1 000",
-    "6 furlings",
-    "6 in 7",
-    "6 in - 3 in",
     "6 in**(9**9**9)",  # must not be evaluated
-    "__import__('os').getcwd()",
-    "nan in",
-    "-inf m",
-    "1e16 m",
-    "-1e200 m",
-    "1e400 m",
+    *("6", "in", "", "1 000", "6 furlings", "6 in 7", "6 in - 3 in", "__import__('os').getcwd()"),
+    *("nan in", "-inf m", "1e16 m", "-1e200 m", "1e400 m"),
 ]
 
 

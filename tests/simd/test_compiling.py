@@ -53,40 +53,41 @@ def test_a_read_only_installation_caches_in_the_users_folder_if_it_can(
     assert any(tmp_path.rglob("oscillator.oscillator_output*.nbc")) == caches
 
 
-@pytest.mark.parametrize(
-    ("imported", "value"),
-    [
-        ("from {package}.constant import VALUE", "VALUE"),
-        ("from {package} import constant", "constant.VALUE"),
-        ("from {package} import (\n    constant as other,\n)", "other.VALUE"),
-        ("import {package}.constant as constant", "constant.VALUE"),
-    ],
-    ids=["name", "module", "renamed module", "dotted module"],
-)
-def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(
-    package, tmp_path, imported, value
-):
+IMPORTS = {
+    "name": ("from {package}.constant import VALUE", "VALUE"),
+    "module": ("from {package} import constant", "constant.VALUE"),
+    "renamed": ("from {package} import (\n    constant as other,\n)", "other.VALUE"),
+    "dotted": ("import {package}.constant as constant", "constant.VALUE"),
+}
+"""Ways in which a module gets a constant of another one."""
+
+
+def test_a_kernel_is_compiled_anew_when_what_it_uses_has_changed(package, tmp_path):
     # outer() contains inner(), which uses a constant of a third module; they may be in any folder.
     kernels, name = package / "tetra_drake" / "elsewhere" / "deeper", "tetra_drake.elsewhere.deeper"
     kernels.mkdir(parents=True)
     begin = "from tetra_drake.simd.compiling import compiled, inlined\n"
     (kernels / "constant.py").write_text("VALUE = 1.0\n")
-    (kernels / "inner.py").write_text(
-        f"{begin}{imported.format(package=name)}\n@inlined\ndef inner():\n    return {value}\n"
-    )
-    (kernels / "outer.py").write_text(
-        f"{begin}from {name}.inner import inner\n@compiled\ndef outer():\n    return inner()\n"
-    )
-    program = f"from {name}.outer import outer;print(outer(), sum(outer.stats.cache_hits.values()))"
+    program = ""
+    for way, (imported, value) in IMPORTS.items():
+        (kernels / f"inner_{way}.py").write_text(
+            f"{begin}{imported.format(package=name)}\n@inlined\ndef inner():\n    return {value}\n"
+        )
+        (kernels / f"outer_{way}.py").write_text(
+            f"{begin}from {name}.inner_{way} import inner\n"
+            "@compiled\ndef outer():\n    return inner()\n"
+        )
+        program += f"from {name}.outer_{way} import outer\n"
+        program += "print(outer(), sum(outer.stats.cache_hits.values()))\n"
     (kernels / "__pycache__").write_text("in the way")
 
-    def value_and_hits() -> list[str]:
-        return run(package, tmp_path / "cache", program).split()
+    def values_and_hits() -> list[str]:
+        return run(package, tmp_path / "cache", program).splitlines()
 
-    assert value_and_hits() == ["1.0", "0"]
-    assert value_and_hits() == ["1.0", "1"]
+    assert values_and_hits() == ["1.0 0"] * 4
+    assert values_and_hits() == ["1.0 1"] * 4
     (kernels / "constant.py").write_text("VALUE = 2.0\n")
-    assert value_and_hits() == ["2.0", "0"]
+    assert values_and_hits() == ["2.0 0"] * 4
 
 
 TWICE = """
@@ -221,7 +222,7 @@ def timers(monkeypatch):
     return made
 
 
-def test_only_compilation_that_takes_longer_than_a_moment_is_announced(folder, timers):
+def test_only_compilation_that_takes_longer_than_a_moment_is_announced_once(folder, timers, caplog):
     compiled(twice)(0.25)
     (timer,) = timers
     assert [call[0] for call in timer.method_calls] == ["start", "cancel"]
@@ -229,12 +230,8 @@ def test_only_compilation_that_takes_longer_than_a_moment_is_announced(folder, t
     assert (function, arguments) == (announce, [True])
     compiled(twice)(0.25)  # from the cache
     assert timers == [timer]
-
-
-def test_compilation_is_announced_once(caplog):
     announce.cache_clear()
-    announce(True)
-    announce(True)
-    assert [(record.name, record.levelno) for record in caplog.records] == [
-        (LOGGER, logging.WARNING)
-    ]
+    for _ in range(2):
+        announce(True)
+    (told,) = caplog.records
+    assert (told.name, told.levelno) == (LOGGER, logging.WARNING)

@@ -1,6 +1,7 @@
 """Many gaits at a time on the compiled engine: each as if it were alone."""
 
 import dataclasses
+import itertools
 import threading
 import time
 from concurrent.futures import CancelledError
@@ -41,16 +42,32 @@ FALLING = {"robot.gravity": "1000 m/s^2", "robot.offsets": [["0 m", "0 m", "9 m"
 TOO_STRONG = {"cpg.gain": "300.0 N", "simulation.max_evaluations": 20_000}
 """One that winds it up until steps are tiny."""
 
+ROUGH = {"robot.contacts": "all", "friction": Coulomb()}
+ROUGH |= {"terrain": Rough(amplitude=2e-3, wavelength=0.1)}
+FINER = ROUGH | {"terrain": Rough(amplitude=3e-3, wavelength=0.05, seed=1)}
+FINER |= {"friction": Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)}
+LIMITS = [(70.0, 0.5, 0.02), (5.0, 0.1, 0.1), (4.0, 0.3, 0.5e-3)]
+"""Force (N), speed (m/s) and time constant (s) of actuators."""
+
+GOES, FAILS, ENDS = SimulationResult, Diverged, StepBudgetExceeded
+NEIGHBOURS = {
+    "strength": [({}, GOES), (FAR_TOO_STRONG, FAILS), ({}, GOES), (TOO_STRONG, ENDS)],
+    # Each lane has a grid of its own size, and constants of its own.
+    "ground": [(FINER, GOES), (ROUGH, GOES), (ROUGH | FAR_TOO_STRONG, FAILS)],
+}
+for kind in (Winch, TensionMotor):
+    NEIGHBOURS[kind.__name__] = [
+        ({"actuation": kind(max_force=f, max_speed=v, time_constant=tau)}, GOES)
+        for f, v, tau in LIMITS
+    ]
+"""Changes of scenarios that walk side by side, and how they end."""
+
 
 @pytest.fixture
 def short(scenario: Scenario) -> Scenario:
     """One second on the compiled engine, driven from 0.2 s on."""
-    times = {
-        "simulation.duration": "1.0 s",
-        "simulation.steady_from": "0.5 s",
-        "cpg.start_up": "0.2 s",
-    }
-    return scenario.with_changes({"engine": "!Compiled", **times})
+    times = {"simulation.duration": "1.0 s", "simulation.steady_from": "0.5 s"}
+    return scenario.with_changes({"engine": "!Compiled", "cpg.start_up": "0.2 s", **times})
 
 
 Ending = tuple[SimulationResult | SimulationFailure, Motion]
@@ -58,7 +75,8 @@ Ending = tuple[SimulationResult | SimulationFailure, Motion]
 
 def endings(walks: list[Prepared], width: int) -> list[Ending]:
     """Outcomes and motions in an engine whose lanes take the next gait when one has ended."""
-    engine = LaneEngine(walks[0], width=width)
+    widest = max(walks, key=lambda walk: walk.robot.ground.heights.size)
+    engine = LaneEngine(widest, width=width)
     waiting, found = list(enumerate(walks)), dict[int, Ending]()
     in_lane = dict[int, int]()
     while waiting or in_lane:
@@ -72,10 +90,6 @@ def endings(walks: list[Prepared], width: int) -> list[Ending]:
                 outcome = failure
             found[in_lane.pop(lane)] = outcome, engine.motion(lane)
     return [found[i] for i in range(len(walks))]
-
-
-def kinds_of(found: list[Ending]) -> list[type]:
-    return [type(outcome) for outcome, _ in found]
 
 
 def prepared(scenario: Scenario, seed: int = 0) -> Prepared:
@@ -94,57 +108,23 @@ def same(a: Ending, b: Ending) -> bool:
     return repr(a[0]) == repr(b[0])
 
 
+@pytest.mark.parametrize("name", NEIGHBOURS)
 @pytest.mark.parametrize("width", WIDTHS)
-def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, width):
-    kinds = [short, short.with_changes(FAR_TOO_STRONG), short, short.with_changes(TOO_STRONG)]
-    scenarios = [kinds[i % 4] for i in range(11)]
+def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short, width, name):
+    changes, expected = zip(*NEIGHBOURS[name], strict=True)
+    robots = [Robot.of(short.with_changes(change)) for change in changes]
+    gaits = [seeded_gait(short, i) for i in range(11)]
     walks = [
-        Prepared.of(Robot.of(s), seeded_gait(s, i), record=True) for i, s in enumerate(scenarios)
+        Prepared.of(robots[i % len(robots)], gait, record=True) for i, gait in enumerate(gaits)
     ]
     alone = [endings([walk], 1)[0] for walk in walks]
-    expected = [SimulationResult, Diverged, SimulationResult, StepBudgetExceeded]
-    assert kinds_of(alone[:4]) == expected
+    assert tuple(type(outcome) for outcome, _ in alone[: len(robots)]) == expected
+    assert not any(same(one, other) for one, other in itertools.pairwise(alone))
+    wound = [np.ptp(motion.drives) > 0.0 for _, motion in alone if motion.drives.size]
+    assert all(wound) and bool(wound) == ("actuation" in changes[0])
     for order in (range(11), range(10, -1, -1)):
         found = endings([walks[i] for i in order], width)
         assert all(same(ending, alone[i]) for i, ending in zip(order, found, strict=True))
-
-
-@pytest.mark.parametrize("width", WIDTHS)
-def test_on_other_ground_too_a_gait_walks_alike_beside_any_neighbours(short, width):
-    # Each lane has a grid of its own size, and constants of its own.
-    rough = {
-        "robot.contacts": "all",
-        "terrain": Rough(amplitude=2e-3, wavelength=0.1),
-        "friction": Coulomb(),
-    }
-    firm = Coulomb(static=0.6, kinetic=0.3, stiffness=900.0)
-    finer = rough | {"terrain": Rough(amplitude=3e-3, wavelength=0.05, seed=1), "friction": firm}
-    kinds = [short.with_changes(changes) for changes in (finer, rough, rough | FAR_TOO_STRONG)]
-    walks = [
-        Prepared.of(Robot.of(s), seeded_gait(s, i), record=True) for i, s in enumerate(kinds * 3)
-    ]
-    alone = [endings([walk], 1)[0] for walk in walks]
-    assert kinds_of(alone[:3]) == [SimulationResult, SimulationResult, Diverged]
-    assert not same(alone[1], alone[4])
-    assert all(map(same, endings(walks, width), alone))
-
-
-@pytest.mark.parametrize("kind", [Winch, TensionMotor])
-@pytest.mark.parametrize("width", WIDTHS)
-def test_actuators_of_different_limits_pull_alike_beside_each_other(short, width, kind):
-    limits = [(70.0, 0.5, 0.02), (5.0, 0.1, 0.1), (4.0, 0.3, 0.5e-3)]
-    scenarios = [
-        short.with_sections(actuation=kind(max_force=f, max_speed=v, time_constant=tau))
-        for f, v, tau in limits
-    ]
-    robots = [Robot.of(scenarios[i % 3]) for i in range(9)]
-    walks = [
-        Prepared.of(robot, seeded_gait(short, i), record=True) for i, robot in enumerate(robots)
-    ]
-    alone = [endings([walk], 1)[0] for walk in walks]
-    assert kinds_of(alone) == [SimulationResult] * 9
-    assert all(np.ptp(motion.drives) > 0.0 for _, motion in alone)
-    assert all(map(same, endings(walks, width), alone))
 
 
 @pytest.mark.parametrize("workers", [1, 3])
