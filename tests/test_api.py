@@ -100,14 +100,6 @@ def test_a_result_shows_its_replay_in_a_notebook(folder: Path) -> None:
     assert html.unescape(page) == (folder / "alone.html").read_text()
 
 
-def test_a_gait_may_be_the_path_of_its_file() -> None:
-    scenario = td.load_scenario("quick")
-    gait = td.load_gait("gait.json", scenario)
-    results = [td.simulate(scenario, "gait.json"), *td.simulate_many(scenario, [Path("gait.json")])]
-    for result in results:
-        assert (result.gait, result.metrics) == (gait, td.simulate(scenario, gait).metrics)
-
-
 def test_a_failure_among_many_says_of_which_gait_and_scenario() -> None:
     scenario = td.load_scenario("quick")
     failing = scenario.with_changes({"simulation.max_evaluations": 10, "name": "failing"})

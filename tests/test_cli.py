@@ -144,14 +144,6 @@ def test_a_full_disk_behind_the_output_is_told_in_one_line(command, work):
     assert "Traceback" not in process.stderr and "Exception" not in process.stderr
 
 
-def test_the_process_ends_with_the_status_and_no_traceback(unchanged):
-    line = [sys.executable, "-m", "tetra_drake", "simulate", "--gait", "missing.json"]
-    process = subprocess.run(line, capture_output=True, text=True, timeout=60)
-    assert (process.returncode, process.stdout) == (2, "")
-    (message,) = process.stderr.splitlines()
-    assert message.startswith("tetra-drake: missing.json: ")
-
-
 def test_a_simulation_that_fails_says_when_and_why_with_status_1(unchanged, capsys):
     assert main(["simulate", "--scenario", "poor.yaml"]) == 1
     (line,) = capsys.readouterr().err.splitlines()

@@ -25,14 +25,9 @@ from tetra_drake.scenario.terrain_kinds import Steps
 @pytest.fixture
 def tiny():
     """Four gaits and two iterations of 0.3 s on the compiled engine."""
-    return small_scenario(population=4, iterations=2, trials=1).with_changes(
-        {
-            "engine": "!Compiled",
-            "simulation.duration": "0.3 s",
-            "simulation.steady_from": "0.1 s",
-            "cpg.start_up": 0.0,
-        }
-    )
+    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
+    changes = {"engine": "!Compiled", "cpg.start_up": 0.0, **times}
+    return small_scenario(population=4, iterations=2, trials=1).with_changes(changes)
 
 
 @pytest.fixture
@@ -319,9 +314,6 @@ def test_the_map_is_simulated_on_as_many_local_threads_as_there_are_cores(
     tetra_drake.evolve(tiny, tmp_path / "threads", workers=3)
     tetra_drake.evolve(tiny, tmp_path / "cluster", workers=32, executor=OneByOne)
     assert asked == [3, None]
-
-
-# The command
 
 
 SMALL = ("--trials", "1", "--evaluations", "18", "--workers", "1")

@@ -27,8 +27,6 @@ from tetra_drake.robot.gait import save_gait, seeded_gait
 from tetra_drake.scenario.common_sections import Disturbances
 from tetra_drake.scenario.disturbances import disturbed, fresh_draws, fresh_seed
 from tetra_drake.scenario.load import dump_scenario, load_scenario
-from tetra_drake.scenario.terrain_kinds import Steps
-from tetra_drake.scenario.units import INCH
 
 DRAWS = 3
 
@@ -222,21 +220,3 @@ def test_nothing_is_written_for_a_gait_of_another_robot(scenario, tmp_path, refu
     save_gait(seeded_gait(scenario, 1), gait, scenario)
     assert main(["robustness", str(gait), "--out", str(out)]) == 2
     assert str(gait) in capsys.readouterr().err and not out.exists()
-
-
-def test_a_draw_in_which_the_robot_cannot_start_is_a_failure(scenario, gaits):
-    # The foremost nodes on the ground, those of T3's base, are 1 in from the middle of a step's
-    # ascent, and are moved by up to 0.4 spacings, 1.18 in.
-    edge = 2.0 * scenario.robot.spacing + INCH
-    steps = Steps(height=1.0 * INCH, depth=1.0, count=1, start=edge)
-    changes = {"terrain": steps, "disturbances": Disturbances(draws=1, start=0.4)}
-    found = judge(scenario.with_changes(changes), gaits, draws=8, seed=3)
-    assert by_change(found).loc[START, "failed"] > 0
-    failed = found.draws[found.draws["failure"].notna()]
-    assert 2 <= len(failed) < 16 and failed["failure"].str.contains("below the ground").all()
-    assert failed["gait"].tolist() == ["a", "b"] * (len(failed) // 2)
-    walked = found.draws.drop(failed.index)
-    draws = fresh_draws(found.scenario, 3, 8)
-    i, gait, distance = walked[["draw", "gait", "distance"]].iloc[-1]
-    changed = disturbed(found.scenario, draws[i])
-    assert simulate(scenario=changed, gait=gaits[gait]).metrics.distance == distance

@@ -2,7 +2,6 @@
 
 import pickle
 import typing
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from unittest.mock import Mock
 
@@ -102,18 +101,6 @@ def test_the_path_is_that_of_the_trajectory(scenario, engine):
     np.testing.assert_allclose(path.heading, whole.heading[::25], atol=1e-9)
     assert abs(path.heading[-1]) > 1e-4
     assert result.metrics.heading_change == path.heading[-1] - path.heading[0]
-
-
-@pytest.mark.parametrize("engine", ["compiled", MUJOCO])
-def test_a_gait_is_not_influenced_by_company_or_threads(scenario, engine):
-    short = shortly(scenario, engine)
-
-    def distance(seed: int) -> float:
-        return simulate(scenario=short, gait=seeded_gait(short, seed)).metrics.distance
-
-    alone = [distance(seed) for seed in range(6)]
-    with ThreadPoolExecutor(4) as threads:
-        assert list(threads.map(distance, [*range(6), *range(6)])) == alone * 2
 
 
 FALLING = {"robot.gravity": "1000 m/s^2", "robot.offsets": [["0 m", "0 m", "9 m"]] * 5}

@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 from helpers.analytic import (
     Bowl,
-    Deadly,
     DrawnBowl,
+    Dying,
     drawn_scenario,
     in_threads,
-    is_deadly,
     read_record,
     record_run,
     tasks_of,
@@ -52,22 +51,19 @@ def tasks(scenario):
 
 
 def test_what_ends_its_worker_is_named_and_the_others_are_evaluated(
-    cluster, tasks, monkeypatch, refused
+    cluster, tasks, tmp_path, monkeypatch, refused
 ):
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 1)
-    chosen = [task for task in tasks if not is_deadly(task.vector)][:14]
-    deadly = next(task for task in tasks if is_deadly(task.vector))
-    chosen.insert(12, deadly)
     others = {}
     with (
-        refused(deadly, "", "died"),
+        refused(tasks[12], "", "died"),
         dask_cluster(cluster) as make,
-        OnExecutor(Deadly(), make, 2) as evaluator,
+        OnExecutor(Dying(tmp_path, always=(12,)), make, 2) as evaluator,
     ):
-        for task, evaluation in evaluate_all(evaluator, chosen):
+        for task, evaluation in evaluate_all(evaluator, tasks[:15]):
             others[task.index] = evaluation
     assert others == {i: Bowl()(tasks[i]) for i in others}
-    assert deadly.index not in others
+    assert 12 not in others
 
 
 def test_only_this_machine_can_reach_the_cluster(cluster):

@@ -42,15 +42,11 @@ BOWL = DrawnBowl()
 @pytest.fixture(scope="module")
 def tiny():
     """0.3 s of three tetrahedra, actuated at once, on the compiled engine, among three draws."""
-    return small_scenario(oscillators=2, population=4, iterations=2, trials=2).with_changes(
-        {
-            "engine": "!Compiled",
-            "simulation.duration": "0.3 s",
-            "simulation.steady_from": "0.1 s",
-            "cpg.start_up": 0.0,
-            "disturbances": Disturbances(draws=3, spreads=STIFFNESS, start=0.02),
-        }
-    )
+    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
+    changes = {"engine": "!Compiled", "cpg.start_up": 0.0, **times}
+    changes |= {"disturbances": Disturbances(draws=3, spreads=STIFFNESS, start=0.02)}
+    small = small_scenario(oscillators=2, population=4, iterations=2, trials=2)
+    return small.with_changes(changes)
 
 
 @pytest.fixture(scope="module")
@@ -63,9 +59,6 @@ def by_hand(scenario, vector):
     gait = ParameterSpace.of(scenario).gait(vector, name="any")
     draws = [draw_disturbances(scenario, (*SEED, k)) for k in range(3)]
     return [simulate(scenario=disturbed(scenario, draw), gait=gait) for draw in draws]
-
-
-# Evaluations
 
 
 def test_a_gait_is_simulated_in_each_of_its_draws(tiny, vector):
@@ -124,9 +117,6 @@ def test_metrics_are_means_but_for_the_least_clearance_and_tension():
     assert list(combined.values()) == [2.0, 1.0, 3.0, [0.25, 0.5], None]
 
 
-# Failures
-
-
 def test_a_gait_that_misses_a_requirement_has_failed_with_its_metrics(tiny, vector):
     still = tiny.with_changes({"disturbances": None})
     walked = GaitEvaluation(still)(Task(vector))
@@ -178,9 +168,6 @@ def test_a_draw_that_fails_or_cannot_start_fails_its_gait_with_and_without_lanes
     for gait in failed:
         assert re.match(rf"draw [012]: {kind}: ", gait.failure)
         assert (gait.fitness, gait.metrics, gait.draws) == (-math.inf, {}, None)
-
-
-# Runs
 
 
 @pytest.fixture

@@ -19,9 +19,8 @@ from tetra_drake.robot.gait import ParameterSpace
 @pytest.fixture
 def tiny():
     """0.3 s from a standing start, actuated at once so that gaits differ."""
-    return small_scenario().with_changes(
-        {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s", "cpg.start_up": 0.0}
-    )
+    times = {"simulation.duration": "0.3 s", "simulation.steady_from": "0.1 s"}
+    return small_scenario().with_changes({"cpg.start_up": 0.0, **times})
 
 
 @pytest.fixture
@@ -68,33 +67,29 @@ def test_an_objective_that_reads_the_trajectory_says_so(
     assert evaluation.metrics == result.metrics.to_json()
 
 
-@pytest.mark.parametrize(
-    ("changes", "objective", "kind"),
-    [
-        ({"simulation.max_evaluations": 50}, None, "step budget: "),
-        ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, None, "diverged: "),
-        ({}, lambda result: math.nan, "diverged: "),
-    ],
-)
-def test_failures_say_why_and_have_the_worst_fitness(tiny, vectors, changes, objective, kind):
-    failed = GaitEvaluation(tiny.with_changes(changes), objective)(Task(vectors[0]))
+FAILING = [
+    ({"simulation.max_evaluations": 50}, None, "step budget: "),
+    ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, None, "diverged: "),
+    ({}, lambda result: math.nan, "diverged: "),
+    ({"simulation.duration": "60 s", "evolution.time_budget": "0.01 s"}, None, "time budget: "),
+]
+
+
+@pytest.mark.parametrize("lanes", [False, True], ids=["diagram", "lanes"])
+@pytest.mark.parametrize(("changes", "objective", "kind"), FAILING)
+def test_failures_say_why_and_have_the_worst_fitness(
+    tiny, vectors, lanes, changes, objective, kind
+):
+    engine = {"engine": "!Compiled" if lanes else "!Drake"}
+    evaluate = GaitEvaluation(tiny.with_changes(engine | changes), objective)
+    if lanes:
+        with InLanes(evaluate, LanePool(1)) as evaluator:
+            failed = evaluator.submit(Task(vectors[0])).result()
+    else:
+        failed = evaluate(Task(vectors[0]))
     assert failed.failure.startswith(kind)
     assert (failed.fitness, failed.metrics) == (-math.inf, {})
-
-
-def test_evaluations_in_lanes_keep_their_budgets(tiny, vectors):
-    compiled = tiny.with_changes({"engine": "!Compiled"})
-    endless = {"simulation.duration": "1 h", "evolution.time_budget": "0.05 s"}
-    for changes, kind in (
-        ({"simulation.max_evaluations": 50}, "step budget: "),
-        ({"cpg.gain": "4e9 N", "cpg.start_up": 0.0}, "diverged: "),
-        (endless, "time budget: "),
-    ):
-        evaluate = GaitEvaluation(compiled.with_changes(changes))
-        with InLanes(evaluate, LanePool(1)) as lanes:
-            failed = lanes.submit(Task(vectors[0])).result()
-        assert failed.failure.startswith(kind)
-        assert failed.wall_time > 0.0
+    assert failed.wall_time > 0.0
 
 
 @pytest.mark.parametrize("engine", ["drake", "compiled", "mujoco"])

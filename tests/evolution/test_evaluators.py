@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from helpers.analytic import (
     Bowl,
+    Dying,
     evaluated,
     in_threads,
     read_record,
@@ -44,21 +45,6 @@ def test_every_task_is_evaluated_once_also_when_workers_are_recycled(tasks, monk
         evaluations = evaluated(evaluator, tasks)
         assert evaluated(evaluator, []) == {}
     assert evaluations == {i: Bowl()(task) for i, task in enumerate(tasks)}
-
-
-class Dying:
-    """Bowl, which ends its process at some tasks, the first time or always."""
-
-    def __init__(self, folder, *, once=(), always=()):
-        self.folder, self.once, self.always = folder, once, always
-
-    def __call__(self, task):
-        seen = self.folder / str(task)
-        dies = task.index in self.always or (task.index in self.once and not seen.exists())
-        seen.touch()
-        if dies:
-            os._exit(3)
-        return Bowl()(task)
 
 
 @pytest.mark.parametrize(

@@ -82,9 +82,6 @@ def test_a_compressed_record_reads_alike_and_can_be_added_to(run_small, refused)
         load_run(run)
 
 
-# Best gaits, populations, states of trials
-
-
 def test_the_best_of_each_trial_are_different_gaits_the_earlier_of_equals_first(tmp_path):
     trials = [[[(5.0, 0), (5.0, 1), (None, 2), (4.0, 3)]], [[(3.0, 0)], [(6.0, 0)]]]
     run = load_run(write_run(tmp_path / "run", trials))

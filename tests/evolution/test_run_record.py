@@ -32,9 +32,6 @@ def create(directory, scenario=None):
     return record
 
 
-# What a run is, and what is refused
-
-
 def test_the_manifest_holds_seed_versions_and_method_and_the_scenario_its_own_file(run_small):
     run = run_small(seed=11)
     manifest = read_manifest(run)
@@ -144,9 +141,6 @@ def test_a_second_process_is_refused_until_the_first_ends(run_small):
         other.kill()
     with RunRecord.resume(run):
         pass
-
-
-# Torn and damaged lines
 
 
 @pytest.mark.parametrize("name", ["evaluations.jsonl", "iterations.jsonl"])
@@ -316,9 +310,6 @@ def test_a_line_that_is_there_twice_is_refused(run_small, refused):
             file.read()
 
 
-# A run that begins, and one that replaces another
-
-
 def test_nothing_is_written_before_the_first_line(run_small, tmp_path):
     def interrupt(task):
         raise InterruptedError
@@ -358,9 +349,6 @@ def test_a_run_stays_if_that_which_replaces_it_cannot_begin(run_small, monkeypat
         assert read_record(run) == before
     with RunRecord.resume(run):
         pass
-
-
-# Resuming
 
 
 def test_what_is_in_progress_is_recalled_but_never_for_another_genome(tmp_path, refused):

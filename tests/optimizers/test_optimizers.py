@@ -148,9 +148,6 @@ def test_batches_that_fail_as_a_whole_teach_nothing_and_stop_nothing(kind):
         assert fitnesses(batches).max() > -1.5
 
 
-# CMA-ES
-
-
 def test_it_begins_with_a_random_sample_and_goes_on_from_the_mean_of_its_best_quarter(monkeypatch):
     monkeypatch.setattr(cma_es, "SIGMA", 1e-9)
     batches, iterations = run(CmaEs(sample=32), seed=8, budget=60)
@@ -197,9 +194,6 @@ def test_it_begins_anew_and_larger_around_its_best_where_it_has_converged():
     assert reports[first]["sigma"] == pytest.approx(cma_es.SIGMA, rel=1e-4)
     best = max(np.concatenate(batches[:first]), key=lambda vector: bowl(vector).fitness)
     assert np.abs(np.mean(batches[first], axis=0) - best)[:-2].max() < 3 * 0.2 * 2.4 / 3
-
-
-# Quality-diversity
 
 
 def walker(vector):

@@ -45,9 +45,6 @@ def generator():
     return np.random.default_rng(7)
 
 
-# Operators
-
-
 def test_tournaments_of_five_are_drawn_with_replacement(generator):
     fitnesses = np.arange(50.0)
     options = {"tournament": 5, "generator": generator}
@@ -165,9 +162,6 @@ def test_steps_are_the_thesis_s(scenario):
     np.testing.assert_allclose(steps(listing)[[TAU_A, TAU_B]], [0.0, 0.1])
     fixed = {"gait_bounds.tau_a_min": "0.3 s", "gait_bounds.tau_a_max": "0.3 s"}
     np.testing.assert_array_equal(steps(fixed)[[TAU_A, TAU_B]], 0.0)
-
-
-# The optimiser
 
 
 def evaluate(vector):

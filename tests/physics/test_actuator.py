@@ -1,7 +1,5 @@
 """The laws of winches and tension motors: their limits, and what a cable is to integrators."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -134,13 +132,3 @@ def test_a_tension_motor_pulls_less_the_faster_it_winds(rate, most):
     assert pull(16.0, 0.4, rate=rate).tension == pytest.approx(most)
     assert pull(16.0, 0.4, rate=rate).limited == 1.0
     assert pull(0.5 * most, 0.3, rate=rate).tension == pytest.approx(0.5 * most)
-
-
-def test_a_winch_without_limits_is_the_force_law_when_it_has_arrived():
-    # At rest at its command, l0 - S / k: k (l - l0 + S / k) = k (l - l0) + S.
-    limitless = Limits(max_force=1e9, max_speed=1e9, time_constant=1e-3, least_length=-math.inf)
-    for _, length, rate, signal in random_pulls(50):
-        found = wind(0.2 - signal / 100.0, length, rate=rate, signal=signal, limits=limitless)
-        expected = 100.0 * (length - 0.2) + 5.0 * rate + signal
-        assert found.tension == pytest.approx(max(0.0, expected), abs=1e-6)
-        assert (found.rate, found.limited) == (pytest.approx(0.0, abs=1e-12), 0.0)

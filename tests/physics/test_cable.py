@@ -33,14 +33,6 @@ def test_tension_is_equation_6():
     assert cable_tension(0.3, -0.25, 1.5, CableLaw(35.0, 8.0, 0.1)) == pytest.approx(6.5, rel=1e-15)
 
 
-def test_cables_keep_momentum_and_angular_momentum(robot, state):
-    wrench = forces_of_cables(robot.model, state, 1.0, -2.0, 0.5, 3.0)[0].reshape(5, 6)
-    p_WB = state[:35].reshape(5, 7)[:, 4:]
-    torque = wrench[:, :3] + np.cross(p_WB, wrench[:, 3:])
-    np.testing.assert_allclose(wrench[:, 3:].sum(axis=0), 0.0, atol=1e-13)
-    np.testing.assert_allclose(torque.sum(axis=0), 0.0, atol=1e-13)
-
-
 def test_power_of_the_cables_is_tension_times_shortening(robot, structure, state):
     # Virtual power: generalized force . v = - sum of T dl/dt.
     force, tensions = forces_of_cables(robot.model, state, 1.0, 0.0, -1.0, 2.0)

@@ -170,17 +170,6 @@ def test_an_export_that_fails_leaves_nothing(short, tmp_path):
     assert not (tmp_path / "new").exists()
 
 
-def test_the_commands_write_and_play(short, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    export_it = "export --seed 80 --scenario coulomb --rate 100Hz --out lab"
-    assert main(export_it.split()) == 0
-    assert "No motor is given" in capsys.readouterr().out
-    play = "simulate --command lab/command.csv --out out"
-    assert main(play.split()) == 0
-    assert capsys.readouterr().out.startswith("command.csv: walks")
-    assert (tmp_path / "out/replay.html").exists()
-
-
 def test_a_command_is_played_on_the_scenario_beside_it(short, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     export(short, seeded_gait(short), rate=50.0, out="lab")

@@ -65,19 +65,6 @@ def test_a_robot_on_a_circle_has_turned_by_its_angle(robot, radius):
     np.testing.assert_allclose(result.path.centre[:, 2], robot.structure.p_WB[0, 2])
 
 
-def test_mirrored_states_negate_turning_and_bending(robot):
-    states = on_a_circle(robot, per_second=0.3)
-    poses = states[:, :35].reshape(-1, 5, 7)
-    poses = poses + np.random.default_rng(1).normal(scale=0.02, size=poses.shape)
-    mirrored = states.copy()
-    states[:, :35] = poses.reshape(-1, 35)
-    mirrored[:, :35] = (poses * [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]).reshape(-1, 35)
-    left, right = (result_of(robot, each).metrics for each in (states, mirrored))
-    assert left.heading_change > 4.0 and left.path_curvature > 3.0
-    assert right.heading_change == pytest.approx(-left.heading_change, rel=1e-12)
-    assert right.path_curvature == pytest.approx(-left.path_curvature, rel=1e-9)
-
-
 def test_the_path_is_written(robot, tmp_path):
     result = result_of(robot, on_a_circle(robot, per_second=-0.5))
     save_result(tmp_path / "result.json", result)

@@ -43,9 +43,6 @@ def gait_file(**changes: object) -> dict[str, object]:
     return {"schema": 2, "name": "mine", "weights": WEIGHTS, "tau_a_s": 0.3} | changes
 
 
-# Files
-
-
 def test_a_gait_file_gives_weights_and_time_constants(tmp_path, scenario):
     shuffled = dict(reversed(WEIGHTS.items()))
     gait = load_gait(write(tmp_path, gait_file(weights=shuffled)), scenario)
@@ -138,9 +135,6 @@ def test_a_saved_gait_of_any_scenario_loads_back(tmp_path, shipped):
     assert load_gait(tmp_path / "gait.json", shipped) == gait
 
 
-# Parameter space
-
-
 def test_a_vector_is_a_gait_in_every_scenario_and_back(shipped):
     space = ParameterSpace.of(shipped)
     assert len(space.names) == len(set(space.names))
@@ -202,9 +196,6 @@ def test_repair_couples_tau_b_unless_it_is_independent(scenario):
     np.testing.assert_array_equal(ParameterSpace.of(scenario).repair(vector), vector)
 
 
-# Random gaits
-
-
 def draw(scenario, seed: int, count: int) -> np.ndarray:
     """Vectors drawn one after the other, (count, parameters)."""
     generator, space = np.random.default_rng(seed), ParameterSpace.of(scenario)
@@ -221,9 +212,6 @@ def test_random_gaits_are_uniform_within_the_bounds(scenario):
     assert np.abs(weights.mean(axis=0) - 2.2).max() < 5 * 0.0155
     assert np.abs(weights.std(axis=0) - 0.693).max() < 0.05
     np.testing.assert_array_equal(vectors[:, TAU_B], 2.0 * taus)
-
-
-# Printing
 
 
 def test_a_printed_gait_has_weights_in_the_row_of_the_inhibited_oscillator(tmp_path, scenario):

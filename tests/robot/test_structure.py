@@ -38,9 +38,6 @@ def tumbling(structure: Structure) -> np.ndarray:
     return disturbed(structure, 0, pose=1.0, speed=1.0)
 
 
-# The tetrahedron
-
-
 def test_struts_of_six_inches_join_all_nodes_base_vertical_and_tip_forward(structure):
     edges = [np.linalg.norm(structure.p_BN[i] - structure.p_BN[j]) for i, j in STRUTS]
     assert edges == pytest.approx([6 * IN] * 6, rel=1e-14)
@@ -83,9 +80,6 @@ def test_a_payload_adds_mass_and_weight_but_no_inertia_about_the_centre(scenario
     assert loaded.model.bodies.inertia == pytest.approx(moments, rel=1e-14)
     assert loaded.structure.p_BN == pytest.approx(structure.p_BN, abs=0.0)
     assert loaded.structure.isotropic
-
-
-# Any number of tetrahedra
 
 
 def test_the_robot_starts_at_rest_on_its_bottom_nodes_evenly_spaced_and_symmetric(row, scenario):
@@ -143,9 +137,6 @@ def test_the_ground_touches_all_bottom_nodes_and_the_lead_tip(row):
     touched = [row.node_names[i] for i in row.contacts]
     bottom = [f"{body} {node}" for body in row.bodies for node in ("bottom_left", "bottom_right")]
     assert touched == [*bottom, f"{row.bodies[-1]} tip"]
-
-
-# The bodies in a plant
 
 
 @pytest.mark.parametrize("name", ["thesis", "prism", "mast"])

@@ -22,8 +22,6 @@ def test_changes_are_checked_converted_and_made_in_a_copy(scenario):
     assert scenario.with_changes({}) == scenario
 
 
-# Balanced spacing
-
 STIFF = "cables: {outer_stiffness: 0.4 lbf/in}"
 
 

@@ -124,8 +124,6 @@ def test_as_many_bumps_stand_as_there_are_squares():
     assert volume == pytest.approx(rows * columns * one, rel=0.02)
 
 
-# Height files
-
 HEIGHTS = np.array([[0.0, 1.0, 2.0, 3.0], [0.5, -1.0, 2.5, 1e-3], [4.0, 5.0, 6.0, 7.0]])
 
 

@@ -86,9 +86,6 @@ def check(in_kernel, width: int, *, expected: Callable[..., tuple], gives_masks:
         assert_same(results.array[k].ravel(), row.astype(float), f"result {k}")
 
 
-# Operators.
-
-
 @register_jitable
 def arithmetic(x, y):
     added, subtracted, multiplied, divided = 1.0 * x, 1.0 * x, 1.0 * x, 1.0 * x  # copies
@@ -120,9 +117,6 @@ def masks(x, y):
     with_scalars = (p & False, True & p, p | False, True | p, p ^ True, False ^ p)
     compared = (*comparisons(x, y), *comparisons(x, -3.7), *comparisons(3, x))
     return (*combined, *with_scalars, *compared)
-
-
-# Functions.
 
 
 def functions(x, y):
@@ -199,9 +193,6 @@ def test_inverse_square_root_is_within_two_units_in_the_last_place(width):
         assert max(errors) < 2.0
 
 
-# Fields.
-
-
 @pytest.mark.parametrize(("any_size", "compilations"), [(False, 2), (True, 1)])
 def test_a_kernel_is_compiled_once_for_all_lengths_that_the_type_does_not_know(
     any_size, compilations
@@ -237,9 +228,6 @@ def test_lanes_may_begin_at_any_double(width, first):
     swap(FieldArray(numbers, width))
     assert_same(numbers, np.arange(2.0 * width).reshape(2, width)[::-1])
     assert memory.sum() == numbers.sum(), "the doubles beside them stay zero"
-
-
-# What numba refuses.
 
 
 def branch_on_a_mask(line, plane):

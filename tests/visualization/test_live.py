@@ -91,13 +91,6 @@ def test_shows_where_the_robot_is(short, meshcat, visitor, monkeypatch):
     assert np.diff(times).max() < 1.0 / FRAMES_PER_SECOND + 0.009
 
 
-def test_other_engines_cannot_be_watched(short, meshcat, refused):
-    compiled = short.with_changes({"engine": "!Compiled"})
-    view = LiveView(meshcat, short)
-    with refused("scenario thesis", "engine", "'compiled'"):
-        simulate(scenario=compiled, gait=seeded_gait(compiled), viewer=view)
-
-
 def test_only_this_machine_can_watch(short):
     told = []
     view = open_view(short, say=told.append)

@@ -7,7 +7,7 @@ import pytest
 from tetra_drake.engines.simulate import simulate
 from tetra_drake.engines.time_limit import time_limit
 from tetra_drake.errors import Diverged, StepBudgetExceeded
-from tetra_drake.robot.gait import load_gait, seeded_gait
+from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.engine_kinds import SHORTEST_STEP, Compiled
 from tetra_drake.scenario.scenario import Scenario
@@ -43,13 +43,6 @@ def test_extreme_settings_come_to_an_end(compiled, setting, value, failure):
 )
 def test_steps_end_sooner_after_a_mode_change_if_the_tolerance_is_finer(tolerance, look_ahead):
     assert Compiled(tolerance=tolerance).look_ahead == look_ahead
-
-
-def test_signals_integrated_with_error_control_are_those_of_the_diagram(compiled, data):
-    # Gait c goes 0.4 in farther than on the listing's signals.
-    compiled = compiled.with_changes({"cpg.signals": "live"})
-    result = simulate(scenario=compiled, gait=load_gait(data / "gait_c.json", compiled))
-    assert result.metrics.distance_in == pytest.approx(2.22, abs=0.05)
 
 
 def test_cables_in_no_order_of_the_bodies_that_they_join_are_refused(scenario, structure):

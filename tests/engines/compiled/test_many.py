@@ -27,7 +27,6 @@ from tetra_drake.results.result import SimulationResult
 from tetra_drake.results.trajectory import Motion
 from tetra_drake.robot.gait import seeded_gait
 from tetra_drake.robot.robot import Robot
-from tetra_drake.robot.signals import signals_at
 from tetra_drake.scenario.actuator_kinds import TensionMotor, Winch
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.scenario import Scenario
@@ -127,22 +126,13 @@ def test_a_gait_walks_alike_in_any_lane_in_any_order_beside_any_neighbours(short
         assert all(same(ending, alone[i]) for i, ending in zip(order, found, strict=True))
 
 
-@pytest.mark.parametrize("workers", [1, 3])
-def test_many_gaits_have_the_results_of_single_ones(short, workers):
-    gaits = [seeded_gait(short, seed) for seed in range(12)]
-    found = simulate_many(scenario=short, gaits=gaits, record=True, workers=workers)
-    for gait, result in zip(gaits, found, strict=True):
-        alone = simulate(scenario=short, gait=gait, record=True)
-        assert without_cost(result) == without_cost(alone)
-        xarray.testing.assert_identical(result.trajectory, alone.trajectory)
-
-
 def without_cost(result: SimulationResult | SimulationFailure) -> SimulationResult:
     assert isinstance(result, SimulationResult)
     return dataclasses.replace(result, wall_time=0.0, recorded=None)
 
 
-def test_every_gait_may_have_a_scenario_of_its_own(short):
+@pytest.mark.parametrize("workers", [1, 3])
+def test_every_gait_may_have_a_scenario_of_its_own(short, workers):
     scenarios = [
         short,
         short.with_changes({"robot.cables.outer_stiffness": "0.21 lbf/in"}),
@@ -154,9 +144,11 @@ def test_every_gait_may_have_a_scenario_of_its_own(short):
         short.with_changes({"robot.gravity": "1.6 m/s^2", "ground.stiffness": "20 lbf/in"}),
     ]
     gaits = [seeded_gait(each, 3) for each in scenarios]
-    found = simulate_many(scenario=scenarios, gaits=gaits, workers=1)
-    alone = [simulate(scenario=s, gait=g) for s, g in zip(scenarios, gaits, strict=True)]
-    assert [without_cost(each) for each in found] == [without_cost(each) for each in alone]
+    found = simulate_many(scenario=scenarios, gaits=gaits, record=True, workers=workers)
+    alone = [simulate(s, g, record=True) for s, g in zip(scenarios, gaits, strict=True)]
+    for ours, theirs in zip(found, alone, strict=True):
+        assert without_cost(ours) == without_cost(theirs)
+        xarray.testing.assert_identical(ours.trajectory, theirs.trajectory)
     assert len({each.metrics.distance for each in alone}) == len(alone), "all of them differ"
 
 
@@ -190,17 +182,6 @@ def test_failures_stand_in_the_place_of_results(short):
         assert each.reason.startswith(reason)
         assert (each.time, each.reason) == (alone.value.time, alone.value.reason)
     assert found[2].time > 0.0 and found[3].metrics == simulate(scenario=short, gait=gait).metrics
-
-
-def test_cables_are_fed_the_signals_of_the_network(short):
-    # The engine computes them as it goes; here they are computed at once.
-    gait = seeded_gait(short)
-    trajectory = simulate(scenario=short, gait=gait, record=True).trajectory
-    times = trajectory.time.values
-    times = times[np.abs(times - short.cpg.start_up) > 1e-9]  # there the signals jump
-    expected = signals_at(Robot.of(short), gait, times)
-    assert np.abs(expected).max() > 1.0, "N"
-    np.testing.assert_allclose(trajectory.signal.sel(time=times), expected, atol=1e-12)
 
 
 def test_scenarios_and_gaits_have_to_fit(short):

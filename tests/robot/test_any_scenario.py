@@ -1,0 +1,74 @@
+"""Every scenario that loads makes a robot, or ends in one line."""
+
+import numpy as np
+import pytest
+
+from tetra_drake.errors import InputError
+from tetra_drake.robot.gait import seeded_gait
+from tetra_drake.robot.robot import Robot
+from tetra_drake.scenario.load import dump_scenario, load_scenario
+
+ANY = {
+    "cpg.signals": ["live", "listing"],
+    "cpg.feedback": [[], ["length"], ["load", "pitch"]],
+    "cpg.reach": [None, 0, 1],
+    "friction": ["!ResetIntegrator", "!Coulomb", "!Coulomb {static: 0.9, lateral: 3}"],
+    "terrain": [
+        "!Flat",
+        "!Incline {slope: 20 deg}",
+        "!Steps {height: 1 cm, depth: 10 cm, count: 3}",
+        "!Rough {amplitude: 1 mm, wavelength: 5 cm}",
+        "!Obstacles {height: 5 mm, radius: 2 cm, spacing: 6 cm}",
+    ],
+    "actuation": [
+        "!Force",
+        "!Winch {max_force: 1 N, max_speed: 1 m/s, time_constant: 1 ms}",
+        "!TensionMotor {max_force: 10 N, max_speed: 1 m/s, time_constant: 20 ms}",
+    ],
+    "engine": ["!Drake", "!Compiled"],
+}
+ROW = {
+    "robot.tetrahedra": [2, 3, 9],
+    "robot.contacts": ["all", "thesis"],
+    "robot.spacing": ["balanced", "1 in", "5 in"],
+    "robot.cables.slack": [True, False],
+    "robot.actuation": [[], [["outer top"]], [["outer bottom_left"], ["outer bottom_right"]]],
+}
+STRUCTURE = {"robot.contacts": ["all"], "robot.actuated": [{}]}
+SCENARIOS = {"thesis": ROW, "turning": ROW, "winch": ROW, "feedback": ROW}
+SCENARIOS |= dict.fromkeys(("prism", "six_bar", "mast", "pair"), STRUCTURE)
+"""Shipped scenarios, with values of what is no number."""
+
+
+def text_of(name, generator):
+    """A scenario file in which some settings and some numbers are others, by up to eight orders of
+    magnitude."""
+    choices = SCENARIOS[name] | ANY
+    keys = generator.choice(list(choices), size=generator.integers(0, 4), replace=False)
+    changes = {key: choices[key][generator.integers(len(choices[key]))] for key in keys.tolist()}
+    scenario = load_scenario(name).with_changes(changes)
+    numbers = scenario.numbers()
+    some = generator.choice(list(numbers), size=generator.integers(0, 4), replace=False).tolist()
+    factors = 10.0 ** generator.uniform(-8.0, 8.0, len(some))
+    factors *= generator.choice([-1.0, 0.0, 1.0, 1.0, 1.0, 1.0], len(some))
+    changed = {key: float(numbers[key] * factor) for key, factor in zip(some, factors, strict=True)}
+    return dump_scenario(scenario.with_numbers(changed))
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_scenario_that_loads_makes_a_robot_or_one_line(name, tmp_path):
+    generator, ends = np.random.default_rng(1), []
+    for _ in range(25):
+        try:
+            (tmp_path / "any.yaml").write_text(text_of(name, generator))
+            scenario = load_scenario(tmp_path / "any.yaml")
+            ends.append("loads")
+            robot = Robot.of(scenario)
+            robot.network(seeded_gait(scenario))
+        except InputError as error:
+            assert len(str(error).splitlines()) == 1
+        else:
+            assert np.isfinite(robot.structure.initial_state).all()
+            assert robot.model.bodies.mass.min() > 0.0
+            ends[-1] = "makes a robot"
+    assert ends.count("makes a robot") > 5
