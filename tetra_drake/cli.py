@@ -429,7 +429,7 @@ def _structure(
     tensions and heights.
 
     Args:
-        unit: the unit of length of a file of NTRT, such as dm
+        unit: unit of length of the file's bare coordinates, such as dm; files of NTRT need it
         out: write an HTML page that shows the structure at rest
         mjcf: write a model for MuJoCo, with its tendons
 

@@ -115,6 +115,29 @@ def test_bodies_nodes_and_cables_of_any_structure_have_names() -> None:
     assert cable.cable_signal.item() == "second"
 
 
+@pytest.mark.parametrize(
+    ("coordinate", "given", "told"),
+    [
+        ("cable_bodies", "T1-T3", "unknown 'T1-T3'; did you mean 'T1-T2'?"),
+        ("node_body", ["T1", "T9", "T10"], "unknown 'T9', 'T10'; expected one of T1, T2"),
+        ("cable_group", ["inner", "middle"], "unknown 'middle'; expected one of outer, inner"),
+        ("oscillator_side", 2, "unknown '2'; expected one of"),
+    ],
+)
+def test_labels_that_a_selection_misses_are_told(coordinate, given, told, refused) -> None:
+    walk = make_walk(bodies=2, duration=0.1)
+    with refused("sel", coordinate, told):
+        walk.sel({coordinate: given})
+
+
+def test_several_names_of_several_cables_each_are_selected() -> None:
+    tension = make_walk(bodies=3, duration=0.1).tension
+    both = tension.sel(cable_group=["inner", "outer"])
+    assert both.identical(tension)
+    bodies = tension.sel(cable_bodies=["T2-T3"]).cable
+    assert bodies.size == tension.cable.size / 2 and all("T2-T3" in name for name in bodies.values)
+
+
 def test_what_is_saved_is_what_is_read(tmp_path: Path) -> None:
     walk = make_walk(bodies=2, duration=0.1)
     save_dataset(walk, tmp_path / "t.nc")

@@ -9,7 +9,7 @@ from pytest import approx
 from tetra_drake.scenario.load import dump_scenario, load_scenario
 from tetra_drake.scenario.robot_structure import StructureFile
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.shipped import shipped_structures
+from tetra_drake.scenario.shipped import STRUCTURES, shipped_structures
 from tetra_drake.scenario.structure_files import read_structure
 
 BAR = """
@@ -131,6 +131,14 @@ def test_a_file_of_ntrt_needs_a_unit(folder: Path) -> None:
     assert given.cables_of_oscillator == {"one": (1,)}
     again = read_structure(folder / "ntrt.yaml", unit="dm")
     assert again.nodes == given.nodes
+
+
+def test_a_unit_is_that_of_bare_coordinates(refused) -> None:
+    in_m, in_dm = read_structure("prism"), read_structure("prism", unit="dm")
+    for node, place in in_m.nodes.items():
+        assert in_dm.nodes[node] == approx([0.1 * x for x in place])
+    with refused(STRUCTURES / "prism.yaml", "unit", "'furlon'"):
+        read_structure("prism", unit="furlon")
 
 
 @pytest.mark.parametrize(

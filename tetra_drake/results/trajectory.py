@@ -118,9 +118,11 @@ def make_dataset(robot: Robot, motion: Motion) -> xarray.Dataset:
 
 
 def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
-    """The dataset with an index of each coordinate, which files do not keep."""
+    """The dataset with an index of each coordinate. Files do not keep indexes."""
+    from tetra_drake.results.label_index import LabelIndex
+
     for name in dataset.coords.keys() - dataset.xindexes.keys():
-        dataset = dataset.set_xindex(str(name))
+        dataset = dataset.set_xindex(str(name), LabelIndex)
     return dataset
 
 

@@ -25,13 +25,16 @@ KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
     """A shipped structure by its name, or that of a structure file or a file of NTRT by its path.
 
-    unit: length of NTRT's unit, such as "dm". Raises InputError that names file and key.
+    unit: unit of length of coordinates without one, such as "dm"; a file of NTRT needs it.
+
+    Raises InputError that names file and key.
     """
     file = structure_file(str(name_or_file), Path())
     if not os.path.exists(file):
         problem = no_such("structure file", str(name_or_file), shipped_structures())
         raise InputError(name_or_file, "", problem)
-    return StructureFile.from_tree(_tree_of_file(file, unit, source=file, key="unit"), file)
+    content = _tree_of_file(file, unit, source=file, key="unit")
+    return StructureFile.from_tree(content | ({"unit": unit} if unit else {}), file)
 
 
 def structure_file(name: str, folder: Path) -> Path:

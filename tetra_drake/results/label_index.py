@@ -1,0 +1,38 @@
+"""An index of labels that repeat, such as the bodies that cables join."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from xarray.core.indexing import IndexSelResult
+from xarray.indexes import PandasIndex
+
+from tetra_drake.errors import InputError
+from tetra_drake.scenario.refusals import hint
+
+
+class LabelIndex(PandasIndex):
+    """Labels along a dimension that has names of its own.
+
+    A dimension's names have xarray's index, as arrays of other indexes cannot be aligned with it.
+    """
+
+    def sel(
+        self, labels: dict[Any, Any], method: str | None = None, tolerance: Any = None
+    ) -> IndexSelResult:
+        """Positions of one label, or of several in a list. Raises InputError for other labels."""
+        ((coordinate, given),) = labels.items()
+        wanted = np.asarray(given)
+        if isinstance(given, slice) or wanted.dtype.kind == "b":
+            return super().sel(labels, method=method, tolerance=tolerance)
+        missing = [str(label) for label in wanted.ravel() if label not in self.index]
+        if missing:
+            unknown = ", ".join(f"'{label}'" for label in missing)
+            problem = (
+                f"found the unknown {unknown}; {hint(missing[0], map(str, self.index.unique()))}"
+            )
+            raise InputError("sel", str(coordinate), problem)
+        if wanted.ndim == 1:
+            return IndexSelResult({self.dim: np.flatnonzero(self.index.isin(wanted))})
+        return super().sel(labels, method=method, tolerance=tolerance)
