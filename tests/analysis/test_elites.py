@@ -6,13 +6,7 @@ from helpers.synthetic_run import tiny_scenario, write_run
 from pandas import DataFrame
 from ribs.archives import GridArchive
 
-from tetra_drake.analysis.elites import (
-    CELLS,
-    chosen,
-    elites,
-    judge_elites,
-    robust,
-)
+from tetra_drake.analysis.elites import CELLS, chosen, elites, judge_elites, robust
 from tetra_drake.analysis.robustness import Judgement
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.quality_diversity import FLOOR

@@ -150,13 +150,7 @@ def test_a_bar_on_a_tension_motor_is_a_linear_system(engine):
     tau = 0.01
     scenario = swaying(TensionMotor(time_constant=tau, **LIMITLESS), damping=DAMPING)
     k, c, m, stretch = STIFFNESS, DAMPING, reduced_mass(scenario), LENGTH - FREE_LENGTH
-    rates = np.array(
-        [
-            [0.0, 1.0, 0.0],
-            [-k / m, -c / m, 1.0 / m],
-            [-k / tau, -c / tau, -1.0 / tau],
-        ]
-    )
+    rates = np.array([[0.0, 1.0, 0.0], [-k / m, -c / m, 1.0 / m], [-k / tau, -c / tau, -1.0 / tau]])
     constant = np.array([0.0, -k * stretch / m, k * stretch / tau])
     start = 0.8 * k * stretch
     t, y = sway(scenario.with_changes({"engine": engine}), start)

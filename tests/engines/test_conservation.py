@@ -26,10 +26,7 @@ FALLING = {
 
 @pytest.mark.parametrize(
     "engine",
-    [
-        Drake(scheme="runge_kutta3", accuracy=1e-9, max_step=1e-3),
-        Compiled(tolerance=1e-7),
-    ],
+    [Drake(scheme="runge_kutta3", accuracy=1e-9, max_step=1e-3), Compiled(tolerance=1e-7)],
     ids=["drake", "compiled"],
 )
 def test_a_falling_robot_keeps_momentum_and_energy(scenario, engine):

@@ -62,10 +62,7 @@ def turned_by_euler(structure: Structure, w_WB: np.ndarray, steps: int = 5_000) 
         q, w = state[:, :4], state[:, 4:]
         spin = np.einsum("bij,bj->bi", inertia, w)
         q_rates = np.column_stack(
-            [
-                -0.5 * (q[:, 1:] * w).sum(axis=1),
-                0.5 * (q[:, :1] * w + np.cross(q[:, 1:], w)),
-            ]
+            [-0.5 * (q[:, 1:] * w).sum(axis=1), 0.5 * (q[:, :1] * w + np.cross(q[:, 1:], w))]
         )
         return np.hstack([q_rates, np.einsum("bij,bj->bi", inverse, np.cross(spin, w))])
 

@@ -18,10 +18,7 @@ from tetra_drake.scenario.engine_kinds import Compiled, Drake
 from tetra_drake.scenario.friction_kinds import Coulomb
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.scenario.terrain_kinds import (
-    Incline,
-    Rough,
-)
+from tetra_drake.scenario.terrain_kinds import Incline, Rough
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 INCH = 0.0254

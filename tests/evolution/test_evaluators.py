@@ -47,13 +47,7 @@ def test_every_task_is_evaluated_once_also_when_workers_are_recycled(tasks, monk
     assert evaluations == {i: Bowl()(task) for i, task in enumerate(tasks)}
 
 
-@pytest.mark.parametrize(
-    ("make", "once"),
-    [
-        (InProcesses, (0, 9)),
-        (on_processes, (0,)),
-    ],
-)
+@pytest.mark.parametrize(("make", "once"), [(InProcesses, (0, 9)), (on_processes, (0,))])
 def test_a_task_whose_worker_dies_is_tried_once_more(tasks, tmp_path, make, once):
     with make(Dying(tmp_path, once=once), 2) as evaluator:
         evaluations = evaluated(evaluator, tasks)

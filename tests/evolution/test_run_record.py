@@ -66,29 +66,16 @@ def test_a_changed_scenario_is_reported(run_small, refused):
         RunRecord.resume(run)
 
 
-ADDED = [
-    ({"disturbances": {"draws": 2, "start": 0.1}}, "disturbances.draws"),
-    ({"objective.lead": "1 /m"}, "objective.lead"),
-    ({"require.clearance": "1 mm"}, "require.clearance"),
-]
-
-
-@pytest.mark.parametrize("has_it", [True, False], ids=["of the run", "of what is given"])
-@pytest.mark.parametrize(("changes", "key"), ADDED)
-def test_a_run_is_not_resumed_with_a_scenario_that_adds_or_lacks_something(
-    tmp_path, refused, changes, key, has_it
-):
-    plain = small_scenario()
-    ours, given = plain.with_changes(changes), plain
-    if not has_it:
-        ours, given = given, ours
-    run = tmp_path / "run"
-    with create(run, ours):
-        pass
-    with refused(run, key, "has" if has_it else "has none"):
-        RunRecord.resume(run, scenario=given)
-    with RunRecord.resume(run, scenario=ours.with_changes({"name": "another"})):
-        pass
+def test_a_run_is_not_resumed_with_a_scenario_that_adds_or_lacks_something(tmp_path, refused):
+    plain, required = small_scenario(), small_scenario().with_changes({"require.clearance": "1 mm"})
+    for ours, given, problem in ((plain, required, "has none"), (required, plain, "has")):
+        run = tmp_path / problem
+        with create(run, ours):
+            pass
+        with refused(run, "require.clearance", problem):
+            RunRecord.resume(run, scenario=given)
+        with RunRecord.resume(run, scenario=ours.with_changes({"name": "another"})):
+            pass
 
 
 def test_no_run_is_resumed_where_there_is_none_and_none_begun_in_a_used_directory(
@@ -98,16 +85,11 @@ def test_no_run_is_resumed_where_there_is_none_and_none_begun_in_a_used_director
         with refused(directory, "", "manifest.json"):
             RunRecord.resume(directory)
     assert not (tmp_path / "none").exists()
-    run = run_small()
+    run, notes = run_small(), tmp_path / "notes.txt"
     before = read_record(run)
-    notes = tmp_path / "notes.txt"
     notes.write_text("mine")
-    for directory, problem in (
-        (run, "--resume"),
-        (tmp_path, "is not empty"),
-        (notes, "is a file"),
-        (notes / "run", "is a file"),
-    ):
+    problems = {run: "--resume", tmp_path: "is not empty", notes: "is a file"}
+    for directory, problem in problems.items() | {(notes / "run", "is a file")}:
         with refused(directory, "", problem):
             create(directory)
     assert read_record(run) == before
@@ -123,17 +105,19 @@ def test_what_a_kill_in_the_first_moment_leaves_is_an_empty_directory(tmp_path):
     assert not leftover.exists() and not heights.exists()
 
 
+HOLDING = """
+import sys
+from pathlib import Path
+from tetra_drake.evolution.run_record import RunRecord
+with RunRecord.resume(Path(sys.argv[1])):
+    print("open", flush=True)
+    sys.stdin.read()
+"""
+
+
 def test_a_second_process_is_refused_until_the_first_ends(run_small):
     run = run_small(population=4, iterations=1)
-    program = (
-        "import sys\n"
-        "from pathlib import Path\n"
-        "from tetra_drake.evolution.run_record import RunRecord\n"
-        "with RunRecord.resume(Path(sys.argv[1])):\n"
-        "    print('open', flush=True)\n"
-        "    sys.stdin.read()\n"
-    )
-    command = [sys.executable, "-c", program, str(run)]
+    command = [sys.executable, "-c", HOLDING, str(run)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout.readline() == b"open\n"
         with pytest.raises(InputError, match="another process is at work"):

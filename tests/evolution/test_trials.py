@@ -2,35 +2,19 @@
 
 import json
 import time
-from concurrent.futures import Future
 
 import numpy as np
 import pytest
 from helpers.analytic import Bowl, RandomSearch, read_record, record_run, small_scenario
 from thinning import last_population
 
-from tetra_drake.evolution.evaluators import InProcesses, OnExecutor
+from tetra_drake.evolution.evaluators import InProcesses
 from tetra_drake.evolution.run import load_run
 from tetra_drake.optimizers.base import Evaluation, Task
 
 
 def lines(path):
     return [json.loads(line) for line in path.read_text().splitlines()]
-
-
-class AtOnce:
-    """An executor that does everything in submit()."""
-
-    def __init__(self, workers):
-        pass
-
-    def submit(self, function, *arguments):
-        future = Future()
-        future.set_result(function(*arguments))
-        return future
-
-    def shutdown(self, wait=True, cancel_futures=False):
-        pass
 
 
 def test_every_evaluation_has_its_line_and_those_of_the_iterations_follow(run_small):
@@ -62,10 +46,8 @@ def test_every_evaluation_has_its_line_and_those_of_the_iterations_follow(run_sm
 def test_neither_workers_nor_executor_nor_timing_change_the_record(run_small, tmp_path):
     reference = read_record(run_small("alone", workers=1))
     assert read_record(run_small("crowd", workers=7, evaluate=Bowl(delay=0.004))) == reference
-    evaluators = {"pool": InProcesses(Bowl(), 2), "plain": OnExecutor(Bowl(), AtOnce, 3)}
-    for name, evaluator in evaluators.items():
-        record_run(tmp_path / name, small_scenario(), evaluator=evaluator)
-        assert read_record(tmp_path / name) == reference
+    record_run(tmp_path / "pool", small_scenario(), evaluator=InProcesses(Bowl(), 2))
+    assert read_record(tmp_path / "pool") == reference
 
 
 def test_trials_differ_and_do_not_depend_on_their_number(run_small):

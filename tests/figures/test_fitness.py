@@ -8,11 +8,7 @@ from helpers.synthetic_run import PER_DISTANCE, write_run
 from matplotlib.container import BarContainer
 
 from tetra_drake.evolution.run import load_run
-from tetra_drake.figures.fitness import (
-    fitness_of_trials,
-    initial_distances,
-    initial_fitness,
-)
+from tetra_drake.figures.fitness import fitness_of_trials, initial_distances, initial_fitness
 
 
 @pytest.fixture

@@ -12,12 +12,7 @@ from helpers.analytic import measures, optimise, small_scenario
 from tetra_drake.optimizers import cma_es, optimizer_of, quality_diversity
 from tetra_drake.optimizers.base import Evaluation
 from tetra_drake.robot.gait import TAU_A, TAU_B, ParameterSpace
-from tetra_drake.scenario.optimizer_kinds import (
-    CmaEs,
-    QualityDiversity,
-    RandomSearch,
-    SteadyState,
-)
+from tetra_drake.scenario.optimizer_kinds import CmaEs, QualityDiversity, RandomSearch, SteadyState
 
 LEARNING = [CmaEs(sample=0), CmaEs(sample=20)]
 DIVERSE = QualityDiversity()

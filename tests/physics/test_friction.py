@@ -106,8 +106,7 @@ def test_slow_slip_is_viscous_and_forgets_the_bristle():
 
 
 @pytest.mark.parametrize(
-    ("v", "factor"),
-    [((0.3, 0.0), 2.0), ((-0.3, 0.0), 3.0), ((0.0, 0.3), 0.5), ((0.0, -0.3), 0.5)],
+    ("v", "factor"), [((0.3, 0.0), 2.0), ((-0.3, 0.0), 3.0), ((0.0, 0.3), 0.5), ((0.0, -0.3), 0.5)]
 )
 def test_directional_factors_are_those_along_and_across_the_heading(v, factor):
     directional = law(forward=2.0, backward=3.0, lateral=0.5)

@@ -16,7 +16,6 @@ from tetra_drake.physics.oscillator import (
     make_neurons,
     network_output,
     neuron_rates,
-    oscillator_output,
     predict_neurons,
 )
 
@@ -38,25 +37,6 @@ def test_rates_are_those_of_equation_7():
     neuron_rates(network, np.array([0.5 + 0.05, 0.5]), neurons)
     np.testing.assert_allclose(neurons[:, U_RATE], [-0.4, -2.6], rtol=1e-14)
     np.testing.assert_allclose(neurons[:, V_RATE], [0.6, -0.6], rtol=1e-14)
-
-
-def test_the_network_rests_where_all_neurons_agree():
-    # With u = v = y = r for all neurons, Eq. 7 and its -u term give
-    # r (1 + 1.5 + 3 w + beta) = u0 for four oscillators with equal weights w.
-    weight, beta, u0 = 2.0, 2.5, 0.5
-    r = u0 / (1.0 + 1.5 + 3.0 * weight + beta)
-    inhibition = 1.5 * np.kron(np.eye(4), 1.0 - np.eye(2))
-    inhibition += weight * np.kron(1.0 - np.eye(4), np.eye(2))
-    neurons = neurons_at(np.full(8, r), np.full(8, r))
-    network = Network.of(inhibition, tau_a=0.3, tau_b=0.6, self_inhibition_weight=beta)
-    neuron_rates(network, np.full(8, u0), neurons)
-    np.testing.assert_allclose(neurons[:, [U_RATE, V_RATE]], 0.0, atol=2e-15)
-
-
-def test_output_counts_only_firing_neurons():
-    output = np.empty(2)
-    oscillator_output(neurons_at([0.4, -0.3, -0.1, 0.2], np.zeros(4)), output)
-    assert output.tolist() == [0.4, -0.2]
 
 
 # While both neurons of this oscillator fire, Eq. 7 is linear, without kinks. Halving the step then
@@ -89,8 +69,7 @@ def by_heun(steps: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("at_the_end", "steps", "order"),
-    [(by_listing, 4, 1), (by_runge_kutta, 4, 4), (by_heun, 8, 2)],
+    ("at_the_end", "steps", "order"), [(by_listing, 4, 1), (by_runge_kutta, 4, 4), (by_heun, 8, 2)]
 )
 def test_integrators_have_their_order(at_the_end, steps, order):
     exact = at_the_end(4096)

@@ -6,14 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tetra_drake.physics.actuator import (
-    DIRECT,
-    DRIVE,
-    DRIVE_COLUMNS,
-    LIMITED,
-    TENSION_MOTOR,
-    WINCH,
-)
+from tetra_drake.physics.actuator import DIRECT, DRIVE, DRIVE_COLUMNS, LIMITED, TENSION_MOTOR, WINCH
 from tetra_drake.physics.cable import CABLE_FORCE_COLUMNS, LENGTH, PASSIVE, TENSION
 from tetra_drake.physics.tally import Tally, observe
 from tetra_drake.simd.allocation import allocate
@@ -62,15 +55,6 @@ def test_a_constant_pull_works_along_the_way_by_which_its_cable_shortens():
     assert tally.effort.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
     result = tallied(TIMES, lengths=1.0 + 0.1 * np.sin(TIMES), signals=np.full(1001, -2.0))
     assert result.effort.work[0] == pytest.approx(2.0 * 0.2, rel=1e-5)
-
-
-def test_a_pull_in_phase_with_the_shortening_does_the_work_of_its_circle():
-    # S = 2 cos t and -dl/dt = 0.1 cos t: the integral of 0.2 cos² over a period.
-    tally = tallied(TIMES, lengths=1.0 - 0.1 * np.sin(TIMES), signals=2.0 * np.cos(TIMES))
-    assert tally.effort.work[0] == pytest.approx(0.2 * math.pi, rel=1e-4)
-    # A quarter of a period apart, 0.2 sin t cos t is positive half of the time: twice 0.2 / 2.
-    apart = tallied(TIMES, lengths=1.0 - 0.1 * np.sin(TIMES), signals=2.0 * np.sin(TIMES))
-    assert apart.effort.work[0] == pytest.approx(0.2, rel=1e-4)
 
 
 def test_the_rate_of_signals_is_integrated_as_its_square():

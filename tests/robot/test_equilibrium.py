@@ -59,11 +59,7 @@ def test_rests_where_the_independent_simulation_does(robot, data):
 )
 def test_a_walk_that_is_not_driven_ends_there(scenario, changes):
     # Feet creep under stiction: an error of 3 mm at the start falls to 2e-7 of a length in 20 s.
-    still = {
-        "cpg.start_up": "100.0 s",
-        "simulation.duration": "20.0 s",
-        "engine": "!Compiled",
-    }
+    still = {"cpg.start_up": "100.0 s", "simulation.duration": "20.0 s", "engine": "!Compiled"}
     scenario = scenario.with_changes(still | changes)
     walk = simulate(scenario=scenario, gait=seeded_gait(scenario, 0), record=True).trajectory
     np.testing.assert_allclose(walk.length[-1], Robot.of(scenario).equilibrium.lengths, rtol=1e-6)

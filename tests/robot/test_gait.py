@@ -111,11 +111,7 @@ def test_a_bad_file_is_refused_with_file_and_key(tmp_path, content, key, found, 
         load_gait(file, scenario)
 
 
-SPACES = {
-    "thesis": {},
-    "turning": {},
-    "feedback": {"gait_bounds.independent_tau_b": True},
-}
+SPACES = {"thesis": {}, "turning": {}, "feedback": {"gait_bounds.independent_tau_b": True}}
 """Shipped scenarios, with changes."""
 
 

@@ -72,9 +72,7 @@ def nested_tetrahedra(spacing: float) -> StructureFile:
     inner = [(3, 4 + i) for i in range(3)]
     second = first + np.array([spacing, 0.0, 0.0])
     return structure(
-        [*first, *second],
-        [*struts, *((4 + a, 4 + b) for a, b in struts)],
-        outer + inner,
+        [*first, *second], [*struts, *((4 + a, 4 + b) for a, b in struts)], outer + inner
     )
 
 

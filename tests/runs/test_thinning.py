@@ -39,11 +39,7 @@ TRIALS = [
 
 def metrics_of(trial, i, fitness):
     """More metrics than a synthetic run has."""
-    special = {
-        ALONE: (0.1, 0.45),
-        EDGE: (1.00001 / 3.0, 0.59),
-        BEYOND: (0.5, 0.59),
-    }
+    special = {ALONE: (0.1, 0.45), EDGE: (1.00001 / 3.0, 0.59), BEYOND: (0.5, 0.59)}
     index, lifted = special.get(i if trial == 0 else -1, (0.9, 0.5))
     numbers = {"travelling_index": index, "lifted": lifted, "twist": 0.1 + fitness / 70.0}
     return numbers | {"lateral_drift": -1e-17, "clearance": 1.0}

@@ -335,12 +335,7 @@ BAD = [
     ("robot: &own {cables: *own}", "", "alias of what holds it"),
     ("terrain: !Rough {amplitude: 1 in, wavelength: 1 um}", "terrain.wavelength", "5e-07 m"),
     ("terrain: !Steps {height: 1 in, depth: 0.1 um, count: 2}", "terrain.depth", "4000000"),
-    ("objective: {}", "objective", "at least 1"),
-    ("disturbances: {spreads: {}}", "disturbances.draws", "missing"),
-    ("optimizer: !CmaEs {population: 3}", "optimizer.population", "3"),
     (f"robot: {{payload: [{'1 g,' * 7}]}}", "robot.payload", "found 7 items"),
-    ("optimizer: !QualityDiversity {cells: [9, 1]}", "optimizer.cells[1]", "1"),
-    ("optimizer: !QualityDiversity {measures: {twist: [0 m, 1 m]}}", "optimizer.measures", "1"),
     (
         "optimizer: !QualityDiversity {measures: {lifted: [0, 1], tension: [1 lbf, 0 lbf]}}",
         "optimizer.measures.tension",

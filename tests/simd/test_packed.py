@@ -56,15 +56,6 @@ def test_a_kernel_gets_all_that_is_packed(flag, flips):
     assert gather_sums(parts, x) == sign * total + 7
 
 
-def test_a_kernel_sees_what_is_written_to_the_arrays_later():
-    parts, x = parts_of(), np.array([1.0])
-    packed = Packed(parts)
-    call = machine_code(gather_sums, packed, x)
-    before = call(packed, x)
-    parts[0].inner.weights[:] *= 2.0
-    assert call(packed, x) - 7 == 2.0 * (before - 7)
-
-
 def test_robots_of_any_size_share_machine_code():
     x = np.array([1.0])
     codes = {machine_code(gather_sums, Packed(parts_of(rows=rows)), x) for rows in (1, 2, 5)}

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 
 from tetra_drake.physics.oscillator import (
     NEURON_COLUMNS,
@@ -62,17 +61,3 @@ def test_derivatives_are_the_laws_with_what_is_connected(network, cpg, feedback,
     neuron_rates(network, inputs, neurons)
     expected = np.concatenate([neurons[:, U_RATE], neurons[:, V_RATE]])
     np.testing.assert_array_equal(cpg.EvalTimeDerivatives(context).CopyToVector(), expected)
-
-
-@pytest.mark.parametrize("oscillators", [1, 7])
-def test_takes_any_number_of_oscillators_and_a_matrix_of_ones_own(oscillators):
-    inhibition = np.kron(np.eye(oscillators), 1.5 * (1.0 - np.eye(2)))
-    inhibition += np.kron(1.5 * (1.0 - np.eye(oscillators)), np.eye(2))
-    taus = {"tau_a": 0.3, "tau_b": 0.6}
-    network = Network.of(inhibition, **taus, self_inhibition_weight=2.5)
-    start = np.append(np.full(2 * oscillators, 0.3), np.tile([0.1, 0.5], oscillators))
-    simulator = Simulator(MatsuokaCpg(network, tonic=0.5, initial_state=start))
-    simulator.AdvanceTo(1.0)
-    signals = simulator.get_system().GetOutputPort("signals").Eval(simulator.get_context())
-    assert signals.shape == (oscillators,)
-    np.testing.assert_allclose(signals, signals[0], rtol=1e-6, err_msg="all alike, all in phase")

@@ -82,8 +82,7 @@ def film_of(page):
 
 
 @pytest.mark.parametrize(
-    ("samples", "period", "frames"),
-    [(1501, 0.01, 376), (11, 0.1, 11), (1, 1, 1)],
+    ("samples", "period", "frames"), [(1501, 0.01, 376), (11, 0.1, 11), (1, 1, 1)]
 )
 def test_frames_are_evenly_spread_over_the_samples(samples, period, frames):
     chosen = frame_samples(period * np.arange(samples))

@@ -55,12 +55,3 @@ def test_a_row_of_bodies_fills_nothing_in():
     schedule = Schedule.of(*GRAPHS["row"])
     assert schedule.count.tolist() == [1, 1, 1, 1, 0]
     assert schedule.width == 2 * BLOCK
-
-
-def test_elimination_couples_the_neighbours_of_a_body():
-    # In a ring, body 0 couples 1 and 5, then 1 couples 2 and 5, and so on.
-    schedule = Schedule.of(*GRAPHS["ring"])
-    assert [schedule.later[i, : schedule.count[i]].tolist() for i in range(6)] == [
-        [1, 5], [2, 5], [3, 5], [4, 5], [5], [],
-    ]  # fmt: skip
-    assert schedule.column_of(1, 5) == 2 * BLOCK
