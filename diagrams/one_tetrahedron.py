@@ -95,16 +95,15 @@ def start_axes(structure: Structure) -> np.ndarray:
     return RotationMatrix(Quaternion(structure.q_WB[0])).matrix().T
 
 
-def make_diagram(scenario: Scenario, *, witness: bool = True) -> Diagram:
-    """The tetrahedron and the ground under it, with logs of their outputs; without `witness`, modes
-    change at the ends of steps only."""
+def make_diagram(scenario: Scenario) -> Diagram:
+    """The tetrahedron and the ground under it, with logs of their outputs."""
     tetrahedron = make_standing_tetrahedron(scenario)
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("plant", MultibodyPlant(time_step=0.0))
     AddBodies(plant, tetrahedron.structure)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scenario.robot.gravity])
     plant.Finalize()
-    ground = builder.AddNamedSystem("ground", GroundContact(tetrahedron, witness=witness))
+    ground = builder.AddNamedSystem("ground", GroundContact(tetrahedron, witness=True))
 
     state, force = plant.get_state_output_port(), ground.GetOutputPort("generalized_force")
     builder.Connect(state, ground.GetInputPort("state"))
