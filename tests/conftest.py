@@ -15,7 +15,7 @@ from tetra_drake.robot.structure import Structure
 from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.scenario import Scenario
 
-Refused = Callable[[object, str, str], contextlib.AbstractContextManager[None]]
+Refused = Callable[..., contextlib.AbstractContextManager[None]]
 
 
 ORDER = (
@@ -84,18 +84,18 @@ def data() -> Path:
 
 @pytest.fixture(scope="session")
 def refused() -> Refused:
-    """refused(source, key, problem): a block that must end with an InputError whose message is
-    one line, names source and key, and contains `problem`."""
+    """refused(source, key, fact, ...): a block that must end with an InputError whose message is
+    one line, names source and key, and contains the facts."""
 
     @contextlib.contextmanager
-    def block(source: object, key: str, problem: str) -> Iterator[None]:
+    def block(source: object, key: str, *facts: str) -> Iterator[None]:
         with pytest.raises(InputError) as caught:
             yield
         error = caught.value
         assert (error.source, error.key) == (str(source), key)
         source = str(source).replace("\0", r"\x00")
         assert str(error).startswith(f"{source}: {key}: " if key else f"{source}: ")
-        assert problem in str(error)
+        assert all(fact in str(error) for fact in facts), str(error)
         assert len(str(error).splitlines()) == 1
 
     return block

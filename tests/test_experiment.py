@@ -12,12 +12,10 @@ import tetra_drake
 from tetra_drake import cli
 from tetra_drake.errors import InputError
 from tetra_drake.evolution.evaluators import OnExecutor
-from tetra_drake.evolution.manifest import read_manifest
 from tetra_drake.evolution.progress import Progress
 from tetra_drake.evolution.reevaluation import reevaluate
 from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.optimizers.steady_state import SteadyState
-from tetra_drake.scenario.load import load_scenario
 from tetra_drake.scenario.optimizer_kinds import CmaEs
 from tetra_drake.scenario.terrain_kinds import Steps
 
@@ -325,20 +323,6 @@ def evolve(monkeypatch, reports):
     for module in ("experiment", "evolution.reevaluation"):
         monkeypatch.setattr(f"tetra_drake.{module}.evaluator_of", lambda *_, **__: in_threads())
     return lambda *options: cli.main(["evolve", *map(str, options)])
-
-
-def test_the_command_runs_the_first_look_with_its_options(evolve, tmp_path, capsys, reports):
-    out = tmp_path / "runs" / "demo"
-    assert evolve(*SMALL, "--out", out, "--seed", 4) == 0
-    manifest = read_manifest(out)
-    assert manifest.seed == 4
-    quick = load_scenario("quick")
-    assert manifest.scenario == quick.with_changes({"evolution.evaluations": 18})
-    assert load_scenario(out / "scenario.yaml") == manifest.scenario
-    assert reports == [out]
-    printed = capsys.readouterr().out
-    for text in (f"{out}/report.html", f"{out}/replay.html"):
-        assert text in printed
 
 
 def test_a_switch_leaves_out_the_diagram_at_the_end(evolve, tmp_path, monkeypatch):

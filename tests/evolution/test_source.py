@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from helpers.synthetic_run import tiny_scenario, write_run
 
-from tetra_drake.cli import main
 from tetra_drake.evolution.run import load_run
 from tetra_drake.evolution.source import load_source
 from tetra_drake.robot.gait import save_gait
@@ -45,18 +44,3 @@ def test_another_scenario_than_the_gaits_is_said_once_with_both_names(run, tmp_p
         assert load_source(source, scenario=str(other), warn=told.append).scenario.name == "other"
     assert len(told) == 3
     assert all("tiny" in text and "other" in text for text in told)
-
-
-def test_commands_take_a_run_for_its_best_gait_and_warn_in_one_line(run, tmp_path, capsys):
-    assert main(["cpg", "--gait", str(run), "--out", str(tmp_path / "run.csv")]) == 0
-    assert capsys.readouterr().err == ""
-    three = tmp_path / "three.yaml"
-    three.write_text(
-        "base: thesis\nname: three\nrobot: {tetrahedra: 3}\nsimulation: {duration: 4 s}"
-    )
-    command = ["cpg", "--gait", str(run), "--scenario", str(three)]
-    assert main([*command, "--out", str(tmp_path / "three.csv")]) == 0
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "tiny" in line and "three" in line
-    short, long = ((tmp_path / f"{name}.csv").read_text().count("\n") for name in ("run", "three"))
-    assert 0 < short < long

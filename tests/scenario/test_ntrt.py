@@ -189,13 +189,11 @@ def test_nested_substructures_builders_and_paths_of_nodes(tmp_path: Path) -> Non
         ("substructures: {v: {path: my.yaml}}", "substructures", "itself"),
     ],
 )
-def test_problems_name_file_key_and_facts(text: str, key: str, fact: str, tmp_path: Path) -> None:
+def test_problems_name_file_key_and_facts(text, key, fact, tmp_path, refused) -> None:
     write(tmp_path, VERTEBRA, "vertebra.yaml")
     file = write(tmp_path, text)
-    with pytest.raises(InputError) as caught:
+    with refused(file, key, fact):
         read(file)
-    assert (caught.value.source, caught.value.key) == (str(file), key)
-    assert fact in caught.value.problem
 
 
 ROD = "pair_groups.rod[0]"
@@ -229,12 +227,10 @@ def test_a_substructure_may_have_no_nodes(tmp_path: Path) -> None:
     assert given.struts["rod"].diameter == pytest.approx(0.4)
 
 
-def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path) -> None:
+def test_a_problem_of_a_substructure_names_its_file(tmp_path: Path, refused) -> None:
     part = write(tmp_path, VERTEBRA.replace("left:", "lleft:"), "vertebra.yaml")
-    with pytest.raises(InputError) as caught:
+    with refused(part, "pair_groups.rod[3]"):
         read(write(tmp_path, SPINE))
-    assert (caught.value.source, caught.value.key) == (str(part), "pair_groups.rod[3]")
     part.unlink()
-    with pytest.raises(InputError) as caught:
+    with refused(part, ""):
         read(write(tmp_path, SPINE))
-    assert caught.value.source == str(part)

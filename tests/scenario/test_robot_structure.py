@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tetra_drake.errors import InputError
 from tetra_drake.scenario.changes import merged
 from tetra_drake.scenario.robot_structure import MOST_NODES, MOST_PAIRS, Member, StructureFile
 from tetra_drake.scenario.section import Tree, written
@@ -130,40 +129,33 @@ def test_shipped_structures(name, first, bodies, cables, oscillators) -> None:
         ("actuated: {to left: [side c d]}", "actuated.to left", ["blanks"]),
     ],
 )
-def test_problems_name_key_and_facts(changes: str, key: str, facts: list[str]) -> None:
-    with pytest.raises(InputError) as caught:
+def test_problems_name_key_and_facts(changes: str, key: str, facts: list[str], refused) -> None:
+    with refused("my.yaml", key, *facts):
         structure(changes)
-    assert (caught.value.source, caught.value.key) == ("my.yaml", key)
-    for fact in facts:
-        assert fact in caught.value.problem
 
 
 BOMB = "- &b0 [1]\n" + "\n".join(f"- &b{i} [{f'*b{i - 1}, ' * 9}]" for i in range(1, 13))
 
 
-def test_a_coordinate_that_is_a_list_without_end_is_refused_at_once() -> None:
+def test_a_coordinate_that_is_a_list_without_end_is_refused_at_once(refused) -> None:
     """By YAML's aliases a short text is a list of 9^12 numbers."""
     *_, lists = parse_yaml(BOMB, "my.yaml")
     tree = parse_yaml(FILE, "my.yaml")
     tree["nodes"]["d"] = [lists, 0, 0]
-    with pytest.raises(InputError) as caught:
+    with refused("my.yaml", "nodes.d[0]"):
         StructureFile.from_tree(tree, "my.yaml")
-    assert caught.value.key == "nodes.d[0]"
 
 
-def test_nodes_with_units_need_no_unit_and_bare_ones_do(tmp_path: Path) -> None:
+def test_nodes_with_units_need_no_unit_and_bare_ones_do(tmp_path: Path, refused) -> None:
     file = tmp_path / "my.yaml"
     file.write_text(FILE.replace("unit: cm", ""))
-    with pytest.raises(InputError) as caught:
+    with refused(file, "nodes.g[0]"):
         read_structure(file)
-    assert (caught.value.source, caught.value.key) == (str(file), "nodes.g[0]")
 
 
-def test_limits() -> None:
+def test_limits(refused) -> None:
     many = [f"n{i}" for i in range(MOST_NODES)]
-    with pytest.raises(InputError) as caught:
+    with refused("my.yaml", "nodes"):
         structure(f"nodes: {{{': [0, 0, 0], '.join(many)}: [0, 0, 0]}}")
-    assert caught.value.key == "nodes"
-    with pytest.raises(InputError) as caught:
+    with refused("my.yaml", "cables.side.pairs"):
         structure(f"cables: {{side: {{pairs: {[['b', 'd']] * (MOST_PAIRS + 1)}}}}}")
-    assert caught.value.key == "cables.side.pairs"

@@ -1,13 +1,14 @@
-"""The wiring of the robot's diagram."""
+"""The wiring of the robot's diagram, and cables as a system."""
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
-from tetra_drake.systems import MatsuokaCpg
+from tetra_drake.systems import CableNetwork, MatsuokaCpg
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
 
@@ -37,3 +38,13 @@ def test_the_friction_brings_no_continuous_state(scenario, robot, gait):
     live = MakeTensegrityDiagram(live, gait)
     assert isinstance(live.GetSubsystemByName("cpg"), MatsuokaCpg)
     assert live.CreateDefaultContext().num_continuous_states() == 13 * 5 + 4 * 4
+
+
+@pytest.mark.parametrize(("slack", "least"), [(True, 0.0), (False, -97.4)])
+def test_slack_cables_do_not_push(scenario, slack, least):
+    robot = Robot.of(scenario.with_changes({"robot.cables.slack": slack}))
+    cables = CableNetwork(robot)
+    context = cables.CreateDefaultContext()
+    cables.GetInputPort("state").FixValue(context, robot.structure.initial_state)
+    cables.GetInputPort("signals").FixValue(context, np.full(4, -100.0))
+    assert cables.GetOutputPort("tensions").Eval(context).min() == pytest.approx(least, abs=0.1)
