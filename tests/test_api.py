@@ -118,6 +118,12 @@ def test_a_run_stands_for_its_scenario_and_its_best_gait():
     assert td.seeded_gait(run, 3) == td.seeded_gait(run.scenario, 3)
 
 
+def test_a_folder_in_the_place_of_a_gait_says_how_its_best_gait_is_had():
+    with pytest.raises(InputError) as caught:
+        td.simulate("runs/demo", "runs/demo")
+    assert caught.value.source == "runs/demo" and "load_run('runs/demo')" in caught.value.problem
+
+
 def test_sweep_takes_a_single_value_and_a_run():
     run = td.load_run("runs/demo")
     swept = td.sweep(run, run, {"robot.cables.outer_stiffness": "35 N/m"})

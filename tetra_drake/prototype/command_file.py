@@ -81,6 +81,8 @@ def _cells(text: str, wanted: Sequence[str], path: str | Path) -> pandas.DataFra
         heading, *rows = csv.reader(io.StringIO(text.rstrip()), strict=True)
     except (csv.Error, ValueError) as error:  # an empty file, too
         raise InputError(path, "", "is no table with commas between cells") from error
+    if set(heading).isdisjoint(wanted):  # the file may be any, so nothing of it is shown
+        raise InputError(path, "", f"has no column of a command; {hint('', wanted)}")
     for name in [*heading, *wanted]:
         if name not in wanted:
             raise InputError(path, name, f"is no column of this robot; {hint(name, wanted)}")

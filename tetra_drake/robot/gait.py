@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from numbers import Integral
@@ -276,6 +277,8 @@ def given_gait(gait: GivenGait, scenario: Scenario) -> Gait:
     if isinstance(gait, Gait):
         return gait
     if isinstance(gait, (str, Path)):
+        if os.path.isdir(gait):
+            raise InputError(gait, "", f"is a directory; give a gait file, or load_run('{gait}')")
         return load_gait(gait, scenario)
     if hasattr(gait, "best_gait"):
         return gait.best_gait()
