@@ -195,14 +195,16 @@ def test_a_height_file_is_sought_beside_the_scenario_that_names_it(tmp_path, mon
 
 
 def test_fields_are_equal_if_their_heights_are_wherever_they_were_read(tmp_path):
-    names = "one.npy", "same.csv", "other.npy"
-    for name, heights in zip(names, (HEIGHTS, HEIGHTS, HEIGHTS + 1e-12), strict=True):
+    names = "one.npy", "same.csv", "other.npy", "turned.npy"
+    fields = HEIGHTS, HEIGHTS, HEIGHTS + 1e-12, HEIGHTS.reshape(4, 3)
+    for name, heights in zip(names, fields, strict=True):
         write_heights(tmp_path / name, heights)
-    one, same, other = (on_field(tmp_path / name) for name in names)
+    one, same, *others = (on_field(tmp_path / name) for name in names)
     assert one == same and hash(one) == hash(same) and one.differences(same) == []
-    assert one != other
-    [(key, text)], [(_, other_text)] = one.differences(other), other.differences(one)
-    assert key == "terrain.file" and text != other_text
+    for other in others:
+        assert one != other
+        [(key, text)], [(_, other_text)] = one.differences(other), other.differences(one)
+        assert key == "terrain.file" and text != other_text
     assert load_scenario(scenario_file(tmp_path, one.to_yaml(), base="thesis")) == one
 
 
