@@ -6,9 +6,9 @@ import functools
 import re
 from typing import Any
 
-_LONGEST, _QUOTED, _LONGEST_PATH = 300, 80, 4096
-"""Largest number of characters of key and problem, of a quotation if they have more, and of a
-source."""
+_LONGEST, _QUOTED, _CUT, _LONGEST_PATH = 300, 80, 200, 4096
+"""Largest number of characters of key and problem; if they have more, of a key or a quotation, and
+of a problem; of a source."""
 
 
 class InputError(ValueError):
@@ -32,7 +32,7 @@ def _shortened(problem: str) -> str:
     """The problem with long quotations cut. A quotation may be a whole file."""
     problem = re.sub(rf"'([^']{{{_QUOTED}}})[^']+'", r"'\1 ...'", problem)
     problem = re.sub(rf"([^\s']{{{_QUOTED}}})[^\s']+", r"\1 ...", problem)
-    return _cut(problem, _LONGEST - _QUOTED)
+    return _cut(problem, _CUT)
 
 
 def _one_line(text: str) -> str:

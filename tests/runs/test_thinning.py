@@ -17,6 +17,7 @@ from tetra_drake.evolution.run_record import RunRecord
 from tetra_drake.evolution.source import load_source
 from tetra_drake.report.summary import run_text
 from tetra_drake.scenario.optimizer_kinds import QualityDiversity
+from tetra_drake.scenario.terrain_kinds import HeightField
 
 AGAIN, ALONE, EDGE, BEYOND = range(20, 24)
 """Evaluations that nothing else makes matter: reevaluated; alone in its cell of the map, and one
@@ -50,7 +51,9 @@ def runs(tmp_path_factory):
     """A run, and the same thinned."""
     folder = tmp_path_factory.mktemp("runs")
     kind = QualityDiversity(cells=[3, 3])
-    changes = {"optimizer": kind, "engine": "!Compiled"}
+    np.save(folder / "level.npy", np.zeros((11, 11)))
+    field = HeightField(file=str(folder / "level.npy"), cell=0.5)
+    changes = {"optimizer": kind, "engine": "!Compiled", "terrain": field}
     metrics = {
         fitness: metrics_of(number, i, fitness)
         for number, trial in enumerate(FITNESS)
