@@ -19,13 +19,13 @@ def test_little_is_quoted_of_what_is_long(problem, kept):
     error = InputError(LONG[:4000], LONG, problem)
     place, key, told = str(error).split(": ")
     assert place == LONG[:4000]
-    assert key == f"{LONG[:80]} ..."
-    assert len(f"{key}: {told}") <= 300 and kept in told
+    assert key == f"{LONG[:60]} ..."
+    assert len(f"{key}: {told}") <= 270 and kept in told
     assert " ".join(error.problem.split()) == told
 
 
 def test_a_usual_problem_is_told_in_full():
-    problem = f"found '{LONG[:180]}', expected one of " + ", ".join(f"name_{i}" for i in range(9))
+    problem = f"found '{LONG[:150]}', expected one of " + ", ".join(f"name_{i}" for i in range(9))
     assert str(InputError("a.yaml", "key", problem)) == f"a.yaml: key: {problem}"
 
 

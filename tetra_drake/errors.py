@@ -6,7 +6,7 @@ import functools
 import re
 from typing import Any
 
-_LONGEST, _QUOTED, _CUT, _LONGEST_PATH = 300, 80, 200, 4096
+_LONGEST, _QUOTED, _CUT, _LONGEST_PATH = 270, 60, 200, 4096
 """Largest number of characters of key and problem; if they have more, of a key or a quotation, and
 of a problem; of a source."""
 
