@@ -28,8 +28,8 @@ LEAST_FORCE = 1e-9
 MOST_STEPS, LEAST_STEPS = 1000, 10
 """Upper limit of the steps of a search, for few bodies and for as many as a structure can have."""
 
-MOST_WORK = 5e10
-"""Upper limit of steps times the cube of their unknowns, between these: a minute or so."""
+MOST_WORK = 2e11
+"""Upper limit of steps times the cube of their unknowns, between these: two minutes or so."""
 
 FIRST_REACH, LONGEST_REACH = 0.05, 0.2
 """Largest step of Newton's method for a body, as a share of its radius."""
