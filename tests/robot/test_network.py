@@ -88,7 +88,7 @@ def test_what_is_sensed_is_relative_to_the_robot_at_rest(scenario):
     assert senses.drivers[6:12].tolist() == [2, 2, -1, -1, -1, 3]
     assert senses.ahead.tolist() == [1, 1, 2, 2, 3, 3, 4, 4]
     driven = senses.drivers >= 0
-    per_cable = (senses.per_length * senses.settled)[driven]
+    per_cable = (senses.per_length * senses.neutral_length)[driven]
     np.testing.assert_allclose(per_cable, [0.5, 0.5, 1.0] * 4, rtol=1e-14)
     # Five tetrahedra of 20.29 g weigh 5 * 0.02029 kg * 9.80665 m/s^2 = 0.9949 N.
     assert 1.0 / senses.per_load[0] == pytest.approx(0.9949, rel=1e-3)

@@ -1,4 +1,4 @@
-"""The engine `drake`: one gait through one Drake diagram, with error-controlled integration."""
+"""Engine `drake`: one gait in one Drake diagram, with error-controlled integration."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from tetra_drake.scenario.common_sections import SimulationSection
 from tetra_drake.scenario.engine_kinds import Drake
 from tetra_drake.systems.diagram import MakeTensegrityDiagram
 
-_WITNESS_WINDOW = 2e-5  # s: how closely a witness localises, where the accuracy is 1e-3 or more
-_WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; how Drake's Simulator derives the isolation window
+_WITNESS_WINDOW = 2e-5  # s; precision of witnessed mode changes for accuracies of 1e-3 and above
+_WITNESS_WINDOW_PER_ACCURACY = 0.01  # s; Drake's isolation window is this times the accuracy
 
 _NEAR = 1e-3
-"""Time (s) to a mode change from which on a step aims at it."""
+"""Largest time (s) to a mode change for which a step ends at the change."""
 _AIM_FACTOR = 1.02
 _AIM_BEYOND = 5e-5
-"""A step aims at this factor of the time to a mode change, and this time (s) beyond it."""
+"""Length of a step that ends at a mode change: the time to it, times a factor, plus a time (s)."""
 _APPROACH = 0.8
 """Share of the time to a farther mode change that a step takes."""
 _FIRST_STEP = 3e-4
@@ -40,7 +40,7 @@ _RENEW_FROM = 8e-4
 
 
 class DrakeEngine(Engine):
-    """The Drake diagram, one gait at a time."""
+    """Engine that simulates the Drake diagram, one gait at a time."""
 
     can_be_watched = True
 
@@ -66,7 +66,7 @@ class DrakeEngine(Engine):
         sampler = Sampler(diagram, times, max_step=engine.max_step)
 
         def after_step(context: Context) -> None:
-            # What is done here must not depend on whether somebody records or watches.
+            # Nothing here may change the simulation, whether it is recorded or watched or not.
             check_time()
             bodies, now = state.Eval(context), context.get_time()
             velocities = bodies[7 * len(robot.structure.bodies) :]
@@ -74,7 +74,7 @@ class DrakeEngine(Engine):
             aimer.aim(context, velocities)
             sampler.after_step(context)
             observer.add(now, bodies, signals.Eval(context), drives_at(context))
-            if now == start_up and robot.structure.signals:  # its event comes after this step
+            if now == start_up and robot.structure.signals:  # the event is after this step
                 cpg = diagram.GetSubsystemByName("cpg")
                 begun = cpg.get_output_port(0).Eval(cpg.GetMyContextFromRoot(context))
                 observer.add(now, bodies, begun, drives_at(context))
@@ -89,7 +89,7 @@ class DrakeEngine(Engine):
         except SimulationFailure:
             raise
         except RuntimeError as error:
-            # Drake's own reasons: a step below the least, a state that is not finite.
+            # Errors of Drake: the step became too small, or the state is not finite.
             now, reason = simulator.get_context().get_time(), str(error).strip()
             raise Diverged(time=now, reason=reason.splitlines()[0]) from error
         wall_time = time.perf_counter() - started
@@ -113,7 +113,7 @@ class DrakeEngine(Engine):
 
 
 def MakeSimulator(diagram: Diagram, settings: Drake) -> Simulator:
-    """A simulator of the diagram with the scenario's integrator settings."""
+    """Simulator of a diagram with the scenario's integrator settings."""
     simulator = Simulator(diagram)
     integrator = ResetIntegratorFromFlags(simulator, settings.scheme, settings.max_step)
     integrator.set_target_accuracy(settings.accuracy)
@@ -124,14 +124,16 @@ def MakeSimulator(diagram: Diagram, settings: Drake) -> Simulator:
 
 
 class _Work:
-    """Work of an integrator, including what it forgets when it is initialised again."""
+    """Counter of an integrator's work. An integrator that is initialised again begins at zero;
+    this counter does not."""
 
     def __init__(self, integrator: IntegratorBase) -> None:
         self._integrator = integrator
         self._before = (0, 0, 0)
 
     def total(self) -> tuple[int, int, int]:
-        """Steps, derivative evaluations, and those of them for Jacobians."""
+        """Numbers of steps, of derivative evaluations, and of derivative evaluations for
+        Jacobians."""
         statistics = dict(self._integrator.GetStatisticsSummary())
         for_jacobian = int(statistics.get("integrator_num_derivative_evaluations_for_jacobian", 0))
         steps, _, jacobian = self._before
@@ -142,11 +144,11 @@ class _Work:
         )
 
     def derivative_evaluations(self) -> int:
-        """The second of total()."""
+        """Number of derivative evaluations."""
         return self._before[1] + self._integrator.get_num_derivative_evaluations()
 
     def keep(self) -> None:
-        """Call it before the integrator is initialised again."""
+        """Adds the work so far. Call it before the integrator is initialised again."""
         self._before = self.total()
 
 
@@ -163,7 +165,7 @@ def _check(settings: SimulationSection, now: float, velocities: np.ndarray, work
 
 
 class _StepAimer:
-    """Chooses the longest next step, by the time to the next mode change.
+    """Chooses the largest allowed length of the next step, by the time to the next mode change.
 
     | mode change             | longest step                                                    |
     |-------------------------|-----------------------------------------------------------------|
@@ -175,9 +177,9 @@ class _StepAimer:
     The prediction uses the mean acceleration of the last step, which costs nothing. The present
     acceleration is no better: the vibrations after a mode change decay at rates of 1e4 /s.
 
-    A mode change also changes the Jacobian. The integrator would keep the old one while its Newton
-    iterations converge, slowly and with an error of one sign. So it gets a new one, unless the
-    next step is shorter than _RENEW_FROM.
+    A mode change also changes the Jacobian. The integrator would keep the old one as long as
+    Newton's iterations converge, slowly and with an error of one sign. So we renew the Jacobian,
+    unless the next step is shorter than _RENEW_FROM.
     """
 
     def __init__(
@@ -190,7 +192,7 @@ class _StepAimer:
         self._aims = (
             settings.mode_changes == "step_end"
             and settings.look_ahead > 0.0
-            and settings.scheme == "radau3"  # stability keeps the steps of the other one short
+            and settings.scheme == "radau3"  # other schemes take short steps anyway
         )
         self._last_time = 0.0
         size = simulator.get_context().get_continuous_state().num_v()
@@ -199,7 +201,7 @@ class _StepAimer:
         self._jacobian_is_old = False
 
     def aim(self, context: Context, velocities: np.ndarray) -> None:
-        """Limits the next step; call it after each step."""
+        """Limits the length of the next step. Call it after each step."""
         if not self._aims:
             return
         step_taken = context.get_time() - self._last_time
@@ -220,7 +222,7 @@ class _StepAimer:
         self._integrator.set_maximum_step_size(step)
 
     def _step_towards(self, time_to_change: float) -> float:
-        """The step (s) towards a mode change that is predicted in a time (s)."""
+        """Length (s) of the step to a mode change that is predicted after `time_to_change` (s)."""
         look_ahead = self._settings.look_ahead
         if _NEAR < time_to_change < self._settings.max_step:
             return _APPROACH * time_to_change
@@ -229,7 +231,7 @@ class _StepAimer:
 
     def _renew_jacobian(self) -> None:
         self._work.keep()
-        # Its initial step, which is the longest, must be allowed then.
+        # Initialize() needs a limit that allows the initial step, which is the longest.
         self._integrator.set_maximum_step_size(self._settings.max_step)
         self._integrator.Initialize()
         self._jacobian_is_old = False

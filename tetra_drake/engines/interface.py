@@ -1,4 +1,4 @@
-"""The interface of all engines, and the engine that a scenario names."""
+"""Interface of all engines; lookup of a scenario's engine."""
 
 from __future__ import annotations
 
@@ -20,45 +20,44 @@ if TYPE_CHECKING:
     from tetra_drake.engines.compiled.lane_pool import LanePool
 
 _BRIEF = 0.01
-"""Duration (s) of a simulation that only compiles."""
+"""Duration (s) of a simulation whose only purpose is to compile the kernels."""
 
 Outcome = SimulationResult | SimulationFailure
-"""The result of a simulation, or the Diverged or StepBudgetExceeded that ended it."""
+"""Result of a simulation, or its failure: Diverged or StepBudgetExceeded."""
 
 
 class Viewer(Protocol):
-    """Someone who watches a simulation as it runs."""
+    """Observer that shows a simulation while it runs."""
 
     def wants(self, time: float) -> bool:
-        """True if the viewer wants the state at this time (s)."""
+        """True if the viewer needs the state at this time (s)."""
 
     def show(self, frame: xarray.Dataset) -> None:
-        """Takes one sample of a trajectory (see results.trajectory.make_dataset)."""
+        """Shows one sample of a trajectory (see results.trajectory.make_dataset)."""
 
 
 class Engine:
-    """An engine: simulate() for one gait; the rest is the same on all engines that do not differ.
+    """Base class of engines. A subclass must implement simulate(); the other methods have defaults.
 
-    A simulation ends with TimeBudgetExceeded when the time of engines.time_limit is up.
+    simulate() must call time_limit.check_time() often, which raises TimeBudgetExceeded.
     """
 
     can_be_watched: ClassVar[bool] = False
-    """True if a viewer sees the robot while it is simulated."""
-
+    """True if simulate() accepts a viewer."""
     lane_pool: type[LanePool] | None = None
-    """The class of a pool that simulates gaits side by side in lanes, if the engine can."""
+    """Pool class for simulating gaits side by side in lanes; None if the engine has no lanes."""
 
     def check(self, scenario: Scenario) -> None:
         """Raises InputError if the engine cannot simulate the scenario."""
 
     def prepare(self, scenario: Scenario) -> None:
-        """Compiles the kernels for simulations of one gait at a time: simulates a moment."""
+        """Compiles the kernels that simulate() needs, by a very short simulation."""
         brief = max(_BRIEF, scenario.cpg.listing_step)
         if brief < scenario.simulation.duration:
             times = {"duration": brief, "steady_from": 0.0, "sample_period": 0.1 * brief}
             changes = {f"simulation.{key}": f"{time!r} s" for key, time in times.items()}
             scenario = scenario.with_changes(changes)
-        with contextlib.suppress(SimulationFailure):  # recorded, which takes samples within steps
+        with contextlib.suppress(SimulationFailure):  # recording needs kernels, too
             self.simulate(Robot.of(scenario), seeded_gait(scenario), record=True)
 
     def simulate(
@@ -70,20 +69,20 @@ class Engine:
         viewer: Viewer | None = None,
         steering: SteeringSignal | None = None,
     ) -> SimulationResult:
-        """Simulates a gait; raises as engines.simulate.simulate() does.
+        """Simulates a gait. Raises the same errors as engines.simulate.simulate().
 
-        A viewer is given only if the engine can be watched.
+        A viewer is only given to an engine with `can_be_watched`.
         """
         raise NotImplementedError
 
     def simulate_many(
-        self, walks: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
+        self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
     ) -> list[Outcome]:
-        """Simulates gaits, each on its scenario, on up to so many threads: one after another."""
-        return [self.outcome(*walk, record=record) for walk in walks]
+        """Simulates many gaits, each on its scenario. This default simulates one after another."""
+        return [self.outcome(*simulation, record=record) for simulation in simulations]
 
     def outcome(self, scenario: Scenario, gait: Gait, *, record: bool) -> Outcome:
-        """Outcome of the simulation of one gait."""
+        """Simulates one gait. Returns its result or its failure."""
         try:
             return self.simulate(Robot.of(scenario), gait, record=record)
         except SimulationFailure as failure:
@@ -91,14 +90,14 @@ class Engine:
 
 
 def engine_of(scenario: Scenario) -> Engine:
-    """The engine that the scenario names; its module is imported here."""
+    """The engine of a scenario. The engine's module is imported on demand."""
     engine: Engine = importlib.import_module(ENGINES[scenario.engine_name]).ENGINE
     return engine
 
 
 def check_can_be_watched(scenario: Scenario) -> None:
-    """Raises InputError if the scenario's engine shows nothing until it has ended."""
+    """Raises InputError if the scenario's engine does not support a viewer."""
     if not engine_of(scenario).can_be_watched:
         engine = scenario.engine_name
-        problem = f"found '{engine}', expected 'drake', which alone can be watched as it simulates"
+        problem = f"found '{engine}', expected 'drake': no other engine can be watched"
         raise InputError(f"scenario {scenario.name}", "engine", problem)

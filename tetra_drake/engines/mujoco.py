@@ -1,14 +1,17 @@
-"""The engine `mujoco`: the same robot in MuJoCo (https://mujoco.org), as its users would model it.
+"""Engine `mujoco`: the same robot in MuJoCo (https://mujoco.org), modelled as MuJoCo's users do.
 
-Bodies, cables, actuation and gravity are those of the other engines. The ground is MuJoCo's soft
-contact with a cone of friction. The normal force has the scenario's stiffness, but constant
-damping: the scenario's at the depth of rest on the nodes of the thesis, which otherwise grows with
-depth. Coulomb friction without stiffness is the scenario's own, and robots walk as far as on the
-other engines. In place of the reset integrator, a node that sticks is held by the scenario's
-stiction damping, but breaks free where that exceeds MUJOCO_FRICTION times the normal force, not
-after a deflection, and then does not slide almost freely.
+Bodies, cables, actuation and gravity are the same as in the other engines. The ground differs: it
+is MuJoCo's soft contact with a friction cone.
 
-The ground is a plane, level or inclined; other terrains are refused.
+- Normal force: the stiffness is the scenario's. The damping is constant; in the other engines it
+  grows with depth. Both agree at the depth of a robot in equilibrium.
+- Coulomb friction without bristle stiffness is the same law. Robots walk as far as on the other
+  engines.
+- The reset integrator does not exist in MuJoCo. A sticking node is held by the scenario's stiction
+  damping. It breaks free at MUJOCO_FRICTION times the normal force, not after a deflection. A
+  sliding node has Coulomb friction; with the reset integrator it slides almost freely.
+
+The ground must be a plane, level or inclined.
 """
 
 from __future__ import annotations
@@ -45,35 +48,28 @@ Array = np.ndarray
 INSTALL = 'pip install "mujoco>=3.13"'
 
 _IMPRATIO = 1000.0
-"""How much harder friction is than the normal force. A node that slips gets 1 / _IMPRATIO of the
-force that would hold it as normal force: with 1, MuJoCo's default, it is thrown up and chatters."""
-
+"""MuJoCo's option impratio: the ratio of the impedances of friction and normal force. In MuJoCo a
+slipping node gets a part, 1 / impratio, of the force that would hold it as normal force. With the
+default 1, nodes are thrown up and chatter."""
 _IMPEDANCE = 1.0 / (1.0 + _IMPRATIO)
-"""Impedance of contacts. It adds inertia: along the ground the body's mass, which keeps friction
-stable in long steps, and 1 / _IMPRATIO of that along the normal."""
-
-_POINT = 1e-8  # radius (m) of the spheres that touch the floor; a larger one spins thin bars
-
-_ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs of `contact` touch each other
-
-_STRETCH = 5000  # steps between two checks of whether a simulation is still stable
-
-_NO_DRIVES = np.zeros(0)  # as signals are forces
-
-_OBSERVED = 8  # steps from one observation to the next: with the default step, 1 ms
-
+"""Impedance of contacts. It adds inertia to a contact: the body's mass along the ground, which
+keeps friction stable in long steps, and 1 / _IMPRATIO of the mass along the normal."""
+_POINT = 1e-8  # radius (m) of the spheres that touch the floor; larger ones spin thin bars
+_ALONE = {"contype": "0", "conaffinity": "0"}  # only the pairs in `contact` can touch
+_STRETCH = 5000  # steps between two checks of stability
+_NO_DRIVES = np.zeros(0)  # the actuators have no states
+_OBSERVED = 8  # steps from one observation to the next; 1 ms with the default step
 INTEGRATOR = "implicitfast"
-"""Integrator of MuJoCo."""
-
+"""Name of MuJoCo's integrator."""
 MAX_SPEED = 1.0
-"""Top speed of a body (m/s), less than in other engines. Too long a step throws a robot about,
-at times far forward; a walking robot stays below 0.2 m/s."""
+"""Largest speed of a body (m/s); less than in other engines. With too long a step a robot is thrown
+about, sometimes far forward. A walking robot stays below 0.2 m/s."""
 
 
 class MujocoEngine(Engine):
-    """MuJoCo, in steps of `engine.step`. Other Python threads run while it simulates.
+    """Engine that simulates with MuJoCo, in steps of `engine.step`.
 
-    Instants asked for, as of samples, are those of the nearest steps.
+    Other Python threads run meanwhile. Samples are taken at the nearest steps.
     """
 
     def check(self, scenario: Scenario) -> None:
@@ -113,7 +109,7 @@ class MujocoEngine(Engine):
         wall_time = time.perf_counter() - started
         totals = observer.totals()
         if robot.model.slack and totals.tension[0] <= 0.0:
-            reason = "a cable went slack, where MuJoCo's tendon pushes"
+            reason = "a cable went slack, and a tendon of MuJoCo would push"
             raise SimulationFailure(time=float(totals.time[0]), reason=reason)
         signals_kept = signals_at(robot, gait, times, steering=steering)
         return make_result(
@@ -129,14 +125,14 @@ class MujocoEngine(Engine):
         )
 
     def simulate_many(
-        self, walks: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
+        self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
     ) -> list[Outcome]:
         with ThreadPoolExecutor(threads) as pool:
-            return list(pool.map(lambda walk: self.outcome(*walk, record=record), walks))
+            return list(pool.map(lambda each: self.outcome(*each, record=record), simulations))
 
 
 def installed() -> bool:
-    """True if a MuJoCo with rollouts is installed."""
+    """True if MuJoCo is installed, in a version with rollouts."""
     try:
         from mujoco.rollout import Rollout  # noqa: F401
     except ImportError:
@@ -145,7 +141,7 @@ def installed() -> bool:
 
 
 def make_mjcf(robot: Robot) -> str:
-    """The robot and its ground in MuJoCo's format, with one motor per driven cable."""
+    """The robot and its ground in MuJoCo's XML format, with one motor per driven cable."""
     scenario = robot.scenario
     model = Element("mujoco", model=scenario.name)
     steps = {"integrator": INTEGRATOR, "timestep": scenario.settings_of(Mujoco).step}
@@ -160,14 +156,14 @@ def make_mjcf(robot: Robot) -> str:
 
 
 class _Simulator:
-    """MuJoCo with its model of a robot."""
+    """MuJoCo's model of a robot, and its simulation."""
 
     def __init__(self, robot: Robot) -> None:
         import mujoco
 
         if mujoco.get_mju_user_warning() is None:
-            # MuJoCo would print that a simulation is unstable, and append it to a file in the
-            # working folder. Not set back: other threads may be simulating.
+            # Otherwise MuJoCo prints warnings of instability, also to a file in the working folder.
+            # The handler is not restored, because other threads may be simulating.
             mujoco.set_mju_user_warning(lambda message: None)
         self._mujoco: Any = mujoco
         self._robot = robot
@@ -178,11 +174,14 @@ class _Simulator:
             raise InputError(robot.scenario.name, "robot", problem) from error
         self._step = robot.scenario.settings_of(Mujoco).step
         driven = robot.structure.cables["signal"]
-        self._motors = driven[driven != PASSIVE]  # the signal of each motor
+        self._motors = driven[driven != PASSIVE]  # index of each motor's signal
 
     def run(self, signals: Array, steps_kept: Array, observer: Observer) -> Array:
-        """MuJoCo's states (time, qpos, qvel) after each of the `steps_kept`, ascending, of a gait
-        with these signals (steps, n), of which an observer is shown all. Raises Diverged."""
+        """Simulates and returns MuJoCo's states (time, qpos, qvel) after the steps `steps_kept`.
+
+        `signals` (steps, n) drive the cables. `observer` gets states along the way. Raises
+        Diverged.
+        """
         from mujoco.rollout import Rollout
 
         data = self._mujoco.MjData(self._model)
@@ -204,26 +203,27 @@ class _Simulator:
         return kept
 
     def _observe(self, observer: Observer, states: Array, signals: Array, first: int) -> None:
-        """Shows an observer every _OBSERVED-th of the states after step `first` and the next, and
-        the one at which signals begin to act."""
+        """Passes states to an observer: every _OBSERVED-th one, and the state at the end of the
+        start-up. `states` are after step `first` and the following ones."""
         begins = round(self._robot.scenario.cpg.start_up / self._step)
         observed = np.arange(first + 1, first + len(states) + 1)
-        chosen = np.flatnonzero((observed % _OBSERVED == 0) | (observed == begins))
-        if not chosen.size:
+        rows = np.flatnonzero((observed % _OBSERVED == 0) | (observed == begins))
+        if not rows.size:
             return
-        steps: list[int] = observed[chosen].tolist()
-        for step, state in zip(steps, self.body_states(states[chosen]), strict=True):
+        steps: list[int] = observed[rows].tolist()
+        for step, state in zip(steps, self.body_states(states[rows]), strict=True):
             now = signals[min(step, len(signals) - 1)]
             observer.add(self._step * step, state, now, _NO_DRIVES)
 
     def _check(self, states: Array, first: int) -> None:
-        """Raises Diverged if the states after step `first` and the next ones show a failure."""
+        """Raises Diverged if a body is too fast or MuJoCo found instability. `states` are after
+        step `first` and the following ones."""
         v_WB = states[:, 1 + self._model.nq :].reshape(len(states), -1, 6)[:, :, :3]
         fast = ~(np.abs(v_WB).max(axis=(1, 2)) <= MAX_SPEED)
         if fast.any():
             reason = f"a body's velocity exceeds the limit of {MAX_SPEED:g} m/s"
             raise Diverged(time=float(states[fast.argmax(), 0]), reason=reason)
-        # Where MuJoCo warns of instability, it starts again from time 0, or stops.
+        # An unstable simulation starts again from time 0, or stops.
         times = self._step * (first + 1.0 + np.arange(len(states)))
         warned = np.abs(states[:, 0] - times) > 0.5 * self._step
         if warned.any():
@@ -231,7 +231,8 @@ class _Simulator:
             raise Diverged(time=float(times[warned.argmax()]), reason=reason)
 
     def body_states(self, states: Array) -> Array:
-        """[q; v] (rows, 13 bodies) of MuJoCo's states, where w is given in the body's frame."""
+        """States [q; v] (rows, 13 bodies) from MuJoCo's states. MuJoCo's angular velocities are in
+        the body's frame."""
         rows, end = len(states), 1 + self._model.nq
         pose = states[:, 1:end].reshape(rows, -1, 7)
         velocity = states[:, end:].reshape(rows, -1, 6)
@@ -242,7 +243,7 @@ class _Simulator:
         return np.hstack([np.concatenate(part, axis=2).reshape(rows, -1) for part in parts])
 
     def motion(self, times: Array, states: Array, signals: Array) -> Motion:
-        """The motion in MuJoCo's states at `times` (s), driven by the signals."""
+        """Motion from MuJoCo's states at `times` (s), with their signals."""
         data = self._mujoco.MjData(self._model)
         rows = zip(states, signals, strict=True)
         ground_forces = np.array([self._ground_forces(data, *row) for row in rows])
@@ -252,7 +253,7 @@ class _Simulator:
         return Motion(times, self.body_states(states), signals, modes, drives, ground_forces)
 
     def _ground_forces(self, data: Any, state: Array, signals: Array) -> Array:
-        """(contacts, 3): MuJoCo's contact forces on the nodes along t1, t2 and n, in N."""
+        """MuJoCo's contact forces on the nodes along t1, t2 and n (contacts, 3), in N."""
         mujoco, model = self._mujoco, self._model
         mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         data.ctrl[:] = signals[self._motors]
@@ -260,7 +261,7 @@ class _Simulator:
         forces, wrench = np.zeros((len(self._robot.structure.contacts), 3)), np.zeros(6)
         for i, contact in enumerate(data.contact):
             mujoco.mj_contactForce(model, data, i, wrench)
-            # The floor is geom 0; those of the contact nodes follow in their order.
+            # Geom 0 is the floor, geom i + 1 is contact node i.
             forces[contact.geom[1] - 1] += contact.frame.reshape(3, 3).T @ wrench[:3]
         nodes = data.site_xpos[self._robot.structure.contacts]
         axes = ground_axes(nodes, self._robot.ground)
@@ -268,7 +269,7 @@ class _Simulator:
 
 
 def _add_floor(world: Element, robot: Robot) -> None:
-    """The floor, a plane, which is geom 0."""
+    """Adds the floor: a plane, geom 0."""
     slope = robot.scenario.terrain.plane_slope or 0.0
     pos = [_POINT * math.sin(slope), 0.0, -_POINT * math.cos(slope)]
     quat = [math.cos(slope / 2), 0.0, -math.sin(slope / 2), 0.0]
@@ -276,7 +277,7 @@ def _add_floor(world: Element, robot: Robot) -> None:
 
 
 def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
-    """The bodies, with a site at each node, and spheres on those that touch the floor."""
+    """Adds the bodies, with a site at each node and a small sphere at each contact node."""
     structure, bodies = robot.structure, robot.model.bodies
     pairs = _add(model, "contact")
     for i, body_name in enumerate(structure.bodies):
@@ -286,9 +287,9 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
         mass, inertia = bodies.mass[i], bodies.inertia[i]
         is_bar = structure.first_node[i + 1] - structure.first_node[i] == 2
         if is_bar:
-            # A bar gets its moment across its axis about its axis, too: a spin about that moves no
-            # node, and cables give none. But MuJoCo's contact points are half the depth above the
-            # nodes, and there friction would soon spin a thin bar as fast as it slides.
+            # A bar gets a larger moment of inertia about its axis: the same as across it. A spin
+            # about the axis moves no node, and cables cause none. But MuJoCo's contact points are
+            # above the nodes by half the depth, so friction would soon spin a thin bar.
             across = np.linalg.eigvalsh(RotationalInertia(*inertia).CopyToFullMatrix3())[-1]
             moments = {"diaginertia": 3 * [across]}
         elif structure.isotropic:
@@ -306,13 +307,13 @@ def _add_bodies(model: Element, world: Element, robot: Robot) -> None:
 
 
 def _contact(robot: Robot, mass: float) -> dict:
-    """Contact settings of the floor and a body of this mass (kg)."""
+    """Contact settings for the floor and a body of this mass (kg)."""
     ground = robot.scenario.ground
     cone = robot.scenario.friction.cone(robot.scenario.name)
     borne = robot.weight / _feet(robot)
     rest_damping = ground.damping * borne / ground.stiffness
-    # MuJoCo takes accelerations for forces, and divides them by 1 - impedance; it multiplies those
-    # of friction by impratio. The minus says that the numbers are stiffness and damping.
+    # MuJoCo's numbers are per mass, divided by 1 - impedance, and for friction multiplied by
+    # impratio. Negative numbers mean stiffness and damping.
     per_mass = -(1.0 - _IMPEDANCE) / mass
     return {
         "condim": "3",
@@ -324,12 +325,12 @@ def _contact(robot: Robot, mass: float) -> dict:
 
 
 def _feet(robot: Robot) -> int:
-    """The nodes that bear the weight: by the blueprint, or at rest."""
+    """Number of nodes that bear the weight: from the blueprint, or in equilibrium."""
     return robot.structure.feet or max(1, robot.equilibrium.feet)
 
 
 def _add_cables(model: Element, structure: Structure) -> None:
-    """A tendon for each cable, and a motor for each that is driven."""
+    """Adds a tendon for each cable and a motor for each driven cable."""
     tendons, actuators = _add(model, "tendon"), _add(model, "actuator")
     for name, cable in zip(structure.cable_names, structure.cables, strict=True):
         law = {"stiffness": cable["stiffness"], "damping": cable["damping"]}
@@ -341,7 +342,7 @@ def _add_cables(model: Element, structure: Structure) -> None:
 
 
 def _add(parent: Element, tag: str, **attributes: Any) -> Element:
-    """A new element; its attributes are text, numbers or arrays of numbers."""
+    """Adds an XML element. Attributes are texts, numbers or arrays of numbers."""
     text = {
         name: value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))
         for name, value in attributes.items()

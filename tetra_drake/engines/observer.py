@@ -1,4 +1,4 @@
-"""The observer of a Drake or MuJoCo simulation, which makes the tally from recorded states."""
+"""Observer of a Drake or MuJoCo simulation: computes the tally (see physics.tally) from states."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.simd.compiling import compiled
 from tetra_drake.simd.lanes import Table
 
-_TOGETHER = 1000  # observations, as calls of kernels with many tables are slow
+_TOGETHER = 1000  # observations per call: calls of kernels with many tables are slow
 
 
 class Observer:
-    """Tallies a walk from its states in the order of time, the first at t = 0.
+    """Observer that computes the tally of a simulation from its states.
 
-    It only reads states, so observing cannot change the simulation.
+    States are added in the order of time, beginning at t = 0. Observing does not change the
+    simulation.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -31,13 +32,13 @@ class Observer:
         self._waiting: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []
 
     def add(self, time: float, state: np.ndarray, signals: np.ndarray, drives: np.ndarray) -> None:
-        """Adds a state (13 bodies,), the signals (m,) in N and the drives at a time (s)."""
+        """Adds the state (13 bodies,), signals (m,) in N, and drives at a time (s)."""
         self._waiting.append((time, state, signals, drives))
         if len(self._waiting) == _TOGETHER:
             self._flush()
 
     def totals(self) -> Tally:
-        """The tally of all that has been added."""
+        """The tally of all added states."""
         self._flush()
         return self._tally
 
@@ -60,8 +61,10 @@ def observe_states(
     signals: Table,
     drives: Table,
 ) -> None:
-    """Observes states (k, 13 bodies), signals (k, m) and drives at times (k,); `modes`, (contacts,
-    MODE_COLUMNS), is room. What is tallied does not depend on whether contacts stick."""
+    """Adds states (k, 13 bodies), signals (k, m) and drives at times (k,) to a tally.
+
+    `modes` (contacts, MODE_COLUMNS) is scratch memory. The tally does not depend on friction modes.
+    """
     generalized = np.empty(6 * robot.bodies.mass.size)
     for k in range(times.size):
         modes[:] = 0.0

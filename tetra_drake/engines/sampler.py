@@ -1,4 +1,4 @@
-"""The sampler of a Drake simulation: evenly spaced samples of its context."""
+"""Sampler of a Drake simulation: samples of its context at given times."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class Sample(NamedTuple):
 
     time: float
     continuous: np.ndarray
-    """[q; v] of the bodies, then other continuous state, as of a live network."""
+    """Continuous state: [q; v] of the bodies, then other state, such as a live network's."""
     discrete: tuple[np.ndarray, ...]
 
     @classmethod
     def of(cls, context: Context) -> Sample:
-        """A copy of what the context holds."""
+        """A copy of the content of a context."""
         discrete = context.get_discrete_state()
         return cls(
             context.get_time(),
@@ -33,25 +33,25 @@ class Sample(NamedTuple):
 
 
 class Sampler:
-    """Takes samples at given times from a simulation whose steps end anywhere.
+    """Takes samples at given times; steps of the simulation may end at other times.
 
-    It only copies what the context holds, interpolates between the ends of a step, and leaves
-    forces and lengths for later, so recording cannot change the simulation.
+    It copies the context and interpolates within a step. Forces and lengths are computed after the
+    simulation. So recording does not change the simulation.
     """
 
     def __init__(self, diagram: Diagram, times: np.ndarray, *, max_step: float) -> None:
-        """Samples at ascending `times` (s), where steps are at most `max_step` (s)."""
+        """`times` (s) of the samples ascend. Steps are at most `max_step` (s)."""
         self._diagram, self._times = diagram, times
-        self._ahead = 2.0 * max_step  # as Drake stretches a step that nearly reaches its end
+        self._ahead = 2.0 * max_step  # Drake may stretch a step to reach its end
         self._bodies = slice(diagram.GetOutputPort("state").size())
         self._samples: list[Sample] = []
         self._latest: Sample | None = None
 
     def after_step(self, context: Context) -> None:
-        """Takes the samples that are due in the step that ends here."""
+        """Takes the samples within the step that has just ended."""
         due = self._times[len(self._samples) :]
         if due.size == 0 or due[0] > context.get_time() + self._ahead:
-            self._latest = None  # no sample needs the state of this time
+            self._latest = None  # no sample needs this state
             return
         after = Sample.of(context)
         before, self._latest = self._latest or after, after
@@ -61,11 +61,12 @@ class Sampler:
             self._samples.append(self._between(before, after, float(time)))
 
     def motion(self) -> Motion:
-        """The motion at the times that have passed."""
+        """The motion up to now, at the times of the samples."""
         return motion_of(self._diagram, self._samples)
 
     def _between(self, before: Sample, after: Sample, time: float) -> Sample:
-        """The sample at a time (s) of a step, with the discrete state of its end."""
+        """The sample at a time (s) within a step. Its discrete state is from the end of the
+        step."""
         if time == after.time:
             return after
         step, bodies = after.time - before.time, self._bodies
@@ -77,7 +78,7 @@ class Sampler:
 
 
 def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
-    """The motion in samples of a robot's diagram."""
+    """The motion that samples of a robot's diagram contain."""
     state, signals = diagram.GetOutputPort("state"), diagram.GetOutputPort("signals")
     context = diagram.CreateDefaultContext()
     ground = diagram.GetSubsystemByName("ground").GetMyContextFromRoot(context)
@@ -103,7 +104,8 @@ def motion_of(diagram: Diagram, samples: Sequence[Sample]) -> Motion:
 
 
 def drives_of(diagram: Diagram) -> Callable[[Context], np.ndarray]:
-    """The drives (drives,) by a context of a robot's diagram; empty without actuators."""
+    """Function that reads the drives (drives,) from a context of a robot's diagram. They are empty
+    without actuators."""
     if not diagram.HasOutputPort("drives"):
         return lambda context: np.zeros(0)
     evaluate: Callable[[Context], np.ndarray] = diagram.GetOutputPort("drives").Eval

@@ -1,4 +1,4 @@
-"""simulate() and simulate_many(): gaits on scenarios, by the engine that a scenario names."""
+"""Simulation of gaits on the scenario's engine: `simulate`, `simulate_many`."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def simulate(
             raise InputError("simulate", "command", "excludes a gait, and steering")
         robot = commanded_robot(scenario, command)
         result = engine.simulate(robot, command.gait, record=record, viewer=viewer)
-        return dataclasses.replace(result, scenario=scenario)  # the one with a network
+        return dataclasses.replace(result, scenario=scenario)  # the caller's, with a network
     if gait is None:
         raise InputError("simulate", "gait", "is needed, or a command")
     robot, gait = Robot.of(scenario), given_gait(gait, scenario)
@@ -98,28 +98,28 @@ def simulate_many(
     threads = available_cores() if workers is None else workers
     if threads < 1:
         raise InputError("simulate_many", "workers", f"found {workers}, expected at least 1")
-    walks = [(each, given_gait(gait, each)) for each, gait in zip(scenarios, gaits, strict=True)]
+    pairs = [(each, given_gait(gait, each)) for each, gait in zip(scenarios, gaits, strict=True)]
     engines = {engine_of(scenario) for scenario in scenarios}
     if len(engines) == 1:
-        outcomes = engines.pop().simulate_many(walks, record=record, threads=threads)
+        outcomes = engines.pop().simulate_many(pairs, record=record, threads=threads)
     else:
-        outcomes = [engine_of(walk[0]).outcome(*walk, record=record) for walk in walks]
-    for (walked, gait), outcome in zip(walks, outcomes, strict=True):
+        outcomes = [engine_of(pair[0]).outcome(*pair, record=record) for pair in pairs]
+    for (simulated, gait), outcome in zip(pairs, outcomes, strict=True):
         if isinstance(outcome, SimulationFailure):
-            outcome.scenario, outcome.gait, outcome.name = walked, gait, gait.name
+            outcome.scenario, outcome.gait, outcome.name = simulated, gait, gait.name
     return outcomes
 
 
 def check_scenario(scenario: Scenario) -> None:
-    """Raises InputError if the scenario's gaits cannot be simulated: the engine cannot do it, the
-    robot would start in the ground, or nothing drives it."""
+    """Raises InputError if gaits cannot be simulated on a scenario: its engine does not support it,
+    the robot would start in the ground, or no oscillator drives it."""
     if not scenario.oscillators:
-        problem = "found no oscillator, expected one at least, which drives cables"
+        problem = "found no oscillator, expected at least one that drives cables"
         raise InputError(scenario.name, "robot.actuated", problem)
     Robot.of(scenario).network(seeded_gait(scenario))
     engine_of(scenario).check(scenario)
 
 
 def prepare(scenario: Scenario) -> None:
-    """Compiles the scenario's engine, so that no simulation has to wait for that."""
+    """Compiles the kernels of the scenario's engine, so that later simulations need not wait."""
     engine_of(scenario).prepare(scenario)

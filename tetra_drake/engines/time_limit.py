@@ -1,4 +1,4 @@
-"""The wall time that a simulation may take, in any thread, on engines without lanes."""
+"""Limit for the wall time of simulations, for engines without lanes; each thread has its own."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from contextvars import ContextVar
 from tetra_drake.errors import TimeBudgetExceeded
 
 _deadline = ContextVar("deadline", default=(math.inf, math.inf))
-"""Deadline by time.perf_counter(), and the budget (s)."""
+"""Deadline on the clock time.perf_counter(), and the budget (s)."""
 
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """A block in which simulations end with TimeBudgetExceeded after this wall time."""
+    """Context manager: simulations in the block raise TimeBudgetExceeded after this wall time."""
     token = _deadline.set((time.perf_counter() + seconds, seconds))
     try:
         yield
@@ -25,7 +25,7 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 
 def check_time() -> None:
-    """Raises TimeBudgetExceeded if the time is up; every engine calls it again and again."""
+    """Raises TimeBudgetExceeded if the time is up. Engines call it often during a simulation."""
     deadline, seconds = _deadline.get()
     if time.perf_counter() > deadline:
         raise TimeBudgetExceeded(f"not done after {seconds:g} s")

@@ -1,12 +1,12 @@
-"""Actuators: what a signal does to the cable that it drives.
+"""Actuators: the effect of a signal S on the cable that it drives.
 
-    direct         superimposes a force, without limits (Eq. 6)
-    winch          winds the cable: its free length is a state, commanded as l0 - S / k
-    tension motor  pulls the cable by force control: its tension is a state, commanded as the
-                   whole law of the cable, of which spring and damper are played by software
+    direct         adds a force to the tension, without limits (Eq. 6)
+    winch          winds the cable. Its state is the free length; the command is l0 - S / k
+    tension motor  controls the tension. Its state is the tension; the command is the tension of
+                   Eq. 6, so software imitates the spring and the damper of the cable
 
-A *drive* is the state of an actuator: of a winch the free length (m), of a tension motor the
-tension (N). A direct force has none.
+The state of an actuator is called its *drive*: the free length (m) of a winch, or the tension (N)
+of a tension motor. A direct force has no drive.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ DIRECT, WINCH, TENSION_MOTOR = range(3)
 """Kinds of actuators."""
 
 DRIVE, RATE, LIMITED, DRIVE_COLUMNS = range(4)
-"""Columns of `drives`, a row for each driven cable whose actuator has one: the drive, its rate per
-s, 1 where a limit binds or else 0; and their number."""
+"""Columns of the table `drives`, and their number: the drive, its rate per s, and 1 if a limit
+binds or 0. There is a row for each actuator with a drive."""
 
 
 class Limits(NamedTuple):
-    """What an actuator can do, in SI units; NaN where it has no limit."""
+    """Limits of an actuator in SI units; NaN without a limit."""
 
     max_force: Real = math.nan
     max_speed: Real = math.nan
@@ -42,36 +42,37 @@ class Actuator(NamedTuple):
 
     kind: int
     limits: Table
-    """The numbers of Limits."""
+    """Table of the numbers of Limits."""
 
     @classmethod
     def of(cls, kind: int, **limits: float) -> Self:
-        """Actuators of a kind, with values of Limits by name."""
+        """Actuators of a kind, with limits by name; see Limits."""
         return cls(kind, np.array(Limits(**limits)))
 
 
 class ActuatorForce(NamedTuple):
-    """What an actuator does to its cable."""
+    """Tension that an actuator gives its cable, and the rate of its drive."""
 
     tension: Real
-    """N."""
+    """Tension in N."""
     tension_per_rate: Real
-    """dT/d(dl/dt), N s/m: how much the tension rises with the rate of the length."""
+    """Derivative of the tension with respect to the rate of the length, dT/d(dl/dt), in N s/m."""
     rate: Real
     """Rate of the drive, per s."""
     limited: Real
-    """1 where a limit binds, or else 0."""
+    """1 if a limit binds, otherwise 0."""
 
 
 @inlined
 def has_drive(actuator: Actuator) -> bool:
-    """True if the actuators have states."""
+    """True if the actuators have drives (states)."""
     return actuator.kind != DIRECT
 
 
 @inlined
 def wound(actuator: Actuator, drive: Table, otherwise: Table) -> Table:
-    """The drive if it is the free length of a wound cable, or else `otherwise`; also of tables."""
+    """The drive, if it is the free length of a cable on a winch; `otherwise` for other actuators.
+    Both may be numbers or tables."""
     if actuator.kind == WINCH:
         return drive
     return otherwise
@@ -81,8 +82,8 @@ def wound(actuator: Actuator, drive: Table, otherwise: Table) -> Table:
 def actuator_force(
     actuator: Actuator, drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw
 ) -> ActuatorForce:
-    """The force of an actuator that has a drive, for a cable of `length` that lengthens at
-    `rate`."""
+    """Force of an actuator with a drive. `length` (m) is the length of its cable, `rate` (m/s) the
+    rate of the length."""
     limits = named(Limits, actuator.limits)
     if actuator.kind == WINCH:
         return winch_force(drive, length, rate, signal, law, limits)
@@ -93,14 +94,14 @@ def actuator_force(
 def winch_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """The force of a winch whose cable has a free length `drive`.
+    """Force of a winch. `drive` is the free length of its cable.
 
-    It follows its command with a lag, pays out at max_speed at most, and winds at most at
-    max_speed (1 - tension / max_force). Above max_force it is driven backward. The tension depends
-    on the winding by the cable's damping, and the winding on the tension by the force-speed line:
-    both are linear, so they are solved together. A command below least_length counts as
-    least_length. So the winch slows down before that; a sudden stop there would be a jump of the
-    tension, which no step of an integrator is short enough for.
+    The winch follows its command with a lag. It pays out with at most max_speed, and winds with at
+    most max_speed (1 - tension / max_force). Above max_force the cable pulls it backward. The
+    tension depends on the winding speed because of the cable's damping, and the winding speed
+    depends on the tension because of the force-speed line. Both equations are linear and are solved
+    together. A command below least_length counts as least_length, so the winch slows down before
+    it. A sudden stop would be a jump of the tension, which an integrator cannot handle.
     """
     elastic = elastic_tension(length - drive, law)
     wanted = (law.free_length - signal / law.stiffness - drive) / limits.time_constant
@@ -125,10 +126,10 @@ def winch_force(
 def motor_force(
     drive: Real, length: Real, rate: Real, signal: Real, law: CableLaw, limits: Limits
 ) -> ActuatorForce:
-    """The force of a tension motor of tension `drive`.
+    """Force of a tension motor. `drive` is its tension.
 
-    It follows its command with a lag, pulls with max_force at most, and less the faster it winds:
-    max_force (1 - winding speed / max_speed).
+    The motor follows its command with a lag. Its tension is at most max_force
+    (1 - winding speed / max_speed).
     """
     left = minimum(maximum(1.0 + rate / limits.max_speed, 0.0), 1.0)
     most = limits.max_force * left

@@ -1,10 +1,13 @@
 """Ground contact: normal force (Eq. 1), friction, and the modes of contact nodes.
 
-What a contact node remembers is a row of `modes`, (contacts, 8): whether it touches the ground, its
-friction mode along the tangents t1 and t2 (see `friction`), its stick point, a point of World where
-its bristle deflection is zero, and the heading of its body at touchdown.
+The state of a contact node is a row of the table `modes` (contacts, 8):
 
-The laws act in the frames of `terrain`: on flat ground these are the axes of World.
+- contact: 1 if the node touches the ground, otherwise 0
+- friction mode along the tangents t1 and t2; see `friction`
+- stick point: the point in the world where the bristle deflection is zero
+- heading of the node's body at touchdown
+
+The laws use the frames of `terrain`. On flat ground these are the axes of the world.
 """
 
 from __future__ import annotations
@@ -28,42 +31,44 @@ from tetra_drake.simd.lanes import (
 )
 
 CONTACT, MODE, STICK_POINT, HEADING, MODE_COLUMNS = 0, 1, 3, 6, 8
-"""Columns of `modes`: contact (0 or 1), mode (along t1, t2), stick point (x, y, z) in m, heading
-(along t1, t2); and their number."""
+"""Columns of the table `modes`, and their number: contact (0 or 1), friction mode (along t1, t2),
+stick point (x, y, z) in m, heading (along t1, t2)."""
 
 FRICTION_1, FRICTION_2, NORMAL, GROUND_FORCE_COLUMNS = range(4)
-"""Columns of `ground_forces`, (contacts, 3): friction along t1 and t2, normal force (N); and their
-number."""
+"""Columns of the table `ground_forces` (contacts, 3), and their number: friction along t1 and t2,
+normal force (N)."""
 
 
 class NormalForce(NamedTuple):
-    """The constants of the normal force (Table 1), SI."""
+    """Constants of the normal force (Table 1); SI units."""
 
     stiffness: Real
     damping: Real
 
 
 class Ground(NamedTuple):
-    """The ground as kernels take it, and the nodes that may touch it."""
+    """Ground in the form of the kernels, and the nodes that may touch it (contact nodes)."""
 
     contacts: Table
-    """(contacts,), the indices of the nodes."""
+    """Indices of the contact nodes (contacts,)."""
     carriers: Table
-    """(contacts,), the indices of their bodies, ascending."""
+    """Index of the body of each contact node (contacts,), ascending."""
     normal: Table
-    """The numbers of a NormalForce."""
+    """Table of the numbers of NormalForce."""
     friction: friction.FrictionLaw
     flat: bool
     grid: Table
-    """The numbers of a SurfaceGrid."""
+    """Table of the numbers of SurfaceGrid."""
     heights: Table
-    """(points,): the control points of the surface in m, row by row."""
+    """Heights (points,) of the surface's control points in m, row by row."""
 
 
 @inlined
 def meet_ground(ground: Ground, nodes: Table, frames: Table) -> None:
-    """Writes the `frames`, (contacts, FRAME_COLUMNS), in which `nodes` of `kinematics` meet the
-    ground. Flat ground leaves them as they are."""
+    """Writes the frames of the surface at the contact nodes to `frames` (contacts, FRAME_COLUMNS).
+
+    `nodes` is the table of `kinematics`. On flat ground, `frames` is not used.
+    """
     if not ground.flat:
         grid = named(terrain.SurfaceGrid, ground.grid)
         terrain.find_frames(nodes, ground.contacts, grid, ground.heights, frames)
@@ -71,7 +76,7 @@ def meet_ground(ground: Ground, nodes: Table, frames: Table) -> None:
 
 @inlined
 def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
-    """Distance (m) of a contact node from the ground, negative in it."""
+    """Distance (m) from the ground to a contact node; negative in the ground."""
     if ground.flat:
         return nodes[ground.contacts[i], P_WN + 2]
     return frames[i, terrain.GAP]
@@ -79,10 +84,10 @@ def gap(nodes: Table, ground: Ground, frames: Table, i: int) -> Real:
 
 @inlined
 def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
-    """Force (N) along the normal on a node `depth` (m) in the ground, which sinks at `depth_rate`
-    (m/s).
+    """Normal force (N) on a node by Eq. 1 with n = 1.
 
-    Eq. 1 with n = 1; the ground never pulls.
+    `depth` (m) is the node's depth in the ground, `depth_rate` (m/s) its rate. The ground never
+    pulls.
     """
     force = law.stiffness * depth + law.damping * depth * depth_rate
     return select(depth > 0.0, maximum(force, 0.0), 0.0)
@@ -92,10 +97,7 @@ def normal_force(depth: Real, depth_rate: Real, law: NormalForce) -> Real:
 def sliding(
     nodes: Table, modes: Table, ground: Ground, frames: Table, i: int
 ) -> tuple[friction.Slide, Real]:
-    """Sliding of a contact node, and the rate (m/s) at which its gap grows.
-
-    `modes` is (contacts, MODE_COLUMNS).
-    """
+    """Motion of contact node i along the ground, and the rate (m/s) of its gap."""
     node = ground.contacts[i]
     deflection = difference(vector_at(nodes, node, P_WN), vector_at(modes, i, STICK_POINT))
     v_1, v_2, v_n = terrain.to_frame(vector_at(nodes, node, V_WN), frames, i, ground.flat)
@@ -110,11 +112,10 @@ def sliding(
 
 @inlined
 def update_modes(state: Table, nodes: Table, ground: Ground, frames: Table, modes: Table) -> Truth:
-    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with the nodes of a state; returns True
-    where they changed.
+    """Updates `modes` for the nodes of a state. Returns True in lanes where a mode changed.
 
-    A node that lands sticks where it lands; one that sticks again does so where it is
-    (the reset of the integrator).
+    A node that lands sticks where it lands. A node that sticks again does so at its present
+    position; this is the reset of the reset integrator.
     """
     changed = False
     for i in range(ground.contacts.size):
@@ -147,7 +148,8 @@ def move_stick_point(
     slide: friction.Slide,
     modes: Table,
 ) -> None:
-    """Moves the stick point of a contact node to the node `along` t1 and t2."""
+    """Moves the stick point of a contact node to the node. `along` says, for t1 and t2, whether the
+    stick point moves along this tangent."""
     p_x, p_y, p_z = vector_at(nodes, ground.contacts[i], P_WN)
     stick_x, stick_y, stick_z = vector_at(modes, i, STICK_POINT)
     if ground.flat:
@@ -167,7 +169,7 @@ def move_stick_point(
 def set_heading(
     state: Table, ground: Ground, frames: Table, i: int, where: Truth, modes: Table
 ) -> None:
-    """Notes the heading of a contact node's body: its x axis, projected into the tangent plane."""
+    """Stores the heading of a contact node's body: its x axis, projected into the tangent plane."""
     forward = forward_axis(state, ground.carriers[i])
     h_1, h_2, _ = terrain.to_frame(forward, frames, i, ground.flat)
     per_length = inverse_sqrt(maximum(h_1 * h_1 + h_2 * h_2, 1e-30))

@@ -1,17 +1,19 @@
-"""Feedback to the oscillators: the f of Eq. 7, from the robot's state and forces.
+"""Feedback to the oscillators: the term f of Eq. 7, from the robot's state and forces.
 
-Three pathways, each with a gain. What differs between extensor and flexor turns an oscillator
-towards one of them; what is the same excites or calms both (after Taga 1991, where angles act with
-opposite and loads with equal signs).
+There are three pathways, each with a gain. Feedback with opposite signs on extensor and flexor
+shifts the signal to one side. Feedback with equal signs excites or calms both neurons. In Taga
+(1991), angles act with opposite signs and loads with equal signs.
 
-    length  the relative elongation of the oscillator's cables beyond their settled lengths, mean
-            over its group: + on the extensor, - on the flexor
-    load    the share of the robot's weight on the feet of the body ahead, the last one that the
-            oscillator's cables join: + on both
-    pitch   the sine of the angle by which that body's x axis points up: + and -
+    length  relative elongation of the oscillator's cables from their lengths in equilibrium, mean
+            over the cables: + on the extensor, - on the flexor
+    load    share of the robot's weight on the feet of the body in front (the last body that the
+            oscillator's cables join): + on both
+    pitch   sine of the angle by which the x axis of that body points up: + on the extensor, - on
+            the flexor
 
-What a sense reads must be smooth within a step of an integrator. What jumps, such as touching the
-ground, is read from `modes`, which are constant within a step (see `friction`).
+The input of a sense must be smooth within a step of an integrator. Quantities that jump, such as
+contact with the ground, must be read from `modes`, which are constant within a step (see
+`friction`).
 """
 
 from __future__ import annotations
@@ -24,24 +26,24 @@ from tetra_drake.simd.lanes import Table
 
 
 class Senses(NamedTuple):
-    """Constants of what m oscillators can sense.
+    """Constants of the feedback to m oscillators.
 
-    All tables have one axis. Kernels know every length but the first (see simd.lanes), so with two
-    axes they would be compiled anew for robots of another size.
+    All tables have one axis. The types of tables contain all lengths but the first (see
+    simd.lanes). With two axes, kernels would be compiled again for robots of another size.
     """
 
     drivers: Table
-    """(cables,): the oscillator that drives each cable, PASSIVE if none does."""
+    """Index of the oscillator that drives each cable (cables,); PASSIVE if there is none."""
     ahead: Table
-    """(m,): the body ahead of each oscillator's junction."""
+    """Index of the body in front of each oscillator (m,)."""
     carriers: Table
-    """(contacts,): the body of each contact node."""
-    settled: Table
-    """(cables,): lengths (m) without elongation."""
+    """Index of the body of each contact node (contacts,)."""
+    neutral_length: Table
+    """Cable lengths (cables,) without feedback, in m: the lengths in equilibrium."""
     per_length: Table
-    """(cables,): what a cable's elongation counts for its oscillator, in 1/m."""
+    """Weight of a cable's elongation in the feedback to its oscillator (cables,), in 1/m."""
     per_load: Table
-    """(1,): what a normal force counts, in 1/N."""
+    """Weight of a normal force (1,), in 1/N."""
 
 
 @compiled
@@ -53,17 +55,17 @@ def sense(
     normal_forces: Table,
     feedback: Table,
 ) -> None:
-    """Writes the feedback (2m,), by neuron.
+    """Writes the feedback of each neuron (2m,).
 
-    `gains`, (3,), of length, load and pitch; `state` of the bodies, `lengths` (cables,) in m,
-    `normal_forces` (contacts,) in N.
+    `gains` (3,) are for length, load and pitch. `state` is the state of the bodies, `lengths`
+    (cables,) are in m, `normal_forces` (contacts,) in N.
     """
     for i in range(feedback.size):
         feedback[i] = 0.0
     for i in range(lengths.size):
         k = senses.drivers[i]
         if k != PASSIVE:
-            feedback[2 * k] += senses.per_length[i] * (lengths[i] - senses.settled[i])
+            feedback[2 * k] += senses.per_length[i] * (lengths[i] - senses.neutral_length[i])
     for k in range(feedback.size // 2):
         body, load = senses.ahead[k], 0.0
         for c in range(normal_forces.size):

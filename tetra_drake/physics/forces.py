@@ -1,4 +1,4 @@
-"""The forces of cables, ground and gravity on a robot at a state of its bodies."""
+"""Forces of cables, ground and gravity on a robot in a given state."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ from tetra_drake.simd.packed import Packed, unpacked
 
 
 class Forces(NamedTuple):
-    """The forces at a state, as in `physics`, which kernels write."""
+    """Memory for the forces in a state. Kernels write to it."""
 
     nodes: Annotated[Table, "nodes", kinematics.NODE_COLUMNS]
     frames: Annotated[Table, "contacts", terrain.FRAME_COLUMNS]
-    """Where the nodes meet the ground."""
+    """Frames of the surface at the contact nodes; see physics.terrain."""
     cable_forces: Annotated[Table, "cables", cable.CABLE_FORCE_COLUMNS]
     ground_forces: Annotated[Table, "contacts", contact.GROUND_FORCE_COLUMNS]
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
-    """Of the bodies along World's axes, unless they are isotropic."""
+    """Inertia of the bodies along the world's axes; unused if they are isotropic."""
     drives: Annotated[Table, "drives", actuator.DRIVE_COLUMNS]
-    """In the order of the driven cables. What forces are computed from is given; the rest is
-    written."""
+    """Drives of the actuators, in the order of the driven cables. Column DRIVE is input, the other
+    columns are output."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
-        """Room for the forces on a robot."""
+        """Memory for the forces on a robot."""
         return allocate(cls, sizes_of(robot))
 
 
 def sizes_of(robot: Model) -> dict[str, int]:
-    """The numbers of a robot's parts, for allocate()."""
+    """Numbers of bodies, nodes, contacts, cables and drives of a robot, for allocate()."""
     drivers = robot.cables.signal
     has_drive = actuator.has_drive(robot.actuator)
     return {
@@ -59,12 +59,13 @@ def sizes_of(robot: Model) -> dict[str, int]:
 
 
 Parts: TypeAlias = Packed[tuple[Model, Forces]] | tuple[Model, Forces]
-"""A robot and room for the forces on it, packed for kernels that Python calls often."""
+"""A robot and the memory for its forces, packed for kernels that Python calls often."""
 
 
 @inlined
 def move_robot(robot: Model, state: Table, forces: Forces) -> None:
-    """Moves the nodes to where a state (13 bodies,) has them; no forces act on them yet."""
+    """Computes nodes, frames and inertia for a state (13 bodies,). Forces on the nodes become
+    zero."""
     move_contacts(robot, state, forces)
     if not robot.isotropic:
         turn_inertia(state, robot.bodies.inertia, forces.inertia)
@@ -72,17 +73,17 @@ def move_robot(robot: Model, state: Table, forces: Forces) -> None:
 
 @inlined
 def move_contacts(robot: Model, state: Table, forces: Forces) -> None:
-    """Moves the nodes, and the `frames` in which they meet the ground."""
+    """Computes nodes and frames for a state. Forces on the nodes become zero."""
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     contact.meet_ground(robot.ground, forces.nodes, forces.frames)
 
 
 @inlined
 def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Forces) -> None:
-    """Adds the forces of all cables to those on the nodes.
+    """Adds the forces of all cables to the forces on the nodes.
 
-    `signals`, (signals,), are in N. Writes the rates of the drives, and with `write_parts` the
-    `cable_forces`.
+    `signals` (signals,) are in N. Also writes the rates of the drives, and with `write_parts` the
+    table `cable_forces`.
     """
     nodes, drives, parts = forces.nodes, forces.drives, forces.cable_forces
     drive = 0
@@ -126,9 +127,9 @@ def add_cable_forces(robot: Model, signals: Table, write_parts: bool, forces: Fo
 
 @inlined
 def add_ground_forces(robot: Model, modes: Table, write_parts: bool, forces: Forces) -> None:
-    """Adds the forces of the ground to those on the nodes.
+    """Adds the forces of the ground to the forces on the nodes.
 
-    `modes` is (contacts, MODE_COLUMNS). With `write_parts`, writes the `ground_forces`.
+    `modes` is the table of `contact`. With `write_parts`, also writes the table `ground_forces`.
     """
     ground, nodes, frames, parts = robot.ground, forces.nodes, forces.frames, forces.ground_forces
     for i in range(parts.shape[0]):
@@ -156,10 +157,10 @@ def compute_forces(
     forces: Forces,
     generalized: Table,
 ) -> None:
-    """Writes all forces at a state to which the robot has just been moved, with gravity and
-    gyroscopic torques, as (6 bodies,).
+    """Writes the generalized force (6 bodies,) of cables, ground, gravity and gyroscopic torques.
 
-    With `write_parts`, the `cable_forces` and `ground_forces`, too.
+    move_robot() must have been called for the same state. With `write_parts`, also writes
+    `cable_forces` and `ground_forces`.
     """
     add_cable_forces(robot, signals, write_parts, forces)
     add_ground_forces(robot, modes, write_parts, forces)
@@ -180,8 +181,10 @@ def compute_forces(
 
 @compiled
 def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized: Table) -> None:
-    """Writes [t_W; f_W] of all cables at each Bo, (6 bodies,), for a state of the bodies; also the
-    nodes, the `cable_forces` and the rates of the drives."""
+    """Writes the generalized force of all cables (6 bodies,): [t_W; f_W] at each body's origin.
+
+    Also writes nodes, `cable_forces` and the rates of the drives.
+    """
     robot, forces = unpacked(parts)
     kinematics.move_nodes(state, robot.p_BN, robot.first_node, forces.nodes)
     add_cable_forces(robot, signals, True, forces)
@@ -190,8 +193,10 @@ def compute_cable_forces(parts: Parts, state: Table, signals: Table, generalized
 
 @compiled
 def compute_ground_forces(parts: Parts, state: Table, modes: Table, generalized: Table) -> None:
-    """Writes [t_W; f_W] of the ground at each Bo, (6 bodies,), for a state of the bodies; also the
-    nodes, the frames and the `ground_forces`."""
+    """Writes the generalized force of the ground (6 bodies,): [t_W; f_W] at each body's origin.
+
+    Also writes nodes, frames and `ground_forces`.
+    """
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
     add_ground_forces(robot, modes, True, forces)
@@ -209,10 +214,10 @@ def forces_along(
     cable_forces: Table,
     ground_forces: Table,
 ) -> None:
-    """Writes the forces along a motion: `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and
-    `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
+    """Writes the forces of a motion with k samples: `cable_forces` (k, cables, CABLE_FORCE_COLUMNS)
+    and `ground_forces` (k, contacts, GROUND_FORCE_COLUMNS).
 
-    The motion: states (k, 13 bodies) with modes (k, contacts, MODE_COLUMNS), signals (k, m) in N
+    The motion has states (k, 13 bodies), modes (k, contacts, MODE_COLUMNS), signals (k, m) in N,
     and drives (k, drives).
     """
     generalized = np.empty(6 * (states.shape[1] // 13))

@@ -1,7 +1,7 @@
-"""Moments of inertia of free rigid bodies that are not the same about all axes.
+"""Inertia of bodies that are not isotropic: moments differ between axes.
 
-An *inertia* is a row of a table, (bodies, 6): the moments and products xx, yy, zz, xy, xz, yz of a
-body about its centre of mass, so that the angular momentum is inertia times angular velocity.
+An *inertia* is a row of a table (bodies, 6): moments and products xx, yy, zz, xy, xz, yz of a body
+about its centre of mass. Angular momentum is inertia times angular velocity.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ XX, YY, ZZ, XY, XZ, YZ, INERTIA_COLUMNS = range(7)
 
 @inlined
 def turn_inertia(state: Table, inertia_B: Table, inertia_W: Table) -> None:
-    """Writes the inertia of the bodies along World's axes, for a state (13 bodies,)."""
+    """Writes the inertia of the bodies along the world's axes, for a state (13 bodies,)."""
     for body in range(inertia_B.shape[0]):
         r_00, r_01, r_02, r_10, r_11, r_12, r_20, r_21, r_22 = rotation(state, body)
         x, y, z = (r_00, r_01, r_02), (r_10, r_11, r_12), (r_20, r_21, r_22)
@@ -35,7 +35,7 @@ def turn_inertia(state: Table, inertia_B: Table, inertia_W: Table) -> None:
 
 @inlined
 def times_inertia(inertia: Table, body: int, a: Vector) -> Vector:
-    """The inertia of a body times a vector."""
+    """Inertia of a body times a vector."""
     xx, yy, zz = inertia[body, XX], inertia[body, YY], inertia[body, ZZ]
     xy, xz, yz = inertia[body, XY], inertia[body, XZ], inertia[body, YZ]
     return dot((xx, xy, xz), a), dot((xy, yy, yz), a), dot((xz, yz, zz), a)
@@ -43,10 +43,10 @@ def times_inertia(inertia: Table, body: int, a: Vector) -> Vector:
 
 @inlined
 def over_inertia(inertia: Table, body: int, a: Vector) -> Vector:
-    """The inverse of a body's inertia times a vector: the angular acceleration by a torque."""
+    """Inverse of a body's inertia times a vector. For a torque, it is the angular acceleration."""
     xx, yy, zz = inertia[body, XX], inertia[body, YY], inertia[body, ZZ]
     xy, xz, yz = inertia[body, XY], inertia[body, XZ], inertia[body, YZ]
-    # By cofactors.
+    # The inverse of a 3 x 3 matrix, by its cofactors.
     c_xx, c_yy, c_zz = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
     c_xy, c_xz, c_yz = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - yz * xx
     per_determinant = 1.0 / dot((xx, xy, xz), (c_xx, c_xy, c_xz))
@@ -59,5 +59,5 @@ def over_inertia(inertia: Table, body: int, a: Vector) -> Vector:
 
 @inlined
 def gyroscopic_torque(inertia: Table, body: int, w_WB: Vector) -> Vector:
-    """-w x (I w) of a body of angular velocity w."""
+    """Gyroscopic torque -w x (I w) of a body with angular velocity w."""
     return cross(times_inertia(inertia, body, w_WB), w_WB)

@@ -1,4 +1,4 @@
-"""Positions and velocities of the nodes of free rigid bodies, and forces back onto the bodies."""
+"""Kinematics of free rigid bodies: motion of their nodes, and forces from nodes to bodies."""
 
 from __future__ import annotations
 
@@ -11,18 +11,21 @@ from tetra_drake.simd.lanes import Real, Table, inverse_sqrt
 Array = np.ndarray
 
 P_BN_W, P_WN, V_WN, FORCE, NODE_COLUMNS = 0, 3, 6, 9, 12
-"""Columns of `nodes`, (nodes, 12), a row a node: the vector from the body's origin to the node (m),
-its position (m), its velocity (m/s), the force on it (N), all in World; and their number. Nodes
-run body by body."""
+"""Columns of the table `nodes` (nodes, 12), and their number: vector from the body's origin to the
+node (m), position (m), velocity (m/s), force on the node (N), all in the world frame. The nodes of
+a body are consecutive rows."""
 
 
 @compiled
 def move_nodes(state: Table, p_BN: Table, first_node: Table, nodes: Table) -> None:
-    """Writes the `nodes`, fixed to the bodies, without forces.
+    """Writes the table `nodes` for a state, with forces of zero.
 
-    `state` is [q; v] of the bodies, 13 numbers per body; `p_BN`, (nodes, 3) in m, are the nodes in
-    the frames of their bodies; `first_node`, (bodies + 1,), is the index of each body's first node,
-    and the number of nodes.
+    Args:
+        state: [q; v] of the bodies, 13 numbers per body.
+        p_BN: positions of the nodes (nodes, 3) in the frames of their bodies, in m.
+        first_node: index of each body's first node (bodies + 1,); the last number is the number of
+            nodes.
+        nodes: the table to write.
     """
     bodies = state.size // 13
     for body in range(bodies):
@@ -46,7 +49,7 @@ def move_nodes(state: Table, p_BN: Table, first_node: Table, nodes: Table) -> No
 
 @inlined
 def rotation(state: Table, body: int) -> tuple[Real, ...]:
-    """The nine numbers of R_WB of a body, row by row."""
+    """Rotation matrix R_WB of a body: nine numbers, row by row."""
     q = 7 * body
     w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
     s = 2.0 / (w * w + x * x + y * y + z * z)
@@ -65,12 +68,15 @@ def rotation(state: Table, body: int) -> tuple[Real, ...]:
 
 @inlined
 def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> None:
-    """Writes the positions of a state (13 bodies,) whose bodies have `moved` for a time (s) at
-    velocities (6 bodies,); quaternions get the length 1."""
+    """Writes the positions after a time (s) to `moved` (13 bodies,).
+
+    The bodies move from `state` with constant `velocities` (6 bodies,). Quaternions get the
+    length 1.
+    """
     half = 0.5 * time
     for body in range(velocities.size // 6):
         q, v = 7 * body, 6 * body
-        # The rotation's quaternion, to fourth order in its angle (some thousandths per step).
+        # Quaternion of the rotation, to fourth order in the angle (some 0.001 rad per step).
         x, y, z = half * velocities[v], half * velocities[v + 1], half * velocities[v + 2]
         square = x * x + y * y + z * z
         sine = 1.0 - square * (1.0 / 6.0)
@@ -93,7 +99,7 @@ def move_bodies(state: Table, velocities: Table, time: Real, moved: Table) -> No
 
 @inlined
 def forward_axis(state: Table, body: int) -> Vector:
-    """The x axis of a body in World."""
+    """The x axis of a body in the world frame."""
     q = 7 * body
     w, x, y, z = state[q], state[q + 1], state[q + 2], state[q + 3]
     s = 2.0 / (w * w + x * x + y * y + z * z)
@@ -104,8 +110,8 @@ def forward_axis(state: Table, body: int) -> Vector:
 def node_acceleration(
     state: Table, acceleration: Table, nodes: Table, node: int, body: int
 ) -> Vector:
-    """Acceleration (m/s²) of a node of a body in World from dv/dt of the bodies, 6 numbers per
-    body."""
+    """Acceleration (m/s²) of a node in the world frame. `acceleration` is dv/dt of the bodies, 6
+    numbers per body."""
     v, a = 7 * (state.size // 13) + 6 * body, 6 * body
     w_x, w_y, w_z = state[v], state[v + 1], state[v + 2]
     p_x, p_y, p_z = vector_at(nodes, node, P_BN_W)
@@ -120,8 +126,8 @@ def node_acceleration(
 
 @inlined
 def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> None:
-    """Writes the forces on the nodes as [t_W; f_W] at each Bo, (6 bodies,): Drake's
-    applied_generalized_force."""
+    """Sums the forces on the nodes to the generalized force (6 bodies,): [t_W; f_W] at each body's
+    origin, as in Drake's applied_generalized_force."""
     for body in range(generalized_force.size // 6):
         t_x = t_y = t_z = f_x = f_y = f_z = 0.0
         for node in range(first_node[body], first_node[body + 1]):
@@ -144,19 +150,19 @@ def gather_forces(nodes: Table, first_node: Table, generalized_force: Table) -> 
 
 @compiled
 def interpolate_state(before: Array, after: Array, step: float, part: float) -> Array:
-    """A state (13 bodies,) within a step, at `part` (0 to 1) of its length `step` (s).
+    """State (13 bodies,) within a step of length `step` (s), at the share `part` (0 to 1) of it.
 
-    Positions follow the cubic polynomial that has the velocities of both ends; velocities are
-    linear. At part 1 it equals `after`.
+    Positions are cubic polynomials that fit positions and velocities at both ends. Velocities are
+    linear. At part 1 the state equals `after`.
     """
     bodies = before.size // 13
     between = after.copy()
     if part == 1.0:
         return between
-    rest = 1.0 - part
-    from_before = (1.0 + 2.0 * part) * rest * rest
-    rate_before = step * part * rest * rest
-    rate_after = -step * part * part * rest
+    left = 1.0 - part
+    from_before = (1.0 + 2.0 * part) * left * left
+    rate_before = step * part * left * left
+    rate_after = -step * part * part * left
     q_rates = np.empty((2, 7))
     for body in range(bodies):
         q, v = 7 * body, 7 * bodies + 6 * body
@@ -180,5 +186,5 @@ def interpolate_state(before: Array, after: Array, step: float, part: float) -> 
         for k in range(4):
             between[q + k] /= norm
         for k in range(6):
-            between[v + k] = rest * before[v + k] + part * after[v + k]
+            between[v + k] = left * before[v + k] + part * after[v + k]
     return between

@@ -1,4 +1,4 @@
-"""When contact and friction modes change: the margin until then, and a prediction of the time."""
+"""Changes of contact and friction modes: detection, margin, and prediction of their time."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ Array = np.ndarray
 
 @compiled
 def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
-    """Brings `modes`, (contacts, MODE_COLUMNS), up to date with a state of the bodies, as
-    update_modes() does; writes the nodes and frames, too."""
+    """Updates `modes` for a state, as update_modes() does. Also writes nodes and frames."""
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
     return contact.update_modes(state, forces.nodes, robot.ground, forces.frames, modes)
@@ -29,10 +28,10 @@ def modes_after_step(parts: Parts, state: Table, modes: Table) -> Truth:
 
 @compiled
 def mode_margin(parts: Parts, state: Array, modes: Array) -> float:
-    """Positive while no mode is due to change; crosses zero where the first one is.
+    """Mode margin of the robot: positive until the first mode changes, zero at the change.
 
-    The least of: gap in the air, depth on the ground (m), the margin of friction. Only its sign has
-    a meaning. Writes the nodes and frames.
+    It is the least of the gaps of nodes in the air, the depths of nodes in the ground (m), and the
+    margins of friction. Only the sign has a meaning. Also writes nodes and frames.
     """
     robot, forces = unpacked(parts)
     move_contacts(robot, state, forces)
@@ -53,10 +52,11 @@ def mode_margin(parts: Parts, state: Array, modes: Array) -> float:
 def time_to_mode_change(
     robot: Model, state: Table, acceleration: Table, modes: Table, forces: Forces, horizon: Real
 ) -> Real:
-    """Time (s) to the next mode change, at most `horizon`, at constant node accelerations, over the
-    local tangent plane.
+    """Predicted time (s) to the next mode change, at most `horizon`.
 
-    `acceleration` is dv/dt, 6 numbers per body; `forces` has the nodes and frames of the state.
+    The prediction assumes constant accelerations of the nodes, and the tangent plane in place of
+    the ground. `acceleration` is dv/dt, 6 numbers per body. `forces` has the nodes and frames of
+    the state.
     """
     ground, nodes, frames = robot.ground, forces.nodes, forces.frames
     time, law = horizon, named(contact.NormalForce, ground.normal)
@@ -67,7 +67,7 @@ def time_to_mode_change(
         slide, v_n = contact.sliding(nodes, modes, ground, frames, i)
         touches = modes[i, contact.CONTACT] != 0.0
         distance = contact.gap(nodes, ground, frames, i)
-        up = select(touches, -1.0, 1.0)  # the way that leads to the ground's surface
+        up = select(touches, -1.0, 1.0)  # sign of the motion away from the surface
         time = minimum(time, friction.first_zero(up * distance, up * v_n, up * a_n, horizon))
         if not any_lane(touches):
             continue
@@ -86,10 +86,10 @@ def next_mode_change(
     modes: Array,
     horizon: float,
 ) -> tuple[bool, float]:
-    """Mode change that is due in a state of the bodies, and the time (s) to the next change
-    after that, as time_to_mode_change() predicts it.
+    """Updates `modes` for a state. Returns whether a mode changed, and the predicted time (s) to
+    the next change (see time_to_mode_change()).
 
-    Writes the nodes and frames, and brings `modes` up to date.
+    Also writes nodes and frames.
     """
     robot, forces = unpacked(parts)
     due = modes_after_step(parts, state, modes)

@@ -1,4 +1,4 @@
-"""The constants of a robot's laws, as the kernels of every engine take them."""
+"""Constants of a robot in the form of the kernels."""
 
 from __future__ import annotations
 
@@ -15,34 +15,36 @@ class Bodies(NamedTuple):
     """Constants of the bodies; SI units."""
 
     mass: Table
-    """(bodies,)."""
+    """Masses (bodies,)."""
     inertia: Table
-    """(bodies, 6): about the centre of mass in the body's frame; see physics.inertia."""
+    """Inertia (bodies, 6) about the centre of mass in the body's frame; see physics.inertia."""
     radius: Table
-    """(bodies,): the greatest distance of a node from the centre of mass."""
+    """Largest distance of a node from the centre of mass (bodies,)."""
     weight: Table
-    """(bodies,)."""
+    """Weights (bodies,)."""
 
 
 class Couplings(NamedTuple):
-    """The pairs of bodies that cables join. The cables of a pair follow each other, and run from
-    its first body, which has the lower index, to its second one."""
+    """Pairs of bodies joined by cables. The cables of a pair are consecutive. They run from the
+    first body, with the lower index, to the second body."""
 
     first: Table
-    """(pairs,)."""
+    """Index of the first body of each pair (pairs,)."""
     second: Table
-    """(pairs,)."""
+    """Index of the second body of each pair (pairs,)."""
     first_cable: Table
-    """(pairs + 1,): the index of each pair's first cable, and the number of cables."""
+    """Index of the first cable of each pair (pairs + 1,); the last number is the number of
+    cables."""
 
 
 class Model(NamedTuple):
-    """A structure and the constants of its laws; SI units."""
+    """Constants of a robot: its structure and its physical laws; SI units."""
 
     p_BN: Table
-    """(nodes, 3): nodes in the frames of their bodies, body by body."""
+    """Positions of the nodes (nodes, 3) in the frames of their bodies, in the order of the
+    bodies."""
     first_node: Table
-    """(bodies + 1,): the index of each body's first node, and the number of nodes."""
+    """Index of each body's first node (bodies + 1,); the last number is the number of nodes."""
     cables: Cables
     actuator: Actuator
     couplings: Couplings
@@ -52,4 +54,4 @@ class Model(NamedTuple):
     isotropic: bool
     """True if each body has the same moment of inertia about all axes."""
     slack: bool
-    """True if a cable cannot push."""
+    """True if cables go slack instead of pushing."""

@@ -1,10 +1,12 @@
-"""The Matsuoka network (Eq. 7-9): 2n neurons, of which neurons 2k and 2k + 1 (counting from
-0) are the extensor and the flexor of oscillator k. Neuron i, with y = max(0, u) and weights w:
+"""Matsuoka network (Eq. 7-9) of n oscillators with 2n neurons. Neurons 2k and 2k + 1, counted from
+0, are the extensor and the flexor of oscillator k.
+
+The law of neuron i, with the output y = max(0, u) and weights w:
 
     tau_A du_i/dt = u0_i + f_i - u_i - beta v_i - sum_j w_ij y_j
     tau_B dv_i/dt = y_i - v_i
 
-u0 is the tonic input, f the feedback. The signal of an oscillator is `cpg.gain` times
+The tonic input is u0, the feedback f. The signal of an oscillator is `cpg.gain` times
 y_extensor - y_flexor.
 """
 
@@ -21,25 +23,25 @@ from tetra_drake.simd.lanes import Real, Table, Truth, maximum, select
 Array = np.ndarray
 
 U, V, U_RATE, V_RATE, Y, U_START, V_START, U_SUM, V_SUM, NEURON_COLUMNS = range(10)
-"""Columns of `neurons`, (2n, 9): inner state u, self-inhibition v, their rates in 1/s, output y, u
-and v at the start of a step, sums of their rates; and the number of columns."""
+"""Columns of the table `neurons` (2n, 9), and their number: inner state u, self-inhibition v, their
+rates (1/s), output y, u and v at the beginning of a step, sums of their rates."""
 
 
 class Network(NamedTuple):
-    """The constants of a network, by neuron."""
+    """Constants of a network, by neuron."""
 
     first: Table
-    """(2n,): the first neuron that inhibits each neuron."""
+    """Index of the first neuron that inhibits each neuron (2n,)."""
     beyond: Table
-    """(2n,): one more than the last neuron that inhibits each; 0 if none does."""
+    """Index of the last neuron that inhibits each neuron, plus 1 (2n,); 0 if there is none."""
     inhibition: Table
-    """(2n, 2n): W[i, j], of neuron i by neuron j."""
+    """Weights W (2n, 2n): W[i, j] is the inhibition of neuron i by neuron j."""
     per_tau_a: Table
-    """(2n,): 1 / tau_A in 1/s."""
+    """1 / tau_A (2n,) in 1/s."""
     per_tau_b: Table
-    """(2n,): 1 / tau_B in 1/s."""
+    """1 / tau_B (2n,) in 1/s."""
     self_inhibition_weight: Table
-    """(2n,): beta."""
+    """Weight beta of self-inhibition (2n,)."""
 
     @classmethod
     def of(
@@ -50,9 +52,9 @@ class Network(NamedTuple):
         tau_b: npt.ArrayLike,
         self_inhibition_weight: npt.ArrayLike,
     ) -> Self:
-        """A network with time constants (s) and beta for all neurons, or for each by itself.
+        """A network with time constants (s) and beta; each is one number, or one per neuron.
 
-        Raises ValueError for an inhibition that is not (2n, 2n).
+        Raises ValueError if the shape of `inhibition` is not (2n, 2n).
         """
         matrix = np.array(inhibition, dtype=float)
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] % 2:
@@ -71,7 +73,7 @@ class Network(NamedTuple):
 
 
 def make_neurons(state: Array) -> Array:
-    """The `neurons` of a state (4n,): u, then v, of all neurons."""
+    """Table `neurons` for a state (4n,): u of all neurons, then v."""
     neurons = np.zeros((state.size // 2, NEURON_COLUMNS))
     neurons[:, U], neurons[:, V] = state.reshape(2, -1)
     return neurons
@@ -79,8 +81,10 @@ def make_neurons(state: Array) -> Array:
 
 @inlined
 def steered_input(external_input: Real, turn: Table, side: Table) -> Table:
-    """The tonic input by the turn, for neurons on the left (side 1), on the right (-1) or neither
-    (0), as Matsuoka's snakes are steered (arXiv 2207.04899); numbers or arrays."""
+    """Tonic input of a neuron for a turn, as in the steering of snakes (arXiv 2207.04899).
+
+    `side` is 1 on the left, -1 on the right, 0 for neither. Arguments are numbers or arrays.
+    """
     return external_input * (1.0 + turn * side)
 
 
@@ -88,7 +92,7 @@ def steered_input(external_input: Real, turn: Table, side: Table) -> Table:
 def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
     """Writes the rates of u and v (Eq. 7; -u as in listing B.2).
 
-    `inputs`, (2n,), are what comes from outside: the tonic input u0 and the feedback f.
+    `inputs` (2n,) is the sum of tonic input u0 and feedback f.
     """
     count = neurons.shape[0]
     for i in range(count):
@@ -104,7 +108,7 @@ def neuron_rates(network: Network, inputs: Table, neurons: Table) -> None:
 
 @compiled
 def oscillator_output(neurons: Table, output: Table) -> None:
-    """y_extensor - y_flexor (n,) of each oscillator, y = max(0, u) (Eq. 8 and 9)."""
+    """Writes the outputs y_extensor - y_flexor (n,), with y = max(0, u) (Eq. 8 and 9)."""
     for k in range(output.size):
         extensor, flexor = neurons[2 * k, U], neurons[2 * k + 1, U]
         output[k] = maximum(extensor, 0.0) - maximum(flexor, 0.0)
@@ -112,7 +116,7 @@ def oscillator_output(neurons: Table, output: Table) -> None:
 
 @inlined
 def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
-    """A step (s) of the forward Euler method, as in listing B.1."""
+    """Integrates a network by one step (s) of the forward Euler method, as in listing B.1."""
     neuron_rates(network, inputs, neurons)
     for i in range(neurons.shape[0]):
         neurons[i, U] += step * neurons[i, U_RATE]
@@ -121,13 +125,13 @@ def euler_step(network: Network, inputs: Table, step: Real, neurons: Table) -> N
 
 @inlined
 def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
-    """A step (s) of the classical Runge-Kutta method of order 4."""
+    """Integrates a network by one step (s) of the classical Runge-Kutta method of order 4."""
     for i in range(neurons.shape[0]):
         neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
         neurons[i, U_SUM], neurons[i, V_SUM] = 0.0, 0.0
     for stage in range(4):
         weight = (1.0 if stage == 0 or stage == 3 else 2.0) / 6.0
-        reach = 1.0 if stage == 2 else 0.5  # where the next stage begins
+        reach = 1.0 if stage == 2 else 0.5  # of the next stage
         neuron_rates(network, inputs, neurons)
         for i in range(neurons.shape[0]):
             neurons[i, U_SUM] += weight * neurons[i, U_RATE]
@@ -143,11 +147,11 @@ def runge_kutta_step(network: Network, inputs: Table, step: Real, neurons: Table
 def network_output(
     network: Network, inputs: Array, step: float, listing: bool, neurons: Array, output: Array
 ) -> None:
-    """Writes the outputs of a network without lanes, (samples, n), one a step (s); `inputs`,
-    (some, 2n), are those of the first steps, and the last row of all that follow.
+    """Writes the outputs (samples, n) of a network without lanes, one sample per step (s).
 
-    With `listing`, by forward Euler and after each step: listing B.1 stamps the state after i + 1
-    steps with the time of i. Otherwise by Runge-Kutta, from the start on.
+    `inputs` has a row (2n,) for each of the first steps. Later steps use its last row. With
+    `listing`, the method is forward Euler, and sample i is the state after i + 1 steps, as in
+    listing B.1. Otherwise the method is Runge-Kutta, and sample i is the state after i steps.
     """
     last = inputs.shape[0] - 1
     for i in range(output.shape[0]):
@@ -161,7 +165,8 @@ def network_output(
 
 @inlined
 def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table) -> None:
-    """The first half of Heun's method of order 2, a step (s) by Euler's; `inputs` of its start."""
+    """First half of a step (s) of Heun's method (order 2): an Euler step. `inputs` are at the
+    beginning of the step."""
     neuron_rates(network, inputs, neurons)
     for i in range(neurons.shape[0]):
         neurons[i, U_START], neurons[i, V_START] = neurons[i, U], neurons[i, V]
@@ -174,7 +179,8 @@ def predict_neurons(network: Network, inputs: Table, step: Real, neurons: Table)
 def correct_neurons(
     network: Network, inputs: Table, step: Real, accepted: Truth, neurons: Table
 ) -> None:
-    """The second half, with the `inputs` of the step's end; back to its start if not accepted."""
+    """Second half of a step of Heun's method. `inputs` are at the end of the step. Without
+    `accepted`, the neurons return to the beginning of the step."""
     neuron_rates(network, inputs, neurons)
     half = 0.5 * step
     for i in range(neurons.shape[0]):

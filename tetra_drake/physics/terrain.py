@@ -1,12 +1,12 @@
-"""The surface of the ground, z = h(x, y), and the frame in which a node meets it.
+"""Surface of the ground, z = h(x, y), and its tangent frame at a node.
 
-The surface is the uniform biquadratic B-spline whose control points are a regular grid of heights:
-its gradient is continuous, a plane is exact, and it lies nowhere higher than the highest control
-point. An edge is rounded by a cell. Beyond the grid the surface goes on as it is at the edge.
+The surface is a uniform biquadratic B-spline. Its control points are a regular grid of heights. The
+gradient is continuous, a plane is exact, and no point is higher than the highest control point. An
+edge is rounded over one cell. Beyond the grid the surface continues with the height at the border.
 
-A *frame*, a row of `frames`, holds the distance of a node from the surface, positive above it, and
-the axes of the local tangent plane: normal n, t1 (World's x axis projected into the plane), and
-t2 = n x t1. On flat ground these are z and the axes of World, and frames are neither made nor used.
+A *frame* is a row of the table `frames`. It has the distance of a node from the surface, positive
+above it, and the axes of the tangent plane: normal n, t1 (the world's x axis projected into the
+plane), and t2 = n x t1. On flat ground the axes are the world's, and `frames` is not used.
 """
 
 from __future__ import annotations
@@ -29,37 +29,40 @@ from tetra_drake.simd.lanes import (
 )
 
 GAP, N_X, N_Y, N_Z, T1_X, T1_Y, T1_Z, T2_Y, T2_Z, FRAME_COLUMNS = range(10)
-"""Columns of `frames`, (contacts, 9): distance (m), n, t1, t2 (whose x is 0); and their number."""
+"""Columns of the table `frames` (contacts, 9), and their number: distance (m), n, t1, and t2
+without its x, which is 0."""
 
 
 class SurfaceGrid(NamedTuple):
-    """Grid of the control points of a surface; SI units."""
+    """Grid of a surface's control points; SI units."""
 
     corner_x: Real
-    """Position of the first control point, with `corner_y`."""
+    """Coordinate x of the first control point."""
     corner_y: Real
+    """Coordinate y of the first control point."""
     per_cell_x: Real
     per_cell_y: Real
     last_row: Real
-    """The largest coordinate, in cells along x, with three rows of control points around it."""
+    """Largest coordinate along x, in cells, that has three rows of control points around it."""
     last_column: Real
+    """Largest coordinate along y, in cells, that has three columns of control points around it."""
     columns: Real
-    """Control points in a row."""
+    """Number of control points per row."""
     first: Real
-    """The index of the first one."""
+    """Index of the first control point in the heights."""
     top: Real
-    """Height of the highest one."""
+    """Height of the highest control point."""
 
 
 @inlined
 def surface(x: Real, y: Real, grid: SurfaceGrid, heights: Table) -> tuple[Real, Real, Real]:
     """Height (m) of the surface at x and y (m), and its gradient.
 
-    `heights`, (points,), are the control points, row by row.
+    `heights` (points,) are the heights of the control points, row by row.
     """
     cells_x = (x - grid.corner_x) * grid.per_cell_x
     cells_y = (y - grid.corner_y) * grid.per_cell_y
-    # In this order, a NaN becomes a bound, and no index leaves the grid.
+    # With this order of minimum and maximum, NaN becomes a bound, so no index leaves the grid.
     s = maximum(minimum(cells_x, grid.last_row), 0.5)
     t = maximum(minimum(cells_y, grid.last_column), 0.5)
     row, column = floor(s + 0.5), floor(t + 0.5)
@@ -83,10 +86,10 @@ def _across_row(heights: Table, index: Real, b: Real) -> tuple[Real, Real]:
 
 @inlined
 def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Real]:
-    """A quadratic B-spline and its derivative, `part` (-1/2 to 1/2) of a cell from a control
-    point."""
+    """Value and derivative of a quadratic B-spline. `part` (-1/2 to 1/2) is the distance from the
+    control point `here`, in cells."""
     less, more, rise, next_rise = 0.5 - part, 0.5 + part, here - before, after - here
-    # Each sum has one product in it: there is one way to round the two together.
+    # Each sum has one product, so there is only one way to round a product and a sum together.
     value = here - 0.5 * less * less * rise + 0.5 * more * more * next_rise
     return value, rise + more * (next_rise - rise)
 
@@ -95,9 +98,9 @@ def _spline(before: Real, here: Real, after: Real, part: Real) -> tuple[Real, Re
 def find_frames(
     nodes: Table, contacts: Table, grid: SurfaceGrid, heights: Table, frames: Table
 ) -> None:
-    """Writes the `frames` of the contact nodes, whose indices are `contacts`, (contacts,).
+    """Writes the `frames` at the nodes with the indices `contacts` (contacts,).
 
-    A node above the highest control point has the frame of level ground at that height.
+    A node above the highest control point gets the frame of level ground at that height.
     """
     for i in range(contacts.size):
         node = contacts[i]
@@ -124,7 +127,7 @@ def find_frames(
 
 @inlined
 def to_frame(vector: Vector, frames: Table, i: int, flat: bool) -> Vector:
-    """A vector of World along t1, t2 and n of a frame."""
+    """Components of a vector of the world frame along t1, t2 and n of a frame."""
     if flat:
         return vector
     x, y, z = vector
@@ -137,7 +140,7 @@ def to_frame(vector: Vector, frames: Table, i: int, flat: bool) -> Vector:
 
 @inlined
 def to_world(t_1: Real, t_2: Real, n: Real, frames: Table, i: int, flat: bool) -> Vector:
-    """A vector along t1, t2 and n of a frame, in World."""
+    """Converts components along t1, t2 and n of a frame to a vector in the world frame."""
     if flat:
         return t_1, t_2, n
     return (

@@ -1,4 +1,4 @@
-"""Equilibrium of a robot on flat ground while its cables are not actuated."""
+"""Equilibrium of a robot on flat ground without actuation, by Newton's method."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ from tetra_drake.simd.compiling import LOGGER, compiled
 from tetra_drake.simd.lanes import Table
 
 TOLERANCE = 1e-11
-"""Greatest force left over, as a share of the greatest tension or of the robot's weight."""
-
+"""Largest remaining force in equilibrium, as a share of the greatest tension or of the weight."""
 LEAST_FORCE = 1e-9
-"""N: forces beside which no tension and no weight count."""
+"""Lower limit (N) of the force that TOLERANCE is a share of."""
 
 MOST_STEPS, LEAST_STEPS = 1000, 10
 """Upper limit of the steps of a search, for few bodies and for as many as a structure can have."""
@@ -32,42 +31,38 @@ MOST_WORK = 2e11
 """Upper limit of steps times the cube of their unknowns, between these: two minutes or so."""
 
 FIRST_REACH, LONGEST_REACH = 0.05, 0.2
-"""Largest step of Newton's method for a body, as a share of its radius."""
-
+"""Largest step of Newton's method at first, and later, as a share of the largest body's radius."""
 OVERSHOOT = 0.9
-"""A step is too long if the forces work against it at its end by more than this share of the work
-they began with."""
-
+"""Limit for the force against the step at its end, as a share of the force along the step at its
+beginning. A step beyond the limit is too long."""
 DIFFERENCE = 1e-7
-"""Displacement in finite differences, as a share of a body's radius."""
+"""Displacement for finite differences, as a share of the largest body's radius."""
 
 LEAST_STIFFNESS = 1e-9
 """Least stiffness of a stable mode, as a share of the ground's stiffness."""
 
 LONG = 5.0
-"""Time (s) that a search takes before it is announced."""
-
+"""Time (s) after which a long search is announced."""
 LENGTH_DIGITS = 9
-"""Digits of a settled length (m) behind the point. What follows depends on the processor, as the
-linear algebra does, and a walk with feedback would enlarge it."""
+"""Decimals of a cable length (m) in equilibrium. Further digits depend on the processor, and a
+simulation with feedback would amplify their differences."""
 
 _LOG = logging.getLogger(LOGGER)
 
 
 class Equilibrium(NamedTuple):
-    """A robot at rest."""
+    """Equilibrium of a robot on flat ground."""
 
     state: np.ndarray
-    """(13 n,): [q; v] of the bodies."""
+    """State [q; v] of the bodies (13 n,)."""
     lengths: np.ndarray
-    """(cables,): the lengths of the cables, in whole nm."""
-
+    """Lengths of the cables (cables,), in m, rounded to nm."""
     feet: int
-    """The number of contact nodes that bear a load."""
+    """Number of contact nodes that bear a load."""
 
 
 class Unactuated(NamedTuple):
-    """A robot whose forces are sought, without actuation, and room to compute them in."""
+    """A robot without actuation, with memory for its forces."""
 
     model: Model
     forces: Forces
@@ -75,7 +70,7 @@ class Unactuated(NamedTuple):
 
     @classmethod
     def of(cls, model: Model) -> Self:
-        """The robot of a model, no signal driving its cables."""
+        """The robot of a model, with all cables passive."""
         cables = model.cables._replace(signal=np.full_like(model.cables.signal, PASSIVE))
         return cls(model._replace(cables=cables), Forces.of(model))
 
@@ -83,11 +78,10 @@ class Unactuated(NamedTuple):
 def find_equilibrium(
     model: Model, start: np.ndarray, *, bodies: Sequence[str], source: str
 ) -> Equilibrium:
-    """Equilibrium of a robot on flat ground, let go at `start` (13 n,) without actuation.
+    """Finds the equilibrium of a robot on flat ground without actuation.
 
-    It is the minimum of potential energy downhill from there; friction carries nothing.
-
-    Raises InputError if it is not found, with the source and the name of a body.
+    The search goes downhill in potential energy from the state `start` (13 n,) to a minimum.
+    Friction bears no load. Raises InputError, naming `source` and a body, if none is found.
     """
     robot, state = Unactuated.of(model), start
     weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
@@ -117,10 +111,10 @@ def find_equilibrium(
         moved = displaced(robot, state, step)
         if force_at_rest(robot, moved) @ step >= -OVERSHOOT * (force @ step):
             state, reach = moved, min(2.0 * reach, LONGEST_REACH * radius)
-        else:  # NaN, too, where the ends of a cable meet
+        else:  # also if the force is NaN because the ends of a cable meet
             reach = 0.5 * np.abs(step).max()
     left = np.abs(force.reshape(-1, 6)).max(axis=1)
-    body = int(left.argmax())  # the first one with NaN, if there is any
+    body = int(left.argmax())  # argmax takes the first NaN, if there is one
     amount = f"{left[body]:.3g} N" if np.isfinite(left[body]) else "which is not finite"
     found = f"finds no equilibrium until step {count + 1}"
     problem = f"{found}; the greatest force left, {amount}, is on '{bodies[body]}'"
@@ -128,22 +122,24 @@ def find_equilibrium(
 
 
 class _Descent:
-    """Steps of Newton's method to a minimum of the potential energy."""
+    """Newton's method for a minimum of the potential energy."""
 
     def __init__(self, robot: Unactuated) -> None:
         self._robot = robot
         self._hard = float(NormalForce(*robot.model.ground.normal).stiffness)
         self._shifts = [0.0, LEAST_STIFFNESS * self._hard]
-        """Stiffnesses (N/m): the least one that makes the potential energy convex is added."""
+        """Stiffnesses (N/m) to try. A step adds the least one that makes the energy convex."""
         while self._shifts[-1] < math.inf:
             self._shifts.append(10.0 * self._shifts[-1])
         self._index = 0
-        """Index of the last step's shift, which is most often the next one's, too."""
+        """Index of the last step's shift. The next step mostly needs the same shift."""
 
     def step(self, state: np.ndarray, force: np.ndarray) -> np.ndarray | None:
-        """Displacements (6 n,) that bring the force to zero where the potential energy is convex,
-        and lead downhill where it is not; the robot as a whole stays where it is. None if the
-        derivatives of the forces are not finite."""
+        """Newton step: displacements (6 n,) that bring the force to zero.
+
+        If the potential energy is not convex, the displacements lead downhill. The robot as a whole
+        does not move. None if the derivatives of the forces are not finite.
+        """
         stiffness, held = stiffness_at_rest(self._robot, state), _free_motions(self._robot, state)
         stiffness = 0.5 * (stiffness + stiffness.T) + self._hard * held @ held.T
         before = self._index
@@ -159,14 +155,14 @@ class _Descent:
         return step
 
     def _solved(self, stiffness: np.ndarray, force: np.ndarray, index: int) -> np.ndarray | None:
-        """The step with a shift; None if the potential energy is not convex with it."""
+        """The step with a shift; None if the energy is not convex with this shift."""
         shifted, step = stiffness + self._shifts[index] * np.eye(len(force)), np.empty_like(force)
         is_convex = solve_convex(shifted, force, LEAST_STIFFNESS * self._hard, step)
         return step if is_convex else None
 
 
 def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
-    """(6 n, 3): displacements of the whole robot along x, along y, and about z."""
+    """Displacements (6 n, 3) of the whole robot along x, along y, and about z."""
     motions = np.zeros((len(state) // 13, 6, 3))
     p_WB = state[: 7 * len(motions)].reshape(-1, 7)[:, 4:]
     x, y = ((p_WB - p_WB.mean(axis=0)) / robot.model.bodies.radius.max())[:, :2].T
@@ -177,10 +173,10 @@ def _free_motions(robot: Unactuated, state: np.ndarray) -> np.ndarray:
 
 @compiled
 def solve_convex(matrix: Table, right: Table, least: float, x: Table) -> bool:
-    """Solves a symmetric system by Cholesky's method, in place of the upper half of the matrix;
-    False if a pivot is not greater than `least`.
+    """Solves a symmetric system by Cholesky's method. Returns False if a pivot is at most `least`.
 
-    LAPACK's many threads wait for each other where processors are busy.
+    The upper half of the matrix is overwritten. LAPACK is not used because its threads wait for
+    each other on busy processors.
     """
     n = right.size
     for i in range(n):
@@ -200,7 +196,8 @@ def solve_convex(matrix: Table, right: Table, least: float, x: Table) -> bool:
 
 @compiled
 def force_at_rest(robot: Unactuated, state: Table) -> Table:
-    """(6 n,): [t_W / radius; f_W] of all forces at each Bo; contact nodes stick where they are."""
+    """Generalized force (6 n,) at rest: [t_W / radius; f_W] at each body's origin. Contact nodes
+    stick at their positions."""
     model, forces = robot.model, robot.forces
     modes = np.zeros((forces.ground_forces.shape[0], MODE_COLUMNS))
     generalized = np.empty(6 * (state.size // 13))
@@ -215,7 +212,7 @@ def force_at_rest(robot: Unactuated, state: Table) -> Table:
 
 @compiled
 def displaced(robot: Unactuated, state: Table, step: Table) -> Table:
-    """A state whose bodies have moved by `step`, (6 n,): rotation times radius, translation (m)."""
+    """A state displaced by `step` (6 n,): rotation times radius, and translation, in m."""
     moved, motion = state.copy(), step.copy()
     radius = robot.model.bodies.radius.max()
     for body in range(step.size // 6):
@@ -226,7 +223,8 @@ def displaced(robot: Unactuated, state: Table, step: Table) -> Table:
 
 @compiled
 def stiffness_at_rest(robot: Unactuated, state: Table) -> Table:
-    """(6 n, 6 n), in N/m: minus the derivative of the forces by the displacements."""
+    """Stiffness matrix (6 n, 6 n) in N/m: minus the derivative of the forces with respect to the
+    displacements."""
     count, half = state.size // 13 * 6, DIFFERENCE * robot.model.bodies.radius.max()
     stiffness, motion = np.empty((count, count)), np.zeros(count)
     for j in range(count):

@@ -94,14 +94,14 @@ class Robot:
         """Constants of the oscillators' sensors. Raises InputError if there is no equilibrium."""
         drivers, pathways = self.structure.drivers, self.scenario.cpg.feedback
         sizes = np.bincount(drivers - PASSIVE)[drivers - PASSIVE]  # of each cable's group
-        settled = self.equilibrium.lengths if "length" in pathways else np.ones(len(drivers))
+        neutral = self.equilibrium.lengths if "length" in pathways else np.ones(len(drivers))
         per_load = 1.0 / self.weight if "load" in pathways else 0.0
         return Senses(
             drivers=drivers,
             ahead=self.structure.ahead,
             carriers=self.ground.carriers,
-            settled=settled,
-            per_length=1.0 / (settled * sizes),
+            neutral_length=neutral,
+            per_length=1.0 / (neutral * sizes),
             per_load=np.array([per_load]),
         )
 

@@ -1,1 +1,1 @@
-"""Lanes of numbers and the compiling decorator; nothing of robots."""
+"""SIMD lanes and the compilation of kernels. This package is independent of robots."""

@@ -1,4 +1,4 @@
-"""Tables whose shapes stand in the annotations of a NamedTuple.
+"""Allocation of tables. The annotations of a NamedTuple define their shapes.
 
 class Motion(NamedTuple):
     state: Annotated[Table, "13 * bodies"]
@@ -22,14 +22,15 @@ Record = TypeVar("Record", bound=tuple)
 
 
 def allocate(kind: type[Record], sizes: Mapping[str, int], **given: object) -> Record:
-    """A NamedTuple of tables.
+    """A NamedTuple of new tables.
 
     Args:
-        kind: The NamedTuple. An annotated table has the lengths of its dimensions: whole numbers,
-            names of sizes, or their products. With `int`, its numbers are whole. With a float, they
-            are all that number; else they are 0. Any other field is a NamedTuple of tables.
-        sizes: The sizes by name.
-        given: Fields that exist already.
+        kind: class of the NamedTuple. The annotation of a table has a length per dimension: a
+            number, the name of a size, or a product. With `int`, the table has integers. With a
+            float, all numbers have this value; otherwise they are 0. A field without annotation is
+            a NamedTuple of tables.
+        sizes: sizes by name.
+        given: values of fields that are not allocated.
     """
     fields: dict[str, Any] = {}
     for name, hint in _hints(kind).items():

@@ -26,42 +26,39 @@ from tetra_drake.files import write_whole
 F = TypeVar("F", bound=Callable[..., object])
 
 LOGGER = "tetra_drake"
-"""The logger that gets a warning, once, when compilation takes longer than a moment."""
-
+"""Name of the logger that gets a warning, once, when compilation takes long."""
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract"},
-    "no_cfunc_wrapper": True,  # which C would call
+    "no_cfunc_wrapper": True,  # only C code would call the wrapper
 }
-
 _MOMENT = 2.0
-"""Time (s) that a compilation takes before it is announced."""
+"""Time (s) after which a compilation is announced."""
 
 
 def compiled(function: F, *, nogil: bool = False) -> F:
-    """Compiles a kernel that Python calls, keeping the machine code beside the source or in the
-    user's cache.
+    """Decorator of a kernel that Python calls. The machine code is cached on disk.
 
-    Division follows NumPy (no check for zero); a product may be rounded together with the sum it
-    goes into. With `nogil`, other threads run meanwhile; without it, kernels that call this one
-    contain it, since calls with many tables are slow.
+    The cache is beside the source or in the user's cache folder. If neither can be written to (as
+    in a read-only installation without a home), the kernel is compiled in each process.
 
-    Where no folder can hold the cache (say, a read-only installation without a home), the kernel
-    is compiled anew each time.
+    Division follows NumPy, without a check for zero. A product and a sum may be rounded together.
+    With `nogil`, other Python threads run during a call. Without it, the kernel is inlined in other
+    kernels, because calls with many tables are slow.
     """
     return _kernel(function, nogil=nogil, forceinline=not nogil)
 
 
 def merged(function: F) -> F:
-    """A large kernel whose source becomes part of the one that calls it; it is compiled by itself
-    only if Python calls it."""
+    """Decorator of a large kernel. Its source becomes part of kernels that call it. It is compiled
+    separately only if Python calls it."""
     return _kernel(function, inline="always")
 
 
 def inlined(function: F) -> F:
-    """A function that becomes part of the kernels that call it; from Python, a Python function.
+    """Decorator of a function that becomes part of kernels that call it.
 
-    Compiling what a call from Python takes would cost as much again.
+    Python calls the plain function. To compile it for calls from Python would take as long again.
     """
     options: Any = _OPTIONS | {"forceinline": True}
 
@@ -74,9 +71,9 @@ def inlined(function: F) -> F:
 
 
 def machine_code(kernel: F, *arguments: object) -> F:
-    """The machine code of a kernel for arguments of the types of these.
+    """Machine code of a kernel for arguments of the given types.
 
-    A call does not look at types: with others it fails or computes nonsense.
+    A call does not check types: with other types it fails or computes nonsense.
     """
     if not hasattr(kernel, "compile"):  # compilation is switched off
         return kernel
@@ -85,20 +82,20 @@ def machine_code(kernel: F, *arguments: object) -> F:
 
 def _kernel(function: F, **options: Any) -> F:
     kernel: Any = numba.njit(**_OPTIONS, **options)(function)
-    if hasattr(kernel, "_cache"):  # else compilation is switched off by NUMBA_DISABLE_JIT
+    if hasattr(kernel, "_cache"):  # False with NUMBA_DISABLE_JIT
         kernel._cache = KernelCache(function)
     return cast(F, kernel)
 
 
 class KernelCache(NullCache):
-    """The machine code of a kernel, in a file for each signature.
+    """Cache of a kernel's machine code, with a file for each signature.
 
-    Numba's usual cache numbers the files in an index, which is wrong after two processes have
-    saved at once. Here a digest of the signature names the file, and the file begins with a digest
-    of its content and of all that the content depends on. A file that is damaged, out of date or
-    another kernel's is replaced.
+    Numba's own cache numbers its files in an index. The index is wrong after two processes have
+    saved at the same time. Here the name of a file contains a digest of the signature. The file
+    begins with a digest of its content and of everything that the content depends on. A file that
+    is damaged, out of date or of another kernel is replaced.
 
-    Numba asks it at the first call of a kernel with arguments of other types than before:
+    Numba asks the cache at the first call of a kernel with arguments of new types:
 
         load_overload(sig) ──→ machine code, read from the file of this signature
               │
@@ -113,25 +110,25 @@ class KernelCache(NullCache):
         self._kernel = f"{Path(file).stem}.{function.__qualname__}"
         self._origin = f"{self._kernel} {numba.__version__} {sys.version} {source_stamp(file)} "
         self._content: CompileResultCacheImpl | None = None
-        if not function.__closure__:  # whose values would be in the machine code
-            with contextlib.suppress(RuntimeError):  # there is no folder to write to
+        if not function.__closure__:  # the machine code would contain the closure's values
+            with contextlib.suppress(RuntimeError):  # no folder can be written to
                 self._content = CompileResultCacheImpl(function)
         self._timers: dict[object, threading.Timer] = {}
 
     @property
     def cache_path(self) -> str | None:
-        """The folder of the files, None if there is none."""
+        """Folder of the cache files; None if no folder can be written to."""
         return str(self._content.locator.get_cache_path()) if self._content else None
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
-        """The kernel compiled earlier for a signature; None if it has to be compiled now."""
+        """The cached kernel for a signature; None if it must be compiled."""
         target_context.refresh()
         if self._content:
             path, key = self._entry(sig, target_context.codegen())
             seal, data = _read(path)
             if seal == _seal(key, data):
                 saved_sig, reduced = pickle.loads(data)
-                if saved_sig == sig:  # another type may have the same name
+                if saved_sig == sig:  # different types may have the same name
                     return self._content.rebuild(target_context, reduced)
         timer = threading.Timer(_MOMENT, announce, [self._content is not None])
         timer.daemon = True
@@ -140,7 +137,7 @@ class KernelCache(NullCache):
         return None
 
     def save_overload(self, sig: object, data: Any) -> None:
-        """Keeps what was compiled for a signature, if the folder can be written to."""
+        """Saves the compiled kernel for a signature, if the folder can be written to."""
         self._timers.pop(sig).cancel()
         if self._content and self._content.check_cachable(data):
             path, key = self._entry(sig, data.codegen)
@@ -149,7 +146,7 @@ class KernelCache(NullCache):
                 write_whole(path, _seal(key, content) + content)
 
     def _entry(self, sig: object, codegen: Any) -> tuple[Path, str]:
-        """The file of a signature, and a text with all that its content depends on."""
+        """Cache file for a signature, and a text with everything that its content depends on."""
         variant = f"{sig} {codegen.magic_tuple()} {sys.implementation.cache_tag}"
         digest = hashlib.sha256(variant.encode()).hexdigest()[:16]
         return Path(str(self.cache_path), f"{self._kernel}.{digest}.nbc"), self._origin + variant
@@ -160,18 +157,19 @@ def _seal(key: str, content: bytes) -> bytes:
 
 
 def _read(path: Path) -> tuple[bytes, bytes]:
-    """The seal and the content of a file, empty if it cannot be read."""
+    """The digest and the content of a cache file; empty if it cannot be read."""
     try:
-        whole = path.read_bytes()
+        file = path.read_bytes()
     except OSError:
-        whole = b""
+        file = b""
     size = hashlib.sha256().digest_size
-    return whole[:size], whole[size:]
+    return file[:size], file[size:]
 
 
 @functools.cache
 def announce(kept: bool) -> None:
-    """Logs, once a process, that kernels are compiled, and whether that is `kept`."""
+    """Logs, once per process, that kernels are being compiled. `kept` is True if the machine code
+    will be cached."""
     often = "once" if kept else "each time, as no folder can be written to: set NUMBA_CACHE_DIR"
     logging.getLogger(LOGGER).warning(
         "tetra_drake is compiling for this processor, which may take a minute, %s", often
@@ -179,7 +177,7 @@ def announce(kept: bool) -> None:
 
 
 def source_stamp(file: str) -> str:
-    """A digest of a module's source and of all modules of this package that it imports."""
+    """Digest of the sources of a module and of all modules of this package that it imports."""
     sources: set[Path] = set()
     pending = [Path(file).resolve()]
     while pending:
@@ -192,9 +190,9 @@ def source_stamp(file: str) -> str:
 
 @functools.cache
 def _imported(path: Path) -> tuple[Path, ...]:
-    """The files of the modules of this package that a module imports.
+    """Files of the modules of this package that a module imports.
 
-    What an import takes from a package may be a module: `from tetra_drake.physics import contact`.
+    A name imported from a package may be a module: `from tetra_drake.physics import contact`.
     """
     names: set[str] = set()
     for node in ast.walk(ast.parse(path.read_bytes())):

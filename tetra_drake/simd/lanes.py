@@ -1,39 +1,39 @@
 """Lanes: several simulations side by side in the registers of one core.
 
-A processor's SIMD registers hold several doubles, and one instruction adds, multiplies or compares
-all of them: four with AVX2, eight with AVX-512. The compiler fills them by itself only where it
-finds simple loops, which a robot's equations are not. Here they are filled by hand: what a kernel
-takes for a number is `Lanes(W)`, W doubles that belong to W simulations. An addition of two such
-numbers is one instruction, and W robots move in little more than the time of one.
+A SIMD register holds several doubles (four with AVX2, eight with AVX-512), and one instruction
+adds, multiplies or compares all of them. Compilers use these instructions only in simple loops; a
+robot's equations are not simple loops. Therefore a number in a kernel is `Lanes(W)`: W doubles of W
+simulations. An addition of two such numbers is one instruction. So W robots are simulated in little
+more than the time of one.
 
-How numba is taught the type
-    Numba translates a kernel to LLVM, the compiler's own language, where `<8 x double>` is a type
-    like `double`. To numba a type is a Python class (Lanes, Mask, Field) and a model that names its
-    LLVM type. An operator needs two entries: which types it takes and gives (a template), and the
-    instruction to emit (a lowering). LLVM's instructions fadd, fmul, fcmp ... take vectors and
-    doubles alike. If the processor's registers are narrower than W, LLVM splits an instruction in
-    two or more; the numbers are the same. (The last digit depends on whether a processor can
-    multiply and add in one rounding, for single numbers as for lanes.)
+How numba learns the type
+    Numba translates a kernel to LLVM, the compiler's own language. LLVM has the types `double` and
+    `<8 x double>`. In numba a type is a Python class (Lanes, Mask, Field) and a model that names
+    its LLVM type. An operator needs two entries: a template (types of arguments and result) and a
+    lowering (the instruction to emit). LLVM's instructions fadd, fmul, fcmp ... take doubles and
+    vectors. If registers are narrower than W, LLVM splits an instruction in two or more; the
+    results are the same. (The last digit depends on whether the processor can multiply and add with
+    one rounding. This holds for single numbers, too.)
 
 What a kernel must not do
-    Comparing lanes gives a `Mask(W)`, W truth values, and `if` cannot go two ways at once: numba
-    refuses `if mask`, and `and`, `or`, `not`, `a < b < c` of lanes. So laws are written without
-    branches, with &, |, ^, `not_` and parentheses: `select(mask, x, y)` computes both and picks
-    lane by lane. An `if any_lane(mask)` may skip work that no lane needs. A lane that is not picked
-    may compute nonsense (a division by zero, say): no other lane sees it. Lanes may stand in
-    variables, tuples and fields, not in lists.
+    A comparison of lanes gives a `Mask(W)`: W truth values. An `if` cannot branch per lane, so
+    numba refuses `if mask`, and also `and`, `or`, `not` and `a < b < c` of lanes. Therefore kernels
+    have no branches on lanes. They use &, |, ^, `not_` and parentheses; `select(mask, x, y)` takes
+    x or y, both computed, lane by lane. An `if any_lane(mask)` may skip work that no lane needs. An
+    unused lane may compute nonsense, such as a division by zero: other lanes are not affected.
+    Lanes may be in variables, tuples and fields, but not in lists.
 
 The same kernel for one simulation
-    `select`, `any_lane` and the others take plain floats and booleans as well, and arrays are
-    indexed alike: so the kernels that a LeafSystem calls with NumPy arrays are those that run in
-    lanes. In the type hints, Real is a float or Lanes, Truth a bool or Mask, and Table an
-    array or Field. A field of one lane holds float64, LLVM's double: there is no Lanes(1).
+    `select`, `any_lane` and the other functions also take floats and booleans. Fields and arrays
+    have the same indexing. So the same kernels run in lanes and in LeafSystems with NumPy arrays.
+    In type hints, Real is a float or Lanes, Truth is a bool or Mask, and Table is an array or a
+    Field. A field with one lane contains float64; there is no Lanes(1).
 
 Arrays of lanes
-    A `Field` is to a kernel what an array is: `field[i, j]` is a number, here Lanes(W). Made in
-    Python by `lane_table`, it lies in memory as (..., W), the lanes of a number side by side. All
-    lengths but the first are part of its type, so that the compiler knows the strides, and there
-    is no reference count to maintain. Indices are not checked: -1 is the memory before the field.
+    A `Field` is the array of a kernel: `field[i, j]` is a number, such as Lanes(W). In Python,
+    `lane_table` makes one. In memory it has the shape (..., W), with the lanes of a number side by
+    side. All lengths but the first are part of its type, so that the compiler knows the strides.
+    Fields need no reference counts. Indices are not checked: -1 is the memory before the field.
 """
 
 from __future__ import annotations
@@ -74,11 +74,11 @@ _DOUBLE, _BIT, _INT, _INT32 = ir.DoubleType(), ir.IntType(1), ir.IntType(64), ir
 _ALIGNMENT = 64  # bytes of the widest register
 
 
-# The types and their LLVM types.
+# Numba types and their LLVM types.
 
 
 class Lanes(types.Type):
-    """`width` doubles."""
+    """Numba type of a number in lanes: `width` doubles."""
 
     element: Any = _DOUBLE
     scalar: Any = types.float64
@@ -92,12 +92,12 @@ class Lanes(types.Type):
         return isinstance(other, (types.Float, types.Integer))
 
     def can_convert_from(self, context: Any, other: types.Type) -> Conversion | None:
-        """Lets numba cast scalars; a variable that is a scalar here and lanes there is lanes."""
+        """Allows numba to cast scalars. A variable that is sometimes a scalar becomes lanes."""
         return Conversion.safe if self.accepts(other) else None
 
 
 class Mask(Lanes):
-    """`width` truth values."""
+    """Numba type of a truth value in lanes: `width` bits."""
 
     element: Any = _BIT
     scalar: Any = types.boolean
@@ -119,7 +119,7 @@ class _LanesModel(models.PrimitiveModel):
 def _to_all_lanes(context: Any, builder: Any, of: Any, to: Lanes, value: Any) -> Any:
     value = context.cast(builder, value, of, to.scalar)
     vector = ir.VectorType(to.element, to.width)
-    # Puts the scalar in lane 0 of a vector, then copies lane 0 to all.
+    # Puts the scalar into lane 0 of a vector, then copies lane 0 to all lanes.
     undefined, first = ir.Constant(vector, ir.Undefined), ir.Constant(_INT32, 0)
     every = ir.Constant(ir.VectorType(_INT32, to.width), [0] * to.width)
     return builder.shuffle_vector(builder.insert_element(undefined, value, first), undefined, every)
@@ -136,7 +136,7 @@ def _operator(
     over: type = Lanes,
     to: type = Lanes,
 ) -> None:
-    """Teaches numba an operator of the type `over`; one of two operands may be a scalar."""
+    """Registers an operator of the type `over` with numba. One of two operands may be a scalar."""
 
     def generic(self: Any, args: tuple[Any, ...], kws: Any) -> Any:
         vector: Any = next((kind for kind in args if type(kind) is over), None)
@@ -151,13 +151,13 @@ def _operator(
         lower(lambda context, builder, s, args: emit(builder, *args))
 
 
-# Numba types x += y by the in-place name, and then adds.
+# Numba needs the in-place names to type x += y; the result is an addition.
 _operator(["add", "iadd"], ir.IRBuilder.fadd)
 _operator(["sub", "isub"], ir.IRBuilder.fsub)
 _operator(["mul", "imul"], ir.IRBuilder.fmul)
 _operator(["truediv", "itruediv"], ir.IRBuilder.fdiv)
 _operator(["neg"], ir.IRBuilder.fneg, operands=1)
-# Ordered comparisons are false where either is NaN; != is true there.
+# With NaN, ordered comparisons are false, and != is true.
 _operator(["lt"], lambda b, x, y: b.fcmp_ordered("<", x, y), to=Mask)
 _operator(["le"], lambda b, x, y: b.fcmp_ordered("<=", x, y), to=Mask)
 _operator(["gt"], lambda b, x, y: b.fcmp_ordered(">", x, y), to=Mask)
@@ -169,11 +169,11 @@ _operator(["or_", "ior"], ir.IRBuilder.or_, over=Mask, to=Mask)
 _operator(["xor", "ixor"], ir.IRBuilder.xor, over=Mask, to=Mask)
 
 
-# Functions. From Python they take floats; a kernel gets the overload, for floats and lanes.
+# Functions of floats for Python. Kernels use the overloads, for floats and lanes.
 
 
 def _call(builder: Any, name: str, x: Any) -> Any:
-    """A call of an LLVM function of one number or vector, such as llvm.sqrt.v8f64."""
+    """Emits the call of an LLVM function of one number or vector, such as llvm.sqrt.v8f64."""
     is_vector = isinstance(x.type, ir.VectorType)
     count = f"v{x.type.count}" if is_vector else ""
     element = x.type.element if is_vector else x.type
@@ -200,7 +200,7 @@ overload(abs)(lambda x: (lambda x: _abs(x)) if isinstance(x, Lanes) else None)
 
 
 def floor(x: Real) -> Real:
-    """The largest whole number that is not larger."""
+    """Rounds down to a whole number."""
     return float(np.floor(x))
 
 
@@ -208,7 +208,7 @@ overload(floor)(lambda x: lambda x: _floor(x))
 
 
 def select(mask: Truth, x: Real, y: Real) -> Real:
-    """x where the mask is true, y elsewhere."""
+    """x in lanes where the mask is true, y in other lanes."""
     return x if mask else y
 
 
@@ -225,24 +225,24 @@ overload(select)(lambda mask, x, y: lambda mask, x, y: _select(mask, x, y))
 
 @inlined
 def minimum(x: Real, y: Real) -> Real:
-    """The smaller; y where they are equal or either is NaN."""
+    """The smaller of two numbers; y if they are equal or one is NaN."""
     return select(x < y, x, y)
 
 
 @inlined
 def maximum(x: Real, y: Real) -> Real:
-    """The larger; y where they are equal or either is NaN."""
+    """The larger of two numbers; y if they are equal or one is NaN."""
     return select(x > y, x, y)
 
 
 @inlined
 def not_(mask: Truth) -> Truth:
-    """The opposite."""
+    """Negation of a mask."""
     return mask ^ True
 
 
 def any_lane(mask: Truth) -> bool:
-    """True if the mask is true in any lane."""
+    """True if a mask is true in at least one lane."""
     return mask
 
 
@@ -261,11 +261,11 @@ overload(any_lane)(
 
 
 def inverse_sqrt(x: Real) -> Real:
-    """1 / sqrt(x) to within 2 units in the last place, for x from 1e-37 to 1e38; 0 above 3.4e38,
-    NaN for 0, negatives and infinity.
+    """1 / sqrt(x), with an error of at most 2 units in the last place for x from 1e-37 to 1e38.
 
-    Division and square root of doubles are slow. This is those of singles, made exact by two steps
-    of Newton's method, in a third of the time.
+    The result is 0 above 3.4e38, and NaN for 0, negative numbers and infinity. Division and square
+    root of doubles are slow. This function uses singles, and two steps of Newton's method for the
+    precision. It takes a third of the time.
     """
     return 1.0 / math.sqrt(x)
 
@@ -296,8 +296,8 @@ def _overload_inverse_sqrt(x):  # type: ignore[no-untyped-def]
 
 
 def gather(numbers: Table, index: Real, offset: int) -> Real:
-    """The number at a whole `index`, which each lane has for itself, plus `offset`; `numbers`,
-    (size,), have no lanes."""
+    """numbers[index + offset], with an own index for each lane. `numbers` (size,) has no lanes; an
+    index is a whole number."""
     return numbers[int(index) + offset]
 
 
@@ -325,7 +325,7 @@ def _overload_gather(numbers, index, offset):  # type: ignore[no-untyped-def]
 
 
 def named(kind: type[Record], table: Table) -> Record:
-    """The numbers of a table as a NamedTuple of this kind, in its order."""
+    """Converts a table of numbers to a NamedTuple, in the order of its fields."""
     return kind(*table)
 
 
@@ -346,13 +346,14 @@ def _named(context: Any, kind: Any, table: Any) -> Any:
 overload(named)(lambda kind, table: lambda kind, table: _named(kind, table))
 
 
-# Fields: a pointer and the lengths of all dimensions, of which the type may know some.
+# Fields: a pointer and the lengths of all dimensions. The type may fix some lengths.
 
 
 class Field(types.Type):
-    """An array of numbers of the numba type `number`.
+    """Numba type of an array of numbers, in lanes or not.
 
-    `lengths` are those of its dimensions; None where the type does not know it.
+    `number` is the numba type of a number. `lengths` has the length of each dimension; None if the
+    type does not fix it.
     """
 
     def __init__(self, number: types.Type, lengths: tuple[int | None, ...]) -> None:
@@ -361,10 +362,10 @@ class Field(types.Type):
 
 
 class FieldArray:
-    """A contiguous array that kernels see as a Field, the last axis the `width` lanes, if given.
+    """A contiguous array that kernels see as a Field. With `width`, the last axis is the lanes.
 
-    Its numbers are float64, or int64 without lanes. The type knows all lengths but the first, or,
-    with `any_size`, none. Raises ValueError for an array that is not like this.
+    Numbers are float64, or int64 without lanes. The type fixes all lengths but the first, or none
+    with `any_size`. Raises ValueError for another array.
     """
 
     def __init__(
@@ -381,7 +382,7 @@ class FieldArray:
 
 
 def lane_table(shape: tuple[int, ...], width: int, *, any_size: bool = False) -> FieldArray:
-    """A table of zeros in lanes; its `array` is (*shape, width)."""
+    """A table of zeros in lanes. Its `array` has the shape (*shape, width)."""
     size = math.prod(shape) * width
     buffer = np.zeros(size + _ALIGNMENT // 8)
     first = -buffer.ctypes.data % _ALIGNMENT // 8
@@ -416,7 +417,7 @@ def _unbox(kind: Field, value: Any, c: Any) -> NativeValue:
 
 
 def _lengths(context: Any, builder: Any, kind: Field, value: Any) -> list[Any]:
-    """The lengths of a field: constants where the type knows them."""
+    """Lengths of a field; constants if the type fixes them."""
     field = cgutils.create_struct_proxy(kind)(context, builder, value)
     lengths = cgutils.unpack_tuple(builder, field.lengths)
     for axis, length in enumerate(kind.lengths):
@@ -426,7 +427,7 @@ def _lengths(context: Any, builder: Any, kind: Field, value: Any) -> list[Any]:
 
 
 def _place(context: Any, builder: Any, kind: Field, value: Any, index: Any) -> Any:
-    """The pointer to a number of a field; nsw promises that the arithmetic does not overflow."""
+    """Pointer to a number of a field. The flag nsw promises arithmetic without overflow."""
     indices = [index] if len(kind.lengths) == 1 else cgutils.unpack_tuple(builder, index)
     lengths = _lengths(context, builder, kind, value)
     offset = indices[0]
@@ -437,7 +438,7 @@ def _place(context: Any, builder: Any, kind: Field, value: Any, index: Any) -> A
 
 
 def _index_kind(kind: types.Type, index: Any) -> types.Type | None:
-    """Type of a cast index; None if it is not one for a number of a field."""
+    """Type of an index after the cast; None if it is no valid index of a field."""
     if not isinstance(kind, Field):
         return None
     count = len(kind.lengths)
@@ -465,7 +466,7 @@ class _SetItem(AbstractTemplate):
         return index and signature(types.none, args[0], index, args[0].number)
 
 
-# Without align, LLVM takes a vector to lie at a multiple of its size, and crashes elsewhere.
+# Without `align`, LLVM assumes that a vector is at a multiple of its size, and crashes otherwise.
 
 
 @lower_builtin(operator.getitem, Field, types.Any)
@@ -482,7 +483,7 @@ def _lower_setitem(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
 
 @_intrinsic
 def by_lane(context: Any, field: Field) -> Any:
-    """The memory of a field of lanes as a field of floats, (..., W)."""
+    """The memory of a field of lanes, as a field of floats (..., W)."""
     width = field.number.width if isinstance(field.number, Lanes) else 1
     floats = Field(types.float64, (*field.lengths, width))
 

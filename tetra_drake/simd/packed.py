@@ -1,12 +1,12 @@
-"""Arguments that are packed once for all calls of a kernel.
+"""Packed arguments: converted once for all calls of a kernel.
 
-Numba looks at each array of a call: 44 ns for one by itself, 120 ns for one in a NamedTuple, and in
-the kernel each has a reference count to maintain. Of the constants of a robot, which are the same
-at every call, that is more than the computation takes.
+Numba converts each array at each call: 44 ns for an array, 120 ns for one in a NamedTuple. In the
+kernel each array has a reference count. For the constants of a robot, this takes longer than the
+computation.
 
-`Packed(values)` writes the addresses, lengths and numbers in NamedTuples into one row of words. The
-kernel takes the address of this row, and `unpacked(packed)` gives it the NamedTuples again, with a
-Field in place of each array.
+`Packed(values)` writes addresses, lengths and numbers of NamedTuples to one row of words. The
+kernel gets the address of this row. In the kernel, `unpacked(packed)` is the NamedTuples again,
+with a Field in place of each array.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _WORD = ir.IntType(64)
 
 
 class PackedKind(types.Type):
-    """The numba type of packed values of the type `content`."""
+    """Numba type of packed values; `content` is the type of the values."""
 
     def __init__(self, content: types.Type) -> None:
         self.content = content
@@ -46,10 +46,10 @@ class PackedKind(types.Type):
 
 
 class Packed(Generic[Values]):
-    """Tuples of arrays, whole numbers, truth values and such tuples, as one argument of a kernel.
+    """A nested tuple of arrays, integers and booleans, as one argument of a kernel.
 
-    A kernel sees what is written to the arrays later. Packing takes half a millisecond: for a few
-    calls the tuple itself will do. Raises ValueError for an array that cannot be a Field.
+    The arrays are not copied, so a kernel sees later changes. Packing takes half a millisecond; for
+    a few calls, pass the tuple itself. Raises ValueError for an array that cannot be a Field.
     """
 
     def __init__(self, values: Values) -> None:
@@ -61,7 +61,7 @@ class Packed(Generic[Values]):
 
 
 def _pack(value: Any, words: list[int]) -> types.Type:
-    """The type of a value, whose words are appended."""
+    """Appends the words of a value to `words`. Returns the numba type of the value."""
     if isinstance(value, tuple):
         kinds = [_pack(item, words) for item in value]
         named = hasattr(value, "_fields")
@@ -75,7 +75,7 @@ def _pack(value: Any, words: list[int]) -> types.Type:
 
 
 def unpacked(values: Packed[Values] | Values) -> Values:
-    """The values of a Packed, in a kernel or in Python; of a tuple, the tuple."""
+    """The values of a Packed, in a kernel or in Python. A tuple is returned as it is."""
     return values.values if isinstance(values, Packed) else values
 
 
@@ -101,16 +101,16 @@ def _unbox(kind: PackedKind, value: Any, c: Any) -> NativeValue:
 def _unpacked(context: Any, packed: PackedKind) -> Any:
     def emit(c: Any, builder: Any, s: Any, args: Any) -> Any:
         words = builder.bitcast(args[0], _WORD.as_pointer())
-        place = 0
+        position = 0
 
         def next_word() -> Any:
-            nonlocal place
-            word = builder.load(builder.gep(words, [ir.Constant(_WORD, place)]))
-            place += 1
+            nonlocal position
+            word = builder.load(builder.gep(words, [ir.Constant(_WORD, position)]))
+            position += 1
             return word
 
         def unpack(kind: Any) -> Any:
-            if hasattr(kind, "types"):  # a tuple's
+            if hasattr(kind, "types"):  # the type of a tuple
                 return c.make_tuple(builder, kind, [unpack(item) for item in kind.types])
             if isinstance(kind, Field):
                 field = cgutils.create_struct_proxy(kind)(c, builder)

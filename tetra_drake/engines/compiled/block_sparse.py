@@ -1,10 +1,10 @@
-"""Symmetric positive definite systems of 6 x 6 blocks, a block per body, for any graph of bodies.
+"""Block-sparse linear systems: symmetric, positive definite, with 6 x 6 blocks per pair of bodies.
 
-Bodies are eliminated in their order, by a schedule that is made once from the pairs of bodies that
-are coupled. A system is kept as `rows`, (bodies, 6, width): row r of body i holds, from the
-diagonal on, its own block (columns 0 to 5), then one block for each later body that i is coupled
-to, those included that become coupled as bodies before i are eliminated. In a row of bodies each
-is coupled to the next one only, and the system is block-tridiagonal.
+Bodies are eliminated in their order. A schedule is made once from the pairs of coupled bodies. A
+system is stored as `rows` (bodies, 6, width). Row r of body i has the body's own block (columns 0
+to 5, from the diagonal on), then one block for each later body coupled to i, directly or by
+fill-in. In a row of tetrahedra each body is only coupled to the next one, and the system is
+block-tridiagonal.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ BLOCK = 6
 
 
 class Schedule(NamedTuple):
-    """The order in which a system's blocks are eliminated."""
+    """Positions of the blocks of a system, for elimination and fill-in."""
 
     count: Table
-    """(bodies,): the number of later bodies that each body is coupled to."""
+    """Number of later bodies coupled to each body (bodies,)."""
     later: Table
-    """(bodies, most): those bodies, ascending."""
+    """Indices of the later bodies coupled to each body (bodies, most), ascending."""
     column: Table
-    """(bodies, most, most): of bodies i, a, b, the column in the rows of the body later[i, a] at
-    which its block with later[i, b] begins; b is at least a."""
+    """Target of fill-in (bodies, most, most): column[i, a, b] is the first column of the block
+    between later[i, a] and later[i, b], in the rows of later[i, a]; a < b."""
 
     @classmethod
     def of(cls, bodies: int, pairs: Iterable[tuple[int, int]]) -> Self:
-        """The schedule of so many bodies, of which pairs are coupled."""
+        """The schedule for a number of bodies and the coupled pairs among them."""
         coupled: list[set[int]] = [set() for _ in range(bodies)]
         for pair in pairs:
             coupled[min(pair)].add(max(pair))
         for body in range(bodies):
-            # Its elimination couples all later bodies that it is coupled to with each other.
+            # Eliminating a body couples all of its later bodies with each other.
             for first, second in itertools.combinations(sorted(coupled[body]), 2):
                 coupled[first].add(second)
         later = [sorted(others) for others in coupled]
@@ -53,18 +53,18 @@ class Schedule(NamedTuple):
         for body, others in enumerate(later):
             schedule.later[body, : len(others)] = others
             for a, b in itertools.combinations(range(len(others)), 2):
-                place = later[others[a]].index(others[b])
-                schedule.column[body, a, b] = BLOCK * (1 + place)
+                position = later[others[a]].index(others[b])
+                schedule.column[body, a, b] = BLOCK * (1 + position)
         return schedule
 
     @property
     def width(self) -> int:
-        """Width of the rows."""
+        """Number of columns of `rows`."""
         return BLOCK * (1 + self.later.shape[1])
 
     @property
     def blocks(self) -> set[tuple[int, int]]:
-        """The pairs of bodies whose block is not zero, or is filled in."""
+        """Pairs of different bodies with a block in the rows, including fill-in."""
         return {
             (body, int(other))
             for body, count in enumerate(self.count)
@@ -72,17 +72,17 @@ class Schedule(NamedTuple):
         }
 
     def column_of(self, first: int, second: int) -> int:
-        """The column in the rows of body `first` at which its block with `second` begins."""
+        """First column of the block between two bodies, in the rows of body `first`."""
         others = self.later[first, : self.count[first]].tolist()
         return BLOCK * (1 + others.index(second))
 
 
 @inlined
 def factorise(rows: Table, schedule: Schedule) -> None:
-    """Turns `rows` into its factors in place: L D Lᵀ with 1 / D on the diagonal.
+    """Factorises `rows` in place: L D Lᵀ with 1 / D on the diagonal.
 
-    A number is in a variable until all products of a body are subtracted from it: in a loop over
-    the pivots it would be read and written once for each.
+    A number stays in a variable while all products of a body are subtracted. A loop over the pivots
+    would read and write it once per pivot.
     """
     for i in range(rows.shape[0]):
         factorise_block(rows, i)
@@ -94,7 +94,7 @@ def factorise(rows: Table, schedule: Schedule) -> None:
 
 @inlined
 def factorise_block(rows: Table, i: int) -> None:
-    """Factorises the own block of body i."""
+    """Factorises the block of body i on the diagonal."""
     for r in range(BLOCK):
         inverse = 1.0 / rows[i, r, r]
         rows[i, r, r] = inverse
@@ -106,7 +106,7 @@ def factorise_block(rows: Table, i: int) -> None:
 
 @inlined
 def reduce_block(rows: Table, i: int, first: int) -> None:
-    """Takes the factors of body i's own block out of its block that begins at column `first`."""
+    """Applies the factors of body i's diagonal block to its block that begins at column `first`."""
     f_01, _, _, _, _, _ = factors(rows, i, 1)
     f_02, f_12, _, _, _, _ = factors(rows, i, 2)
     f_03, f_13, f_23, _, _, _ = factors(rows, i, 3)
@@ -125,7 +125,7 @@ def reduce_block(rows: Table, i: int, first: int) -> None:
 
 @inlined
 def eliminate(rows: Table, schedule: Schedule, i: int, a: int) -> None:
-    """Takes body i out of the rows of the a-th body that it is coupled to."""
+    """Eliminates body i from the rows of the a-th later body coupled to it."""
     j, first = schedule.later[i, a], BLOCK * (1 + a)
     for t in range(BLOCK):
         column = factors(rows, i, first + t)
@@ -140,7 +140,7 @@ def eliminate(rows: Table, schedule: Schedule, i: int, a: int) -> None:
 
 @inlined
 def factors(rows: Table, i: int, c: int) -> tuple[Real, ...]:
-    """Column c of the rows of body i over the pivots."""
+    """Column c of the rows of body i, divided by the pivots."""
     return (
         rows[i, 0, c] * rows[i, 0, 0],
         rows[i, 1, c] * rows[i, 1, 1],
@@ -153,16 +153,16 @@ def factors(rows: Table, i: int, c: int) -> tuple[Real, ...]:
 
 @inlined
 def reduced(x: Real, column: tuple[Real, ...], rows: Table, i: int, c: int) -> Real:
-    """A number less the product of a column of factors and column c of the rows of body i."""
+    """x minus the product of a column of factors and column c of the rows of body i."""
     x = x - column[0] * rows[i, 0, c] - column[1] * rows[i, 1, c] - column[2] * rows[i, 2, c]
     return x - column[3] * rows[i, 3, c] - column[4] * rows[i, 4, c] - column[5] * rows[i, 5, c]
 
 
 @inlined
 def solve(rows: Table, schedule: Schedule, x: Table) -> None:
-    """Solves with the factors; `x`, (6 bodies,), holds the right-hand side, then the solution.
+    """Solves a factorised system. `x` (6 bodies,) is the right-hand side, then the solution.
 
-    The numbers of a body are in variables: in a loop over x, each would wait for the memory.
+    The numbers of a body are in variables. In a loop over x, each operation would wait for memory.
     """
     bodies = rows.shape[0]
     for i in range(bodies):

@@ -1,6 +1,6 @@
-"""The equations of motion: free rigid bodies under the forces of cables, ground and gravity.
+"""Equations of motion: free rigid bodies under the forces of cables, ground and gravity.
 
-Vectors over bodies hold 6 numbers per body, rotation before translation, in World.
+A vector over bodies has 6 numbers per body, rotation before translation, in the world frame.
 """
 
 from __future__ import annotations
@@ -32,34 +32,34 @@ from tetra_drake.simd.compiling import inlined, merged
 from tetra_drake.simd.lanes import Real, Table, any_lane, named, select
 
 CABLES_AT_ONCE = 6
-"""The cables of a pair of bodies whose damping is summed at once."""
+"""Number of cables of a pair of bodies whose damping is summed at once."""
 
 U, W, D, WEIGHT, LINE_COLUMNS = 0, 3, 6, 9, 10
-"""Columns of `lines`, a row per cable: u, w and d as in add_cables(), damping times time; and their
-number."""
+"""Columns of the table `lines`, and their number: u, w and d of a cable (see add_cables()), damping
+times time."""
 
 
 class Solver(NamedTuple):
-    """Where the blocks of the implicit matrix stand, and the order in which it is eliminated."""
+    """Positions of the blocks of the implicit matrix, and the schedule of its elimination."""
 
     schedule: Schedule
     columns: Table
-    """(pairs,): the column of the block of each pair of coupled bodies."""
+    """First column of the block of each pair of coupled bodies (pairs,)."""
     fill_bodies: Table
-    """(blocks,): of blocks that only elimination fills in, the bodies in whose rows they stand."""
+    """Bodies in whose rows there are blocks of fill-in (blocks,)."""
     fill_columns: Table
-    """(blocks,): their columns."""
+    """First columns of the blocks of fill-in (blocks,)."""
 
     @classmethod
     def of(cls, robot: Model) -> Self:
-        """The solver of a robot."""
+        """The solver for a robot."""
         first, second = robot.couplings.first.tolist(), robot.couplings.second.tolist()
         return cls._of(len(robot.bodies.mass), tuple(zip(first, second, strict=True)))
 
     @classmethod
-    @functools.lru_cache(maxsize=8)  # as most robots of a run are coupled alike
+    @functools.lru_cache(maxsize=8)  # most robots of a run have the same couplings
     def _of(cls, bodies: int, pairs: tuple[tuple[int, int], ...]) -> Self:
-        """The solver for so many bodies, of which pairs are coupled."""
+        """The solver for a number of bodies and the coupled pairs among them."""
         schedule = Schedule.of(bodies, pairs)
         fill = sorted(schedule.blocks - set(pairs))
         return cls(
@@ -76,8 +76,10 @@ def _indices(numbers: Iterable[int]) -> np.ndarray:
 
 @inlined
 def accelerate(robot: Model, inertia: Table, force: Table, acceleration: Table) -> None:
-    """Writes the accelerations (6 bodies,) of bodies under forces (6 bodies,); `inertia` as in
-    Forces."""
+    """Writes the accelerations (6 bodies,) of bodies under forces (6 bodies,).
+
+    `inertia` is Forces.inertia.
+    """
     for body in range(force.size // BLOCK):
         i = BLOCK * body
         per_mass = 1.0 / robot.bodies.mass[body]
@@ -94,7 +96,10 @@ def accelerate(robot: Model, inertia: Table, force: Table, acceleration: Table) 
 
 @inlined
 def momentum(robot: Model, inertia: Table, velocity: Table, body: int) -> tuple[Real, ...]:
-    """The mass matrix of a body times its part of a vector over bodies; `inertia` as in Forces."""
+    """Momentum of a body: its mass matrix times its part of a vector over bodies.
+
+    `inertia` is Forces.inertia.
+    """
     i, mass = BLOCK * body, robot.bodies.mass[body]
     if robot.isotropic:
         moment = robot.bodies.inertia[body, XX]
@@ -107,8 +112,8 @@ def momentum(robot: Model, inertia: Table, velocity: Table, body: int) -> tuple[
 
 @inlined
 def refer_torques(inertia: Table, inertia_now: Table, force: Table) -> None:
-    """Turns the torques in `force`, (6 bodies,), into those that give bodies of another `inertia`
-    the same acceleration."""
+    """Converts the torques in `force` (6 bodies,) from `inertia_now` to `inertia`: the angular
+    accelerations stay the same."""
     for body in range(force.size // BLOCK):
         i = BLOCK * body
         torque = force[i], force[i + 1], force[i + 2]
@@ -126,11 +131,10 @@ def implicit_matrix(
     lines: Table,
     rows: Table,
 ) -> None:
-    """Writes mass matrix + time * damping matrix + time² * contact stiffness, as rows of
-    block_sparse; time in s.
+    """Writes the implicit matrix: mass matrix + time * damping matrix + time² * contact stiffness.
 
-    Damping is what makes the equations stiff: that of cables, normal forces and stiction.
-    `lines`, (CABLES_AT_ONCE, LINE_COLUMNS), is room for what is computed on the way.
+    `rows` has the form of block_sparse; `time` is in s. The damping of cables, normal forces and
+    stiction makes the equations stiff. `lines` (CABLES_AT_ONCE, LINE_COLUMNS) is scratch memory.
     """
     for body in range(rows.shape[0]):
         for r in range(BLOCK):
@@ -154,7 +158,7 @@ def implicit_matrix(
 
 @inlined
 def add_masses(robot: Model, inertia: Table, rows: Table) -> None:
-    """Adds the mass matrix; `inertia` as in Forces."""
+    """Adds the mass matrix to the rows. `inertia` is Forces.inertia."""
     for body in range(rows.shape[0]):
         mass = robot.bodies.mass[body]
         if robot.isotropic:
@@ -183,20 +187,17 @@ def add_cables(
     lines: Table,
     rows: Table,
 ) -> None:
-    """Adds time * damping * l lᵀ for the cables of a pair of bodies from `first` on, at most
+    """Adds time * damping * l lᵀ for cables of a pair of bodies, from cable `first` on, at most
     CABLES_AT_ONCE.
 
-    l, of 12 numbers, times the velocities of both bodies is the rate of the cable's length: the
-    ends at p_a and p_b move apart along d, so l = (u, -d, w, d) with u = d x p_a and w = p_b x d.
-    All cables are summed at once, a product of two columns of `lines`.
+    The 12 numbers of l, times the velocities of both bodies, are the rate of the cable's length.
+    With the cable's direction d and its ends p_a and p_b, l = (u, -d, w, d), u = d x p_a and
+    w = p_b x d. The sum over cables is a product of two columns of `lines`.
     """
-    write_lines(robot, forces, time, pair, first, lines)
-    rear, front = robot.couplings.first[pair], robot.couplings.second[pair]
-    adds = first > robot.couplings.first_cable[pair]  # the block holds a sum already
-    turn = solver.columns[pair]  # the columns of the front body's rotation and translation
-    shift = turn + 3
-    weights = column(lines, WEIGHT)
-    for r in range(3):
+    write_lines(robot, forces, time, pair, first, lines) rear, front = robot.couplings.first[pair],
+    robot.couplings.second[pair] adds = first > robot.couplings.first_cable[pair]  # the block has a
+    sum already turn = solver.columns[pair]  # first column of the front body's rotation; its
+    translation follows shift = turn + 3 weights = column(lines, WEIGHT) for r in range(3):
         u = weighted(weights, column(lines, U + r))
         w = weighted(weights, column(lines, W + r))
         d = weighted(weights, column(lines, D + r))
@@ -223,8 +224,8 @@ def add_cables(
 def write_lines(
     robot: Model, forces: Forces, time: Real, pair: int, first: int, lines: Table
 ) -> None:
-    """Writes `lines`, (CABLES_AT_ONCE, LINE_COLUMNS), of the cables that add_cables() takes; zeros
-    after the last cable of the pair."""
+    """Writes the table `lines` (CABLES_AT_ONCE, LINE_COLUMNS) for add_cables(). Rows after the last
+    cable of the pair are zero."""
     last, cable_forces = robot.couplings.first_cable[pair + 1], forces.cable_forces
     for j in range(CABLES_AT_ONCE):
         i = first + j
@@ -243,9 +244,9 @@ def write_lines(
 
 @inlined
 def put(value: Real, adds: bool, body: int, r: int, c: int, rows: Table) -> None:
-    """Writes a value into the rows, or adds it.
+    """Writes a value to the rows, or adds it if `adds`.
 
-    To zero all blocks first and always add takes 2 to 5 % more time for a step.
+    If all blocks were set to zero first, a step would take 2 to 5 % longer.
     """
     if adds:
         rows[body, r, c] += value
@@ -280,7 +281,7 @@ def product(x: Column, y: Column) -> Real:
 def add_contact(
     modes: Table, forces: Forces, ground: Ground, i: int, time: Real, rows: Table
 ) -> None:
-    """Adds time * damping + time² * stiffness of a contact, which acts where it touches."""
+    """Adds time * damping + time² * stiffness of a contact node, in lanes where it touches."""
     nodes, frames, law = forces.nodes, forces.frames, named(NormalForce, ground.normal)
     touches, node, body = modes[i, CONTACT] != 0.0, ground.contacts[i], ground.carriers[i]
     depth = -gap(nodes, ground, frames, i)
@@ -290,7 +291,7 @@ def add_contact(
     k_12 = select(touches, k_12, 0.0)
     presses = touches & (forces.ground_forces[i, NORMAL] > 0.0)
     k_n = select(presses, time * (law.damping * depth + time * law.stiffness), 0.0)
-    # The columns of the matrix in World, and from the frame's: R K, then (R K) Rᵀ.
+    # Turns the matrix K of the contact frame into the world frame: R K, then (R K) Rᵀ.
     a = to_world(k_1, k_12, 0.0, frames, i, ground.flat)
     b = to_world(k_12, k_2, 0.0, frames, i, ground.flat)
     c = to_world(0.0, 0.0, k_n, frames, i, ground.flat)
@@ -307,8 +308,8 @@ def add_contact(
 def add_diagonal(
     nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], rows: Table
 ) -> None:
-    """Adds Jᵀ diag(k_x, k_y, k_z) J of a node at p from its body's origin, where J = [-[p]x 1]
-    times the velocity of the body is the node's."""
+    """Adds Jᵀ diag(k_x, k_y, k_z) J for a node at p from its body's origin. J = [-[p]x 1] gives the
+    node's velocity from the body's."""
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     k_x, k_y, k_z = k
     rows[body, 0, 0] += p_y * p_y * k_z + p_z * p_z * k_y
@@ -332,7 +333,7 @@ def add_diagonal(
 def add_off_diagonal(
     nodes: Table, node: int, body: int, k: tuple[Real, Real, Real], rows: Table
 ) -> None:
-    """Product with the symmetric matrix of k_xy, k_xz and k_yz."""
+    """Adds Jᵀ K J as add_diagonal() does, for the symmetric matrix K of k_xy, k_xz and k_yz."""
     p_x, p_y, p_z = nodes[node, P_BN_W], nodes[node, P_BN_W + 1], nodes[node, P_BN_W + 2]
     xy, xz, yz = k
     # The rows of [p]x K.

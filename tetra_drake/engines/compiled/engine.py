@@ -1,4 +1,4 @@
-"""The engine `compiled`: the same equations without Drake, many gaits side by side in lanes."""
+"""Engine `compiled`: the same equations without Drake, with several gaits side by side in lanes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from tetra_drake.robot.robot import Robot, SteeringSignal
 from tetra_drake.scenario.scenario import Scenario
 
 _BODY_STEPS = 100_000
-"""Iterations times bodies, some 70 ms, after which signals of the operating system are heard."""
+"""Iterations times bodies per call of the kernel, about 70 ms. Between calls Python handles signals
+of the operating system."""
 
 
 class CompiledEngine(Engine):
-    """The compiled engine. Other Python threads run while it simulates."""
+    """Engine that simulates in compiled kernels. Other Python threads run meanwhile."""
 
     lane_pool = LanePool
 
@@ -45,11 +46,11 @@ class CompiledEngine(Engine):
         return engine.result(0)
 
     def simulate_many(
-        self, walks: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
+        self, simulations: Sequence[tuple[Scenario, Gait]], *, record: bool, threads: int
     ) -> list[Outcome]:
         outcomes: list[Outcome] = []
         with LanePool(threads) as pool:
-            for future in pool.submit(walks, record=record):
+            for future in pool.submit(simulations, record=record):
                 try:
                     outcomes.append(future.result())
                 except SimulationFailure as failure:

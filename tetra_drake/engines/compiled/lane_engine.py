@@ -1,4 +1,4 @@
-"""The compiled engine's memory: loads a gait into a SIMD lane, runs it, and reads its result."""
+"""Memory of the compiled engine: loads a gait into a SIMD lane, runs it, and reads its result."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from tetra_drake.engines.compiled.loop import (
     MARK,
     PLANNED,
     ROUND,
+    RUNNING,
     SAMPLES,
     STATUS,
     STEP_TOO_SMALL,
@@ -25,7 +26,6 @@ from tetra_drake.engines.compiled.loop import (
     TOO_FAST,
     TOO_MANY_EVALUATIONS,
     TRIED,
-    WALKING,
     Constants,
     Log,
     advance,
@@ -43,14 +43,14 @@ from tetra_drake.simd.compiling import machine_code
 from tetra_drake.simd.lanes import FieldArray, lane_table
 
 FIRST = SurfaceGrid._fields.index("first")
-"""Column of a grid with the index of its first height: those of all lanes stand in one row."""
+"""Column of a grid with the index of its first height. The heights of all lanes are in one row."""
 
 
 class LaneEngine:
-    """Simulates gaits of one kind in `width` lanes."""
+    """Simulates similar gaits (see accepts()) in a number of lanes."""
 
     def __init__(self, first: Prepared, *, width: int) -> None:
-        """Engine for gaits like the first; see `accepts`. Compiles it if that is not done."""
+        """An engine with `width` lanes for gaits like `first`. Compiles its kernel if necessary."""
         self._kind, self._bodies = first.kind, len(first.robot.structure.bodies)
         self._heights = np.zeros((width, first.robot.ground.heights.size))
         self._constants = _constants_in_lanes(first.constants, self._heights)
@@ -61,13 +61,13 @@ class LaneEngine:
         self._advance = machine_code(advance, *self._arguments, 0)
         self._in_lane: list[Prepared | None] = [None] * width
         self._wall_times = [0.0] * width
-        for lane in range(width):  # so that idle lanes compute with proper numbers
+        for lane in range(width):  # idle lanes compute, too, and need valid numbers
             self.load(lane, first)
             self.stop(lane)
 
     def accepts(self, prepared: Prepared) -> bool:
-        """True if a gait can be simulated: one like the first in structure and kind of signals,
-        and with no more to keep."""
+        """True if a gait fits this engine's tables: the same structure and kinds of laws as the
+        first gait, and no more samples, marks, turns or heights."""
         log = self._log
         return (
             prepared.kind == self._kind
@@ -80,16 +80,16 @@ class LaneEngine:
 
     @property
     def idle(self) -> list[int]:
-        """The lanes without a gait."""
+        """Indices of the lanes without a gait."""
         return [lane for lane, prepared in enumerate(self._in_lane) if prepared is None]
 
     def load(self, lane: int, prepared: Prepared) -> None:
-        """Starts a gait in a lane; raises InputError if it does not fit its scenario."""
+        """Starts a gait in a lane. Raises InputError if the gait does not fit its scenario."""
         constants, start = prepared.constants, prepared.start
         fill_lane(self._constants, constants, lane)
         fill_lane(self._lanes, start, lane)
         network, given = self._constants.network, constants.network
-        # So that they hold for all lanes.
+        # The kernel has one range of inhibiting neurons for all lanes.
         network.first.array[:] = np.minimum(network.first.array, given.first)
         network.beyond.array[:] = np.maximum(network.beyond.array, given.beyond)
         heights = prepared.robot.ground.heights
@@ -109,31 +109,32 @@ class LaneEngine:
         log.drives[lane, 0] = start.drives[:, DRIVE]
         log.kept[lane], log.passed[lane] = 1, 0
         engine = prepared.robot.scenario.settings_of(Compiled)
-        clock[STATUS, lane] = WALKING
+        clock[STATUS, lane] = RUNNING
         clock[PLANNED, lane] = min(engine.look_ahead, engine.max_step)
         clock[MARK, lane], clock[DUE, lane] = log.marks[lane, 0], log.times[lane, 1]
         self._in_lane[lane], self._wall_times[lane] = prepared, 0.0
 
     def stop(self, lane: int) -> float:
-        """Takes the gait out of a lane, wherever it is; returns what it cost, in s."""
+        """Removes the gait from a lane, finished or not. Returns its wall time in s."""
         self._in_lane[lane] = None
         self._lanes.clock.array[STATUS, lane] = IDLE
         return self._wall_times[lane]
 
     def advance(self, body_steps: int) -> list[int]:
-        """Simulates until a lane ends, or for about so many iterations times bodies. Returns the
-        lanes that have ended, each to be emptied by result(). Other threads run meanwhile."""
+        """Simulates until a gait ends, or for about `body_steps` iterations times bodies. Returns
+        the lanes with finished gaits; result() empties a lane. Other Python threads run
+        meanwhile."""
         started = time.perf_counter()
         self._advance(*self._arguments, max(1, body_steps // (ROUND * self._bodies)))
         busy = [lane for lane, prepared in enumerate(self._in_lane) if prepared is not None]
         share = (time.perf_counter() - started) / max(len(busy), 1)
         for lane in busy:
             self._wall_times[lane] += share
-        return [lane for lane in busy if self._lanes.clock.array[STATUS, lane] != WALKING]
+        return [lane for lane in busy if self._lanes.clock.array[STATUS, lane] != RUNNING]
 
     def result(self, lane: int) -> SimulationResult:
-        """The result of a simulation that has ended, whose lane becomes idle. Raises Diverged or
-        StepBudgetExceeded if the simulation failed."""
+        """The result of the finished simulation in a lane; the lane becomes idle. Raises Diverged
+        or StepBudgetExceeded if the simulation failed."""
         prepared, status = self._in_lane[lane], int(self._lanes.clock.array[STATUS, lane])
         if prepared is None:
             raise ValueError(f"lane {lane} is idle")
@@ -159,7 +160,7 @@ class LaneEngine:
         )
 
     def motion(self, lane: int) -> Motion:
-        """The samples that the latest simulation in a lane has recorded so far."""
+        """Samples of the latest simulation in a lane, up to now."""
         log = self._log
         kept = slice(log.kept[lane])
         return Motion(
@@ -185,11 +186,10 @@ def _failure(status: int, *, time: float, scenario: Scenario) -> SimulationFailu
 
 
 def lanes_for(gaits: float) -> int:
-    """The number of lanes in which so many gaits are simulated fastest on a core of this machine;
-    their numbers are the same with any.
+    """Fastest number of lanes for simulating a number of gaits on one core of this machine.
 
-    Eight doubles fill a register of AVX-512. With narrower registers, eight lanes need more of
-    them than there are, and four are faster.
+    The results do not depend on the number of lanes. Eight doubles fill a register of AVX-512. With
+    narrower registers, eight lanes would need more registers than there are, so four are faster.
     """
     if gaits <= 1:
         return 1
@@ -197,15 +197,16 @@ def lanes_for(gaits: float) -> int:
 
 
 def processor_features() -> str:
-    """The instructions that numba compiles for, such as +avx2: its settings', or the machine's."""
+    """Instruction sets that numba compiles for, such as "+avx2": from its settings or the
+    machine."""
     return registry.cpu_target.target_context.codegen().magic_tuple()[2]
 
 
 def _constants_in_lanes(constants: Constants, heights: np.ndarray) -> Constants:
-    """Tables for constants such as these, for a row of `heights` per lane."""
+    """Tables in lanes for constants like the given ones. `heights` has a row per lane."""
     width = len(heights)
     lanes = in_lanes(constants, width)
-    # Compiled once for robots of any size.
+    # A field of any size: one compiled kernel serves robots of any size.
     inhibition = lane_table(constants.network.inhibition.shape, width, any_size=True)
     ground = lanes.robot.ground._replace(heights=FieldArray(heights.ravel()))
     robot, network = lanes.robot._replace(ground=ground), lanes.network
@@ -213,8 +214,8 @@ def _constants_in_lanes(constants: Constants, heights: np.ndarray) -> Constants:
 
 
 def in_lanes(values: Any, width: int) -> Any:
-    """A table in lanes for each array of real numbers in NamedTuples, zeros. Arrays of indices are
-    for all lanes; what is no array stays."""
+    """NamedTuples with a table in lanes (zeros) for each array of real numbers. Arrays of indices
+    are shared by all lanes. Other values stay as they are."""
     if isinstance(values, tuple):
         return type(values)(*(in_lanes(value, width) for value in values))
     if not isinstance(values, np.ndarray):
@@ -225,7 +226,7 @@ def in_lanes(values: Any, width: int) -> Any:
 
 
 def fill_lane(tables: Any, values: Any, lane: int) -> None:
-    """Writes the real numbers in NamedTuples into a lane of such tables."""
+    """Copies the real numbers of NamedTuples to one lane of tables from in_lanes()."""
     if isinstance(values, tuple):
         for table, value in zip(tables, values, strict=True):
             fill_lane(table, value, lane)

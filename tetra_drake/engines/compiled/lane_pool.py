@@ -1,4 +1,4 @@
-"""Threads that simulate many gaits at a time, each thread several in lanes."""
+"""Pool of threads that simulate many gaits; each thread simulates several in lanes."""
 
 from __future__ import annotations
 
@@ -19,14 +19,12 @@ from tetra_drake.robot.robot import Robot
 from tetra_drake.scenario.scenario import Scenario
 
 _GATHERING = 1e-3
-"""Time (s) that a thread without work waits for more than one gait to come."""
-
+"""Time (s) that an idle thread waits for a second gait before it starts with one."""
 _BODY_STEPS = 25_000
-"""Iterations times bodies, some 30 ms, after which a thread looks for time budgets and the pool's
-end."""
-
+"""Iterations times bodies per call of the kernel, about 30 ms. Between calls a thread checks time
+budgets and the end of the pool."""
 _ROBOTS = 32
-"""Robots that are kept, for gaits that are simulated on the same scenario."""
+"""Size of the cache of robots."""
 
 
 @dataclass(eq=False)
@@ -40,11 +38,11 @@ class _Job:
 
 
 class LanePool:
-    """Simulates gaits on the compiled engine, in so many threads and as many lanes in each as the
-    waiting gaits fill. At the end of its `with` block, what is under way is cancelled."""
+    """Simulates gaits on the compiled engine in several threads. Each thread has as many lanes as
+    the waiting gaits fill. The end of the `with` block cancels unfinished gaits."""
 
     def __init__(self, threads: int) -> None:
-        """Raises InputError without threads."""
+        """Starts the threads. Raises InputError if `threads` is less than 1."""
         if threads < 1:
             raise InputError("workers", "", f"found {threads}, expected at least 1")
         self._waiting: deque[_Job] = deque()
@@ -74,10 +72,10 @@ class LanePool:
         record: bool = False,
         time_budget: float = math.inf,
     ) -> list[Future[SimulationResult]]:
-        """Puts gaits, each with its scenario, in the queue; a future raises as simulate() does.
+        """Queues gaits with their scenarios. Returns futures of the results.
 
-        A gait that is not done after `time_budget` (s) fails with TimeBudgetExceeded. Callbacks of
-        futures are called in the threads of the pool.
+        A future raises the same errors as simulate(), and TimeBudgetExceeded if the gait takes
+        longer than `time_budget` (s). Callbacks of futures run in the threads of the pool.
         """
         jobs = [_Job(scenario, gait, record, time_budget) for scenario, gait in gaits]
         with self._changed:
@@ -86,7 +84,7 @@ class LanePool:
         return [job.future for job in jobs]
 
     def _work(self) -> None:
-        """Loop of a thread: fills idle lanes, simulates, hands over results."""
+        """Main loop of a thread: fills idle lanes, simulates, sets results."""
         crew = _Crew(self._robots)
         while (jobs := self._take(crew)) is not None:
             for job in jobs:
@@ -95,12 +93,12 @@ class LanePool:
                         self._waiting.appendleft(job)
             try:
                 crew.advance()
-            except Exception as error:  # those who wait for the lanes are told
+            except Exception as error:  # all jobs in the lanes fail with it
                 crew.give_up(error)
         crew.give_up(CancelledError())
 
     def _take(self, crew: _Crew) -> list[_Job] | None:
-        """Jobs for the idle lanes of a thread; None at the pool's end."""
+        """Waits for jobs for the idle lanes of a thread; None at the end of the pool."""
         with self._changed:
             while not (self._closing or self._waiting or crew.jobs):
                 self._changed.wait()
@@ -108,50 +106,50 @@ class LanePool:
                 self._changed.wait(_GATHERING)
             if self._closing:
                 return None
-            room = crew.room
+            count = crew.idle_lanes
             if not crew.jobs:
                 share = math.ceil(len(self._waiting) / len(self._threads))
-                room = min(share, lanes_for(share))
-            return [self._waiting.popleft() for _ in range(min(room, len(self._waiting)))]
+                count = min(share, lanes_for(share))
+            return [self._waiting.popleft() for _ in range(min(count, len(self._waiting)))]
 
 
 class _Robots:
-    """Makes robots, each once for all threads that need it at a time."""
+    """Cache of robots by scenario, shared by all threads."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._latest: dict[int, Robot] = {}
-        """Robots by the identity of their scenario, the one last used at the end."""
+        """Robots by the id() of their scenario; the last used one is at the end."""
 
     def __call__(self, scenario: Scenario) -> Robot:
         with self._lock:
             robot = self._latest.pop(id(scenario), None) or Robot.of(scenario)
-            self._latest[id(scenario)] = robot  # with its scenario, so no other one gets its id
+            self._latest[id(scenario)] = robot  # keeps the scenario alive, so its id stays unique
             if len(self._latest) > _ROBOTS:
                 del self._latest[next(iter(self._latest))]
         return robot
 
 
 class _Crew:
-    """The lanes of one thread and the jobs in them."""
+    """Lanes of one thread, and the jobs in them."""
 
     def __init__(self, robots: _Robots) -> None:
         self.jobs: dict[int, _Job] = {}
-        """Jobs by lane."""
+        """Jobs by index of the lane."""
         self._robots = robots
         self._engine: LaneEngine | None = None
         self._engines: dict[int, LaneEngine] = {}
-        """Engines by width."""
+        """Engines by number of lanes."""
 
     @property
-    def room(self) -> int:
-        """The number of idle lanes."""
+    def idle_lanes(self) -> int:
+        """Number of idle lanes."""
         return len(self._engine.idle) if self._engine else 0
 
     def load(self, job: _Job, *, among: int) -> bool:
-        """Puts a job in an idle lane; False if it has to wait until all lanes are idle.
+        """Puts a job in an idle lane. Returns False if the job must wait until all lanes are idle.
 
-        If they are, there will be lanes for as many jobs as it is `among`.
+        If all lanes are idle, an engine is chosen that fits `among` jobs.
         """
         try:
             robot = self._robots(job.scenario)
@@ -161,7 +159,7 @@ class _Crew:
                 return False
             self._engine, lane = engine, engine.idle[0]
             engine.load(lane, prepared)
-        except Exception as error:  # such as a gait that does not fit the scenario
+        except Exception as error:  # a gait may not fit its scenario
             job.future.set_exception(error)
             return True
         job.deadline = time.perf_counter() + job.time_budget
@@ -169,7 +167,7 @@ class _Crew:
         return True
 
     def advance(self) -> None:
-        """Simulates for a while; jobs that have ended leave."""
+        """Simulates for a short time and removes finished jobs."""
         engine = self._engine
         if engine is None or not self.jobs:
             return
@@ -177,7 +175,7 @@ class _Crew:
             future = self.jobs.pop(lane).future
             try:
                 result = engine.result(lane)
-            except Exception as failure:  # such as one that has diverged
+            except Exception as failure:  # the simulation may have diverged
                 future.set_exception(failure)
             else:
                 future.set_result(result)
@@ -189,7 +187,7 @@ class _Crew:
             job.future.set_exception(error)
 
     def give_up(self, error: Exception) -> None:
-        """Ends all jobs with an error."""
+        """Ends all jobs with the same error."""
         for job in self.jobs.values():
             job.future.set_exception(error)
         self.jobs, self._engine, self._engines = {}, None, {}

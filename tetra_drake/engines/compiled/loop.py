@@ -1,13 +1,13 @@
-"""The simulation loop: several simulations in lanes, each with its own time, step and modes.
+"""Simulation loop of several simulations in lanes; each has its own time, step and modes.
 
-All lanes go through the same iteration: forces, prediction of the next mode change, signals, one
-step. A lane whose step is rejected repeats it with a shorter one in the next iteration.
+All lanes do the same iteration: forces, prediction of the next mode change, signals, one step. If
+the step of a lane is rejected, the lane repeats it with a shorter step in the next iteration.
 
-The listing's network does not depend on the robot: it runs ahead in steps of its own, and its
-signals are interpolated. (To compute them all before, one lane at a time, costs a tenth of the
-speed of one lane, and a fifth in eight.) A `live` network takes the robot's steps by Heun's method,
-which is explicit, as its rates are slow, and what ROS2 is without its matrix: both are of order 2
-together.
+The listing's network does not depend on the robot. It runs ahead in its own steps, and its signals
+are interpolated. (Signals computed beforehand, one lane at a time, would make one lane slower by a
+tenth, and eight lanes by a fifth.) A `live` network takes the same steps as the robot, by Heun's
+method. An explicit method is enough because the network is slow. ROS2 without its matrix is Heun's
+method, so both together are of order 2.
 """
 
 from __future__ import annotations
@@ -45,59 +45,60 @@ from tetra_drake.simd.lanes import Real, Table, Truth, any_lane, by_lane, maximu
 
 Array = np.ndarray
 
-IDLE, WALKING, DONE, TOO_FAST, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS = range(6)
-"""The status of a lane."""
+IDLE, RUNNING, DONE, TOO_FAST, STEP_TOO_SMALL, TOO_MANY_EVALUATIONS = range(6)
+"""Status of a lane."""
 
 LEAST_STEP = 1e-9  # s
 SAFETY, SHRINK, GROW = 0.85, 0.2, 3.0
-"""The next step is the one whose error would be the tolerance, times SAFETY, within factors."""
-
+"""Step control: the next step is the one with an error equal to the tolerance, times SAFETY. It
+differs from the last step at most by the factors SHRINK and GROW."""
 AIM_FACTOR = 1.02
-"""A step shall end just after the mode change it aims at, by the error of its prediction and
-the settings' `look_ahead`."""
-
+"""Factor on the predicted time to a mode change. A step ends just after the change: the factor
+covers the error of the prediction, and the setting `look_ahead` is added."""
 EVALUATIONS = 3
-"""Force evaluations of an attempted step."""
-
+"""Number of force evaluations per attempted step."""
 ROUND = 32
-"""Iterations, some 40 ms of a walk, after which the distances of struts are looked at: enough to
-find the least one to within 0.1 mm."""
+"""Iterations (about 40 ms of motion) between two computations of the clearance. They find the least
+clearance to within 0.1 mm."""
 
 STATUS, TIME, PLANNED, STEP, END, MARK, DUE, ACTIVE, SAMPLES, TRIED, TAKEN = range(11)
-"""Rows of `clock`: status, time, length of the step planned next, length of the one tried and its
-end, times of the next mark and of the next sample to keep (s), whether signals act (0 or 1), number
-of samples of the signals that exist, steps tried, steps taken."""
+"""Rows of `clock`. Times and lengths of steps are in s.
+
+STATUS, TIME: status of the lane and its time. PLANNED: length of the next step. STEP, END: length
+and end of the step that is tried. MARK: time of the next mark. DUE: time of the next sample.
+ACTIVE: 1 if signals act, 0 before the start-up time. SAMPLES: number of computed samples of the
+signals. TRIED, TAKEN: numbers of steps.
+"""
 
 CLOCK_ROWS = 11
 
 ACCEPTED, NETWORK_STEPS, TURN_INDEX = range(3)
-"""Rows of `scratch`: 1 if the step is accepted, 1 if the network takes a step, or else 0; and a
-place among the turns."""
+"""Rows of `scratch`: 1 if the step is accepted, 1 if the network takes a step, position among the
+turns (an index with a fraction)."""
 
 SCRATCH_ROWS = 3
 
 
 class Constants(NamedTuple):
-    """Constants of several simulations, in lanes: tables of one where nothing else is said, in
-    SI units."""
+    """Constants of the simulations in lanes; SI units. Tables without a shape have one number."""
 
     robot: Model
     solver: Solver
     network: Network
     senses: Senses
     sides: Table
-    """(2n,): by neuron, see Actuation; n oscillators."""
+    """Side of each neuron (2n,) for n oscillators: 1 left, -1 right, 0 neither."""
     external_input: Table
     gains: Table
-    """(3,): of feedback."""
+    """Feedback gains (3,): length, load, pitch."""
     gain: Table
-    """Force per unit of an oscillator's output."""
+    """Force (N) per unit of an oscillator's output."""
     period: Table
     """Time (s) between samples of the listing's signals, or of the turns."""
     samples: Table
-    """Number of samples of the listing's signals; the last one lasts."""
+    """Number of samples of the listing's signals. The last sample holds for ever."""
     start_up: Table
-    """Time from which the signals act."""
+    """Start-up time: signals act from then on."""
     tolerance: Table
     max_step: Table
     look_ahead: Table
@@ -105,64 +106,67 @@ class Constants(NamedTuple):
 
 
 class LaneState(NamedTuple):
-    """The state of several simulations, in lanes, and what is computed on the way."""
+    """State of the simulations, in lanes, with scratch memory."""
 
     clock: Annotated[Table, CLOCK_ROWS]
     scratch: Annotated[Table, SCRATCH_ROWS]
-    """What has just been computed for all lanes, and is then read lane by lane."""
+    """Numbers that are computed for all lanes and then read lane by lane."""
     step: Step
     forces: Forces
     modes: Annotated[Table, "contacts", MODE_COLUMNS]
     acceleration: Annotated[Table, "6 * bodies"]
     signals: Annotated[Table, "signals"]
-    """At the lane's time; `end_signals` at the end of its step."""
+    """Signals at the lane's time."""
     end_signals: Annotated[Table, "signals"]
+    """Signals at the end of the lane's step."""
     drives: Annotated[Table, "drives", DRIVE_COLUMNS]
-    """At the lane's time."""
+    """Drives at the lane's time."""
     end_drives: Annotated[Table, "drives"]
-    """Free lengths or tensions at the end of the lane's step."""
+    """Drives at the end of the lane's step."""
     neurons: Annotated[Table, "2 * signals", NEURON_COLUMNS]
     output: Annotated[Table, "signals"]
-    """The oscillators' latest outputs."""
+    """Latest outputs of the oscillators."""
     tonic: Annotated[Table, "2 * signals"]
-    """The input without feedback; `inputs` with it."""
+    """Inputs of the neurons without feedback."""
     inputs: Annotated[Table, "2 * signals"]
+    """Inputs of the neurons with feedback."""
     lengths: Annotated[Table, "cables"]
-    """What is sensed, as are `normal_forces`."""
+    """Cable lengths for the feedback."""
     normal_forces: Annotated[Table, "contacts"]
+    """Normal forces for the feedback."""
     tally: Tally
 
 
 class Log(NamedTuple):
-    """What is given to each simulation, and what is kept of it, a row a lane."""
+    """Schedule and recorded samples of each simulation; a row per lane."""
 
     marks: Annotated[Table, "lanes", "marks"]
-    """Times (s) at which steps end, ascending; infinite after the last."""
+    """Times (s) at which a step must end, ascending; infinite after the last."""
     passed: Annotated[Table, "lanes", int]
-    """How many marks there are behind."""
+    """Number of marks that have passed."""
     times: Annotated[Table, "lanes", "times"]
-    """Times (s) of the samples to keep, likewise."""
+    """Times (s) of the samples, ascending; infinite after the last."""
     kept: Annotated[Table, "lanes", int]
-    """How many samples there are already."""
+    """Number of recorded samples."""
     states: Annotated[Table, "lanes", "samples", "13 * bodies"]
     modes: Annotated[Table, "lanes", "samples", "contacts", MODE_COLUMNS]
-    """Those of the step."""
+    """Modes during the step that contains the sample."""
     signals: Annotated[Table, "lanes", "samples", "signals"]
-    """N."""
+    """Signals in N."""
     drives: Annotated[Table, "lanes", "samples", "drives"]
     recent: Annotated[Table, "lanes", "recent", "signals"]
-    """The latest samples of the listing's signals; see row_of."""
+    """Ring buffer of the listing's signals; see row_of()."""
     turns: Annotated[Table, "lanes", "turns"]
-    """At 0, one `period` ..., linear between them; the last one lasts. One alone is in `tonic`
-    already."""
+    """Turns at multiples of `period`, linear in between. The last turn holds for ever. A single
+    turn is in `tonic` from the start."""
 
 
 @functools.partial(compiled, nogil=True)
 def advance(constants: Constants, lanes: LaneState, log: Log, live: bool, rounds: int) -> None:
-    """Simulates to the end of the round in which one of the lanes ends, or for a number of rounds:
-    so each simulation's begin with its own, and lanes may be filled again in between.
+    """Runs rounds until a simulation has ended, at most `rounds`.
 
-    `live`: whether the network is integrated with the robot.
+    A simulation starts at the beginning of a round, so its numbers do not depend on its neighbours.
+    `live` is True if the network is integrated together with the robot.
     """
     for _ in range(rounds):
         ended = False
@@ -177,16 +181,16 @@ def advance(constants: Constants, lanes: LaneState, log: Log, live: bool, rounds
 
 @merged
 def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
-    """Tries a step in all lanes; whether a simulation has ended."""
+    """Tries a step in all lanes. Returns True if a simulation has ended."""
     clock, ended = lanes.clock, False
-    if any_lane((clock[STATUS] == WALKING) & (clock[TIME] >= clock[MARK])):
+    if any_lane((clock[STATUS] == RUNNING) & (clock[TIME] >= clock[MARK])):
         if not live:
             run_ahead(constants, lanes, log, clock[TIME])
         ended = pass_marks(constants, lanes, log, live)
-    is_walking = clock[STATUS] == WALKING
+    is_running = clock[STATUS] == RUNNING
 
     arrive(constants, lanes)
-    step = select(is_walking, aim(constants, lanes), 0.0)
+    step = select(is_running, aim(constants, lanes), 0.0)
     step_end = select(step == clock[MARK] - clock[TIME], clock[MARK], clock[TIME] + step)
     clock[STEP], clock[END] = step, step_end
     foresee_signals(constants, lanes, log, live)
@@ -203,7 +207,7 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     )
     correct_drives(lanes)
 
-    accepted = is_walking & (error <= constants.tolerance[0])
+    accepted = is_running & (error <= constants.tolerance[0])
     if live:
         feel(constants, lanes, log, step_end, lanes.step.end)
         correct_neurons(constants.network, lanes.inputs, step, accepted, lanes.neurons)
@@ -211,10 +215,10 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
     if any_lane(accepted & (clock[DUE] <= step_end)):
         lanes.scratch[ACCEPTED] = select(accepted, 1.0, 0.0)
         keep_samples(constants, lanes, log, live)
-    move_on(lanes, is_walking, accepted)
+    move_on(lanes, is_running, accepted)
     clock[PLANNED] = next_step(error, step, constants.tolerance[0], constants.max_step[0])
 
-    status = select(is_walking, fate(constants, lanes), clock[STATUS])
+    status = select(is_running, fate(constants, lanes), clock[STATUS])
     ended |= any_lane(status != clock[STATUS])
     clock[STATUS] = status
     return ended
@@ -222,7 +226,7 @@ def iterate(constants: Constants, lanes: LaneState, log: Log, live: bool) -> boo
 
 @inlined
 def arrive(constants: Constants, lanes: LaneState) -> None:
-    """Brings the modes up to date with the state, computes its forces and tallies them."""
+    """Updates the modes for the state, computes the forces, and adds them to the tally."""
     robot, forces, state = constants.robot, lanes.forces, lanes.step.state
     move_robot(robot, state, forces)
     for i in range(lanes.drives.shape[0]):
@@ -234,8 +238,7 @@ def arrive(constants: Constants, lanes: LaneState) -> None:
 
 @inlined
 def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
-    """Writes the signals at the end of the step: the listing's, or a prediction of a live
-    network's."""
+    """Writes the signals at the end of the step. For a live network they are a prediction."""
     clock = lanes.clock
     if live:
         feel(constants, lanes, log, clock[TIME], lanes.step.state)
@@ -250,7 +253,8 @@ def foresee_signals(constants: Constants, lanes: LaneState, log: Log, live: bool
 
 @inlined
 def foresee_drives(lanes: LaneState) -> None:
-    """Notes the drives and their rates at the state, and moves them to the end of the step."""
+    """Stores the rates of the drives at the state, and predicts the drives at the end of the
+    step."""
     drives = lanes.forces.drives
     for i in range(drives.shape[0]):
         lanes.drives[i, RATE] = drives[i, RATE]
@@ -259,15 +263,15 @@ def foresee_drives(lanes: LaneState) -> None:
 
 @inlined
 def correct_drives(lanes: LaneState) -> None:
-    """Writes the drives at the end of the step, by the mean of the rates at both ends."""
+    """Writes the drives at the end of the step, with the mean of the rates at both ends."""
     for i in range(lanes.drives.shape[0]):
         rate = 0.5 * (lanes.drives[i, RATE] + lanes.forces.drives[i, RATE])
         lanes.end_drives[i] = lanes.drives[i, DRIVE] + lanes.clock[STEP] * rate
 
 
 @inlined
-def move_on(lanes: LaneState, is_walking: Truth, accepted: Truth) -> None:
-    """Makes the end of the step the state where it is accepted."""
+def move_on(lanes: LaneState, is_running: Truth, accepted: Truth) -> None:
+    """Copies the end of the step to the state, in lanes that accept the step."""
     clock, state = lanes.clock, lanes.step.state
     for i in range(state.size):
         state[i] = select(accepted, lanes.step.end[i], state[i])
@@ -276,14 +280,14 @@ def move_on(lanes: LaneState, is_walking: Truth, accepted: Truth) -> None:
     for i in range(lanes.drives.shape[0]):
         lanes.drives[i, DRIVE] = select(accepted, lanes.end_drives[i], lanes.drives[i, DRIVE])
     clock[TIME] = select(accepted, clock[END], clock[TIME])
-    clock[TRIED] += select(is_walking, 1.0, 0.0)
+    clock[TRIED] += select(is_running, 1.0, 0.0)
     clock[TAKEN] += select(accepted, 1.0, 0.0)
 
 
 @merged
 def aim(constants: Constants, lanes: LaneState) -> Real:
-    """The step (s) to try: at most the planned one, to just after the next mode change if that is
-    nearer, and to the next mark or half the way to it if that is near."""
+    """Length (s) of the step to try: the planned one, or less. A near mode change or mark shortens
+    it: the step ends just after the mode change, at the mark, or halfway to the mark."""
     robot, clock = constants.robot, lanes.clock
     accelerate(robot, lanes.forces.inertia, lanes.step.force, lanes.acceleration)
     planned = clock[PLANNED]
@@ -298,16 +302,16 @@ def aim(constants: Constants, lanes: LaneState) -> Real:
 
 @inlined
 def next_step(error: Real, step: Real, tolerance: Real, max_step: Real) -> Real:
-    """The step (s) that a method of order 2 should take after one with this error."""
+    """Length (s) of the next step of a method of order 2, after a step with this error."""
     factor = SAFETY * math.sqrt(tolerance / maximum(error, 1e-12))
     factor = minimum(GROW, maximum(SHRINK, factor))
-    factor = select(error == error, factor, SHRINK)  # NaN
+    factor = select(error == error, factor, SHRINK)  # error is NaN
     return minimum(max_step, step * factor)
 
 
 @inlined
 def fate(constants: Constants, lanes: LaneState) -> Real:
-    """The status of each lane after a step, as if all were walking."""
+    """Status of each lane after a step, computed as if all lanes were running."""
     state, speed = lanes.step.state, 0.0
     bodies = state.size // 13
     for body in range(bodies):
@@ -315,31 +319,30 @@ def fate(constants: Constants, lanes: LaneState) -> Real:
             speed = larger(speed, abs(state[7 * bodies + BLOCK * body + 3 + k]))
     too_fast = (speed > MAX_SPEED) | (speed != speed)
     too_many = EVALUATIONS * lanes.clock[TRIED] > constants.max_evaluations[0]
-    status = select(too_fast, 1.0 * TOO_FAST, 1.0 * WALKING)
+    status = select(too_fast, 1.0 * TOO_FAST, 1.0 * RUNNING)
     status = select(lanes.clock[PLANNED] <= LEAST_STEP, 1.0 * STEP_TOO_SMALL, status)
     return select(too_many, 1.0 * TOO_MANY_EVALUATIONS, status)
 
 
 @inlined
 def run_ahead(constants: Constants, lanes: LaneState, log: Log, until: Real) -> None:
-    """Lets the listing's networks run until every walking lane has the samples around a time (s).
+    """Runs the listing's networks until every running lane has the samples around a time (s).
 
-    All lanes whose samples have room in `log.recent` take part, so that few steps are taken for
-    one lane alone.
+    Other lanes run too, as far as their ring buffers allow. So steps for a single lane are rare.
     """
-    clock, period, is_walking = lanes.clock, constants.period[0], lanes.clock[STATUS] == WALKING
+    clock, period, is_running = lanes.clock, constants.period[0], lanes.clock[STATUS] == RUNNING
     last_needed = until / period + 1.0
-    end_of_room = clock[TIME] / period + (log.recent.shape[1] - 1.0)
-    is_unfinished = is_walking & (clock[SAMPLES] < constants.samples[0])
+    end_of_buffer = clock[TIME] / period + (log.recent.shape[1] - 1.0)
+    is_unfinished = is_running & (clock[SAMPLES] < constants.samples[0])
     while any_lane(is_unfinished & (clock[SAMPLES] <= last_needed)):
-        takes_step = is_unfinished & (clock[SAMPLES] < end_of_room)
+        takes_step = is_unfinished & (clock[SAMPLES] < end_of_buffer)
         steer(constants, lanes, log, clock[SAMPLES] + 0.5)
         euler_step(constants.network, lanes.tonic, select(takes_step, period, 0.0), lanes.neurons)
         oscillator_output(lanes.neurons, lanes.output)
         lanes.scratch[NETWORK_STEPS] = select(takes_step, 1.0, 0.0)
         keep_outputs(constants, lanes, log)
         clock[SAMPLES] += lanes.scratch[NETWORK_STEPS]
-        is_unfinished = is_walking & (clock[SAMPLES] < constants.samples[0])
+        is_unfinished = is_running & (clock[SAMPLES] < constants.samples[0])
 
 
 @inlined
@@ -356,7 +359,7 @@ def keep_outputs(constants: Constants, lanes: LaneState, log: Log) -> None:
 
 @inlined
 def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Table) -> None:
-    """Writes the inputs of a live network at a time (s), for a state and its forces."""
+    """Writes the inputs of a live network at a time (s), from a state and its forces."""
     steer(constants, lanes, log, time / constants.period[0])
     for i in range(lanes.lengths.size):
         lanes.lengths[i] = lanes.forces.cable_forces[i, LENGTH]
@@ -370,24 +373,25 @@ def feel(constants: Constants, lanes: LaneState, log: Log, time: Real, state: Ta
 
 @inlined
 def steer(constants: Constants, lanes: LaneState, log: Log, sample: Real) -> None:
-    """Writes the tonic input where the turns change; `sample` is a place between two of them."""
+    """Writes the tonic input if the turns change. `sample` is a position among the turns: an index
+    with a fraction."""
     turns = log.turns.shape[1]
     if turns == 1:
         return
     lanes.scratch[TURN_INDEX] = sample
-    places, sides, tonic = by_lane(lanes.scratch), by_lane(constants.sides), by_lane(lanes.tonic)
+    scratch, sides, tonic = by_lane(lanes.scratch), by_lane(constants.sides), by_lane(lanes.tonic)
     for lane in range(log.kept.size):
-        place, external = places[TURN_INDEX, lane], by_lane(constants.external_input)[0, lane]
-        i = max(0, min(int(place), turns - 2))
+        position, external = scratch[TURN_INDEX, lane], by_lane(constants.external_input)[0, lane]
+        i = max(0, min(int(position), turns - 2))
         before, after = log.turns[lane, i], log.turns[lane, i + 1]
-        turn = before + (min(place, turns - 1.0) - i) * (after - before)
+        turn = before + (min(position, turns - 1.0) - i) * (after - before)
         for k in range(lanes.tonic.size):
             tonic[k, lane] = steered_input(external, turn, sides[k, lane])
 
 
 @inlined
 def drive(constants: Constants, lanes: LaneState) -> None:
-    """Writes the signals at the end of the step, N, from a live network."""
+    """Writes the signals (N) of a live network at the end of the step."""
     oscillator_output(lanes.neurons, lanes.output)
     active, gain = lanes.clock[ACTIVE] != 0.0, constants.gain[0]
     for k in range(lanes.output.size):
@@ -398,34 +402,34 @@ def drive(constants: Constants, lanes: LaneState) -> None:
 def interpolate(
     constants: Constants, lanes: LaneState, log: Log, lane: int, time: float, signals: Table
 ) -> None:
-    """Writes a lane's `signals`, (n, W) in N, at a time (s)."""
+    """Writes the listing's signals of a lane at a time (s) to `signals` (n, W), in N."""
     if by_lane(lanes.clock)[ACTIVE, lane] == 0.0:
         for k in range(signals.shape[0]):
             signals[k, lane] = 0.0
         return
-    place = time / by_lane(constants.period)[0, lane]
+    position = time / by_lane(constants.period)[0, lane]
     last = int(by_lane(constants.samples)[0, lane]) - 1
-    i = int(place)
+    i = int(position)
     row, next_row = row_of(min(i, last), log), row_of(min(i + 1, last), log)
     for k in range(signals.shape[0]):
         before, after = log.recent[lane, row, k], log.recent[lane, next_row, k]
-        signals[k, lane] = before + (place - i) * (after - before)
+        signals[k, lane] = before + (position - i) * (after - before)
 
 
 @inlined
 def row_of(sample: int, log: Log) -> int:
-    """Row of a sample among the recent ones: its number modulo theirs, a power of two."""
+    """Row of a sample in the ring buffer: its index modulo the number of rows, a power of two."""
     return sample & (log.recent.shape[1] - 1)
 
 
 @merged
 def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> bool:
-    """Sets the next mark where one is reached, and the signals there; whether a simulation
-    is done."""
+    """Sets the next mark and the signals in lanes that have reached a mark. Returns True if a
+    simulation is finished."""
     clock, signals, done = by_lane(lanes.clock), by_lane(lanes.signals), False
     oscillator_output(lanes.neurons, lanes.output)
     for lane in range(log.kept.size):
-        if clock[STATUS, lane] != WALKING or clock[TIME, lane] < clock[MARK, lane]:
+        if clock[STATUS, lane] != RUNNING or clock[TIME, lane] < clock[MARK, lane]:
             continue
         log.passed[lane] += 1
         clock[MARK, lane] = log.marks[lane, log.passed[lane]]
@@ -445,7 +449,7 @@ def pass_marks(constants: Constants, lanes: LaneState, log: Log, live: bool) -> 
 
 @merged
 def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -> None:
-    """Keeps the samples that are due in the accepted step of each lane that has one."""
+    """Records the samples within the step, in lanes that accept the step."""
     clock, modes, accepted = by_lane(lanes.clock), by_lane(lanes.modes), by_lane(lanes.scratch)
     signals = np.empty((lanes.signals.size, log.kept.size))
     for lane in range(log.kept.size):
@@ -476,7 +480,7 @@ def keep_samples(constants: Constants, lanes: LaneState, log: Log, live: bool) -
 
 @inlined
 def column(table: Table, lane: int) -> Array:
-    """A copy of a lane of a table (..., W)."""
+    """Copy of one lane of a table (size, W)."""
     copy = np.empty(table.shape[0])
     for k in range(copy.size):
         copy[k] = table[k, lane]

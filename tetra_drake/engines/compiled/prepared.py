@@ -1,4 +1,4 @@
-"""A gait prepared for a lane of the compiled engine: constants, state at t = 0, sample times."""
+"""Gait prepared for a lane of the compiled engine: constants, state at t = 0, sample times."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from tetra_drake.scenario.engine_kinds import Compiled
 from tetra_drake.simd.allocation import allocate
 
 _SPARE_MARKS = 4
-"""Marks that another gait on the same engine may have more than the first one."""
+"""Number of marks that a gait may have more than the first gait on the same engine."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A gait on a scenario, prepared for a lane: arrays without lanes."""
+    """A gait on a scenario, prepared for a lane. Its arrays have no lanes yet."""
 
     robot: Robot
     gait: Gait
     record: bool
     times: np.ndarray
-    """The times (s) of the samples to keep, those of motion_times()."""
+    """Times (s) of the samples; see motion_times()."""
     marks: np.ndarray
-    """The times (s) at which steps end."""
+    """Times (s) at which a step must end."""
     turns: np.ndarray
-    """The turns that Robot.turns() gives."""
+    """Turns of the steering; see Robot.turns()."""
     constants: Constants
-    """Constants of all laws; those of the ground are without heights."""
+    """Constants of all laws, without the heights of the ground."""
     start: LaneState
-    """State at t = 0, and room for what is computed on the way."""
+    """State at t = 0, with scratch memory."""
 
     @classmethod
     def of(
@@ -51,7 +51,7 @@ class Prepared:
         record: bool,
         steering: SteeringSignal | None = None,
     ) -> Prepared:
-        """Prepares a gait; raises InputError if it or the steering does not fit the scenario."""
+        """Prepares a gait. Raises InputError if gait or steering do not fit the scenario."""
         simulation, start_up = robot.scenario.simulation, robot.scenario.cpg.start_up
         instants = [0.0, simulation.steady_from, simulation.duration, start_up]
         marks = np.unique(np.concatenate([instants, _jumps(robot)]))
@@ -69,14 +69,14 @@ class Prepared:
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """Properties that simulations on one engine must share."""
+        """Properties that all simulations on one LaneEngine must share."""
         structure, ground = self.robot.structure, self.robot.ground
         cables = structure.cables
         return (
             structure.first_node.tobytes(),
             structure.struts.tobytes(),
             structure.contacts.tobytes(),
-            # One by one: the bytes of a view of several fields are those of all fields.
+            # One field at a time, because the bytes of a multi-field view include all fields.
             *(cables[name].tobytes() for name in ("node_a", "node_b", "signal")),
             structure.isotropic,
             self.robot.model.slack,
@@ -88,13 +88,13 @@ class Prepared:
 
     @property
     def live(self) -> bool:
-        """True if the network is integrated with the robot."""
+        """True if the network is integrated together with the robot."""
         return self.robot.scenario.cpg.signals == "live"
 
     @property
     def recent_signals(self) -> int:
-        """Number of signal samples that an engine holds: those within a step, and as many
-        for lanes that run ahead, or all those of a command; a power of two."""
+        """Rows of the ring buffer of signals: at least two steps' worth, or a whole command; a
+        power of two."""
         scenario = self.robot.scenario
         within = scenario.settings_of(Compiled).max_step / scenario.cpg.listing_step
         least = max(2.0 * within + 32.0, len(self.robot.commanded))
@@ -102,7 +102,7 @@ class Prepared:
 
     @property
     def log_sizes(self) -> dict[str, int]:
-        """Sizes of an engine's log for this gait and such ones with a few more marks."""
+        """Sizes of the engine's Log for this gait. There is space for a few more marks."""
         return sizes_in_lanes(self.robot, Solver.of(self.robot.model)) | {
             "marks": len(self.marks) + 1 + _SPARE_MARKS,
             "times": len(self.times) + 1,
@@ -115,9 +115,9 @@ class Prepared:
 def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
     scenario, model = robot.scenario, robot.model
     cpg, engine = scenario.cpg, scenario.settings_of(Compiled)
-    # Up to its time constant, NaN if it has none, Heun's method is stable for an actuator.
+    # Heun's method is stable for an actuator up to its time constant (NaN if it has none).
     max_step = np.fmin(engine.max_step, Limits(*model.actuator.limits).time_constant)
-    ground = model.ground._replace(heights=None)  # of which lanes have different numbers
+    ground = model.ground._replace(heights=None)  # lanes have different numbers of heights
     return Constants(
         robot=model._replace(ground=ground),
         solver=solver,
@@ -138,7 +138,7 @@ def _constants(robot: Robot, gait: Gait, solver: Solver) -> Constants:
 
 
 def _jumps(robot: Robot) -> np.ndarray:
-    """Times (s) at which a change of the robot's command begins or ends."""
+    """Times (s) at which a change of the command begins or ends."""
     changes = (np.diff(robot.commanded, axis=0) != 0.0).any(axis=1)
     ends = np.append(changes, False) | np.append(False, changes)
     return robot.scenario.cpg.listing_step * np.flatnonzero(ends)
@@ -158,6 +158,6 @@ def _start(robot: Robot, turns: np.ndarray, solver: Solver) -> LaneState:
 
 
 def sizes_in_lanes(robot: Robot, solver: Solver) -> dict[str, int]:
-    """Sizes of the tables of a robot in lanes, for allocate()."""
+    """Sizes of a robot's tables in lanes, for allocate()."""
     signals, width = robot.structure.signals, solver.schedule.width
     return sizes_of(robot.model) | {"signals": signals, "width": width}

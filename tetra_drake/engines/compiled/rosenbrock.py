@@ -1,4 +1,4 @@
-"""One step of ROS2, a linearly implicit Runge-Kutta method of order 2.
+"""Integration step by ROS2, a linearly implicit Runge-Kutta method of order 2.
 
 J. G. Verwer, E. J. Spee, J. G. Blom and W. Hundsdorfer, "A second-order Rosenbrock method
 applied to photochemical dispersion problems", SIAM J. Sci. Comput. 20 (1999). With
@@ -8,22 +8,23 @@ A an approximation of the Jacobian of y' = f(t, y):
     (1 - γ h A) k2 = f(t + h, y + h k1) - 2 k1 - γ h df/dt
     y(t + h) = y + 3/2 h k1 + 1/2 h k2
 
-It is of order 2 whatever A is, and stable at any step with the exact one. Here k1 and k2 are the
-rates of velocities v. Those of positions need no solution:
+The method is of order 2 for any A. With the exact Jacobian it is stable at any step. Here k1 and k2
+are the rates of the velocities v. The rates of the positions are explicit:
 
     q1 = v + γ h k1
     q2 = v + h k1 - 2 q1 + γ h k2
 
-A holds what is stiff: dampings (a symmetric matrix with blocks for pairs of bodies that cables
-join) and the stiffness of contacts. A law that adds stiffness needs no Jacobian; one that adds
-damping returns dT/d(dl/dt).
+A contains the stiff terms: dampings (a symmetric matrix with a block for each pair of bodies joined
+by cables) and the stiffness of contacts. A new law with stiffness needs no Jacobian; a new law with
+damping must return dT/d(dl/dt).
 
-How forces change with positions otherwise, and with the signals, is df/dt, the change along the
-motion, a difference of forces. The method needs it: where damping dominates, it would be of order 1
-without.
+The term df/dt is a difference of forces along the motion. It contains the effect of signals, and of
+positions as far as A lacks it. Without df/dt, the method would be of order 1 where damping
+dominates.
 
-The equations are multiplied by the mass matrix at the beginning of the step. Where bodies are not
-isotropic, it turns with them, and later torques are referred to it.
+The equations are multiplied by the mass matrix at the beginning of the step. The mass matrix of a
+body that is not isotropic turns with the body. Torques at the end of the step are converted to the
+mass matrix at the beginning.
 """
 
 from __future__ import annotations
@@ -52,27 +53,27 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 
 class Step(NamedTuple):
-    """A step from `state` to `end`, (13 bodies,), and what is computed on the way."""
+    """Memory of a step from `state` to `end` (13 bodies,)."""
 
     state: Annotated[Table, "13 * bodies"]
     end: Annotated[Table, "13 * bodies"]
     force: Annotated[Table, "6 * bodies"]
-    """At the state."""
+    """Force at the beginning of the step."""
     end_force: Annotated[Table, "6 * bodies"]
     change: Annotated[Table, "6 * bodies"]
-    """γ h df/dt."""
+    """Change of the force, γ h df/dt."""
     k1: Annotated[Table, "6 * bodies"]
     k2: Annotated[Table, "6 * bodies"]
     velocity: Annotated[Table, "6 * bodies"]
-    """v, at the state."""
+    """Velocity v at the beginning of the step."""
     q1: Annotated[Table, "6 * bodies"]
     mean_rate: Annotated[Table, "6 * bodies"]
-    """3/2 q1 + 1/2 q2."""
+    """Mean rate of the positions, 3/2 q1 + 1/2 q2."""
     rows: Annotated[Table, "bodies", BLOCK, "width"]
-    """The implicit matrix; `width` is its schedule's."""
+    """Implicit matrix; see Schedule.width."""
     lines: Annotated[Table, CABLES_AT_ONCE, LINE_COLUMNS]
     inertia: Annotated[Table, "bodies", INERTIA_COLUMNS]
-    """At the state."""
+    """Inertia at the beginning of the step."""
 
 
 @merged
@@ -86,13 +87,13 @@ def take_step(
     step: Real,
     write_parts: bool,
 ) -> Real:
-    """Writes the end of a step (s); `signals` are the end's.
+    """Writes the end of a step of length `step` (s). Returns an estimate of its error.
 
-    Input: `work.state`, and `work.force` and `forces` there. `forces` is overwritten: with
-    `write_parts`, all of it becomes that of stage 2, at the end of the step to order 1.
+    Input: `work.state`, `work.force` and `forces` at the state, `signals` at the end of the step.
+    `forces` is overwritten; with `write_parts` it holds the forces of stage 2.
 
-    Returns the difference to the first-order solution within: the largest of any body's
-    velocity (m/s), of rotation that of its nodes; NaN if one is.
+    The error is the difference to the embedded first-order solution: the largest difference of a
+    velocity (m/s) of a body or, for rotations, of its nodes. NaN if a velocity is NaN.
     """
     state, end, k1, k2 = work.state, work.end, work.k1, work.k2
     velocity, q1, mean_rate = work.velocity, work.q1, work.mean_rate
@@ -139,8 +140,8 @@ def take_step(
 def compute_end_forces(
     robot: Model, work: Step, modes: Table, forces: Forces, signals: Table, write_parts: bool
 ) -> None:
-    """Writes work.end_force, in which torques are those that the mass matrix at the beginning of
-    the step needs."""
+    """Writes work.end_force: the forces at work.end. Torques are converted to the mass matrix at
+    the beginning of the step."""
     move_robot(robot, work.end, forces)
     compute_forces(robot, work.end, modes, signals, write_parts, forces, work.end_force)
     if not robot.isotropic:
@@ -149,10 +150,10 @@ def compute_end_forces(
 
 @inlined
 def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real:
-    """The largest component of k1 + k2 as an acceleration (m/s²) of a body, or by rotation of its
-    nodes; NaN if one is.
+    """Largest component of k1 + k2, as the acceleration (m/s²) of a body or, for rotations, of its
+    nodes. NaN if a component is NaN.
 
-    The spin of a thin bar about its axis does not count, as it moves no node.
+    The spin of a thin bar about its axis does not count, because it moves no node.
     """
     largest = 0.0
     for body in range(k1.size // BLOCK):
@@ -173,5 +174,5 @@ def largest_difference(robot: Model, nodes: Table, k1: Table, k2: Table) -> Real
 
 @inlined
 def larger(x: Real, y: Real) -> Real:
-    """The larger; NaN if either is."""
+    """The larger of two numbers; NaN if one is NaN."""
     return select((y > x) | (y != y), y, x)
