@@ -194,10 +194,13 @@ def add_cables(
     With the cable's direction d and its ends p_a and p_b, l = (u, -d, w, d), u = d x p_a and
     w = p_b x d. The sum over cables is a product of two columns of `lines`.
     """
-    write_lines(robot, forces, time, pair, first, lines) rear, front = robot.couplings.first[pair],
-    robot.couplings.second[pair] adds = first > robot.couplings.first_cable[pair]  # the block has a
-    sum already turn = solver.columns[pair]  # first column of the front body's rotation; its
-    translation follows shift = turn + 3 weights = column(lines, WEIGHT) for r in range(3):
+    write_lines(robot, forces, time, pair, first, lines)
+    rear, front = robot.couplings.first[pair], robot.couplings.second[pair]
+    adds = first > robot.couplings.first_cable[pair]  # the block has a sum already
+    turn = solver.columns[pair]  # first column of the front body's rotation
+    shift = turn + 3  # and of its translation
+    weights = column(lines, WEIGHT)
+    for r in range(3):
         u = weighted(weights, column(lines, U + r))
         w = weighted(weights, column(lines, W + r))
         d = weighted(weights, column(lines, D + r))
