@@ -15,10 +15,10 @@ Coulomb friction acts in the plane, regularised by a bristle. The normal force F
     F = -u min(1, mu F_N / s(u)), with mu static in stick and kinetic in slip
     s(u) = sqrt((u_f / a_f)^2 + (u_l / a_l)^2)
 
-The component u_f is along the body's heading at touchdown; a_f is `forward` or `backward`, depending
-on the sign of u_f. The component u_l is sideways; a_l is `lateral`. A node breaks free at
-s(u) > static F_N if it moves outward. It sticks again, with x = 0, at s(c v) <= kinetic F_N. With
-k = 0 and static = kinetic the law has no memory: it is MuJoCo's soft friction.
+The component u_f is along the body's heading at touchdown; a_f is `forward` or `backward`,
+depending on the sign of u_f. The component u_l is sideways; a_l is `lateral`. A node breaks free at
+s(u) > static F_N if it moves outward. It sticks again, with x = 0, at s(c v) <= kinetic F_N. With k
+= 0 and static = kinetic the law has no memory: it is MuJoCo's soft friction.
 
 A node on the ground sticks or slips. Its *mode* is STICK, or the direction in which it broke free:
 +1 or -1 along each tangent for the reset integrator, a unit vector for Coulomb friction. A node
