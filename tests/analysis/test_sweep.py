@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -42,9 +41,7 @@ def test_each_key_is_a_labelled_axis_of_the_numbers_of_single_simulations(short:
     }  # fmt: skip
 
 
-def test_the_path_of_one_gait_is_enough_and_a_failure_is_nan(
-    short: Scenario, tmp_path: Path
-) -> None:
+def test_the_path_of_one_gait_is_enough_and_a_failure_is_nan(short, tmp_path):
     save_gait(seeded_gait(short), tmp_path / "gait.json", short)
     found = sweep(short, tmp_path / "gait.json", {"simulation.max_evaluations": [10, 100_000]})
     assert found.distance.dims == ("max_evaluations", "gait")

@@ -8,8 +8,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from helpers.forces import forces_at
-from helpers.steps import make_step
+from helpers.kernels import forces_at, make_step
 from helpers.structures import onto_recorded, poses_of, recorded_structure, simulated
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder

@@ -171,8 +171,6 @@ def test_the_headline_says_where_the_robot_walks(scenario, terrain, text):
         (math.nan, ["twist is nan in, less than 0.5 in"]),
     ],
 )
-def test_a_metric_below_its_least_value_or_nan_is_unmet(
-    robot: Robot, twist: float, texts: list[str]
-) -> None:
+def test_a_metric_below_its_least_value_or_nan_is_unmet(robot, twist, texts):
     metrics = dataclasses.replace(metrics_of(robot, CIRCLE, 0.0), twist=twist)
     assert unmet_requirements(metrics, {"twist": 0.5 * INCH, "distance": 0.0}) == texts

@@ -100,9 +100,7 @@ def test_a_wrench_is_torque_about_the_origin_then_force() -> None:
         (nested_tetrahedra(2.0 * 0.0254), 1, 1),
     ],
 )
-def test_self_stress_states_and_mechanisms(
-    given: StructureFile, self_stress_states: int, mechanisms: int
-) -> None:
+def test_self_stress_states_and_mechanisms(given, self_stress_states, mechanisms):
     statics = statics_of(given)
     assert statics.mechanisms == mechanisms
     assert statics.self_stresses.shape == (self_stress_states, len(given.all_cables))

@@ -156,9 +156,7 @@ def test_a_unit_is_that_of_bare_coordinates(refused) -> None:
         ("{masses: {b: 1 g}}", "robot.masses", "!Structure"),
     ],
 )
-def test_a_fault_of_the_scenario_names_it(
-    folder: Path, robot: str, key: str, fact: str, refused
-) -> None:
+def test_a_fault_of_the_scenario_names_it(folder, robot, key, fact, refused):
     with refused(folder / "mine.yaml", key, fact):
         load(folder, robot)
 
@@ -171,9 +169,7 @@ def test_a_fault_of_the_scenario_names_it(
         ("unit: cm", "unit: [", "", "YAML"),
     ],
 )
-def test_a_fault_of_a_structure_file_names_that(
-    folder: Path, old: str, new: str, key: str, fact: str, refused
-) -> None:
+def test_a_fault_of_a_structure_file_names_that(folder, old, new, key, fact, refused):
     file = folder / "bar.yaml"
     file.write_text(BAR.replace(old, new))
     with refused(file, key, fact):

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from helpers.forces import forces_at
+from helpers.kernels import forces_at, make_step
 from helpers.states import disturbed, mass_matrix
-from helpers.steps import make_step
 
 from tetra_drake.engines.compiled.block_sparse import BLOCK
 from tetra_drake.engines.compiled.dynamics import Solver, accelerate, implicit_matrix

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.forces import forces_at
-from helpers.steps import make_step
+from helpers.kernels import forces_at, make_step
 
 from tetra_drake.engines.compiled.dynamics import Solver
 from tetra_drake.engines.compiled.rosenbrock import larger, take_step

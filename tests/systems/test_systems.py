@@ -1,0 +1,151 @@
+"""The systems of the diagram and their wiring; their laws are tested in tests/physics.
+
+A lone tetrahedron settles and slides on the ground in tests/diagrams/test_one_tetrahedron.py.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from one_tetrahedron import make_diagram, make_standing_tetrahedron
+from pydrake.systems.analysis import Simulator
+
+from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS
+from tetra_drake.physics.friction import STICK
+from tetra_drake.physics.oscillator import (
+    NEURON_COLUMNS,
+    U_RATE,
+    V_RATE,
+    U,
+    V,
+    neuron_rates,
+)
+from tetra_drake.robot.gait import Gait, load_gait
+from tetra_drake.robot.robot import Robot, initial_neurons
+from tetra_drake.robot.structure import node_positions
+from tetra_drake.scenario.scenario import Scenario
+from tetra_drake.systems import CableNetwork, MatsuokaCpg, Steering
+from tetra_drake.systems.diagram import MakeTensegrityDiagram
+
+
+@pytest.fixture
+def gait(scenario: Scenario, data: Path) -> Gait:
+    return load_gait(data / "gait_b.json", scenario)
+
+
+def test_has_the_blocks_of_the_thesis_and_nothing_to_show_or_log(robot, gait):
+    names = {system.get_name() for system in MakeTensegrityDiagram(robot, gait).GetSystems()}
+    assert names == {"cpg", "start_up", "cables", "ground", "forces", "plant"}
+
+
+def test_exports_what_a_user_plots(robot, gait):
+    diagram = MakeTensegrityDiagram(robot, gait)
+    context = diagram.CreateDefaultContext()
+    ports = [diagram.get_output_port(i) for i in range(diagram.num_output_ports())]
+    sizes = {"state": 65, "signals": 4, "tensions": 24, "lengths": 24}
+    sizes |= {"normal_forces": 11, "friction_forces": 22, "modes": 33}
+    assert {port.get_name(): len(port.Eval(context)) for port in ports} == sizes
+
+
+def test_the_friction_brings_no_continuous_state(scenario, robot, gait):
+    context = MakeTensegrityDiagram(robot, gait).CreateDefaultContext()
+    assert context.num_continuous_states() == 13 * 5
+    live = Robot.of(scenario.with_changes({"cpg.signals": "live"}))
+    live = MakeTensegrityDiagram(live, gait)
+    assert isinstance(live.GetSubsystemByName("cpg"), MatsuokaCpg)
+    assert live.CreateDefaultContext().num_continuous_states() == 13 * 5 + 4 * 4
+
+
+@pytest.mark.parametrize(("slack", "least"), [(True, 0.0), (False, -97.4)])
+def test_slack_cables_do_not_push(scenario, slack, least):
+    robot = Robot.of(scenario.with_changes({"robot.cables.slack": slack}))
+    cables = CableNetwork(robot)
+    context = cables.CreateDefaultContext()
+    cables.GetInputPort("state").FixValue(context, robot.structure.initial_state)
+    cables.GetInputPort("signals").FixValue(context, np.full(4, -100.0))
+    assert cables.GetOutputPort("tensions").Eval(context).min() == pytest.approx(least, abs=0.1)
+
+
+@pytest.mark.parametrize(("height", "touches"), [(-1e-5, True), (1e-5, False)])
+def test_initialize_takes_contact_and_stick_points_from_the_pose(scenario, height, touches):
+    structure = make_standing_tetrahedron(scenario).structure
+    simulator, state = Simulator(make_diagram(scenario)), structure.initial_state
+    state[6] += height
+    simulator.get_mutable_context().SetContinuousState(state)
+    simulator.Initialize()
+    ground = simulator.get_system().GetSubsystemByName("ground")
+    context = ground.GetMyContextFromRoot(simulator.get_context())
+    modes = context.get_discrete_state_vector().value().reshape(3, MODE_COLUMNS)
+    assert (modes[:, CONTACT] == touches).all()
+    assert (modes[:, MODE : MODE + 2] == STICK).all()
+    if touches:
+        p_WN = node_positions(structure, state)
+        np.testing.assert_allclose(modes[:, 3:5], p_WN[:3, :2], atol=1e-15)
+
+
+@pytest.fixture
+def cpg(scenario: Scenario, robot: Robot, gait: Gait) -> MatsuokaCpg:
+    law = scenario.cpg
+    start, network = initial_neurons(law, 4), robot.network(gait)
+    return MatsuokaCpg(network, tonic=law.external_input, initial_state=start, gain=law.gain)
+
+
+def test_starts_at_the_values_of_table_4(cpg):
+    context = cpg.CreateDefaultContext()
+    state = context.get_continuous_state_vector().CopyToVector()
+    np.testing.assert_array_equal(state[:8], 0.3)
+    np.testing.assert_array_equal(state[8:], np.tile([0.1, 0.5], 4))
+    # Both neurons of each oscillator start alike, so its signal starts at zero.
+    np.testing.assert_array_equal(cpg.GetOutputPort("signals").Eval(context), np.zeros(4))
+
+
+@pytest.mark.parametrize("tonic", [None, np.linspace(0.3, 0.9, 8)], ids=["0.5", "its own"])
+@pytest.mark.parametrize("feedback", [None, np.linspace(-1.0, 1.0, 8)], ids=["none", "some"])
+def test_derivatives_are_the_laws_with_what_is_connected(robot, gait, cpg, feedback, tonic):
+    context = cpg.CreateDefaultContext()
+    state, neurons = np.random.default_rng(5).normal(size=16), np.zeros((8, NEURON_COLUMNS))
+    context.SetContinuousState(state)
+    if feedback is not None:
+        cpg.GetInputPort("feedback").FixValue(context, feedback)
+    if tonic is not None:
+        cpg.GetInputPort("tonic").FixValue(context, tonic)
+    inputs = (0.5 if tonic is None else tonic) + (np.zeros(8) if feedback is None else feedback)
+    neurons[:, U], neurons[:, V] = state[:8], state[8:]
+    neuron_rates(robot.network(gait), inputs, neurons)
+    expected = np.concatenate([neurons[:, U_RATE], neurons[:, V_RATE]])
+    np.testing.assert_array_equal(cpg.EvalTimeDerivatives(context).CopyToVector(), expected)
+
+
+def doubled(turn: np.ndarray) -> np.ndarray:
+    return np.array([2.0 * turn, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("turn", "port", "decides"),
+    [
+        (0.25, None, 0.25),
+        (lambda time: 0.1 * time, None, 0.3),
+        (lambda time: 0.1 * time, -0.5, -0.5),
+    ],
+    ids=["number", "function of time", "port"],
+)
+def test_the_port_decides_if_it_is_connected(turn, port, decides):
+    steering = Steering(doubled, turn=turn)
+    context = steering.CreateDefaultContext()
+    context.SetTime(3.0)
+    if port is not None:
+        steering.GetInputPort("turn").FixValue(context, [port])
+    assert steering.get_output_port().Eval(context) == pytest.approx([2.0 * decides, 0.0])
+
+
+@pytest.mark.parametrize("turn", [5.0, -1.1, math.nan])
+def test_a_turn_beyond_its_limits_is_refused_on_the_port_as_by_a_function(turn, refused):
+    for given, port in ((0.0, turn), (lambda time: turn, None)):
+        steering = Steering(doubled, turn=given)
+        context = steering.CreateDefaultContext()
+        context.SetTime(3.0)
+        if port is not None:
+            steering.GetInputPort("turn").FixValue(context, [port])
+        with refused("steering", "at 3 s", str(turn)):
+            steering.get_output_port().Eval(context)
