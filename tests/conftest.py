@@ -20,9 +20,12 @@ Refused = Callable[..., contextlib.AbstractContextManager[None]]
 
 ORDER = (
     *("engines/compiled/test_many.py", "engines", "systems", "diagrams", "robot", "scenario"),
-    *("figures", "physics", "simd", "optimizers", "analysis", "evolution", ""),
+    *("figures", "physics", "simd", "optimizers"),
+    *(f"evolution/test_{name}" for name in ("run", "trials", "evaluators", "kill", "cluster")),
+    *("analysis", "evolution", ""),
 )
-"""The folders of tests, those first that compile most; figures and physics compile least."""
+"""The folders of tests, those first that compile most; what walks in lanes is later in the second
+half, when the first test has compiled for it."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
