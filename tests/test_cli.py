@@ -247,9 +247,7 @@ def test_a_gait_file_gives_the_numbers_of_the_seed_it_was_drawn_with(work, gait_
     assert again | varying == result | varying
 
 
-def test_replay_makes_the_page_of_simulate_from_its_recording_and_from_the_gait(
-    simulated, work, gait_3, capsys
-):
+def test_replay_makes_the_page_of_simulate_from_recording_or_gait(simulated, work, gait_3, capsys):
     save_gait(gait_3, "gait.json", load_scenario("short.yaml"))
     for source in ([str(simulated[0])], ["gait.json", "--scenario", "short.yaml"]):
         assert main(["replay", *source, "--out", "sub/again.html"]) == 0

@@ -112,9 +112,7 @@ def test_a_robot_of_another_length_is_evolved_and_drawn(tiny, tmp_path):
     assert drawn == {"T1", "T2"}
 
 
-def test_candidates_side_by_side_have_the_records_of_candidates_one_by_one(
-    tiny, tmp_path, reports, monkeypatch
-):
+def test_gaits_side_by_side_have_the_records_of_single_ones(tiny, tmp_path, reports, monkeypatch):
     prepared = []
     monkeypatch.setattr("tetra_drake.engines.simulate.prepare", prepared.append)
     several = tiny.with_changes({"evolution.trials": 3})
@@ -175,9 +173,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("key", "value"), [(k, v) for k, values in WRONG.items() for v in values])
-def test_a_wrong_argument_is_refused_before_anything_is_written(
-    tiny, tmp_path, run_small, refused, key, value
-):
+def test_wrong_arguments_are_refused_at_once(tiny, tmp_path, run_small, refused, key, value):
     run = run_small()
     before = read_record(run)
     for out in (run, tmp_path / "new"):
@@ -187,7 +183,7 @@ def test_a_wrong_argument_is_refused_before_anything_is_written(
     assert not (tmp_path / "new").exists()
 
 
-def test_a_run_of_ones_own_is_resumed_only_as_what_it_is(
+def test_a_run_is_resumed_only_as_what_it_is(
     tiny, tmp_path, refused, capsys, interrupting, reports
 ):
     method = {"objective": Heaviest(2.0), "optimizer": RandomSearch}
@@ -234,9 +230,7 @@ def make_objective(factor):
     return objective
 
 
-def test_no_record_holds_fitnesses_of_two_objectives_of_the_same_name(
-    tiny, tmp_path, refused, interrupting
-):
+def test_no_record_is_of_two_objectives_of_one_name(tiny, tmp_path, refused, interrupting):
     run, quick = tmp_path / "run", {"reevaluate": False, "report": False}
 
     def refuse_others():
@@ -266,9 +260,7 @@ def test_the_scenarios_optimiser_is_used_and_recorded(tiny, tmp_path, refused):
         tetra_drake.evolve(None, run, resume=True, optimizer=SteadyState, **quick)
 
 
-def test_a_report_that_fails_is_no_failed_run_and_other_versions_are_told(
-    tiny, tmp_path, monkeypatch
-):
+def test_a_report_that_fails_and_other_versions_are_told(tiny, tmp_path, monkeypatch):
     monkeypatch.setattr("tetra_drake.report.run_page.write_report", lambda path: {}["x1"])
     with pytest.warns(RuntimeWarning, match="x1"):
         run = tetra_drake.evolve(tiny, tmp_path / "run", reevaluate=False)
@@ -280,9 +272,7 @@ def test_a_report_that_fails_is_no_failed_run_and_other_versions_are_told(
         tetra_drake.evolve(None, tmp_path / "run", resume=True, reevaluate=False, report=False)
 
 
-def test_what_cannot_be_evaluated_again_is_named_and_the_report_is_written(
-    tiny, tmp_path, reports, monkeypatch
-):
+def test_what_cannot_be_evaluated_again_is_named(tiny, tmp_path, reports, monkeypatch):
     compiled_alone = tiny.with_changes({"simulation.duration": "3000 s"})
     monkeypatch.setattr("tetra_drake.experiment.evaluator_of", lambda *_, **__: in_threads())
     progress = Told()
@@ -301,9 +291,7 @@ def test_a_gain_that_hardly_acts_is_named_when_a_run_begins(tiny, tmp_path):
     assert "cpg.gain 0.1 N" in warning
 
 
-def test_the_map_is_simulated_on_as_many_local_threads_as_there_are_cores(
-    tiny, tmp_path, reports, monkeypatch
-):
+def test_a_map_is_simulated_in_local_threads(tiny, tmp_path, reports, monkeypatch):
     asked = []
     monkeypatch.setattr(
         "tetra_drake.experiment.judge_elites", lambda out, workers: asked.append(workers)
@@ -356,7 +344,7 @@ def test_resuming_needs_the_directory_only_and_leaves_the_run_as_it_is(evolve, t
         assert capsys.readouterr().err.startswith(f"tetra-drake: {out}: {key}: ")
 
 
-def test_an_interrupted_run_says_how_to_continue_once_there_is_one(
+def test_an_interrupted_run_says_how_to_continue(
     evolve, tmp_path, capsys, monkeypatch, interrupting
 ):
     out = tmp_path / "my run"

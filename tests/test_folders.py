@@ -88,7 +88,7 @@ def written(tmp_path_factory) -> Path:
 
 @pytest.mark.parametrize("writer", WRITERS)
 @pytest.mark.parametrize("reader", READERS)
-def test_a_folder_is_read_or_refused_in_one_line(
+def test_each_folder_is_read_or_refused_in_a_line(
     reader, writer, written, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(written)

@@ -22,9 +22,7 @@ def test_without_feedback_the_oscillator_keeps_its_own_frequency():
 @pytest.mark.parametrize(
     ("ratio", "feedback", "near"), [(0.65, FEEDBACK, 0.1), (1.6, -FEEDBACK, 0.02)]
 )
-def test_it_follows_a_slower_mass_by_positive_and_a_faster_one_by_negative_feedback(
-    ratio, feedback, near
-):
+def test_it_follows_slower_and_faster_masses_by_feedback_of_either_sign(ratio, feedback, near):
     locked = min(balance(ratio, feedback), key=lambda f: abs(f - ratio))
     assert locked == pytest.approx(ratio, rel=near)
     assert simulate(ratio, feedback, OFF) == pytest.approx(locked, rel=0.02)

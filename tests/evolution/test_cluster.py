@@ -50,9 +50,7 @@ def tasks(scenario):
     return tasks_of(space.random(generator) for _ in range(40))
 
 
-def test_what_ends_its_worker_is_named_and_the_others_are_evaluated(
-    cluster, tasks, tmp_path, monkeypatch, refused
-):
+def test_what_ends_its_worker_is_named(cluster, tasks, tmp_path, monkeypatch, refused):
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 1)
     others = {}
     with (

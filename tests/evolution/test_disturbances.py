@@ -152,9 +152,7 @@ def beside_a_step(scenario):
         (lambda tiny: tiny.with_changes({"simulation.max_evaluations": 50}), "step budget"),
     ],
 )
-def test_a_draw_that_fails_or_cannot_start_fails_its_gait_with_and_without_lanes(
-    tiny, vector, change, kind
-):
+def test_a_draw_that_fails_or_cannot_start_fails_its_gait(tiny, vector, change, kind):
     scenario = change(tiny)
     tasks = [Task(vector, index=i, seed=(1, 0, i)) for i in range(4)]
     evaluate = GaitEvaluation(scenario)

@@ -53,9 +53,7 @@ def highest(result):
 
 
 @pytest.mark.parametrize("engine", ["!Drake", "!Compiled"])
-def test_an_objective_that_reads_the_trajectory_says_so(
-    tiny, vectors, engine, refused, monkeypatch
-):
+def test_objectives_that_read_the_trajectory_say_so(tiny, vectors, engine, refused, monkeypatch):
     scenario = tiny.with_changes({"engine": engine})
     with refused("objective", "", "needs_trajectory"):
         GaitEvaluation(scenario, highest)(Task(vectors[0]))
@@ -77,9 +75,7 @@ FAILING = [
 
 @pytest.mark.parametrize("lanes", [False, True], ids=["diagram", "lanes"])
 @pytest.mark.parametrize(("changes", "objective", "kind"), FAILING)
-def test_failures_say_why_and_have_the_worst_fitness(
-    tiny, vectors, lanes, changes, objective, kind
-):
+def test_failures_say_why_and_are_the_worst(tiny, vectors, lanes, changes, objective, kind):
     engine = {"engine": "!Compiled" if lanes else "!Drake"}
     evaluate = GaitEvaluation(tiny.with_changes(engine | changes), objective)
     if lanes:

@@ -61,9 +61,7 @@ def test_a_task_whose_worker_dies_twice_is_named(tasks, tmp_path, make, refused)
         evaluated(evaluator, tasks)
 
 
-def test_a_run_whose_gait_ends_its_worker_twice_is_resumed_as_if_nothing_had_happened(
-    tmp_path, refused
-):
+def test_a_run_whose_gait_ends_its_worker_twice_is_resumed(tmp_path, refused):
     run = tmp_path / "run"
     record_run(tmp_path / "whole", small_scenario(trials=1))
     with refused("trial 0, evaluation 17", "", "died"):
@@ -139,9 +137,7 @@ def test_a_program_without_guard_is_told(call, tmp_path):
         ("argument", "evolve()", False),
     ],
 )
-def test_the_diagrams_evolution_works_where_processes_cannot_import_the_program(
-    how, call, alone, tmp_path
-):
+def test_evolution_works_where_processes_cannot_import_the_program(how, call, alone, tmp_path):
     ended = run_program(tmp_path, call, how=how)
     assert ended.stdout == "6 0\n", ended.stderr
     assert ended.stderr.count("in this process") == alone

@@ -61,7 +61,7 @@ def uninterrupted(tmp_path_factory):
         pytest.param("processes", 5, 1.5, marks=pytest.mark.slow),
     ],
 )
-def test_a_run_killed_ends_like_one_that_was_not_and_leaves_no_process(
+def test_a_killed_run_ends_alike_and_leaves_no_process(
     tmp_path, uninterrupted, executor, kills, longest
 ):
     generator = np.random.default_rng()

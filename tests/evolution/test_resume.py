@@ -40,9 +40,7 @@ def a_small_map(monkeypatch):
 
 @pytest.mark.parametrize("robot", ["row", "pair"])
 @pytest.mark.parametrize("optimizer", OPTIMIZERS)
-def test_an_interrupted_run_ends_like_one_that_was_not_and_makes_no_evaluation_again(
-    optimizer, robot, tmp_path
-):
+def test_an_interrupted_run_ends_alike_and_evaluates_nothing_again(optimizer, robot, tmp_path):
     if robot == "row":
         trials, evaluations = 2, 40
         scenario, evaluate = small_scenario(), Bowl()

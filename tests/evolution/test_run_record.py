@@ -78,9 +78,7 @@ def test_a_run_is_not_resumed_with_a_scenario_that_adds_or_lacks_something(tmp_p
             pass
 
 
-def test_no_run_is_resumed_where_there_is_none_and_none_begun_in_a_used_directory(
-    run_small, tmp_path, refused
-):
+def test_runs_are_resumed_where_one_is_and_begun_where_none_is(run_small, tmp_path, refused):
     for directory in (tmp_path, tmp_path / "none"):
         with refused(directory, "", "manifest.json"):
             RunRecord.resume(directory)

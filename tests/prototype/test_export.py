@@ -111,9 +111,7 @@ def test_the_loads_are_those_of_the_metrics(short, actuation, tmp_path):
 @pytest.mark.parametrize(
     ("actuation", "what"), [(FORCE, "length"), (MOTOR, "length"), (WINCH, "free_length")]
 )
-def test_the_least_length_and_the_travel_are_those_of_what_is_wound(
-    short, actuation, what, tmp_path
-):
+def test_least_length_and_travel_are_those_of_what_is_wound(short, actuation, what, tmp_path):
     driven = short.with_changes(actuation | {"simulation.sample_period": "1 ms"})
     export(driven, seeded_gait(short), rate=100.0, out=tmp_path / "lab")
     result = simulate(scenario=driven, gait=seeded_gait(short), record=True)

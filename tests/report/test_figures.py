@@ -53,9 +53,7 @@ def test_an_unfinished_run_is_drawn_as_far_as_it_has_come(tmp_path, trials, miss
     assert figures_in(run / "figures") == OF_A_RUN - missing
 
 
-def test_what_cannot_be_drawn_or_written_is_refused_before_anything_is_simulated(
-    run, tmp_path, monkeypatch, refused
-):
+def test_what_cannot_be_drawn_is_refused_before_simulations(run, tmp_path, monkeypatch, refused):
     monkeypatch.setattr("tetra_drake.report.run_figures.simulate", None)
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").touch()

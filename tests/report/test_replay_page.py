@@ -30,9 +30,7 @@ def test_of_a_run_the_fittest_gait_is_simulated(run, tiny):
     assert stored.scenario.robot == tiny.robot
 
 
-def test_sources_without_motion_and_places_that_cannot_be_written_to_are_refused(
-    tmp_path, folder, run, refused
-):
+def test_sources_without_motion_and_bad_places_are_refused(tmp_path, folder, run, refused):
     failed = write_run(tmp_path / "failed", [[[(None, 0)]]])
     for source in (tmp_path / "missing", tmp_path, failed):
         with refused(source, "", ""):
@@ -73,7 +71,7 @@ def test_missing_and_damaged_files_are_refused_by_name(folder, name, damage):
     ],
     ids=["robot", "missing", "dimensions", "nan", "backward"],
 )
-def test_a_trajectory_that_is_not_the_scenarios_is_refused(
+def test_another_trajectory_than_the_scenarios_is_refused(
     folder, result, key, change, refused, monkeypatch
 ):
     changed = change(result.trajectory)

@@ -156,9 +156,7 @@ def test_a_long_search_is_announced_once(robot, monkeypatch, caplog):
         ({"MOST_WORK": 0.0, "LEAST_STEPS": 1}, 1),
     ],
 )
-def test_a_search_ends_after_steps_that_depend_on_the_robot_alone(
-    robot, refused, monkeypatch, limits, steps
-):
+def test_a_search_ends_after_steps_by_the_robot_alone(robot, refused, monkeypatch, limits, steps):
     for name, value in limits.items():
         monkeypatch.setattr(equilibrium, name, value)
     taken, displaced = [], equilibrium.displaced

@@ -117,8 +117,6 @@ def test_a_copy_of_a_section_is_checked(scenario, refused):
         ({"robot.cables.damping": 1}, "robot.cables.damping", "without a unit"),
     ],
 )
-def test_a_key_without_its_section_is_refused_with_the_whole_key(
-    scenario, refused, changes, key, advice
-):
+def test_a_key_without_its_section_leads_to_the_whole_key(scenario, refused, changes, key, advice):
     with refused("scenario thesis", key, advice):
         scenario.with_changes(changes)

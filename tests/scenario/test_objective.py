@@ -21,9 +21,7 @@ IN = 0.0254
         ),
     ],
 )
-def test_objective_and_requirements_have_units_and_replace_the_base(
-    load_text, tmp_path, text, objective, require
-):
+def test_objective_and_requirements_replace_the_base(load_text, tmp_path, text, objective, require):
     scenario = load_text(text)
     assert scenario.objective == approx(objective, rel=1e-14)
     assert scenario.require == approx(require, rel=1e-14)

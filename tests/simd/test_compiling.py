@@ -44,9 +44,7 @@ def run(package: Path, cache_home: Path, program: str = PROGRAM) -> str:
 
 
 @pytest.mark.parametrize(("folder", "caches"), [("cache", True), ("file/cache", False)])
-def test_a_read_only_installation_caches_in_the_users_folder_if_it_can(
-    package, tmp_path, folder, caches
-):
+def test_a_read_only_installation_caches_for_the_user_if_it_can(package, tmp_path, folder, caches):
     (tmp_path / "file").write_text("")
     assert float(run(package, tmp_path / folder)) == 1.0
     assert any(tmp_path.rglob("oscillator.oscillator_output*.nbc")) == caches

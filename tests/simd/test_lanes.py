@@ -194,9 +194,7 @@ def test_inverse_square_root_is_within_two_units_in_the_last_place(width):
 
 
 @pytest.mark.parametrize(("any_size", "compilations"), [(False, 2), (True, 1)])
-def test_a_kernel_is_compiled_once_for_all_lengths_that_the_type_does_not_know(
-    any_size, compilations
-):
+def test_a_kernel_is_compiled_once_for_lengths_not_in_the_type(any_size, compilations):
     @jit
     def last(plane):
         return plane[plane.shape[0] - 1, plane.shape[1] - 1]

@@ -13,14 +13,7 @@ from pydrake.systems.analysis import Simulator
 
 from tetra_drake.physics.contact import CONTACT, MODE, MODE_COLUMNS
 from tetra_drake.physics.friction import STICK
-from tetra_drake.physics.oscillator import (
-    NEURON_COLUMNS,
-    U_RATE,
-    V_RATE,
-    U,
-    V,
-    neuron_rates,
-)
+from tetra_drake.physics.oscillator import NEURON_COLUMNS, U_RATE, V_RATE, U, V, neuron_rates
 from tetra_drake.robot.gait import Gait, load_gait
 from tetra_drake.robot.robot import Robot, initial_neurons
 from tetra_drake.robot.structure import node_positions

@@ -203,9 +203,7 @@ def test_the_bar_plays_stops_and_tells_time_and_distance(page, trajectory):
 @pytest.mark.parametrize(
     ("speed", "shown"), [(0.0, ["0 s", "5 s"]), (0.1, ["0 s", "2.5 s", "5 s"])]
 )
-def test_a_still_shows_instants_that_do_not_hide_each_other(
-    browser, trajectory, tmp_path, speed, shown
-):
+def test_a_still_hides_no_instant_by_another(browser, trajectory, tmp_path, speed, shown):
     """The robot walks one inch, and in the second case 0.5 m more, its own length."""
     way = speed * trajectory["time"] * xarray.DataArray([1.0, 0.0, 0.0], dims="axis")
     moved = {name: trajectory[name] + way for name in ("p_WN", "p_WB")}
@@ -261,9 +259,7 @@ def test_a_simulation_can_be_watched_as_it_runs(browser, tmp_path):
     assert len(matrices) > 10, "it was shown moving"
 
 
-def test_the_report_of_a_run_shows_its_figures_and_leads_to_the_replay(
-    browser, tmp_path, monkeypatch
-):
+def test_a_report_shows_its_figures_and_leads_to_the_replay(browser, tmp_path, monkeypatch):
     monkeypatch.setattr("tetra_drake.report.run_figures.save_figure", quick_figures.save_figure)
     run = write_run(tmp_path / "run", [[[(1.0, 0), (2.0, 1)]]])
     _, replay, report = write_report(run)

@@ -56,7 +56,7 @@ def visitor(meshcat):
 
 
 @pytest.mark.parametrize(("look", "slept"), [(0.0, 0.3), (1.0, 0.0)], ids=["fast", "slow"])
-def test_watching_changes_nothing_and_waits_for_real_time_only(
+def test_watching_changes_nothing_and_waits_for_real_time(
     short, meshcat, visitor, look, slept, monkeypatch
 ):
     time = FakeTime(look)

@@ -183,9 +183,7 @@ def test_the_title_is_text_and_not_markup(page, trajectory):
     assert "bad()</script>" not in page + packed
 
 
-def test_pages_share_a_viewer_of_which_there_is_one_version(
-    scenario, trajectory, page, tmp_path, refused
-):
+def test_pages_share_one_version_of_a_viewer(scenario, trajectory, page, tmp_path, refused):
     viewer, path = tmp_path / "shared" / "viewer #1.js", tmp_path / "runs" / "a" / "replay.html"
     robot = Robot.of(scenario)
     save = functools.partial(save_replay, robot=robot, trajectory=trajectory, title=TITLE)

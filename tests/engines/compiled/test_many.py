@@ -212,7 +212,7 @@ def test_a_gait_that_takes_too_long_leaves_its_lane_to_others(short):
 
 
 @pytest.mark.parametrize(("tetrahedra", "rounds"), [(2, 10), (5, 4), (200, 1)])
-def test_of_a_large_robot_fewer_steps_are_made_without_a_look_at_the_time(
+def test_large_robots_make_fewer_steps_between_looks_at_the_time(
     short, monkeypatch, tetrahedra, rounds
 ):
     scenario = short.with_changes({"robot.tetrahedra": tetrahedra})
