@@ -99,7 +99,6 @@ def test_nodes_placed_in_the_ground_are_refused(refused):
 
 def test_a_structure_without_rest_is_refused_with_the_body_that_is_left(monkeypatch):
     monkeypatch.setattr(equilibrium, "MOST_STEPS", 2)
-    monkeypatch.setattr(equilibrium, "LEAST_STEPS", 2)
     with pytest.raises(InputError) as caught:
         MakeStructure(load_scenario("six_bar"))
     assert caught.value.key == "robot"

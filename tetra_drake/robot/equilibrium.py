@@ -87,7 +87,7 @@ def find_equilibrium(
     weight, radius = model.bodies.weight.sum(), model.bodies.radius.max()
     descent = _Descent(robot)
     reach, announce_at = FIRST_REACH * radius, math.inf
-    most = max(LEAST_STEPS, min(MOST_STEPS, int(MOST_WORK / (6 * len(bodies)) ** 3)))
+    most = min(MOST_STEPS, max(LEAST_STEPS, int(MOST_WORK / (6 * len(bodies)) ** 3)))
     for count in range(most):
         force = force_at_rest(robot, state)
         if not np.isfinite(force).all():
