@@ -1,4 +1,4 @@
-"""An index of labels that repeat, such as the bodies that cables join."""
+"""Index of labels that repeat along a dimension, such as the bodies that cables join."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from tetra_drake.scenario.refusals import hint
 
 
 class LabelIndex(PandasIndex):
-    """Labels along a dimension that has names of its own.
+    """Index of labels along a dimension that also has unique names.
 
-    A dimension's names have xarray's index, as arrays of other indexes cannot be aligned with it.
+    The names use xarray's own index, because xarray can only align arrays with equal kinds of
+    index.
     """
 
     def sel(

@@ -1,4 +1,4 @@
-"""Quantities derived from a recorded trajectory (see trajectory.make_dataset), in SI units."""
+"""Measures of a recorded trajectory (see trajectory.make_dataset), in SI units."""
 
 from __future__ import annotations
 
@@ -14,38 +14,39 @@ if TYPE_CHECKING:
     import xarray
 
 _STEADY = 0.01
-"""A signal that swings by less than this share of its largest value does not oscillate."""
+"""Least swing of an oscillating signal, as a share of its largest value."""
 
 _PADDING = 16
-"""Length of a zero-padded signal over its own: how many times finer its spectrum is sampled."""
+"""Factor by which zero-padding lengthens a signal, for a finer spectrum."""
 
 
 def distance_walked(trajectory: xarray.Dataset, structure: Structure) -> np.ndarray:
-    """(time,): displacement along x since the start, in m, of the first marker, T1's bottom left
-    node, or of the centre."""
+    """Displacement along x since the start (time,), in m: of the first marker (the bottom left node
+    of T1), or of the centre for a robot without markers."""
     x = followed_nodes(trajectory.p_WN.values, structure)[:, 0, 0]
     return x - x[0]
 
 
 def relative_distances(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """(time, body): x of each body's centre of mass less that of the first body, in m."""
+    """Distance along x from the first body to each body (time, body), between centres of mass, in
+    m."""
     x = trajectory.p_WB.sel(axis="x")
     return x - x.isel(body=0)
 
 
 def path_of_centre(trajectory: xarray.Dataset, structure: Structure) -> CentrePath:
-    """The path of the robot's centre at all samples."""
+    """Path of the robot's centre at all samples."""
     poses = np.concatenate([trajectory.q_WB.values, trajectory.p_WB.values], axis=2)
     return follow(trajectory.time.values, poses, structure)
 
 
 def off_ground(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """(time, contact): whether the contact node bears no normal force."""
+    """True if a contact node bears no normal force (time, contact)."""
     return trajectory.normal_force == 0.0
 
 
 def lifted(trajectory: xarray.Dataset) -> xarray.DataArray:
-    """(time, body): whether no contact node of the body bears a normal force."""
+    """True if no contact node of a body bears a normal force (time, body)."""
     import xarray
 
     off, bodies = off_ground(trajectory), trajectory.body
@@ -54,10 +55,10 @@ def lifted(trajectory: xarray.Dataset) -> xarray.DataArray:
 
 
 def intervals(times: np.ndarray, active: np.ndarray) -> list[tuple[float, float]]:
-    """Intervals in which a Boolean signal is true: their starts and ends (s).
+    """Intervals where a Boolean signal is true, as starts and ends (s).
 
-    `times` (samples,) in s, ascending; `active` (samples,). A sample holds the modes of the step
-    that ends there, so an interval begins at the sample before the first true one.
+    `times` (samples,) are in s and ascend; `active` (samples,) is the signal. A sample has the
+    modes of the step before it. Therefore an interval begins one sample before the first true one.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(int)))
     ends = times[np.maximum(edges - 1, 0)]
@@ -65,7 +66,7 @@ def intervals(times: np.ndarray, active: np.ndarray) -> list[tuple[float, float]
 
 
 def share_of_time(active: xarray.DataArray) -> float:
-    """Share of the time, 0 to 1, in which a Boolean signal (time,) is true."""
+    """Share of time, 0 to 1, during which a Boolean signal (time,) is true."""
     times = active.time.values
     length = sum(end - start for start, end in intervals(times, active.values))
     return length / float(times[-1] - times[0])
@@ -74,8 +75,8 @@ def share_of_time(active: xarray.DataArray) -> float:
 def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
     """Frequency in Hz of the highest peak in the spectrum of a signal (samples,).
 
-    `times` (samples,) in s, ascending; where they are not evenly spaced, the signal is
-    interpolated. NaN for a signal that does not oscillate.
+    `times` (samples,) are in s and ascend. They may be uneven; the signal is interpolated. NaN if
+    the signal does not oscillate.
     """
     if np.ptp(signal) <= _STEADY * np.abs(signal).max():
         return math.nan
@@ -90,9 +91,9 @@ def dominant_frequency(times: np.ndarray, signal: np.ndarray) -> float:
 def last_step(trajectory: xarray.Dataset) -> tuple[float, float] | None:
     """Start and end (s) of one period of the signals, late in the trajectory.
 
-    The period is that of the signal with the largest swing in the second half of the trajectory;
-    the step ends where this signal last rises through its mean. None if no signal oscillates, or
-    if the second half is shorter than two periods.
+    The period is taken from the signal with the largest swing in the second half of the trajectory.
+    The step ends where this signal rises through its mean for the last time. None if no signal
+    oscillates, or if the second half is shorter than two periods.
     """
     if not trajectory.sizes["oscillator"]:
         return None

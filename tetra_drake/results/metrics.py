@@ -54,18 +54,18 @@ def compute_metrics(
 
 
 def compute_fitness(metrics: Metrics, objective: Mapping[str, float]) -> float:
-    """The sum of the metrics times an objective's weights, which are SI; Eq. 10 by default."""
+    """Fitness: the sum of metrics times the objective's weights (SI)."""
     total = 0.0
     for name, weight in objective.items():
-        # In inches, so that Eq. 10 has the thesis's constants, and its numbers their digits.
+        # Inches give Eq. 10 the constants of the thesis, and keep the digits of recorded numbers.
         unit = INCH if UNITS[name] == "m" else 1.0
         total += (weight * unit) * (getattr(metrics, name) / unit)
     return total
 
 
 def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]) -> str:
-    """The metric that says most about a gait: the distance if the objective looks for it, else the
-    one with the largest part in the fitness."""
+    """Name of the most important metric of a gait: the distance if the objective rewards it,
+    otherwise the metric with the largest part in the fitness."""
     if looks_for_distance(objective):
         return "distance"
     parts = {name: abs(weight * metrics[name]) for name, weight in objective.items()}
@@ -73,7 +73,8 @@ def headline_metric(objective: Mapping[str, float], metrics: Mapping[str, float]
 
 
 def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
-    """What a gait does, by its scenario's objective, such as "walks 14.3 inches in 15 s"."""
+    """Short result of a gait, chosen by the scenario's objective, such as "walks 14.3 inches in
+    15 s"."""
     seconds = f"in {scenario.simulation.duration:g} s"
     inches = metrics["distance"] / INCH
     way = [f"walks {fixed(abs(inches), 1)} inches", "backward" if inches < 0.0 else ""]
@@ -88,7 +89,7 @@ def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:
     """Metrics beyond their required SI values, or NaN: name, value and limit, as
-    "clearance is 0.05 in, less than 0.125 in"."""
+    for example "clearance is 0.05 in, less than 0.125 in"."""
     texts = []
     for name, limit in require.items():
         value, unit, most = getattr(metrics, name), UNITS[name], METRICS[name].most

@@ -1,4 +1,4 @@
-"""SimulationResult, which every engine returns, and result.json, made from it."""
+"""Result of a simulation: SimulationResult, which every engine returns, and result.json."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SCHEMA = 1
 
 
 class IntegratorWork(Section):
-    """Integrator settings and cost."""
+    """Settings and cost of an integrator."""
 
     scheme: str
     accuracy: float
@@ -42,7 +42,7 @@ class IntegratorWork(Section):
     steps: int
     derivative_evaluations: int
     jacobian_evaluations: int = 0
-    """Derivative evaluations that went into Jacobian columns, among those above."""
+    """Number of the derivative evaluations that were made for Jacobians."""
 
 
 @dataclass(frozen=True)
@@ -51,24 +51,24 @@ class SimulationResult:
 
     scenario: Scenario = field(repr=False, compare=False)
     robot: Robot = field(repr=False, compare=False)
-    """The robot that was simulated; with a command, without the scenario's network."""
+    """The simulated robot; without a network if it followed a command."""
     name: str
-    """Name of the gait, or of the command that was played."""
+    """Name of the gait or command."""
     gait: Gait | None = field(repr=False, compare=False)
-    """None if a command was played."""
+    """The gait; None for a command."""
     metrics: Metrics
     fitness: float
     duration: float
     """Simulated time in s."""
     wall_time: float
-    """Time from the start of the integration to its end, in s; building is not in it."""
+    """Wall time of the integration in s, without preparations."""
     integrator: IntegratorWork
     engine: str
     """Name of the scenario's engine."""
     path: CentrePath = field(repr=False, compare=False)
     """Path of the robot's centre from start to end, in steps of robot.path.PERIOD."""
     recorded: xarray.Dataset | None = field(default=None, repr=False)
-    """See results.trajectory.make_dataset; None unless asked for."""
+    """Trajectory (see results.trajectory.make_dataset); None if it was not recorded."""
 
     def __str__(self) -> str:
         kept = "not recorded" if self.recorded is None else "recorded"
@@ -83,7 +83,7 @@ class SimulationResult:
 
     @property
     def trajectory(self) -> xarray.Dataset:
-        """The trajectory; raises InputError if the simulation recorded none."""
+        """The trajectory. Raises InputError if it was not recorded."""
         if self.recorded is None:
             problem = "was not recorded; simulate with record=True"
             raise InputError(f"result of {self.name}", "trajectory", problem)
@@ -91,18 +91,18 @@ class SimulationResult:
 
     @property
     def title(self) -> str:
-        """The gait's name and what it did."""
+        """Name of the gait and its headline, such as "gait: walks 14.3 inches in 15 s"."""
         return f"{self.name}: {headline(self.scenario, vars(self.metrics))}"
 
     def show(self, *, height: int = 480) -> ReplayFrame:
-        """The replay, to be the last value of a notebook's cell; `height` is in pixels."""
+        """The replay as a value that a notebook shows. `height` is in pixels."""
         with tempfile.TemporaryDirectory() as folder:
             page = Path(folder, "replay.html")
             self.save_replay(page)
             return ReplayFrame(page.read_text(encoding="utf-8"), height)
 
     def save_replay(self, path: str | Path, *, viewer: str | Path | None = None) -> None:
-        """Writes the page that plays the motion; see visualization.replay.save_replay."""
+        """Writes a page that plays the motion; see visualization.replay.save_replay()."""
         from tetra_drake.visualization.replay import save_replay
 
         save_replay(
@@ -112,7 +112,7 @@ class SimulationResult:
 
 @dataclass(frozen=True)
 class ReplayFrame:
-    """A replay page in a notebook, which shows it by IPython's protocol of rich display."""
+    """Replay page in a notebook, shown by IPython's rich display."""
 
     page: str
     height: int
@@ -123,7 +123,7 @@ class ReplayFrame:
 
 
 def motion_times(simulation: SimulationSection, *, record: bool) -> np.ndarray:
-    """The times (s), ascending, at which make_result() needs the motion of a simulation."""
+    """Times (s), ascending, for which make_result() needs the motion of a simulation."""
     times = [np.array([0.0, simulation.steady_from, simulation.duration])]
     times.append(sample_times(simulation.duration, PERIOD))
     if record:
@@ -141,9 +141,9 @@ def make_result(
     wall_time: float,
     record: bool,
 ) -> SimulationResult:
-    """The result of a simulation, with a trajectory if it shall `record` one.
+    """The result of a simulation. With `record`, it has a trajectory.
 
-    The motion's times are those of motion_times(), `totals` are of the whole simulation, and
+    `motion` has the times of motion_times(). `totals` is the tally of the whole simulation.
     `wall_time` is in s.
     """
     simulation, structure = robot.scenario.simulation, robot.structure
@@ -179,14 +179,14 @@ def make_result(
 
 
 def _poses(states: np.ndarray, structure: Structure) -> np.ndarray:
-    """(k, bodies, 7): the poses in states (k, 13 bodies)."""
+    """Poses (k, bodies, 7) of the bodies in states (k, 13 bodies)."""
     bodies = len(structure.bodies)
     return states[:, : 7 * bodies].reshape(len(states), bodies, 7)
 
 
 def save_result(path: str | Path, result: SimulationResult) -> None:
-    """Writes result.json: metrics in SI, lengths in inches beside them, times in s, and the path of
-    the centre as columns. There is no gait if a command was played."""
+    """Writes result.json: metrics in SI, lengths also in inches, times in s, and the path of the
+    centre as columns. `gait` is null for a command."""
     scenario, gait = result.scenario, result.gait
     way, metrics, radius = result.path, vars(result.metrics), result.metrics.path_radius
     lengths = [name for name, unit in UNITS.items() if unit == "m"]

@@ -1,4 +1,4 @@
-"""The trajectory of a simulation: an xarray dataset with named dimensions, in SI units."""
+"""Trajectory of a simulation: an xarray dataset with named dimensions, in SI units."""
 
 from __future__ import annotations
 
@@ -40,31 +40,32 @@ DIMENSIONS = {
 
 
 def sample_times(duration: float, period: float) -> np.ndarray:
-    """Evenly spaced times (s) from 0 to `duration`, as near to `period` apart as that allows."""
+    """Evenly spaced times (s) from 0 to `duration`. The spacing is as close to `period` as
+    possible."""
     return np.linspace(0.0, duration, max(1, round(duration / period)) + 1)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion of a robot at k times, as its engine hands it on; SI units."""
+    """Motion of a robot at k times, as an engine returns it; SI units."""
 
     times: np.ndarray
-    """(k,): ascending."""
+    """Times (k,), ascending."""
     states: np.ndarray
-    """(k, 13 n): [q; v] of the bodies."""
+    """States [q; v] of the bodies (k, 13 n)."""
     signals: np.ndarray
-    """(k, m): the actuation signals."""
+    """Actuation signals (k, m)."""
     modes: np.ndarray
-    """(k, contacts, MODE_COLUMNS): `modes` of physics.contact, those of the step in which, or at
-    whose end, the time lies."""
+    """Modes of the contact nodes (k, contacts, MODE_COLUMNS) during the step that contains the
+    time, or ends there; see physics.contact."""
     drives: np.ndarray
-    """(k, drives): states of the actuators; see physics.actuator."""
+    """States of the actuators (k, drives); see physics.actuator."""
     ground_forces: np.ndarray | None = None
-    """(k, contacts, 3): forces of the ground along t1, t2 and n, of an engine that has a law of its
-    own; otherwise they follow from states and modes."""
+    """Forces of the ground along t1, t2 and n (k, contacts, 3), if the engine has its own law of
+    contact. None if they follow from states and modes."""
 
     def at(self, times: np.ndarray) -> Motion:
-        """The motion at some of its times."""
+        """The motion at a selection of its times."""
         rows = np.searchsorted(self.times, times)
         return Motion(
             times=self.times[rows],
@@ -127,7 +128,7 @@ def with_indexes(dataset: xarray.Dataset) -> xarray.Dataset:
 
 
 def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:
-    """(k, cables): free lengths in m, as wound."""
+    """Free lengths of the cables (k, cables) in m; winches change them."""
     lengths = np.tile(robot.structure.cables["free_length"], (len(motion.times), 1))
     actuator, driven = robot.model.actuator, robot.driven
     if has_drive(actuator):
@@ -136,7 +137,8 @@ def _free_lengths(robot: Robot, motion: Motion) -> np.ndarray:
 
 
 def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """The `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, 3)."""
+    """Tables `cable_forces` (k, cables, CABLE_FORCE_COLUMNS) and `ground_forces` (k, contacts, 3)
+    of a motion."""
     model, samples = robot.model, len(motion.times)
     cable_forces = np.empty((samples, len(model.cables.signal), CABLE_FORCE_COLUMNS))
     ground_forces = np.empty((samples, len(model.ground.contacts), GROUND_FORCE_COLUMNS))
@@ -147,7 +149,7 @@ def _forces(robot: Robot, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 
 def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
-    """Dimension and values of each coordinate but the time."""
+    """Dimension and values of each coordinate except time."""
     oscillators, cables = structure.oscillators, structure.cables
     driving = ["" if i == PASSIVE else oscillators[i] for i in cables["signal"]]
     body_of_node = [structure.bodies[body] for body in structure.carriers]
@@ -172,8 +174,8 @@ def labels(structure: Structure) -> dict[str, tuple[str, list[Any]]]:
 
 
 def save_dataset(dataset: xarray.Dataset, path: str | Path) -> None:
-    """Writes the dataset as compressed netCDF (readable with xarray.open_dataset)."""
+    """Writes a dataset as compressed netCDF, for xarray.open_dataset()."""
     encoding = {name: {"zlib": True, "complevel": 4} for name in dataset.data_vars}
-    content = io.BytesIO()  # in memory, as HDF5 fails on a full disk with errors of its own
+    content = io.BytesIO()  # in memory: on a full disk, HDF5 raises other errors
     dataset.to_netcdf(content, engine="h5netcdf", encoding=encoding)
     write_whole(path, content.getvalue())

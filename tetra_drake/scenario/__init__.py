@@ -1,1 +1,1 @@
-"""Scenarios: every number of an experiment, as YAML files with units and as dataclasses in SI."""
+"""Scenarios: all settings of an experiment, in YAML files with units or as objects in SI."""

@@ -1,4 +1,4 @@
-"""The blueprint of a robot: plain data that every kind of robot gives."""
+"""Blueprint of a robot: plain data that every kind of robot provides."""
 
 from __future__ import annotations
 
@@ -11,99 +11,100 @@ from typing import Self
 import numpy as np
 
 TOLERANCE = 1e-6
-"""Distance between two points that count as one, as a share of the robot's size."""
+"""Distance below which two points count as the same, as a share of the robot's size."""
 
 
 @dataclass(frozen=True)
 class Blueprint:
-    """A robot where its settings place it. Nodes and struts run body by body; SI units.
+    """A robot at the positions of its settings; SI units.
 
-    Left and right, and mirror images, are those of the plane y = 0.
+    Nodes and struts are in the order of the bodies. Left and right are the two sides of the plane
+    y = 0; mirror images are with respect to this plane.
     """
 
     bodies: tuple[str, ...]
-    """The names of the bodies, such as "T1"."""
+    """Names of the bodies, such as "T1"."""
     node_names: tuple[str, ...]
-    """Such as "T1 tip"."""
+    """Names of the nodes, such as "T1 tip"."""
     first_node: np.ndarray
-    """(bodies + 1,): the index of each body's first node, and the number of nodes."""
+    """Index of each body's first node (bodies + 1,); the last number is the number of nodes."""
     p_WF: np.ndarray
-    """(bodies, 3): the origins of the frames F that the nodes are given in, with World's axes."""
+    """Origins (bodies, 3) of the frames F of the bodies. Their axes are the world's."""
     p_FN: np.ndarray
-    """(nodes, 3)."""
+    """Positions of the nodes (nodes, 3) in the frames F."""
     struts: np.ndarray
-    """(struts, 2): the indices of the nodes that each joins."""
+    """Indices of the two nodes of each strut (struts, 2)."""
     strut_radius: np.ndarray
-    """(struts,)."""
+    """Radii of the struts (struts,)."""
     strut_density: np.ndarray
-    """(struts,): of solid cylinders."""
+    """Densities of the struts (struts,), solid cylinders."""
     node_radius: np.ndarray
-    """(nodes,): 0 where there is no sphere."""
+    """Radii of the spheres at the nodes (nodes,); 0 for no sphere."""
     node_density: np.ndarray
-    """(nodes,): of solid spheres."""
+    """Densities of the spheres at the nodes (nodes,), which are solid."""
     node_mass: np.ndarray
-    """(nodes,): point masses."""
+    """Point masses at the nodes (nodes,)."""
     payload: np.ndarray
-    """(bodies,): point masses at the centres of mass."""
+    """Point masses at the centres of mass (bodies,)."""
     cable_names: tuple[str, ...]
-    """Such as "T1-T2 outer bottom_left", pair by pair of bodies."""
+    """Names of the cables, such as "T1-T2 outer bottom_left", in the order of pairs of bodies."""
     cable_groups: tuple[str, ...]
-    """The group of each cable, such as "outer"."""
+    """Group of each cable, such as "outer"."""
     cable_ends: np.ndarray
-    """(cables, 2): the indices of the nodes that each joins, from the lower body to the higher."""
+    """Indices of the two nodes of each cable (cables, 2), from the lower body to the higher."""
     cable_laws: tuple[Mapping[str, float], ...]
-    """The constants of each cable, by the names of physics.cable.CableLaw."""
+    """Constants of each cable, by the names of physics.cable.CableLaw."""
     slack: bool
-    """True if the cables never push."""
+    """True if cables go slack instead of pushing."""
     oscillators: tuple[str, ...]
-    """The names of the m oscillators, such as "T1-T2"."""
+    """Names of the m oscillators, such as "T1-T2"."""
     groups: tuple[tuple[int, ...], ...]
-    """(m): the cables that each oscillator drives."""
+    """Indices of the cables that each oscillator drives (m)."""
     contacts: np.ndarray
-    """(contacts,): the indices of the nodes that the ground can touch, ascending."""
+    """Indices of the nodes that the ground can touch (contacts,), ascending."""
     markers: np.ndarray
-    """(markers,): the indices of the nodes that are followed, body by body; none if the centre of
-    mass is."""
+    """Indices of the nodes whose motion is shown (markers,), in the order of the bodies. Empty if
+    the motion of the centre of mass is shown."""
     followed: str
-    """The name of what is followed."""
+    """Name of the points whose motion is shown."""
     points_ahead: bool
-    """True if the bodies' x axes point ahead, so that the robot has a heading."""
+    """True if the bodies' x axes point forward, so that the robot has a heading."""
     feet: int | None
-    """The number of nodes that bear the weight; None for those that do at rest."""
+    """Number of nodes that bear the weight; None if it follows from the equilibrium."""
     settles: bool
-    """True if the robot starts at rest, False if it starts where it is placed."""
+    """True if the robot starts in equilibrium, False if it starts at the given positions."""
 
     @functools.cached_property
     def carriers(self) -> np.ndarray:
-        """(nodes,): the index of each node's body."""
+        """Index of the body of each node (nodes,)."""
         return np.repeat(np.arange(len(self.bodies)), np.diff(self.first_node))
 
     @property
     def p_WN(self) -> np.ndarray:
-        """(nodes, 3): the nodes where they are placed."""
+        """Positions of the nodes (nodes, 3) in the world frame."""
         return self.p_WF[self.carriers] + self.p_FN
 
     @property
     def signals(self) -> int:
-        """Actuation signals: one per oscillator."""
+        """Number of actuation signals: one per oscillator."""
         return len(self.oscillators)
 
     @property
     def driven_cables(self) -> tuple[str, ...]:
-        """Cables of each oscillator, such as "T1-T2 outer top + T1-T2 inner top"."""
+        """Names of each oscillator's cables, such as "T1-T2 outer top + T1-T2 inner top"."""
         names = self.cable_names
         return tuple(" + ".join(names[cable] for cable in group) for group in self.groups)
 
     @property
     def ahead(self) -> np.ndarray:
-        """(m,): the last of the bodies that each oscillator's cables join."""
+        """Index of the last body that each oscillator's cables join (m,)."""
         bodies = self.carriers[self.cable_ends]
         last = [bodies[list(cables)].max() for cables in self.groups]
         return np.array(last, dtype=np.int64)
 
     @property
     def sides(self) -> np.ndarray:
-        """(m,): 1.0 for a group on the left of the robot, -1.0 on the right, 0.0 for any other."""
+        """Side of each oscillator's cables (m,): 1.0 left, -1.0 right, 0.0 neither."""
         y, least = self._ends.mean(axis=1)[:, 1], self._least_distance
         is_left = [(y[list(cables)] > least).all() for cables in self.groups]
         is_right = [(y[list(cables)] < -least).all() for cables in self.groups]
@@ -111,7 +112,8 @@ class Blueprint:
 
     @property
     def images(self) -> tuple[int | None, ...]:
-        """(m): the oscillator that drives the mirror image of each group; None where none does."""
+        """Index of the oscillator that drives the mirror image of each oscillator's cables (m);
+        None if there is none."""
         groups = [set(cables) for cables in self.groups]
         image = self._images_of_cables()
         images = [{image[cable] for cable in cables} for cables in self.groups]
@@ -119,8 +121,8 @@ class Blueprint:
 
     @property
     def distances(self) -> np.ndarray:
-        """(m, m): 0 for oscillators whose cables join the same bodies, 1 if they share a body, 2 if
-        both are at distance 1 of a third one, and so on."""
+        """Distances between oscillators (m, m): 0 if their cables join the same bodies, 1 if they
+        share a body, 2 if both are at distance 1 of a third oscillator, and so on."""
         bodies = self.carriers[self.cable_ends]
         joined = [set(bodies[list(cables)].ravel().tolist()) for cables in self.groups]
         count = len(joined)
@@ -133,9 +135,10 @@ class Blueprint:
         return distances.reshape(count, count)
 
     def with_oscillator_per_cable(self, *, without_law: bool) -> Self:
-        """The robot in which an oscillator drives each driven cable alone.
+        """The robot with one oscillator for each driven cable.
 
-        without_law: the constants of driven cables are 0, so that a cable's force is its signal.
+        With `without_law`, the constants of driven cables are 0, so the force of a cable is its
+        signal.
         """
         driven = sorted(cable for group in self.groups for cable in group)
         laws = [
@@ -151,7 +154,7 @@ class Blueprint:
 
     @property
     def _ends(self) -> np.ndarray:
-        """(cables, 2, 3): where each cable begins and ends."""
+        """Positions of the two ends of each cable (cables, 2, 3)."""
         return self.p_WN[self.cable_ends]
 
     @property
@@ -159,11 +162,11 @@ class Blueprint:
         return TOLERANCE * float(np.linalg.norm(np.ptp(self.p_WN, axis=0)))
 
     def _images_of_cables(self) -> list[int]:
-        """The mirror image of each cable, -1 where there is none."""
+        """Index of the mirror image of each cable; -1 if there is none."""
         images, placed, least = [], self._ends, self._least_distance
         for ends in placed * [1.0, -1.0, 1.0]:
-            apart = np.abs(placed - ends).max(axis=(1, 2))
-            reversed_apart = np.abs(placed - ends[::-1]).max(axis=(1, 2))
-            nearest = np.minimum(apart, reversed_apart)
+            forward = np.abs(placed - ends).max(axis=(1, 2))
+            backward = np.abs(placed - ends[::-1]).max(axis=(1, 2))
+            nearest = np.minimum(forward, backward)
             images.append(int(nearest.argmin()) if nearest.min() <= least else -1)
         return images

@@ -11,22 +11,22 @@ from tetra_drake.scenario.section import Section, Tree, joined, python_value
 from tetra_drake.scenario.yaml_text import parse_yaml
 
 REPLACED = ("objective", "require", "robot.actuated")
-"""Mappings of a scenario that a file gives as a whole."""
+"""Mappings that a file replaces as a whole."""
 
 
 class Part(Tree):
-    """A mapping made of dotted keys, which never gives the whole."""
+    """A mapping made from dotted keys. It changes a part of a mapping, never all of it."""
 
 
 def merged(base: Any, changes: Any, key: str = "") -> Any:
-    """The tree of a scenario, or what it has at `key`, with changes. These are the rules:
+    """The tree of a scenario, or the part of it at `key`, with changes. The rules are:
 
     - A mapping changes the keys that it names; the others stay.
-    - A kind of another name replaces the base's with all its keys; one of the same name, or without
-      a name, changes keys of it.
-    - `objective`, `require` and `robot.actuated` replace the base's as a whole. Only dotted keys,
-      from Python, change a part of them, as "objective.speed" does.
-    - All else replaces what the base has: numbers, texts, lists, and sections from Python.
+    - A kind with another tag replaces the base's kind and all its keys. With the same tag, or
+      without a tag, it changes keys.
+    - `objective`, `require` and `robot.actuated` are replaced as a whole. Only dotted keys from
+      Python, such as "objective.speed", change a part of them.
+    - Numbers, texts, lists, and sections from Python replace the base's value.
     """
     if not isinstance(changes, dict):
         return changes
@@ -40,8 +40,8 @@ def merged(base: Any, changes: Any, key: str = "") -> Any:
 
 
 def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
-    """Changes from Python by dotted keys as the tree that a file would hold, in which sections may
-    stand for mappings."""
+    """Converts changes by dotted keys from Python to the tree of a file. The tree may also contain
+    sections."""
     tree: Tree = Part()
     for key in sorted(changes, key=lambda key: key.count(".")):  # "robot" before "robot.gravity"
         *sections, name = key.split(".")
@@ -56,8 +56,8 @@ def tree_of_changes(changes: Mapping[str, Any], source: object) -> Tree:
 
 
 def _given(value: Any, source: object, key: str) -> Any:
-    """A value from Python as a file would hold it; a section is checked once more, as copies of
-    sections are not."""
+    """Converts a value from Python to the value in a file. Sections are validated again, because
+    copies of sections are not validated."""
     value = python_value(value)
     if isinstance(value, Section):
         return type(value).from_tree(value.model_dump(), source, key=key)

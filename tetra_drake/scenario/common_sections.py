@@ -128,10 +128,10 @@ Spread = Annotated[float, Field(gt=0, le=0.5)]
 
 
 class Disturbances(Section):
-    """The changes of robot and surroundings among which evolution looks for gaits.
+    """Disturbances of robot and surroundings for evolution.
 
-    Every gait is simulated once for each of `draws` draws; those of an iteration are the same for
-    all its gaits. Each draw also has another seed of the terrain, if that has one.
+    Every gait is simulated once in each draw. All gaits of an iteration have the same draws. Each
+    draw also has another terrain seed, if the terrain has a seed.
     """
 
     draws: int = Field(ge=1, le=10_000)
@@ -148,5 +148,5 @@ class Disturbances(Section):
 
 
 def separate(joined: str) -> list[str]:
-    """The scenario keys in a key of `spreads`, which joins them by commas."""
+    """Splits a key of `spreads` at its commas into scenario keys."""
     return [key.strip() for key in joined.split(",")]

@@ -1,7 +1,7 @@
-"""Draws of a scenario's disturbances: their seeds, their numbers, and the scenario changed by one.
+"""Draws of a scenario's disturbances: their seeds, their numbers, and the disturbed scenarios.
 
-Draws of evolution have the seeds (run's seed, trial, iteration, k), so that all gaits of an
-iteration have the same. Those by which gaits are judged have seeds of their own, which no run has.
+In evolution, draw k has the seed (run's seed, trial, iteration, k), so all gaits of an iteration
+have the same draws. Draws for judging gaits have other seeds, which no evolution uses.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from tetra_drake.scenario.common_sections import separate
 from tetra_drake.scenario.scenario import Scenario
 
 IterationSeed = tuple[int, int, int]
-"""Seed of a run, number of a trial, number of an iteration."""
+"""Seed of an iteration's draws: seed of the run, number of the trial, number of the iteration."""
 
 
 @dataclass(frozen=True)
 class Draw:
-    """The changes of one draw."""
+    """Changes of robot and surroundings in one draw."""
 
     factors: Mapping[str, float]
     """Factors by the keys of `disturbances.spreads`."""
     moves: np.ndarray | None = None
-    """(n, 3): the displacement of each body at t = 0, in m."""
+    """Displacement of each body at t = 0 (n, 3), in m."""
     terrain_seed: int | None = None
 
 
 def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
-    """The draw of a seed; none of its numbers depends on the scenario's values."""
+    """The draw with a seed. Its factors do not depend on the scenario's values."""
     settings = scenario.disturbances
     if settings is None:
         return Draw({})
@@ -50,17 +50,17 @@ def draw_disturbances(scenario: Scenario, seed: Sequence[int]) -> Draw:
 
 
 def _stream(seed: Sequence[int], *names: str) -> np.random.Generator:
-    """The random numbers by which a draw changes what has these names: the same ones whatever else
-    is disturbed."""
+    """Random numbers for the settings with these names. They do not depend on the other
+    disturbances."""
     digest = hashlib.sha256(",".join(sorted(names)).encode()).digest()
     words = np.frombuffer(digest, dtype="<u4")
     return np.random.default_rng(np.random.SeedSequence(list(seed), spawn_key=words.tolist()))
 
 
 def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
-    """A copy of the scenario changed by a draw, without disturbances of its own.
+    """A copy of the scenario with the changes of a draw, and without `disturbances`.
 
-    Its values are not checked again: those of the largest changes are when a scenario is loaded.
+    The values are not checked: the largest changes were checked when the scenario was loaded.
     """
     numbers = scenario.numbers()
     changed = scenario.with_numbers(
@@ -80,18 +80,20 @@ def disturbed(scenario: Scenario, draw: Draw) -> Scenario:
 
 
 def draws_of_iteration(scenario: Scenario, seed: IterationSeed) -> list[Scenario]:
-    """The scenario in each of its draws in an iteration of an evolution."""
+    """The disturbed scenarios of one iteration of an evolution."""
     draws = [draw_disturbances(scenario, (*seed, k)) for k in range(scenario.draws)]
     return [disturbed(scenario, draw) for draw in draws]
 
 
 def fresh_draws(scenario: Scenario, seed: int, count: int) -> list[Draw]:
-    """Draws that no evolution has seen, whatever its seed."""
+    """Draws that no evolution uses, whatever its seed."""
     return [draw_disturbances(scenario, fresh_seed(seed, k)) for k in range(count)]
 
 
 def fresh_seed(seed: int, k: int) -> tuple[int, ...]:
-    """The seed of a fresh draw: six numbers, the last not 0, so that it never equals one of
-    evolution. Those have four, of which numpy splits the first in two above 2³², and pads with
-    zeros."""
+    """Seed of a fresh draw: six numbers, the last not 0.
+
+    Seeds of evolution have four numbers (five after numpy splits a large first one) and are padded
+    with zeros, so they never end with 1.
+    """
     return seed, k, 0, 0, 0, 1

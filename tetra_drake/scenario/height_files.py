@@ -1,4 +1,4 @@
-"""Height files: read once, and known by their content from then on."""
+"""Height files: read once, then identified by a digest of their content."""
 
 from __future__ import annotations
 
@@ -19,27 +19,28 @@ from tetra_drake.scenario.refusals import described, refuse
 
 MOST_HEIGHTS = 4_000_000
 LARGEST = 1e6
-"""m: heights beyond would leave no digits for the robot."""
+"""Largest height (m). Larger numbers would leave too few digits for the robot's motion."""
 
 RECORDED = re.compile(r"heights-[0-9a-f]{16}\.npy")
-"""Names of files that save() writes."""
+"""Pattern of the names of files that save() writes."""
 
 
 class HeightFile(str):
-    """Heights from a file, as the name under which a record holds them.
+    """Heights from a file. The text is the name of the file in a record.
 
-    The name has a digest of the heights, so equal names are equal heights. In a scenario's tree a
-    path stands for it.
+    The name contains a digest of the heights, so equal names mean equal heights. In the tree of a
+    scenario, a path is given instead.
     """
 
     heights: np.ndarray
-    """(rows, columns), m."""
+    """Heights (rows, columns) in m."""
     path: str
-    """Where the heights were read."""
+    """Path of the file that was read."""
 
     @classmethod
     def read(cls, path: str) -> HeightFile:
-        """The heights of a file; refuses what has none, and one whose name has another digest."""
+        """Reads a height file. Refuses a file without heights, or with another digest in its
+        name."""
         heights = _read_heights(path)
         if heights.ndim != 2 or min(heights.shape) < 3 or heights.size > MOST_HEIGHTS:
             shape = " x ".join(map(str, heights.shape)) or "a single number"
@@ -56,7 +57,7 @@ class HeightFile(str):
         return file
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Writes the heights into a folder, under this name."""
+        """Writes the heights to a folder, as a file with this name."""
         content = io.BytesIO()
         np.lib.format.write_array(content, self.heights, version=(1, 0))
         write_whole(os.path.join(folder, self), content.getvalue())
@@ -75,7 +76,7 @@ class HeightFile(str):
 
 
 def _read_heights(path: str) -> np.ndarray:
-    """Content of a height file, as floats of any shape."""
+    """Content of a height file, as an array of floats."""
     try:
         content = read_bytes(path, "height file")
         if path.endswith(".npy"):
@@ -83,11 +84,11 @@ def _read_heights(path: str) -> np.ndarray:
             return np.ascontiguousarray(heights.astype(float, casting="same_kind"))
         text = re.sub("#.*", "", content.decode("utf-8"))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that it holds nothing
+            warnings.simplefilter("ignore")  # of an empty file
             return np.loadtxt(text.splitlines(), delimiter="," if "," in text else None, ndmin=2)
     except InputError as error:
         refuse("", f"'{path}': {error.problem}")
     except (ValueError, TypeError, MemoryError) as error:
-        # Without what stands there: the file may be any.
+        # The file may be a private one, so the error does not show its content.
         problem = re.sub("string '.*' to float64", "text to a number", str(error))
         refuse("", f"'{path}' cannot be read as heights: {problem}")

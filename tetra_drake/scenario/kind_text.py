@@ -9,9 +9,9 @@ from tetra_drake.scenario.units import shown
 
 
 def settings_text(kind: Section, *, always: Iterable[str] = ()) -> str:
-    """Settings in brackets after a blank, as " (slope 5 deg)"; empty if there are none.
+    """Settings in brackets after a blank, such as " (slope 5 deg)"; empty if there are none.
 
-    Lengths are in inches. Defaults are left out, but for the numbers that are `always` given.
+    Lengths are in inches. Defaults are left out, except the settings named in `always`.
     """
     given = written(kind.model_dump(exclude_defaults=True), shown)
     settings = {name: getattr(kind, name) for name in always} | given

@@ -28,8 +28,8 @@ def load_scenario(name_or_file: str | Path = "thesis") -> Scenario:
         >>> scenario = td.load_scenario("thesis").with_changes({"robot.spacing": "3 in"})
         >>> print(scenario)
 
-    Raises InputError, naming file and key, for whatever is wrong in the file, or in the structure
-    or height file that it names.
+    Raises InputError, naming file and key, if the file is wrong, or the structure or height file
+    that it names.
     """
     name = str(name_or_file)
     file = _file(name, Path())
@@ -52,7 +52,8 @@ GivenScenario = Scenario | HasScenario | str | Path
 
 
 def given_scenario(scenario: GivenScenario) -> Scenario:
-    """The scenario that an argument stands for; InputError for what stands for none."""
+    """The scenario of an argument: a scenario, its name or file, or a run. Raises InputError for
+    anything else."""
     if isinstance(scenario, (str, Path)):
         in_folder = Path(scenario) / SCENARIO
         is_folder = str(scenario) not in shipped_scenarios() and os.path.isfile(in_folder)
@@ -65,14 +66,14 @@ def given_scenario(scenario: GivenScenario) -> Scenario:
 
 
 def dump_scenario(scenario: Scenario) -> str:
-    """The scenario as a scenario file that gives all values, in SI: it loads back to the same
-    scenario, whatever the defaults, beside the height file of save_scenario()."""
+    """The scenario as a file with all settings in SI. It loads back to the same scenario even if
+    defaults change. A height file must be beside it, see save_scenario()."""
     return dump_yaml(written(scenario.model_dump()))
 
 
 def save_scenario(folder: Path, scenario: Scenario) -> str:
-    """Writes a scenario into a folder that can be moved, with its height file if it has one;
-    returns dump_scenario(), the content of the file SCENARIO."""
+    """Writes a scenario, and its height file if it has one, to a folder that can be moved. Returns
+    the content of the scenario's file."""
     text = dump_scenario(scenario)
     scenario.terrain.save(folder)
     write_whole(folder / SCENARIO, text)
@@ -80,14 +81,14 @@ def save_scenario(folder: Path, scenario: Scenario) -> str:
 
 
 def _file(name: str, folder: Path) -> Path:
-    """The file of a shipped scenario, or of a path from `folder`."""
+    """The file of a shipped scenario; for another name, the path relative to `folder`."""
     if name in shipped_scenarios():
         return SCENARIOS / f"{name}.yaml"
     return folder / name
 
 
 def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
-    """The scenario of a file, whose bases are loaded first."""
+    """Loads the scenario of a file, on top of its bases."""
     keys = [*keys_of(Scenario), "base"]
     given = read_mapping(file, "scenario file", keys=keys, most=MOST_BYTES)
     if file.resolve() in seen:
@@ -106,7 +107,8 @@ def _load(file: Path, seen: tuple[Path, ...] = ()) -> Scenario:
 
 
 def _resolve_files(given: Tree, file: Path) -> None:
-    """Makes the paths of height and structure file absolute: they start at the scenario file."""
+    """Makes the paths of height and structure files absolute; they are relative to the scenario
+    file."""
     terrain, robot = given.get("terrain"), given.get("robot")
     if isinstance(terrain, dict) and isinstance(terrain.get("file"), str):
         terrain["file"] = os.path.abspath(file.parent / terrain["file"])

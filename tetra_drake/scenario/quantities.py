@@ -1,4 +1,4 @@
-"""Quantities: numbers in SI whose type says their unit, and which files hold as texts with units.
+"""Quantities: numbers in SI; their type gives the unit. In files they are texts with units.
 
 A field `stiffness: Stiffness = Field(gt=0)` reads "25 lbf/in" as a number in N/m. Items of lists
 and mappings may have such types, too.
@@ -23,7 +23,7 @@ Info = core_schema.ValidationInfo
 
 
 class Quantity(float):
-    """A number in a tree, in the SI unit `unit`."""
+    """Number of a tree, with its SI unit."""
 
     unit: str
 
@@ -38,7 +38,7 @@ class Quantity(float):
 
 @dataclass(frozen=True)
 class Unit:
-    """Marks the type of a number in the SI unit `name`."""
+    """Annotation of a type of numbers with the SI unit `name`."""
 
     name: str
 
@@ -67,15 +67,16 @@ Damping = Annotated[float, Unit("N*s/m")]
 DampingPerLength = Annotated[float, Unit("N*s/m^2")]
 
 Position = Annotated[list[Length], Field(min_length=3, max_length=3)]
-"""x, y and z."""
+"""Coordinates x, y and z."""
 
 
 @dataclass(frozen=True)
 class UnitsByName:
-    """Marks the type of a mapping of numbers, or of lists of them, with SI units by their names."""
+    """Annotation of a type of mappings of numbers, or of lists of numbers, with SI units by
+    name."""
 
     units: Mapping[str, str]
-    """Units; "" for a number without one."""
+    """Units by name; "" for a number without a unit."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
@@ -95,7 +96,7 @@ class UnitsByName:
 
 
 def _each(given: dict[str, Any], change: Callable[[Any, str], Any]) -> dict[str, Any]:
-    """A mapping of numbers, or of lists of them, with change(number, name) in place of each."""
+    """A mapping with change(number, name) in place of each number. Values are numbers or lists."""
     return {
         name: [change(x, name) for x in value] if isinstance(value, list) else change(value, name)
         for name, value in given.items()
@@ -105,15 +106,15 @@ def _each(given: dict[str, Any], change: Callable[[Any, str], Any]) -> dict[str,
 def _converted(
     schema: CoreSchema, read: Callable[[Any, Info], Any], write: Callable[[Any], Any]
 ) -> CoreSchema:
-    """A schema that reads what it validates and writes what it dumps."""
+    """A schema with functions that convert values before validation and when they are dumped."""
     serializer = core_schema.plain_serializer_function_ser_schema(write)
     return core_schema.with_info_before_validator_function(read, schema, serialization=serializer)
 
 
 def _si_number(value: Any, unit: str, info: Info, *, key: str = "") -> Any:
-    """The number of a quantity; what is none is left to pydantic.
+    """The SI number of a quantity. Other values are returned as they are, for pydantic's errors.
 
-    In a validation with a context, that of a file, bare numbers but 0 are refused.
+    In a validation with a context (for a file), numbers without a unit are refused, except 0.
     """
     if isinstance(value, Quantity):
         return float(value)
@@ -129,7 +130,7 @@ def _si_number(value: Any, unit: str, info: Info, *, key: str = "") -> Any:
 
 
 def unit_of(field: FieldInfo) -> str:
-    """The unit of a field's numbers; "" for none."""
+    """Unit of the numbers of a field; "" if they have none."""
     parts = [field.annotation, *field.metadata]
     for part in parts:
         if isinstance(part, Unit):

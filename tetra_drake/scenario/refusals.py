@@ -1,4 +1,4 @@
-"""Words for what is wrong with a value of a tree."""
+"""Error messages about the values of a tree."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from typing import Any, NoReturn
 from pydantic_core import PydanticCustomError
 
 TAG = "_tag"
-"""Key of the name of a tagged kind in a tree."""
+"""Key of a mapping in a tree that holds the tag of its kind."""
 
 _LONGEST_LIST = 200
 """Characters of a list of names."""
 
 _MOST_NAMES, _LONGEST_NAME = 2000, 100
-"""Upper limits of what is compared with a misspelt name, which takes a while."""
+"""Limits for the comparison with a misspelt name, because it is slow: names, and characters."""
 
 
 def refuse(key: str, problem: str) -> NoReturn:
-    """Ends a validation with a problem at a key, relative to what is validated."""
+    """Ends a validation with a problem. `key` is relative to the validated value."""
     raise PydanticCustomError("refused", "{key}: {problem}", {"key": key, "problem": problem})
 
 
 def described(value: Any) -> str:
-    """A value of a tree in words, for a message."""
+    """Description of a tree's value for a message."""
     if isinstance(value, dict):
         return f"!{value[TAG]}" if TAG in value else "a mapping"
     if value is None:
@@ -39,7 +39,7 @@ def described(value: Any) -> str:
 
 
 def hint(name: Any, names: Iterable[str]) -> str:
-    """Advice on a misspelt name."""
+    """Advice about a misspelt name: the most similar name, or all names."""
     names = list(itertools.islice(names, _MOST_NAMES))
     close = difflib.get_close_matches(str(name)[:_LONGEST_NAME], names, n=1)
     if close:
@@ -49,7 +49,7 @@ def hint(name: Any, names: Iterable[str]) -> str:
 
 
 def no_such(what: str, name: str, shipped: Sequence[str]) -> str:
-    """The problem with a name, or a path, of what is neither shipped nor a file."""
+    """Problem with a name or path that is neither shipped nor a file."""
     last = name.rpartition("/")[2][:_LONGEST_NAME]
     if close := difflib.get_close_matches(last, shipped, n=1):
         return f"no such {what}; did you mean '{close[0]}'?"

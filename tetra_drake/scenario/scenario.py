@@ -1,4 +1,4 @@
-"""A scenario: every number of an experiment, and the rules between its sections."""
+"""Scenario: all settings of an experiment, and the rules between its sections."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ from tetra_drake.scenario.yaml_text import dump_yaml, parse_yaml
 EngineKind = TypeVar("EngineKind", Drake, Compiled, Mujoco)
 
 MOST_SIGNALS_OF_DRAKE, MOST_SIGNALS = 20_000_000, 100_000_000
-"""Upper limits of the values of all signals in one simulation: some 3 GB."""
+"""Largest number of values of all signals in one simulation; about 3 GB."""
 
 _WIDTH = 100
-"""Characters of a line of a printed scenario."""
+"""Largest number of characters in a line of a printed scenario."""
 
 MOST_SAMPLES = 2_000_000
-"""Upper limit of the recorded poses of all bodies in one simulation: some 2 GB."""
+"""Largest number of recorded poses of all bodies in one simulation; about 2 GB."""
 
 
 class Scenario(Section):
-    """Everything that defines an experiment but the gait."""
+    """Scenario: all settings of an experiment except the gait."""
 
     has_base: ClassVar[bool] = True
 
@@ -77,7 +77,7 @@ class Scenario(Section):
     optimizer: OptimizerKind = SteadyState()
 
     def __str__(self) -> str:
-        """A few lines: what is simulated, and by section what differs from the thesis."""
+        """Summary in a few lines, with the settings that differ from the scenario `thesis`."""
         lines = [
             f"scenario {self.name}: {self.robot.body_count} bodies, {self.oscillators} oscillators,"
             f" {self.simulation.duration:g} s, engine {self.engine_name}; evolution"
@@ -98,16 +98,16 @@ class Scenario(Section):
         return f"<Scenario {self.name}>"
 
     def to_yaml(self) -> str:
-        """All settings as a scenario file, in units in which they are round numbers."""
+        """All settings as a scenario file, in units with few digits."""
         tree = written(self.model_dump(), shortest)
         tree["terrain"] |= self.terrain.paths
         return dump_yaml(tree)
 
     def differences(self, base: Scenario) -> list[tuple[str, str]]:
-        """(key, value) of what differs from `base`, in units in which the number is round.
+        """Keys and values that differ from `base`, in the unit that needs the fewest digits.
 
-        A value that only `base` has is "none", and left out where kinds of other names explain it.
-        There are no differences exactly if the scenarios are equal.
+        A value that only `base` has is "none". It is left out if the kinds of the section differ.
+        The list is empty exactly if the scenarios are equal.
         """
         ours, theirs = self.values(), base.values()
         kinds = [key for key in ours if key.endswith(f".{TAG}") and ours[key] != theirs[key]]
@@ -124,22 +124,22 @@ class Scenario(Section):
         return found + _differences_in_order(ours, theirs)
 
     def values(self) -> dict[str, Any]:
-        """The values by their dotted keys, without the name, which is only a label: scenarios of
-        the same values are equal."""
+        """Values by dotted keys, without the scenario's name. Scenarios with the same values are
+        equal; the name is only a label."""
         return flattened(self.model_dump(exclude={"name"}))
 
     @property
     def oscillators(self) -> int:
-        """The number of neural oscillators."""
+        """Number of oscillators."""
         return len(self.robot.blueprint().oscillators)
 
     @property
     def engine_name(self) -> str:
-        """Name of the engine: that of its kind, in lower case."""
+        """Name of the engine: its kind in lower case."""
         return type(self.engine).__name__.lower()
 
     def settings_of(self, engine: type[EngineKind]) -> EngineKind:
-        """The settings of the scenario's engine, which must be of this kind."""
+        """The settings of the scenario's engine. Raises TypeError if it is of another kind."""
         if not isinstance(self.engine, engine):
             raise TypeError(f"the engine is !{type(self.engine).__name__}")
         return self.engine
@@ -151,27 +151,27 @@ class Scenario(Section):
 
     @property
     def draws(self) -> int:
-        """Simulations of a gait in evolution: one, or one for each draw of disturbances."""
+        """Number of simulations per gait in evolution: one, or one per draw of disturbances."""
         return self.disturbances.draws if self.disturbances else 1
 
     @classmethod
     def from_tree(cls, tree: Tree, source: object, *, key: str = "") -> Self:
-        """The scenario of a complete tree; raises InputError that names `source` and key."""
+        """The scenario of a complete tree. Raises InputError that names `source` and key."""
         return super().from_tree(with_structure(tree, source), source, key=key)
 
     def with_changes(self, changes: Mapping[str, Any]) -> Self:
         """A checked copy with other values: {"robot.tetrahedra": 7, "friction": "!Coulomb"}.
 
-        The same rules hold as in a file that is based on this scenario: quantities have units,
-        mappings are merged, and the spacing follows what is changed. A kind may be given as a file
-        has it ("friction": "!Coulomb {static: 0.3}"). Sections, whose numbers are SI, replace what
-        they change as a whole: {"friction": Coulomb()}. Raises InputError, naming the key.
+        The rules are the same as for a file with this scenario as its base: quantities have units,
+        mappings are merged, and the spacing is adapted. A kind may be a text as in a file
+        ("friction": "!Coulomb {static: 0.3}"), or a section with SI numbers
+        ({"friction": Coulomb()}), which replaces the old one. Raises InputError, naming the key.
         """
         source = f"scenario {self.name}"
         return self.with_file(tree_of_changes(changes, source), source)
 
     def with_file(self, changes: Tree, source: object) -> Self:
-        """The scenario of a file's tree, of which this one is the base; see changes.merged()."""
+        """The scenario of a file's tree with this scenario as its base; see changes.merged()."""
         base = self.model_dump()
         if names_structure(changes):
             del base["robot"]  # replaced as a whole
@@ -187,24 +187,24 @@ class Scenario(Section):
         return self.from_tree(merged(tree, {"robot": implied}), source)
 
     def with_sections(self, **sections: Any) -> Self:
-        """A copy with other sections, which are not checked."""
+        """A copy with other sections. They are not checked."""
         return self.model_copy(update=sections)
 
     def with_numbers(self, numbers: Mapping[str, float]) -> Self:
-        """A copy with other SI numbers by dotted keys, which are not checked."""
+        """A copy with other SI numbers by dotted keys. They are not checked."""
         changed = self
         for key, number in numbers.items():
             changed = _with_number(changed, key.split("."), number)
         return changed
 
     def numbers(self) -> dict[str, float]:
-        """The SI numbers of the sections but `disturbances`, by their dotted keys."""
+        """SI numbers of the sections by dotted keys, without `disturbances`."""
         tree = self.model_dump(exclude={"disturbances", "objective", "require"})
         return {key: value for key, value in flattened(tree).items() if isinstance(value, float)}
 
     @model_validator(mode="after")
     def _check(self) -> Scenario:
-        """Refuses settings of different sections that cannot go together."""
+        """Refuses combinations of settings from different sections."""
         step, duration = self.cpg.listing_step, self.simulation.duration
         if step > duration:
             expected = f"expected at most the duration, {duration} s"
@@ -237,7 +237,7 @@ class Scenario(Section):
                         refuse(f"{key}.{name}", problem)
 
     def _check_memory(self) -> None:
-        """Refuses what does not fit in memory."""
+        """Refuses simulations that do not fit in memory."""
         duration, sample_period = self.simulation.duration, self.simulation.sample_period
         is_drake = isinstance(self.engine, Drake)
         most_signals = MOST_SIGNALS_OF_DRAKE if is_drake else MOST_SIGNALS
@@ -255,7 +255,7 @@ class Scenario(Section):
                 refuse(key, f"{problem}, for this duration and robot")
 
     def _check_sides(self) -> None:
-        """Refuses gaits that turn, or are mirrored, where groups of cables have no sides."""
+        """Refuses turning or mirrored gaits for robots whose cables are not left or right."""
         blueprint, bounds = self.robot.blueprint(), self.gait_bounds
         if bounds.turn != 0.0 and not blueprint.sides.any():
             expected = "expected 0, as no group is on one side"
@@ -266,7 +266,7 @@ class Scenario(Section):
             refuse("gait_bounds.mirrored", f"found true, {expected}")
 
     def _check_disturbances(self) -> None:
-        """Refuses draws that change a number further than it can be changed."""
+        """Refuses disturbances that make a number invalid."""
         if self.disturbances is None:
             return
         undisturbed, numbers = self.with_sections(disturbances=None), self.numbers()
@@ -286,7 +286,7 @@ class Scenario(Section):
 
 @functools.cache
 def _thesis() -> Scenario:
-    """The scenario that others are compared with in print."""
+    """The scenario `thesis`, which printed scenarios are compared with."""
     file = Path(__file__).parent / "thesis.yaml"
     return Scenario.from_tree(parse_yaml(read_text(file, "scenario file"), file), file)
 
@@ -296,7 +296,7 @@ _NONE = "none"
 
 
 def _text(value: Any, *, exact: bool = False) -> str:
-    """A value of a tree as text; its numbers have six digits unless `exact`."""
+    """A value of a tree as text. Numbers have six digits unless `exact`."""
     if value is None:
         return _NONE
     text = json.dumps(written(value) if exact else written(value, plainest)).replace('"', "")
@@ -306,7 +306,7 @@ def _text(value: Any, *, exact: bool = False) -> str:
 def _differences_in_order(
     ours: Mapping[str, Any], theirs: Mapping[str, Any]
 ) -> list[tuple[str, str]]:
-    """The mapping, if any, that has the same names in another order."""
+    """A mapping with the same names in another order, as a difference; empty if there is none."""
     in_common = [key for key in ours if key in theirs], [key for key in theirs if key in ours]
     for key, other in zip(*in_common, strict=True):
         if key != other:
@@ -318,7 +318,7 @@ def _differences_in_order(
 
 
 def _with_number(value: Any, names: Sequence[str], number: float) -> Any:
-    """A copy of a section, or of a mapping by names, with another number where names lead."""
+    """A copy of a section or mapping with another number at the path `names`."""
     if not names:
         return number
     name, *rest = names

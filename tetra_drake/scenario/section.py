@@ -1,7 +1,8 @@
 """Sections of settings as pydantic models: tagged kinds, trees, and errors of one line.
 
-A *tree* is what a YAML file holds: mappings, lists, numbers and texts. Quantities are texts with
-units. A tagged kind, written `!Name {...}` as in Drake's YAML, is a mapping with its tag under TAG.
+A *tree* is the content of a YAML file: mappings, lists, numbers and texts. Quantities are texts
+with units. A tagged kind, written `!Name {...}` as in Drake's YAML, is a mapping with its tag under
+TAG.
 """
 
 from __future__ import annotations
@@ -22,16 +23,16 @@ from tetra_drake.scenario.refusals import TAG, described, hint, refuse
 
 Tree = dict[str, Any]
 Show = Callable[[float, str], str]
-"""Makes a text of a number and its SI unit."""
+"""Function that makes a text from a number and its SI unit."""
 
 
 class Section(BaseModel):
-    """Settings that belong together. Numbers are SI, values cannot be changed in place."""
+    """Section of settings. Numbers are SI; values cannot be changed in place."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
     has_base: ClassVar[bool] = False
-    """True if a file may give what another file, its `base`, does not."""
+    """True if a file may have a `base` that provides missing values."""
 
     tag: ClassVar[str] = ""
     """Name of the kind in files; the name of the class if not given."""
@@ -48,12 +49,12 @@ class Section(BaseModel):
         validate: pydantic.ModelWrapValidatorHandler[Self],
         info: pydantic.ValidationInfo,
     ) -> Self:
-        """Puts pydantic's first error into words."""
+        """Replaces pydantic's errors by one message."""
         try:
             return validate(tree)
         except ValidationError as error:
             errors = error.errors(include_url=False)
-            # A value that fits no member of a union has an error for each: the innermost says most.
+            # A value that fits no member of a union has an error per member. The innermost is best.
             of_field = [one for one in errors if one["loc"][:1] == errors[0]["loc"][:1]]
             first = max(of_field, key=lambda one: _place(one, tree)[1])
         key, problem = _in_words(first, cls, tree)
@@ -78,22 +79,22 @@ class Section(BaseModel):
         return hash(self._compared())
 
     def values(self) -> dict[str, Any]:
-        """The values by their dotted keys."""
+        """Values by dotted keys."""
         return flattened(self.model_dump())
 
     def _compared(self) -> Any:
-        # In order, which numbers the bodies and oscillators of a structure.
+        # The order counts: it numbers the bodies and oscillators of a structure.
         return _hashable(self.values())
 
     @classmethod
     def _advice(cls, name: str) -> str:
-        """Advice on an unknown key: a key of a section, or a similar one."""
+        """Advice about an unknown key: the same name in a section, or a similar key."""
         keys = [f"'{key}'" for key in dict.fromkeys(_keys_named(name, cls))]
         return f"did you mean {' or '.join(keys)}?" if keys else hint(name, keys_of(cls))
 
     @classmethod
     def from_tree(cls, tree: Any, source: object, *, key: str = "") -> Self:
-        """The section of a tree, found at `key`; raises InputError that names `source` and key."""
+        """The section of a tree at `key`. Raises InputError that names `source` and key."""
         # A context means that quantities need units. Without one, numbers are SI.
         try:
             return cls.model_validate(tree, context={"has_base": cls.has_base})
@@ -103,19 +104,19 @@ class Section(BaseModel):
 
 
 def _hashable(value: Any) -> Any:
-    """A value with tuples in place of lists and mappings."""
+    """Converts lists and mappings to tuples."""
     if isinstance(value, dict):
         value = list(value.items())
     return tuple(map(_hashable, value)) if isinstance(value, (list, tuple)) else value
 
 
 def keys_of(section: type[Section]) -> dict[str, FieldInfo]:
-    """The fields of a section by the keys that stand for them in files."""
+    """Fields of a section by their keys in files."""
     return {field.alias or name: field for name, field in section.model_fields.items()}
 
 
 def _keys_named(name: str, section: type[Section]) -> Iterator[str]:
-    """Dotted keys within a section whose last part is a name."""
+    """Dotted keys in a section that end with a name."""
     for key, field in keys_of(section).items():
         for kind in _union(field.annotation):
             if isinstance(kind, type) and issubclass(kind, Section):
@@ -125,7 +126,8 @@ def _keys_named(name: str, section: type[Section]) -> Iterator[str]:
 
 
 class Kinds:
-    """Marks a union of sections as tagged kinds, of which a mapping without a tag is the first."""
+    """Annotation of a union of sections as tagged kinds. A mapping without a tag is of the first
+    kind."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: pydantic.GetCoreSchemaHandler
@@ -145,7 +147,7 @@ class Kinds:
 
 
 def _kind(value: Any, kinds: Mapping[str, type[Section]]) -> type[Section]:
-    """The kind of a mapping; refuses a key that only another kind has."""
+    """The kind of a mapping. Refuses a key that only another kind has."""
     tags = [f"!{name}" for name in kinds]
     if not isinstance(value, dict):
         refuse("", f"found {described(value)}; {hint('!', tags)}")
@@ -160,19 +162,20 @@ def _kind(value: Any, kinds: Mapping[str, type[Section]]) -> type[Section]:
 
 
 def _union(annotation: Any) -> tuple[Any, ...]:
-    """The members of a union type; a type without members alone."""
+    """Members of a union type; the type itself if it is no union."""
     return typing.get_args(annotation) or (annotation,)
 
 
 @dataclass(frozen=True)
 class Varied:
-    """Marks a number that the default disturbances vary; those of the same name by one factor."""
+    """Annotation of a number that the default disturbances vary. Numbers with the same `name` get
+    the same factor."""
 
     name: str = ""
 
 
 def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
-    """The keys of numbers within a section that are marked as Varied, and the marks' names."""
+    """Keys of the numbers in a section that are marked as Varied, with the names of the marks."""
     for name, field in type(section).model_fields.items():
         value, inner = getattr(section, name), joined(key, name)
         yield from ((inner, mark.name) for mark in field.metadata if isinstance(mark, Varied))
@@ -183,7 +186,7 @@ def varied(section: Section, key: str = "") -> Iterator[tuple[str, str]]:
 
 
 def python_value(value: Any) -> Any:
-    """A value with Python's lists and numbers in place of tuples and of what numpy has."""
+    """Converts tuples, and arrays and numbers of numpy, to Python's lists and numbers."""
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, (list, tuple)):
@@ -192,9 +195,9 @@ def python_value(value: Any) -> Any:
 
 
 def _place(error: ErrorDetails, tree: Any) -> tuple[str, int, Any]:
-    """The key that an error is at, its number of parts, and what the tree holds there."""
+    """Key of an error, number of the key's parts, and the tree's value there."""
     key, depth = "", 0
-    for part in error["loc"]:  # where pydantic also names the members of unions
+    for part in error["loc"]:  # also contains names of union members, which are no keys
         if isinstance(tree, list) and isinstance(part, int):
             key = joined(key, f"[{part}]")
         elif isinstance(tree, dict) and part in tree:
@@ -232,16 +235,16 @@ _LIMITS = {
     "too_short": ("at least", "min_length"),
     "too_long": ("at most", "max_length"),
 }
-"""Words for the kinds of limits, and the names by which pydantic gives their numbers."""
+"""Words for limits, and pydantic's names of their numbers, by type of error."""
 
 
 def joined(key: str, inner: str) -> str:
-    """The key of what has the key `inner` within what is at `key`."""
+    """Joins a key and an inner key, such as "robot" and "gravity", or "pairs" and "[0]"."""
     return f"{key}{inner}" if inner.startswith("[") else f"{key}.{inner}".strip(".")
 
 
 def written(value: Any, show: Show = "{!r} {}".format) -> Any:
-    """A value of a tree as a file holds it: `show` makes the texts of quantities."""
+    """A tree's value for a file. `show` makes the texts of quantities."""
     if isinstance(value, Quantity):
         return show(float(value), value.unit) if value.unit else float(value)
     if isinstance(value, dict):
@@ -252,7 +255,7 @@ def written(value: Any, show: Show = "{!r} {}".format) -> Any:
 
 
 def flattened(tree: Tree, key: str = "") -> dict[str, Any]:
-    """The values of a tree by their dotted keys."""
+    """Values of a tree by dotted keys."""
     values: dict[str, Any] = {}
     for name, value in tree.items():
         inner = joined(key, name)

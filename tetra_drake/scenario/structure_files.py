@@ -1,4 +1,4 @@
-"""Structure files: found, read and merged with what stands beside them in a scenario."""
+"""Structure files: finding, reading, and merging with the settings of a scenario."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tetra_drake.scenario.yaml_text import read_mapping
 _KIND = StructureFile.tag
 
 KEYS_OF_NTRT = {"pair_groups", "builders", "substructures"}
-"""Keys that only files of NTRT have."""
+"""Keys that occur only in files of NTRT."""
 
 
 def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> StructureFile:
@@ -38,22 +38,23 @@ def read_structure(name_or_file: str | Path, *, unit: str | None = None) -> Stru
 
 
 def structure_file(name: str, folder: Path) -> Path:
-    """The file of a shipped structure, or of a path from `folder`."""
+    """The file of a shipped structure; for another name, the path relative to `folder`."""
     return STRUCTURES / f"{name}.yaml" if name in shipped_structures() else folder / name
 
 
 def names_structure(tree: Tree) -> bool:
-    """True if the robot of a scenario's tree is that of a structure file."""
+    """True if the robot of a scenario's tree names a structure file."""
     robot = tree.get("robot")
     is_structure = isinstance(robot, dict) and robot.get(TAG, _KIND) == _KIND
     return is_structure and "file" in tree["robot"]
 
 
 def with_structure(tree: Tree, source: object) -> Tree:
-    """The tree of a scenario with the content of the structure file that its robot may name.
+    """Replaces the key `robot.file` of a scenario's tree by the content of the structure file.
 
-    The file must be a structure by itself. What stands beside `file` overrides its content;
-    `actuated` is replaced as a whole. Raises InputError that names file, or `source`, and key.
+    The file must be a valid structure. Keys beside `file` override its content; `actuated` is
+    replaced as a whole. A tree without `robot.file` stays as it is. Raises InputError that names
+    file, or `source`, and key.
     """
     if not names_structure(tree):
         return tree
@@ -70,13 +71,16 @@ def with_structure(tree: Tree, source: object) -> Tree:
 
 
 def _tree_of_file(file: Path, unit: Any, *, source: object, key: str) -> Any:
-    """Content of a structure file, or of a file of NTRT by the unit that `source` has at `key`."""
+    """Content of a structure file or of a file of NTRT. `source` and `key` tell, in errors, where
+    the `unit` of NTRT is missing."""
     keys = keys_of(StructureFile) | keys_of(NtrtFile)
     content = read_mapping(file, "structure file", keys=keys, most=MOST_BYTES)
     if not KEYS_OF_NTRT & content.keys():
         return content
     if unit is None:
-        raise InputError(source, key, f"is missing; give the unit of length of '{file}', as dm")
+        raise InputError(
+            source, key, f"is missing; give the unit of length of '{file}', such as dm"
+        )
     try:
         length = quantity_to_si(f"1 {unit}", "m")
     except ValueError as error:

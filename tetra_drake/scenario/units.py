@@ -1,4 +1,4 @@
-"""Text with units to SI numbers, and SI numbers in the units that people read."""
+"""Units: conversion of texts to SI numbers, and of SI numbers to texts in customary units."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ INCH = 0.0254  # m, exact
 POUND_FORCE = 4.4482216152605  # N, exact
 
 _READ = {"m": (INCH, "in"), "N": (POUND_FORCE, "lbf"), "rad": (math.pi / 180.0, "deg")}
-"""Size in SI and name of what people read instead of an SI unit."""
+"""Customary unit of each SI unit: size in SI, and name."""
 
 _SMALL = {
     "m": [(1e-3, "mm"), (1e-2, "cm")],
@@ -19,10 +19,10 @@ _SMALL = {
     "kg": [(1e-3, "g")],
     "kg/m^3": [(1e3, "g/cm^3")],
 }
-"""Other units of which settings may be round numbers: size in SI, name."""
+"""Further units for settings, by SI unit: size in SI, and name."""
 
 LARGEST = 1e15
-"""Upper limit of the size of a number in SI units, so that products of a few do not overflow."""
+"""Largest size of a number in SI units. Products of several such numbers do not overflow."""
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[A-Za-z]+(?:\s*(?:\^|\*\*)\s*-?\d)?"
@@ -30,7 +30,7 @@ _FACTORS = rf"{_FACTOR}(?:(?:\s*[*/]\s*|\s+){_FACTOR})*"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(1?\s*/\s*)?({_FACTORS})\s*")
 
 
-@functools.lru_cache(maxsize=1000)  # as files are read on top of their bases
+@functools.lru_cache(maxsize=1000)  # a base is read again for each file
 def quantity_to_si(text: str, unit: str) -> float:
     """Reads a quantity such as "25 lbf/in", or "1 /in", as a number in the SI unit `unit` ("N/m").
 
@@ -55,13 +55,13 @@ def quantity_to_si(text: str, unit: str) -> float:
 
 
 def rounded(text: str) -> str:
-    """A text whose numbers with many decimals are rounded to six digits."""
+    """Rounds all numbers with many decimals in a text to six digits."""
     return re.sub(r"\d+\.\d{6,}(e[+-]?\d+)?", lambda number: f"{float(number[0]):.6g}", text)
 
 
 def customary(unit: str) -> tuple[float, str]:
-    """The unit in which people read numbers of an SI unit, such as "lbf/in" for "N/m": its size in
-    SI, and its name. Units with others than lengths, forces, angles and times stay as they are."""
+    """Customary unit for an SI unit, such as "lbf/in" for "N/m": its size in SI, and its name. A
+    unit with other dimensions than length, force, angle and time is returned as it is."""
     above, _, below = unit.partition("/")
     size = 1.0
     for factors, sign in ((above, 1), (below, -1)):
@@ -75,13 +75,14 @@ def customary(unit: str) -> tuple[float, str]:
 
 
 def shown(number: float, unit: str) -> str:
-    """A number of an SI unit as people read it, such as "25 lbf/in"."""
+    """A number given in an SI unit, as text in the customary unit, such as "25 lbf/in"."""
     size, name = customary(unit)
     return f"{number / size:.4g} {name}".rstrip()
 
 
 def plainest(number: float, unit: str) -> str:
-    """A number of an SI unit in the unit that needs the fewest digits, such as "6 in", "20 ms"."""
+    """A number given in an SI unit, as text in the unit that needs the fewest digits, such as
+    "20 ms"."""
     if number == 0.0:
         return "0"
     candidates = [customary(unit), *_SMALL.get(unit, []), (1.0, unit.removeprefix("1"))]
@@ -94,7 +95,8 @@ def plainest(number: float, unit: str) -> str:
 
 
 def shortest(number: float, unit: str) -> str:
-    """The shortest of the texts that plainest() chooses from which reads as exactly this number."""
+    """The text of plainest(), if it reads as exactly the same number; otherwise the exact number in
+    SI."""
     exact = f"{number!r} {unit}"
     text = plainest(number, unit)
     return text if " " in text and quantity_to_si(text, unit) == number else exact

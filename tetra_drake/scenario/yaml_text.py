@@ -1,4 +1,4 @@
-"""YAML with tagged kinds."""
+"""YAML with tagged kinds: reading and writing."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from tetra_drake.scenario.section import Tree
 
 
 def parse_yaml(content: str, source: object) -> Any:
-    """Content of YAML text; raises InputError if it is not YAML."""
-    # Errors show no lines and no names of what may be any file.
+    """Content of a YAML text. Raises InputError if it is not YAML."""
+    # The file may be a private one, so errors show neither its lines nor its names.
     try:
         return yaml.load(content, _Loader)
     except yaml.MarkedYAMLError as error:
@@ -32,9 +32,10 @@ def parse_yaml(content: str, source: object) -> Any:
 
 
 def read_mapping(file: Path, what: str, *, keys: Collection[str], most: int) -> Tree:
-    """Content of a YAML file of at most so many bytes, a mapping with some of these `keys`.
+    """Content of a YAML file: a mapping with some of `keys`, at most `most` bytes.
 
-    Raises InputError if it is anything else. The file may be any, so the error shows nothing of it.
+    Raises InputError for another content. The file may be a private one, so the error does not show
+    its content.
     """
     content = parse_yaml(read_text(file, what, most=most), file)
     if not isinstance(content, dict):
@@ -46,12 +47,12 @@ def read_mapping(file: Path, what: str, *, keys: Collection[str], most: int) -> 
 
 
 def dump_yaml(tree: Tree) -> str:
-    """The tree as YAML text."""
+    """A tree as YAML text."""
     return yaml.dump(tree, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML with tagged kinds, in which no key may be given twice, and 1e-3 is a number."""
+    """Loader of YAML with tagged kinds. It refuses repeated keys, and reads 1e-3 as a number."""
 
     def __init__(self, stream: str) -> None:
         super().__init__(stream)
@@ -92,12 +93,12 @@ class _Loader(yaml.SafeLoader):
 
 
 def _shown(name: str, what: str) -> str:
-    """A name in quotes; what it is where it does not look like a name."""
+    """A name in quotes; `what` in place of a text that does not look like a name."""
     return f"'{name}'" if re.fullmatch(r"!?[\w.]{1,40}", name) else what
 
 
 class _Dumper(yaml.SafeDumper):
-    """YAML with tagged kinds and without mappings on one line."""
+    """Writer of YAML with tagged kinds. Each key of a mapping has its own line."""
 
     def represent_dict(self, data: Any) -> yaml.MappingNode:
         entries = {name: value for name, value in data.items() if name != TAG}
@@ -110,4 +111,4 @@ _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"), "-+0123456789"
 )
 _Dumper.add_representer(dict, _Dumper.represent_dict)
-_Dumper.add_multi_representer(str, _Dumper.represent_str)  # also of the names of height files
+_Dumper.add_multi_representer(str, _Dumper.represent_str)  # for HeightFile, a subclass of str
