@@ -36,7 +36,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"tetra-drake: {error}", file=sys.stderr)
         return BAD_INPUT if isinstance(error, InputError) else FAILED
     except OSError as error:
-        # Its reader has closed our output, as `| head` does; the disk is full.
+        # The reader of our output has closed it, such as `| head`; or the disk is full.
         if not isinstance(error, BrokenPipeError):
             what = error.filename or "output"
             print(f"tetra-drake: {what}: {error.strerror or error}", file=sys.stderr)
@@ -49,8 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _drop_output() -> None:
-    """Lets what has been printed but not written disappear, which Python would try to write at its
-    end."""
+    """Drops output that was printed but not written. Python would try to write it at its end."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -118,7 +117,7 @@ def _simulate(
     (open it in a browser) and scenario.yaml (all settings).
 
     Args:
-        scenario: (default: that of the gait's run, or beside the command; else thesis)
+        scenario: (default: the scenario of the gait's run or beside the command; else thesis)
         out: the folder to write to (default: %(default)s)
         meshcat: show the robot in a browser while Drake simulates it, in real time at most
 
@@ -219,7 +218,7 @@ def _evolve(
     figures/ and, for a map, elites/ (gait files) into the run directory.
 
     Args:
-        scenario: (default: quick, which takes minutes; with --resume, that of the run)
+        scenario: (default: quick, which takes minutes; with --resume, the run's)
         out: the run directory, such as runs/NAME
         trials: number of independent trials (default: the scenario's)
         evaluations: most evaluations of a trial (default: the scenario's)
@@ -245,7 +244,7 @@ def _evolve(
         changes["evolution.trials"] = trials
     if evaluations is not None:
         changes["evolution.evaluations"] = evaluations
-    chosen: Scenario | None = None  # that of the run
+    chosen: Scenario | None = None  # None means the scenario of the run
     if scenario is not None or not resume:
         chosen = load_scenario(scenario or "quick").with_changes(changes)
     elif changes:
@@ -285,7 +284,7 @@ def _replay(source: ResultOrGait, *, scenario: ScenarioName | None = None, out: 
 
     Args:
         source: a folder written by `simulate`, a gait file, or a folder written by `evolve`
-        scenario: (default: that of its run, or thesis; for gait files only)
+        scenario: (default: the scenario of its run, or thesis; for gait files only)
         out: the HTML file to write
 
     Example: tetra-drake replay runs/champion --out champion.html

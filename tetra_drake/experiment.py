@@ -63,7 +63,7 @@ def evolve(
         worker processes, or one by one where these cannot get an objective, as in a notebook.
     progress: shown none by default; see evolution.progress.
     reevaluate: in the end, evaluates the best gaits on the Drake diagram if the engine is another,
-        and simulates those of a map on disturbed robots.
+        and simulates the gaits of a map on disturbed robots.
     report: in the end, writes report.html, replay.html, figures/, elites/ (of a map).
 
     Raises InputError for what cannot be used, or if a gait ends its worker twice: then resume.

@@ -70,7 +70,7 @@ REFERENCE: Any = {"color": "0.35", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
 @dataclass(frozen=True)
 class Units:
-    """Units in which figures show lengths and forces."""
+    """Units of lengths and forces in figures."""
 
     length: float
     """Size in m."""

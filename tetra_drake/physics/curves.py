@@ -1,4 +1,4 @@
-"""Numbers that describe curves: how a path bends, whether waves travel."""
+"""Curvature of a path, and travelling index of waves."""
 
 from __future__ import annotations
 
@@ -38,19 +38,18 @@ def curvature(points: np.ndarray) -> float:
 
 
 def travelling_index(waves: np.ndarray) -> float:
-    """Travelling index of waves (samples, places): 0 if they stand, 1 if they travel.
+    """Travelling index of waves (samples, positions): 0 for standing waves, 1 for travelling waves.
 
-    At fewer than two places nothing travels.
-
-    Of the strongest complex orthogonal mode, the ratio of the singular values of its real and
-    imaginary parts (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Evenly sampled.
+    It is a property of the strongest complex orthogonal mode: the ratio of the singular values of
+    its real and imaginary parts (B. F. Feeny, Journal of Sound and Vibration 310, 2008). Samples
+    must be evenly spaced. The index of fewer than two positions is 0.
     """
     if waves.shape[1] < 2:
         return 0.0
-    # The mode is that of the analytic signals, whose spectrum has no negative frequencies.
+    # The mode of the analytic signals; their spectrum has no negative frequencies.
     spectrum = np.fft.rfft(waves, axis=0)[1:]
     mode = np.linalg.eigh(spectrum.T @ spectrum.conj())[1][:, -1]
-    # Its parts have the Gram matrix [[a, c], [c, b]], a + b = 1.
+    # The real and imaginary parts have the Gram matrix [[a, c], [c, b]], a + b = 1.
     a, c = float(mode.real @ mode.real), float(mode.real @ mode.imag)
     spread = math.hypot(2.0 * a - 1.0, 2.0 * c)
     return math.sqrt(max(0.0, 1.0 - spread) / (1.0 + spread))

@@ -1,7 +1,7 @@
-"""The tally of a walk: what its metrics need of every step.
+"""Tally of a simulation: sums and extremes over all steps, which metrics are computed from.
 
-A part of the tally is a NamedTuple of tables with a kernel `add`, which adds a step to them. All
-engines call it for each part of `Tally`, and scenario.metrics makes metrics of the tables.
+A part of the tally is a NamedTuple of tables. Its kernel `add` adds a step to them. All engines
+call it for each part of `Tally`. scenario.metrics computes metrics from the tables.
 """
 
 from __future__ import annotations
@@ -21,48 +21,49 @@ from tetra_drake.simd.unrolling import for_each
 
 
 class Step(NamedTuple):
-    """A step of a walk, with the state, signals and forces at its end. The first one takes no time;
-    nor does one that is seen again."""
+    """A step of a simulation, with state, signals and forces at its end. The first step, and a
+    repeated step, take no time."""
 
     robot: Model
     state: Table
-    """(13 bodies,)."""
+    """State of the bodies (13 bodies,)."""
     signals: Table
-    """(signals,): in N; `signals_before` are those at its start."""
+    """Signals (signals,) in N at the end of the step."""
     signals_before: Table
+    """Signals (signals,) in N at the beginning of the step."""
     forces: Forces
     duration: Real
-    """s."""
+    """Duration of the step in s."""
     takes_time: Truth
     counts: Truth
-    """True if it is in the steady stretch, over which sums are taken, and takes time."""
+    """True if the step takes time and is in the steady stretch. Sums are over these steps."""
     counted: Real
-    """Its duration (s) if it counts, or else 0."""
+    """Duration (s) of the step if it counts, otherwise 0."""
 
 
 class Effort(NamedTuple):
-    """The effort of the actuators; integrals are summed over all of them."""
+    """Effort of the actuators. Integrals are over the steady stretch, summed over the actuators;
+    peaks are over all steps."""
 
     left: Annotated[Table, "cables"]
-    """What actuators have left to wind at the latest step, in m: free lengths if they wind, or else
-    lengths of the driven cables."""
+    """Length (m) of each driven cable at the latest step; its free length if a winch winds it."""
     peak_force: Annotated[Table, 1]
-    """N; peaks are of all steps."""
+    """Largest tension of a driven cable, in N."""
     peak_speed: Annotated[Table, 1]
-    """m/s, in either direction."""
+    """Largest speed of an actuator in either direction, in m/s."""
     peak_power: Annotated[Table, 1]
-    """W."""
+    """Largest power of an actuator, in W."""
     impulse: Annotated[Table, 1]
-    """The integral of the tension, in N s."""
+    """Integral of the tension, in N s."""
     wound: Annotated[Table, 1]
-    """m, in either direction."""
+    """Length of cable wound and paid out, in m."""
     pulled: Annotated[Table, 1]
-    """The integral of the positive power of the tension, in J."""
+    """Integral of the positive power of the tension, in J."""
     work: Annotated[Table, 1]
-    """The integral of max(0, -S dl/dt), in J. S is the signal, or the tension if actuators have
+    """Integral of max(0, -S dl/dt), in J. S is the signal, or the tension if actuators have
     drives."""
     limited: Annotated[Table, 1]
-    """Time at a limit, in s."""
+    """Time at a limit of an actuator, in s."""
 
     @inlined
     def add(self, step: Step) -> None:
@@ -93,8 +94,8 @@ class Effort(NamedTuple):
 
 @inlined
 def winding(step: Step, i: int, drive: int) -> tuple[Real, Real, Real]:
-    """How an actuator winds cable `i`: the force (N) of its work, what it has left to wind (m), and
-    1 where a limit binds, or else 0."""
+    """Actuator of cable `i`: the force (N) for its work, the length (m) for Effort.left, and 1 if a
+    limit binds, otherwise 0."""
     length, of_robot = step.forces.cable_forces[i, cable.LENGTH], step.robot.actuator
     if not actuator.has_drive(of_robot):
         k = step.robot.cables.signal[i]
@@ -105,10 +106,10 @@ def winding(step: Step, i: int, drive: int) -> tuple[Real, Real, Real]:
 
 
 class Roughness(NamedTuple):
-    """How fast signals change."""
+    """Roughness of the signals."""
 
     total: Annotated[Table, 1]
-    """The integral of (dS/dt)² of all signals, in N²/s."""
+    """Integral of (dS/dt)² of all signals, in N²/s."""
 
     @inlined
     def add(self, step: Step) -> None:
@@ -121,10 +122,10 @@ class Roughness(NamedTuple):
 
 
 class Lifted(NamedTuple):
-    """How long bodies are off the ground."""
+    """Time that bodies are off the ground."""
 
     time: Annotated[Table, "bodies"]
-    """The time in which no contact node of a body bears a normal force, in s."""
+    """Time (bodies,) in s while no contact node of a body bears a normal force."""
 
     @inlined
     def add(self, step: Step) -> None:
@@ -139,10 +140,10 @@ class Lifted(NamedTuple):
 
 
 class LeastTension(NamedTuple):
-    """The least tension of all steps."""
+    """Least tension over all steps."""
 
     of_all: Annotated[Table, 1, math.inf]
-    """Of all cables, in N."""
+    """Least tension of all cables, in N."""
 
     @inlined
     def add(self, step: Step) -> None:
@@ -154,16 +155,16 @@ class LeastTension(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What is tallied of a walk, part by part."""
+    """Tally of a simulation: its time, and the parts that metrics need."""
 
     begins: Annotated[Table, 1]
     """Time (s) at which the steady stretch begins."""
     time: Annotated[Table, 1]
     """Time (s) at the end of the latest step."""
     signals: Annotated[Table, "signals"]
-    """Signals (N) then."""
+    """Signals (N) at the end of the latest step."""
     clearance: Annotated[Table, 1, math.inf]
-    """The least distance between struts, in m; see look()."""
+    """Least distance between struts, in m; see look()."""
     effort: Effort
     roughness: Roughness
     lifted: Lifted
@@ -171,7 +172,8 @@ class Tally(NamedTuple):
 
     @classmethod
     def of(cls, robot: Model, *, signals: int, begins: float) -> Self:
-        """The tally of a walk at its start, whose steady stretch `begins` at a time (s)."""
+        """The tally at the start of a simulation. `begins` (s) is the start of the steady
+        stretch."""
         tally = allocate(cls, sizes_of(robot) | {"signals": signals})
         tally.begins[0] = begins
         return tally
@@ -184,7 +186,7 @@ add_to_each = for_each("add")
 def observe(
     tally: Tally, robot: Model, time: Real, state: Table, signals: Table, forces: Forces
 ) -> None:
-    """Adds the step that ends at a time (s) with this state, these signals and forces."""
+    """Adds the step that ends at `time` (s) with this state, signals and forces."""
     duration = time - tally.time[0]
     takes_time = duration > 0.0
     counts = takes_time & (tally.time[0] >= tally.begins[0])
@@ -207,8 +209,8 @@ def observe(
 
 @inlined
 def look(tally: Tally, robot: Model, state: Table, nodes: Table) -> None:
-    """Notes the clearance of struts at a state (13 bodies,), which costs too much for every step;
-    `nodes` are those of kinematics."""
+    """Updates the clearance for a state (13 bodies,). It is too slow to be called at every step.
+    `nodes` is the table of physics.kinematics."""
     radius, first_node, least = robot.bodies.radius, robot.first_node, tally.clearance[0]
     least = least_strut_distance(robot.struts, radius, first_node, state, nodes, least)
     tally.clearance[0] = least

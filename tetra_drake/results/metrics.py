@@ -1,4 +1,4 @@
-"""The metrics of a simulation, and the fitness that a scenario's objective makes of them."""
+"""Metrics and fitness of a simulation."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from tetra_drake.scenario.units import INCH, shown
 
 
 def steady_start(scenario: Scenario) -> float:
-    """Time (s) at which the steady stretch begins, over which means are taken."""
+    """Start (s) of the steady stretch. Mean values are over this stretch."""
     return max(scenario.simulation.steady_from, scenario.cpg.start_up)
 
 
 def compute_metrics(
     robot: Robot, *, nodes: np.ndarray, path: CentrePath, totals: Tally, signals: np.ndarray
 ) -> Metrics:
-    """The metrics of a walk.
+    """The metrics of a simulation.
 
     Args:
-        nodes: (3, nodes, 3): p_WN in m at 0, at `simulation.steady_from` and at the end.
-        path: The path of the centre.
-        totals: The tally of the whole walk, as plain arrays.
-        signals: (k, m): signals in N at evenly spaced times from `simulation.steady_from` on.
+        nodes: positions p_WN (3, nodes, 3) in m at 0, at `simulation.steady_from` and at the end.
+        path: path of the centre.
+        totals: tally of the whole simulation, as plain arrays.
+        signals: signals (k, m) in N at evenly spaced times from `simulation.steady_from` on.
     """
     structure, scenario = robot.structure, robot.scenario
     steady_from = scenario.simulation.steady_from
@@ -88,8 +88,8 @@ def headline(scenario: Scenario, metrics: Mapping[str, float]) -> str:
 
 
 def unmet_requirements(metrics: Metrics, require: Mapping[str, float]) -> list[str]:
-    """Metrics beyond their required SI values, or NaN: name, value and limit, as
-    for example "clearance is 0.05 in, less than 0.125 in"."""
+    """Texts about the metrics that do not meet their required SI values, such as "clearance is
+    0.05 in, less than 0.125 in". NaN meets no requirement."""
     texts = []
     for name, limit in require.items():
         value, unit, most = getattr(metrics, name), UNITS[name], METRICS[name].most

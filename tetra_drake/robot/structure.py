@@ -38,8 +38,8 @@ class Structure(Blueprint):
     q_WB: np.ndarray
     """Quaternions of the bodies (bodies, 4) at t = 0, w first."""
     equilibrium: Equilibrium | None = None
-    """Equilibrium in which the structure starts, before offsets and slope. None if it starts where
-    its blueprint places it."""
+    """Equilibrium at the start, before offsets and slope. None if the structure starts where its
+    blueprint places it."""
 
     @classmethod
     def of(cls, blueprint: Blueprint) -> Self:

@@ -1,6 +1,6 @@
-"""Kinds of actuators: what the signals of the oscillators do to the cables.
+"""Kinds of actuators: the effect of the oscillators' signals on the cables.
 
-Their kernels, which need numba, are imported only where a law is asked for.
+The kernels need numba; they are imported when a law is needed.
 """
 
 from __future__ import annotations
@@ -31,45 +31,46 @@ class DrivenCables(NamedTuple):
     """Rate of the length."""
     tension: Any
     free_length: Any
-    """As wound."""
+    """Free length; winches change it."""
 
 
 class ActuatorKind(Section):
-    """A kind of actuators: one on each driven cable."""
+    """Base class of the kinds of actuators. Each driven cable has an actuator."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
-    """What some metrics need and such actuators do not have."""
+    """Properties that some metrics need and these actuators do not have."""
     commanded: ClassVar[str]
-    """Quantity that an actuator is commanded, with its unit: the end of a column's name."""
+    """Commanded quantity with its unit: the end of a column's name in command files."""
     command_unit: ClassVar[float] = 1.0
-    """The unit of that in SI."""
+    """Size of the unit of `commanded` in SI."""
     plays_cable: ClassVar[bool] = False
-    """True if spring and damper of the cable are software: a command has them in it."""
+    """True if software imitates the spring and damper of the cable. A command then contains their
+    effect."""
 
     def law(self) -> Actuator:
         """Law as the kernels take it."""
         raise NotImplementedError
 
     def excess(self, signal: float, *, free_length: float) -> str:
-        """What signals up to `signal` (N) ask beyond the actuator's limits, of a cable whose
-        commanded free length (m) then is least; empty if nothing."""
+        """Text if signals up to `signal` (N) exceed the actuator's limits; empty if they do not.
+        `free_length` (m) is the least commanded free length with these signals."""
         return ""
 
     def check_mujoco(self, source: object) -> None:
-        """Raises InputError, naming `source` and key, where MuJoCo cannot simulate it."""
+        """Raises InputError, naming `source` and key, if MuJoCo cannot simulate this kind."""
         problem = f"found !{self.tag}, but mujoco knows forces on cables only: !Force"
         raise InputError(source, "actuation", problem)
 
     def drives(self, cables: DrivenCables) -> Any:
-        """(..., drives): states of the actuators; see physics.actuator."""
+        """States of the actuators (..., drives); see physics.actuator."""
         raise NotImplementedError
 
     def commands(self, cables: DrivenCables) -> Any:
-        """What the actuators are commanded, in SI units."""
+        """Setpoints of the actuators, in SI units."""
         raise NotImplementedError
 
     def signals(self, commands: Any, law: CableLaw) -> Any:
-        """The signals (N) that have the effect of commands (..., driven cables)."""
+        """Signals (N) with the same effect as setpoints (..., driven cables)."""
         return commands
 
 

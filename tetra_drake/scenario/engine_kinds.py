@@ -15,13 +15,13 @@ LONGEST_LOOK_AHEAD = 2e-5
 
 
 class EngineSettings(Section):
-    """A kind of engine."""
+    """Base class of the kinds of engines."""
 
     packages: ClassVar[tuple[str, ...]] = ()
     """Packages that only this engine needs."""
 
     def friction_text(self, friction: FrictionKind) -> str:
-        """The friction that the engine simulates, in words."""
+        """Description of the friction that the engine simulates."""
         return friction.text
 
 
@@ -39,7 +39,7 @@ class Drake(EngineSettings):
     """Longest step."""
     mode_changes: Literal["step_end", "witness"] = "step_end"
     """Where modes change: at the end of steps, or where a witness function is zero. `witness` needs
-    short steps, such as those of runge_kutta3."""
+    short steps, such as the steps of runge_kutta3."""
     look_ahead: Time = Field(default=2e-5, ge=0)
     """Shortest step that ends at a predicted mode change (step_end with radau3); 0 for none."""
 
@@ -54,8 +54,8 @@ class Compiled(EngineSettings):
 
     @property
     def look_ahead(self) -> float:
-        """Time (s) from a predicted mode change to the end of the step that aims at it: 0.2 s per
-        m/s of tolerance, within limits."""
+        """Time (s) from a predicted mode change to the end of the step: 0.2 s per m/s of tolerance,
+        within limits."""
         return min(LONGEST_LOOK_AHEAD, max(2.0 * SHORTEST_STEP, 0.2 * self.tolerance))
 
 

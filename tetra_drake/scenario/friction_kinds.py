@@ -1,6 +1,6 @@
 """Kinds of friction and their constants.
 
-The kernels of each, which need numba, are imported only where a law is asked for.
+The kernels need numba; they are imported when a law is needed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 MUJOCO_FRICTION = 0.5
-"""Coefficient of MuJoCo's friction, as of metal on a floor, in place of the thesis's law."""
+"""Coefficient of MuJoCo's friction in place of the thesis's law; typical of metal on a floor."""
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class Cone:
 
     coefficient: float
     damping: float
-    """Force per velocity below the limit, N s/m."""
+    """Force per velocity below the limit, in N s/m."""
 
 
 class FrictionKind(Section):
-    """A kind of friction."""
+    """Base class of the kinds of friction."""
 
     modes: ClassVar[str]
-    """What the signs of a contact's friction modes say, which trajectories record."""
+    """Meaning of the signs of friction modes in recorded trajectories."""
 
     def law(self) -> FrictionLaw:
         """Law as the kernels take it."""
@@ -46,17 +46,18 @@ class FrictionKind(Section):
 
     @property
     def text(self) -> str:
-        """The law in words."""
+        """Description of the law for pages."""
         raise NotImplementedError
 
     def cone(self, source: object) -> Cone:
-        """MuJoCo's friction for it; InputError, naming `source` and key, if there is none."""
+        """MuJoCo's friction for this law. Raises InputError, naming `source` and key, if there is
+        none."""
         problem = f"found !{type(self).__name__}, which mujoco cannot simulate"
         raise InputError(source, "friction", problem)
 
     @property
     def cone_text(self) -> str:
-        """MuJoCo's friction for it, in words."""
+        """Description of MuJoCo's friction for this law."""
         return self.text
 
 

@@ -81,7 +81,7 @@ def _table_of_metrics() -> str:
 
 
 def _rows(key: str, section: type[Section]) -> Iterator[Row]:
-    """All that a section holds, and the sections in it."""
+    """All keys of a section and of its inner sections."""
     texts = _docstrings(section)
     for name, field in keys_of(section).items():
         inner = joined(key, name)
@@ -97,13 +97,13 @@ def _rows(key: str, section: type[Section]) -> Iterator[Row]:
 
 
 def _sections(field: FieldInfo) -> list[type[Section]]:
-    """The sections that a field, or each item of its mapping, may be."""
+    """Sections that are possible values of a field, or of an item of its mapping."""
     kinds = (field.annotation, *typing.get_args(field.annotation))
     return [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Section)]
 
 
 def _value(kind: Any, marks: Sequence[Any] = ()) -> str:
-    """What a value of a type may be, with its unit and limits."""
+    """Possible values of a type, with unit and limits."""
     if hasattr(kind, "__metadata__"):
         of_fields = (getattr(mark, "metadata", [mark]) for mark in kind.__metadata__)
         return _value(kind.__origin__, [*itertools.chain(*of_fields), *marks])
@@ -141,7 +141,7 @@ def _limits(marks: Sequence[Any], unit: str) -> Iterator[str]:
 
 
 def _default(field: FieldInfo) -> str:
-    """The default as a file has it; empty if there is none."""
+    """The default as text of a file; empty if there is none."""
     if field.is_required():
         return ""
     value, unit = field.default, unit_of(field)

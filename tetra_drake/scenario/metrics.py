@@ -1,4 +1,4 @@
-"""The metrics of a simulation: each with its unit, what it says, and how it is computed."""
+"""Metrics of a simulation: each with its unit, a note, and its computation."""
 
 from __future__ import annotations
 
@@ -24,50 +24,50 @@ STRAIGHT = 0.01
 by a fifth of a millimetre."""
 
 LEAST_WAY = 1e-3
-"""m: a robot that goes less far counts as gone so far in its cost of transport."""
-
+"""Least way (m) of a robot in the computation of its cost of transport."""
 ROW, LIMITS = "row of tetrahedra", "limited actuators"
-"""What only some robots have, and some metrics need."""
+"""Properties of robots that some metrics need."""
 
 
 @dataclass(frozen=True)
 class Walk:
-    """The numbers of a walk from which metrics are computed, in SI units.
+    """Numbers of a simulation for the computation of metrics, in SI units.
 
-    A row of three positions in World is of 0, of `simulation.steady_from` and of the end. What a
-    robot lacks is NaN.
+    Positions (3, 3) are in the world frame, with a row for each time: 0, `simulation.steady_from`
+    and the end. Positions of points that a robot lacks are NaN.
     """
 
     followed: np.ndarray
-    """(3, 3): T1's bottom left node, or the centre of mass of a robot that is no row."""
+    """Positions (3, 3) of T1's bottom left node. For robots other than rows of tetrahedra, of the
+    centre of mass."""
     centre: np.ndarray
-    """(3, 3): the centre of mass."""
+    """Positions (3, 3) of the centre of mass."""
     right_foot: np.ndarray
-    """(3, 3): T1's bottom right node."""
+    """Positions (3, 3) of T1's bottom right node."""
     tip: np.ndarray
-    """(3, 3): the foremost node."""
+    """Positions (3, 3) of the foremost node."""
     path: np.ndarray
-    """(k, 2): the centre of mass in the plane from `simulation.steady_from` on."""
+    """Path (k, 2) of the centre of mass in the plane from `simulation.steady_from` on."""
     heading: np.ndarray
-    """(k,): the robot's direction in the whole walk; see robot.path."""
+    """Heading (k,) of the robot during the whole simulation; see robot.path."""
     signals: np.ndarray
-    """(k, m): at evenly spaced times from `simulation.steady_from` on."""
+    """Signals (k, m) at evenly spaced times from `simulation.steady_from` on."""
     since_steady_from: float
     """Time from `simulation.steady_from` to the end."""
     weight: float
     actuators: int
-    """The number of driven cables."""
+    """Number of driven cables."""
     tally: Tally
-    """The tally of the whole walk, as plain arrays."""
+    """Tally of the whole simulation, as plain arrays."""
 
     @property
     def followed_way(self) -> np.ndarray:
-        """(3,): the way of what is followed."""
+        """Displacement (3,) of the followed point from 0 to the end."""
         return np.asarray(self.followed[2] - self.followed[0])
 
     @property
     def steady_centre_way(self) -> np.ndarray:
-        """(3,): the way of the centre from `simulation.steady_from` on."""
+        """Displacement (3,) of the centre from `simulation.steady_from` to the end."""
         return np.asarray(self.centre[2] - self.centre[1])
 
     @property
@@ -83,31 +83,32 @@ class Walk:
 
     @property
     def lifted_shares(self) -> tuple[float, ...]:
-        """The share of the steady stretch in which each body is off the ground."""
+        """Share of the steady stretch during which each body is off the ground."""
         return tuple((self.per_steady_time * self.tally.lifted.time).tolist())
 
 
 @dataclass(frozen=True)
 class Metric:
-    """The declaration of a metric."""
+    """Declaration of a metric: its unit, its computation, and its use."""
 
     unit: str
-    """In SI; "" for none."""
+    """SI unit; "" for none."""
     note: str
-    """What it says, for tables."""
+    """Short explanation for tables."""
     compute: Callable[[Walk], float]
     least: bool = False
-    """True if of several simulations the least value is recorded, in place of the mean."""
+    """True if the least value of several simulations is recorded, not their mean."""
     most: bool = False
-    """True if the greatest value is recorded; a requirement is an upper limit then."""
+    """True if the greatest value of several simulations is recorded. A requirement is then an upper
+    limit."""
     is_share: bool = False
-    """True for a share of time, which is shown in percent."""
+    """True for a share of time. It is shown in percent."""
     needs: str = ""
-    """What a robot must have, ROW or LIMITS, for this metric; "" if every robot has it."""
+    """Property (ROW or LIMITS) that a robot must have for this metric; "" for no condition."""
 
 
 def _metric(unit: str, note: str, compute: Callable[[Walk], float], **more: Any) -> Any:
-    """A field of Metrics."""
+    """A field of Metrics, with its declaration as metadata."""
     return field(metadata={"metric": Metric(unit, note, compute, **more)})
 
 
@@ -124,16 +125,17 @@ def _signal_rate(walk: Walk) -> float:
 
 @dataclass(frozen=True)
 class Metrics:
-    """Metrics of a simulation, each number in the SI unit of its declaration.
+    """Metrics of a simulation, in SI units.
 
-    x₁ and y₁ are those of T1's bottom left node, or of the centre of a robot that is no row. x₂ is
-    that of T1's bottom right node, x₃ that of the lead tetrahedron's tip. The steady stretch is
-    from `simulation.steady_from`, or from `cpg.start_up` where that is later, to the end. The
-    centre is that of mass. What a robot lacks is NaN.
+    T1's bottom left node is at x₁ and y₁, its bottom right node at x₂. The tip of the front
+    tetrahedron is at x₃. For robots other than rows of tetrahedra, x₁ and y₁ belong to the centre.
+    The centre is the centre of mass. The steady stretch begins at `simulation.steady_from`, or at
+    `cpg.start_up` if it is later, and lasts to the end. A metric that does not apply to a robot is
+    NaN.
     """
 
     distance: float = _metric("m", "along x", lambda walk: walk.followed_way[0])
-    """Way along x, of x₁."""
+    """Displacement of x₁ from the start to the end."""
     steady_distance: float = _metric(
         "m", "without the start", lambda walk: walk.followed[2, 0] - walk.followed[1, 0]
     )
@@ -148,16 +150,16 @@ class Metrics:
         lambda walk: abs(walk.followed[2, 0] - walk.right_foot[2, 0]),
         needs=ROW,
     )
-    """abs(x₁ - x₂) at the end."""
+    """Distance along x between the two rear feet at the end: abs(x₁ - x₂)."""
     lead: float = _metric(
         "m",
         "front tip ahead of rear foot",
         lambda walk: walk.tip[2, 0] - walk.followed[2, 0],
         needs=ROW,
     )
-    """x₃ - x₁ at the end."""
+    """Distance along x from the rear foot to the front tip at the end: x₃ - x₁."""
     lateral_drift: float = _metric("m", "sideways", lambda walk: abs(walk.followed_way[1]))
-    """Sideways way, abs(y₁)."""
+    """Sideways displacement, abs(y₁), at the end."""
     heading_change: float = _metric(
         "rad", "left positive", lambda walk: walk.heading[-1] - walk.heading[0], needs=ROW
     )
@@ -169,27 +171,27 @@ class Metrics:
     """Curvature of the centre's path from `simulation.steady_from` on; 0 if straight. Positive if
     the path bends left as seen along the motion, even if the robot walks backward."""
     actuator_work: float = _metric("J", "of all actuators", lambda walk: walk.tally.effort.work[0])
-    """Integral of max(0, -S dl/dt) in the steady stretch, for driven cables with signal S and
-    length l: the work of actuators that cannot take any back."""
+    """Work of the actuators in the steady stretch, if they cannot recover energy: the integral of
+    max(0, -S dl/dt) for driven cables with signal S and length l."""
     cost_of_transport: float = _metric("", "work / (weight x distance)", _cost_of_transport)
-    """Actuator work / (weight times the centre's way over the ground) in the steady stretch. The
-    way is 1 mm at least. Infinite without gravity."""
+    """Actuator work divided by weight and by the centre's displacement over the ground, in the
+    steady stretch. The displacement counts as at least 1 mm. Infinite without gravity."""
     signal_rate: float = _metric("N/s", "how fast signals change", _signal_rate)
-    """Root mean square of dS/dt in the steady stretch, over all oscillators' signals S: the less,
-    the smoother the drive."""
+    """Root mean square of dS/dt over all signals S in the steady stretch. Smaller is smoother."""
     lifted: float = _metric(
         "",
         "time off the ground",
         lambda walk: sum(walk.lifted_shares) / len(walk.lifted_shares),
         is_share=True,
     )
-    """Share of the steady stretch in which a body is off the ground, mean of all. Off the ground
-    is one none of whose contact nodes bears a normal force. It says little in MuJoCo."""
+    """Share of the steady stretch during which a body is off the ground, mean over the bodies. A
+    body is off the ground if no contact node of it bears a normal force. In MuJoCo this metric says
+    little."""
     clearance: float = _metric(
         "m", "smallest gap of struts' axes", lambda walk: walk.tally.clearance[0], least=True
     )
-    """Least distance, at any time, between the axes of struts of two bodies. Less than a
-    strut's diameter is overlap: nothing in the model keeps struts apart."""
+    """Least distance, at any time, between the axes of struts of two bodies. Struts overlap if it
+    is less than their diameter: the model does not prevent this."""
     tension: float = _metric(
         "N", "smallest of any cable", lambda walk: walk.tally.tension.of_all[0], least=True
     )
@@ -197,7 +199,8 @@ class Metrics:
     travelling_index: float = _metric(
         "", "0: standing wave, 1: travelling", lambda walk: travelling_index(walk.signals)
     )
-    """0 if the signals stand along the robot, 1 if they travel, in the steady stretch."""
+    """Travelling index of the signals in the steady stretch: 0 for a standing wave along the robot,
+    1 for a travelling wave."""
     peak_actuator_force: float = _metric(
         "N", "at any time", lambda walk: walk.tally.effort.peak_force[0], most=True
     )
@@ -211,8 +214,8 @@ class Metrics:
     peak_actuator_speed: float = _metric(
         "m/s", "at any time", lambda walk: walk.tally.effort.peak_speed[0], most=True
     )
-    """Greatest speed of an actuator at any time, winding or paying out: a winch its free length,
-    another one its cable."""
+    """Greatest speed of an actuator at any time, winding or paying out: the rate of the free length
+    for a winch, otherwise of the cable's length."""
     mean_actuator_speed: float = _metric(
         "m/s",
         "winding or paying out",
@@ -238,13 +241,15 @@ class Metrics:
         is_share=True,
         needs=LIMITS,
     )
-    """Share of the steady stretch in which a limit binds, mean of all winches or tension motors."""
+    """Share of the steady stretch during which a limit of an actuator binds, mean over the
+    actuators."""
     lifted_shares: tuple[float, ...] = ()
-    """The share of `lifted` of each body, from T1 on."""
+    """The share for `lifted` of each body, from T1 on."""
 
     @classmethod
     def of(cls, walk: Walk, *, lacking: Collection[str]) -> Self:
-        """The metrics of a walk; NaN where one needs what the robot is `lacking`."""
+        """Computes all metrics. A metric is NaN if it needs a property that the robot is
+        `lacking`."""
         numbers = {
             name: math.nan if metric.needs in lacking else float(metric.compute(walk))
             for name, metric in METRICS.items()
@@ -252,7 +257,7 @@ class Metrics:
         return cls(**numbers, lifted_shares=walk.lifted_shares)
 
     def __str__(self) -> str:
-        """A table of the metrics that the robot has, in SI and in the units that people read."""
+        """Table of the metrics that apply to the robot, in SI and in customary units."""
         rows = []
         for name, unit in UNITS.items():
             value = round(getattr(self, name), 9) + 0.0  # neither -0 nor rounding errors
@@ -267,7 +272,7 @@ class Metrics:
 
     @property
     def distance_in(self) -> float:
-        """The distance in inches, as the thesis gives it."""
+        """Distance in inches, as in the thesis."""
         return self.distance / INCH
 
     @property
@@ -277,7 +282,7 @@ class Metrics:
         return 1.0 / bend if bend > STRAIGHT else math.inf
 
     def to_json(self) -> dict[str, Any]:
-        """The metrics by name, as JSON holds them: None for one that is not finite."""
+        """Metrics by name for JSON. A number that is not finite is None."""
         numbers = {name: json_number(getattr(self, name)) for name in METRICS}
         return numbers | {"lifted_shares": list(self.lifted_shares)}
 
@@ -285,13 +290,13 @@ class Metrics:
 METRICS: dict[str, Metric] = {
     field.name: field.metadata["metric"] for field in dataclasses.fields(Metrics) if field.metadata
 }
-"""The declarations of all metrics that are numbers, by name."""
+"""Declaration of each metric that is a number, by name."""
 
 UNITS = {name: metric.unit for name, metric in METRICS.items()}
 
 
 def inverse(unit: str) -> str:
-    """The inverse of an SI unit, such as "s/m" of "m/s"; "" for none."""
+    """Inverse of an SI unit, such as "s/m" for "m/s"; "" for no unit."""
     above, _, below = unit.partition("/")
     if not unit or above == "1":
         return below
@@ -299,9 +304,9 @@ def inverse(unit: str) -> str:
 
 
 _WALKED = ("distance", "steady_distance", "speed")
-"""Metrics of which an objective that looks for far walks has one."""
+"""Metrics that reward long distances."""
 
 
 def looks_for_distance(objective: Mapping[str, float]) -> bool:
-    """True for an objective that rewards far walks."""
+    """True if an objective rewards long distances."""
     return any(objective.get(name, 0.0) > 0.0 for name in _WALKED)

@@ -1,8 +1,8 @@
 """Reader of the YAML structures of NTRT, the NASA Tensegrity Robotics Toolkit.
 
-NTRT has y up and masses in kg. It leaves the unit of length open, which forces (kg length/s^2) and
-densities (kg/length^3) share. What only its motors and contacts use is left out, and so are bonds
-of nodes with edges.
+In NTRT y is up and masses are in kg. The unit of length is open; forces (kg length/s^2) and
+densities (kg/length^3) depend on it. Settings of motors and contacts, and bonds of nodes with
+edges, are not read.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from tetra_drake.scenario.units import LARGEST
 from tetra_drake.scenario.yaml_text import read_mapping
 
 MOST_BYTES = 2**20
-"""Upper limit of the size of a file."""
+"""Largest size of a file in bytes."""
 
 MOST_PARTS = MOST_NODES // 2
-"""Upper limit of the substructures of a structure, nested ones included."""
+"""Largest number of substructures, including nested ones."""
 
 UNUSED = (
     "friction roll_friction restitution rotation history max_tension target_velocity "
@@ -56,7 +56,7 @@ class Rotation(Section):
     axis: Point
     """A vector of any length but 0."""
     angle: Number
-    """In degrees."""
+    """Angle in degrees."""
     reference: Point | None = None
 
     @pydantic.model_validator(mode="after")
@@ -81,7 +81,7 @@ class Parameters(Section):
     """Parameters of a builder, with NTRT's defaults."""
 
     radius: float = Field(default=0.5, gt=0)
-    """Of a rod; that of a cable's spool is not used."""
+    """Radius of a rod. For a cable, the radius of its spool, which is not used."""
     density: float = Field(default=1.0, gt=0)
     stiffness: float = Field(default=1000.0, gt=0)
     damping: float = Field(default=10.0, ge=0)
@@ -96,7 +96,7 @@ class Parameters(Section):
 
 
 class Builder(Section):
-    """Class and parameters of the pairs that have a tag."""
+    """Class and parameters for the pairs with a tag."""
 
     made_as: Literal[
         "tgRodInfo",
@@ -112,7 +112,7 @@ DEFAULTS = {
     "rod": Builder.model_validate({"class": "tgRodInfo"}),
     "string": Builder.model_validate({"class": "tgBasicActuatorInfo"}),
 }
-"""Builders of the pairs that have one of these tags and no builder of their file."""
+"""Builders by tag, for pairs without a builder in their file."""
 
 
 class NtrtFile(Section):
@@ -120,12 +120,12 @@ class NtrtFile(Section):
 
     nodes: dict[str, Point] = Field(default={})
     pair_groups: dict[str, list[Pair]] = Field(default={})
-    """Pairs of nodes by their tags, which blanks separate."""
+    """Pairs of nodes by their tags, separated by blanks."""
     builders: dict[str, Builder] = Field(default={})
-    """By the tags that a pair must have."""
+    """Builders by the tags that a pair must have."""
     substructures: dict[str, Substructure] = Field(default={})
     bond_groups: dict[str, dict[str, list[Pair]]] = Field(default={})
-    """By tags and by bonds, in either order."""
+    """Pairs of nodes by tags and by bonds, in either order."""
 
 
 @dataclass
@@ -133,18 +133,19 @@ class Assembly:
     """A file together with its substructures, in NTRT's axes and unit of length."""
 
     nodes: dict[str, np.ndarray] = field(default_factory=dict)
-    """By their paths, such as "SUBSTRUCTURE.NODE"."""
+    """Nodes by path, such as "SUBSTRUCTURE.NODE"."""
     pairs: dict[str, list[Pair]] = field(default_factory=dict)
-    """By their tags, which blanks separate."""
+    """Pairs by their tags, separated by blanks."""
     builders: dict[str, Builder] = field(default_factory=dict)
     parts: int = 0
-    """The number of files that have been added, one for each substructure."""
+    """Number of added files, one for each substructure."""
     pair_count: int = 0
     _read: dict[Path, NtrtFile] = field(default_factory=dict)
-    """Content of the files, as many substructures may share one."""
+    """Content of the files that were read. Several substructures may share a file."""
 
     def add_file(self, file: Path, *, prefix: str = "", above: tuple[Path, ...] = ()) -> None:
-        """Adds a file that the files `above` contain, with a prefix to the names of its nodes."""
+        """Adds a file. `above` are the files that contain it. The names of its nodes get a
+        prefix."""
         given = self._content(file)
         if file.resolve() in above:
             raise InputError(file, "substructures", "the structure contains itself")
@@ -183,8 +184,8 @@ class Assembly:
         return self._read[file]
 
     def _place(self, start: str, entries: list[tuple[int, Substructure]], file: Path) -> None:
-        """Turns the nodes that begin with `start`, then scales them about their centre, then moves
-        them."""
+        """Turns, then scales, then moves the nodes with names that begin with `start`. They are
+        scaled about their centre."""
         names = [name for name in self.nodes if name.startswith(start)]
         if not names:
             return
@@ -203,8 +204,8 @@ class Assembly:
     def _add_pairs(
         self, tags: str, pairs: list[Pair], starts: tuple[str, str], file: Path, key: str
     ) -> None:
-        """Adds pairs whose first and second nodes begin with `starts`. A path means the node with
-        that ending which is the least nested, then the first."""
+        """Adds pairs. `starts` are the beginnings of the names of first and second nodes. A path
+        means a node whose name ends with it: the least nested one, then the first."""
         for place, pair in enumerate(pairs):
             self.pair_count += 1
             _check_size(self.pair_count, MOST_PAIRS, file, f"{key}[{place}]")
@@ -220,14 +221,14 @@ class Assembly:
 
 
 def _check_size(count: int, most: int, file: Path, key: str) -> None:
-    """Refuses a whole that has grown too large, before it grows further."""
+    """Refuses a structure that has become too large."""
     if count > most:
         problem = f"found more than {most} in the whole structure, expected at most as many"
         raise InputError(file, key, problem)
 
 
 def _bonded_parts(bond: str, parts: list[str], file: Path, key: str) -> Iterable[tuple[str, str]]:
-    """Neighbours in a row of substructures, as in the bond "a/b/c/node_node"."""
+    """Neighbours in a row of substructures, for a bond such as "a/b/c/node_node"."""
     *names, kind = bond.split("/")
     if kind != "node_node" or len(names) < 2 or not set(names) <= set(parts):
         expected = f"expected 'A/B/node_node' with A and B of {', '.join(parts)}"
@@ -285,7 +286,7 @@ def _without_dots(name: str) -> str:
 
 
 def _builder_of(tags: str, builders: dict[str, Builder], file: Path) -> Builder:
-    """The builder all of whose tags a pair has, or else NTRT's default."""
+    """The builder for a pair with these tags: from the file, or NTRT's default."""
     for choice in (builders, DEFAULTS):
         fitting = [name for name in choice if set(name.split()) <= set(tags.split())]
         if len(fitting) > 1:

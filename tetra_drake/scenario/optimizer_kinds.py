@@ -79,7 +79,7 @@ class QualityDiversity(Section):
     cells: list[Count] = Field(default=[20, 20], min_length=2, max_length=2)
     """Number of cells along each metric."""
     draws: int = Field(default=10, ge=0, le=10_000)
-    """Draws of disturbances in which each gait of the map is simulated in the end."""
+    """Draws of disturbances. Each gait of the map is simulated in all of them at the end."""
 
     @model_validator(mode="after")
     def _check(self) -> "QualityDiversity":

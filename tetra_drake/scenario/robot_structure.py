@@ -1,7 +1,7 @@
-"""Kinds of robots: the row of tetrahedra, and structures, which are any tensegrity as data.
+"""Kinds of robots: the row of tetrahedra, and structures: any tensegrity, as data.
 
-Struts of a structure that share a node are one rigid body; cables join bodies. Coordinates are in
-World (x forward, y left, z up) and need only be near a static equilibrium.
+Struts of a structure that share a node are one rigid body. Cables join bodies. Coordinates are in
+the world frame (x forward, y left, z up), near a static equilibrium.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ LEAST_DISTANCE = 1e-3
 
 
 def _check_name(name: object) -> object:
-    """A name of a node, group or oscillator: blanks separate the names of a cable, dots those of a
-    key, and commas keys."""
+    """Checks the name of a node, group or oscillator. Blanks, dots and commas are refused: they
+    separate the parts of cable names, the parts of keys, and keys."""
     if not isinstance(name, str):
         refuse("", f"found the name {name}, expected a text, such as n{name}")
     if re.search(r"[\s.,]", name):
@@ -68,7 +68,8 @@ class StrutGroup(Section):
     density: Density = Field(gt=0)
     """Density of struts and spheres."""
     node_diameter: Length = Field(ge=0)
-    """Diameter of the spheres; 0 for none. A node has one, that of its first strut in the file."""
+    """Diameter of the spheres; 0 for none. A node has one sphere, from its first strut in the
+    file."""
 
 
 class CableGroup(CableConstants):
@@ -95,7 +96,7 @@ class CableGroup(CableConstants):
         return self.constants(stiffness=self.stiffness, free_length=free_length)
 
     def free_length_at(self, length: float) -> float:
-        """Free length in m of a cable whose nodes are given `length` apart."""
+        """Free length (m) of a cable. `length` (m) is the distance of its nodes in the file."""
         if self.free_length is not None:
             return self.free_length
         return length - (self.tension or 0.0) / self.stiffness
@@ -105,13 +106,13 @@ class Member(NamedTuple):
     """A strut or a cable."""
 
     key: str
-    """Its place in the structure file, such as "cables.side.pairs[0]"."""
+    """Key in the structure file, such as "cables.side.pairs[0]"."""
     group: str
     nodes: tuple[str, str]
 
     @property
     def name(self) -> str:
-        """Group and nodes, such as "side a1 b1"."""
+        """Name: group and nodes, such as "side a1 b1"."""
         return " ".join((self.group, *self.nodes))
 
 
@@ -123,7 +124,7 @@ class StructureFile(Section):
 
     tag: ClassVar[str] = "Structure"
     lacking: ClassVar[tuple[str, ...]] = (ROW,)
-    """What some metrics need and the robot is not."""
+    """Properties that some metrics need and this robot does not have."""
     slack: ClassVar[bool] = True
     """Cables never push."""
 
@@ -143,26 +144,26 @@ class StructureFile(Section):
     """Displacement [x, y, z] of each body at t = 0; none if empty."""
 
     def __copy__(self) -> Self:
-        # Without the cached properties, as a copy may get other values.
+        # The copy has no cached properties, because it may get other values.
         fields = {name: getattr(self, name) for name in type(self).model_fields}
         return self.model_construct(**fields)
 
     @property
     def body_count(self) -> int:
-        """The number of rigid bodies."""
+        """Number of rigid bodies."""
         return len(self.bodies)
 
     @property
     def size(self) -> float:
-        """Length in m of the shortest strut, of which `disturbances.start` is a share."""
+        """Length (m) of the shortest strut; the unit of `disturbances.start`."""
         return min(map(self._length, self.all_struts))
 
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
-        """What changes, too, where `changes` made this robot of a base: nothing."""
+        """Further changes that follow from `changes` to a base: none."""
         return {}
 
     def blueprint(self) -> Blueprint:
-        """The robot with its nodes where the file has them."""
+        """The robot with its nodes at the positions of the file."""
         number = {node: place for place, node in enumerate(self.body_of_node)}
         struts = sorted(self.all_struts, key=lambda strut: self.body_of_node[strut.nodes[0]])
         groups = [self.struts[strut.group] for strut in struts]
@@ -202,22 +203,23 @@ class StructureFile(Section):
 
     @cached_property
     def all_struts(self) -> tuple[Member, ...]:
-        """The struts, in the order of the file."""
+        """All struts, in the order of the file."""
         return tuple(_members("struts", self.struts))
 
     @cached_property
     def all_cables(self) -> tuple[Member, ...]:
-        """The cables, pair by pair of bodies: as they are numbered, simulated and recorded."""
+        """All cables, in the order of the pairs of bodies. This order numbers them everywhere."""
         return tuple(sorted(_members("cables", self.cables), key=self._bodies_joined))
 
     @cached_property
     def bodies(self) -> tuple[tuple[str, ...], ...]:
-        """The nodes of each rigid body, bodies and nodes in the order of the struts."""
+        """Nodes of each rigid body. Bodies and nodes are in the order of the struts."""
         return _components(self.all_struts)
 
     @cached_property
     def body_names(self) -> tuple[str, ...]:
-        """The group of struts whose nodes are those of the body, or else its nodes."""
+        """Names of the bodies: the group of struts with the same nodes, or the nodes of the
+        body."""
         groups: dict[frozenset[str], str] = {}
         for name, group in self.struts.items():
             groups[frozenset(node for pair in group.pairs for node in pair)] = name
@@ -225,18 +227,18 @@ class StructureFile(Section):
 
     @cached_property
     def body_of_node(self) -> dict[str, int]:
-        """The number of the body that a node belongs to."""
+        """Index of the body of each node."""
         return {node: body for body, nodes in enumerate(self.bodies) for node in nodes}
 
     @cached_property
     def sphere_of_node(self) -> dict[str, StrutGroup]:
-        """The group whose sphere a node has: that of the first strut at the node."""
+        """Group of struts that gives each node its sphere: the group of the node's first strut."""
         last_first = reversed(self.all_struts)
         return {node: self.struts[strut.group] for strut in last_first for node in strut.nodes}
 
     @cached_property
     def free_lengths(self) -> tuple[float, ...]:
-        """Free lengths of the cables in m; from the tension where the file gives that."""
+        """Free lengths of the cables in m. If the file has a tension, they are computed from it."""
         return tuple(
             self.cables[cable.group].free_length_at(self._length(cable))
             for cable in self.all_cables
@@ -244,7 +246,7 @@ class StructureFile(Section):
 
     @cached_property
     def cables_of_oscillator(self) -> dict[str, tuple[int, ...]]:
-        """The numbers of the cables that each oscillator drives."""
+        """Indices of the cables that each oscillator drives."""
         numbers = {}
         for number, cable in enumerate(self.all_cables):
             backward = cable._replace(nodes=cable.nodes[::-1])
@@ -261,12 +263,12 @@ class StructureFile(Section):
 
     @property
     def contact_nodes(self) -> tuple[str, ...]:
-        """The nodes that the ground can touch, in the order of `nodes`."""
+        """Names of the nodes that the ground can touch, in the order of `nodes`."""
         touching = self.nodes if self.contacts == "all" else self.contacts
         return tuple(node for node in self.nodes if node in touching)
 
     def _bodies_joined(self, cable: Member) -> tuple[int, int]:
-        """The numbers of the bodies that a cable joins, the lower one first."""
+        """Indices of the two bodies that a cable joins, the lower one first."""
         first, second = (self.body_of_node[node] for node in cable.nodes)
         return min(first, second), max(first, second)
 
@@ -277,7 +279,7 @@ class StructureFile(Section):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _apply_unit(cls, tree: Any) -> Any:
-        """The tree without its key `unit`, with that unit at all coordinates that have none."""
+        """Applies the key `unit` of a tree to all coordinates without a unit, and removes it."""
         if not isinstance(tree, dict) or "unit" not in tree:
             return tree
         unit = tree["unit"]
@@ -287,7 +289,8 @@ class StructureFile(Section):
             refuse("unit", f"found {described(unit)}, expected a unit of length, such as mm")
 
         def with_unit(place: Any) -> Any:
-            """The coordinates of a node; lists in them, which may be vast, stay as they are."""
+            """The coordinates of a node with unit. Wrong values, such as lists, stay as they
+            are."""
             if not isinstance(place, list):
                 return place
             return [f"{x!r} {unit}" if type(x) in (int, float) else x for x in place]
@@ -398,7 +401,7 @@ def _members(key: str, groups: Mapping[str, StrutGroup | CableGroup]) -> Iterato
 
 
 def _components(members: Iterable[Member]) -> tuple[tuple[str, ...], ...]:
-    """The nodes that members connect, in the order of the members."""
+    """Groups of nodes connected by members, in the order of the members."""
     first_node: dict[str, str] = {}
     for member in members:
         start, joined = (first_node.setdefault(node, node) for node in member.nodes)

@@ -1,4 +1,4 @@
-"""The row of nested tetrahedra of the thesis (section 2.1): its settings, nodes and cables."""
+"""Row of nested tetrahedra of the thesis (section 2.1): settings, nodes and cables."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from tetra_drake.scenario.refusals import refuse
 from tetra_drake.scenario.section import Section, Tree, Varied
 
 NODES = ("bottom_left", "bottom_right", "top", "tip")
-"""The nodes of a tetrahedron; the first three form the base triangle."""
+"""Names of the nodes of a tetrahedron. The first three form the base triangle."""
 
 BOTTOM_LEFT, BOTTOM_RIGHT, TOP, TIP = range(4)
 
 STRUTS = tuple((i, j) for i in range(4) for j in range(i + 1, 4))
-"""The nodes that the struts of a tetrahedron join."""
+"""Indices of the two nodes of each strut of a tetrahedron."""
 
 Cable = Literal[
     "outer bottom_left",
@@ -39,15 +39,15 @@ Cable = Literal[
     "inner bottom_right",
     "inner top",
 ]
-"""A cable of a junction, from one tetrahedron to the next: outer ones join base nodes of the same
-name, inner ones join the tip to base nodes."""
+"""Names of the cables of a junction, from one tetrahedron to the next. Outer cables join base nodes
+with the same name. Inner cables join the tip to base nodes."""
 
 CABLES: tuple[str, ...] = get_args(Cable)
 
 
 def tetrahedron_nodes(strut_length: float) -> np.ndarray:
-    """p_BN (4, 3) in m: the base triangle is vertical, the tip points forward, and the origin is
-    the centre of mass."""
+    """Positions p_BN (4, 3) of a tetrahedron's nodes, in m. The base triangle is vertical, the tip
+    points forward, and the origin is the centre of mass."""
     circumradius = strut_length / math.sqrt(3.0)
     height = strut_length * math.sqrt(2.0 / 3.0)
     x, z = -height / 4, -circumradius / 2
@@ -56,32 +56,32 @@ def tetrahedron_nodes(strut_length: float) -> np.ndarray:
 
 
 def cable_nodes(junction: int, cable: str) -> tuple[int, int]:
-    """The indices of the nodes that a cable of a junction joins; 4 nodes per tetrahedron."""
+    """Indices of the two nodes of a junction's cable. Each tetrahedron has 4 nodes."""
     role, name = cable.split()
-    place = NODES.index(name)
-    rear = place if role == "outer" else TIP
-    return 4 * junction + rear, 4 * (junction + 1) + place
+    front = NODES.index(name)
+    rear = front if role == "outer" else TIP
+    return 4 * junction + rear, 4 * (junction + 1) + front
 
 
 def check_one_per_body(key: str, items: Sequence[object], bodies: int) -> None:
-    """Refuses items that are neither none nor one for each body."""
+    """Refuses a list that is not empty and does not have one item per body."""
     if len(items) not in (0, bodies):
         refuse(key, f"found {len(items)} items, expected none or {bodies}, one for each body")
 
 
 LONGEST, SHORTEST = 1e4, 1e-6
-"""Limits of the length of a strut, in m; nodes are no farther from the origin."""
+"""Limits for the length of a strut, in m. The first is also the largest coordinate of a node."""
 
 THINNEST = 1e-5
-"""Least diameter of a strut, as a share of its length: the moment about its axis must not vanish
-beside the others."""
+"""Least diameter of a strut, as a share of its length. In thinner struts the moment of inertia
+about the axis would be too small beside the others."""
 
 LIGHTEST = 1e-12
 """Least mass of a strut, in kg."""
 
 
 def check_strut(key: str, *, length: float, diameter: float, density: float) -> None:
-    """Refuses a strut of a size (SI units) that forces and motions cannot be computed with."""
+    """Refuses a strut with a size (SI units) that is too extreme for the computation of forces."""
     if not SHORTEST <= length <= LONGEST:
         refuse(key, f"is {length:.3g} m long, expected {SHORTEST:g} m to {LONGEST:g} m")
     if diameter < THINNEST * length:
@@ -93,13 +93,13 @@ def check_strut(key: str, *, length: float, diameter: float, density: float) -> 
 
 
 class CableConstants(Section):
-    """Constants of the cable law that any robot's cables have."""
+    """Constants of the cable law that are common to all kinds of robots."""
 
     damping: Damping = Field(ge=0)
     """Tension per rate of the length."""
 
     def constants(self, **others: float) -> dict[str, float]:
-        """These constants and others, by the names of physics.cable.CableLaw."""
+        """These constants and others by name; see physics.cable.CableLaw."""
         return {name: getattr(self, name) for name in CableConstants.model_fields} | others
 
 
@@ -116,7 +116,7 @@ class RowCables(CableConstants):
     """True if a cable that would push has no tension."""
 
     def law(self, cable: str) -> dict[str, float]:
-        """The constants of a cable of a junction."""
+        """Constants of a cable of a junction, by name."""
         stiffness = self.outer_stiffness if cable.startswith("outer") else self.inner_stiffness
         return self.constants(stiffness=stiffness, free_length=self.free_length)
 
@@ -125,7 +125,7 @@ class Tetrahedra(Section):
     """The tetrahedra and where they stand (thesis section 2.1, appendix C.1)."""
 
     lacking: ClassVar[tuple[str, ...]] = ()
-    """What some metrics need and the robot is not."""
+    """Properties that some metrics need and this robot does not have."""
 
     tetrahedra: int = Field(ge=2, le=200)
     """Number of tetrahedra; T1 is the rearmost."""
@@ -139,9 +139,9 @@ class Tetrahedra(Section):
     """Density of struts and spheres."""
     cables: RowCables
     spacing: Annotated[Length, Varied()] = Field(ge=0)
-    """Distance of base triangles at t = 0. `balanced`, or 0, is the one at which outer and inner
-    cables balance. So is the spacing of a file that changes strut length or the cables' stiffness
-    or free length of its base and gives no spacing."""
+    """Distance between base triangles at t = 0. `balanced` (or 0) computes the spacing at which the
+    cables balance. It is also the default in a file that changes the strut length, or the cables'
+    stiffness or free length, of its base."""
     gravity: Acceleration = Field(ge=0)
     """Acceleration of gravity."""
     offsets: list[Position] = Field(default=[])
@@ -150,7 +150,7 @@ class Tetrahedra(Section):
     """Point mass at the centre of each tetrahedron, such as its motors; none if empty."""
     contacts: Literal["thesis", "all"] = "thesis"
     """Nodes that the ground can touch. `thesis`: the two bottom nodes of every tetrahedron and the
-    tip of the foremost, as no others reach flat ground. `all`: all four of every tetrahedron."""
+    tip of the foremost; no other node reaches flat ground. `all`: all four of every tetrahedron."""
     actuation: list[Annotated[list[Cable], Field(min_length=1)]] = Field(
         default=[["outer bottom_left", "outer bottom_right"]], min_length=1
     )
@@ -158,12 +158,12 @@ class Tetrahedra(Section):
 
     @property
     def body_count(self) -> int:
-        """The number of rigid bodies."""
+        """Number of rigid bodies."""
         return self.tetrahedra
 
     @property
     def body_names(self) -> tuple[str, ...]:
-        """The names of the bodies, T1 being the rearmost."""
+        """Names of the bodies; T1 is the rearmost."""
         return tuple(f"T{i + 1}" for i in range(self.tetrahedra))
 
     @property
@@ -173,13 +173,13 @@ class Tetrahedra(Section):
 
     @property
     def size(self) -> float:
-        """Length in m of which `disturbances.start` is a share."""
+        """Spacing of the tetrahedra (m); the unit of `disturbances.start`."""
         return self.spacing
 
     def blueprint(self) -> Blueprint:
         """The robot on flat ground.
 
-        Base triangles stand vertical with two nodes at height 0, those of T1 at x = 0. The tips
+        Base triangles are vertical, with two nodes at height 0. The base of T1 is at x = 0. Tips
         point forward (+x) into the next tetrahedron.
         """
         n, junctions = self.tetrahedra, self.tetrahedra - 1
@@ -223,7 +223,7 @@ class Tetrahedra(Section):
     def _oscillators(
         self, junctions: Sequence[str]
     ) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
-        """The names of the oscillators, and the cables that each drives."""
+        """Names of the oscillators, and indices of the cables that each oscillator drives."""
         names, groups = [], []
         for i, junction in enumerate(junctions):
             for group in self.actuation:
@@ -233,8 +233,8 @@ class Tetrahedra(Section):
         return tuple(names), tuple(groups)
 
     def implied_changes(self, base: Section, changes: Tree) -> Tree:
-        """What changes, too, where `changes` made this robot of a base: the spacing, unless it is
-        given or nothing has changed on which the balanced one depends."""
+        """Further changes that follow from `changes` to a base: `spacing: balanced` if strut length
+        or cables changed and no spacing was given."""
         if "spacing" in changes or not isinstance(base, Tetrahedra):
             return {}
         if _deciding_numbers(self) == _deciding_numbers(base):
@@ -271,11 +271,12 @@ class Tetrahedra(Section):
 
 
 def balanced_spacing(strut_length: float, cables: RowCables) -> float:
-    """The spacing (m) at which the cables of a junction balance along x.
+    """Spacing s (m) at which the cables of a junction balance along x.
 
-    Three outer cables of length s pull two tetrahedra together. Three inner ones, from a tip at
-    height h to base nodes at s along and R across, push them apart while s < h. The weight does not
-    count: twice the density moves T1 by less than 0.003 in. Refused if there is no such spacing.
+    Three outer cables of length s pull two tetrahedra together. Three inner cables, from a tip at
+    distance h to base nodes at distance s and radius R, push them apart if s < h. The weight is
+    neglected: twice the density moves T1 by less than 0.003 in. Refuses cables that balance at no
+    spacing.
     """
     height = strut_length * math.sqrt(2.0 / 3.0)
     radius = strut_length / math.sqrt(3.0)
@@ -288,7 +289,7 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
     near, far = 0.0, height + cables.free_length
     if pull(near) >= 0.0:
         refuse("", "the cables balance at no spacing; give one")
-    for _ in range(100):  # more than double precision has halvings
+    for _ in range(100):  # enough halvings for double precision
         middle = 0.5 * (near + far)
         if pull(middle) > 0.0:
             far = middle
@@ -298,7 +299,7 @@ def balanced_spacing(strut_length: float, cables: RowCables) -> float:
 
 
 def _deciding_numbers(robot: Tetrahedra) -> tuple[float, ...]:
-    """The numbers on which the balanced spacing depends."""
+    """Numbers that determine the balanced spacing."""
     cables = robot.cables
     stiffness = cables.outer_stiffness, cables.inner_stiffness
     return (*stiffness, cables.free_length, robot.strut_length)

@@ -1,4 +1,4 @@
-"""The kinds of ground that is not flat, and the grid of heights that each of them is simulated as.
+"""Kinds of terrain, and the grid of heights of each kind.
 
 The ground is the surface z = h(x, y) in the world: x forward, y left, z up. The robot starts around
 the origin, T1's base at x = 0, and walks along +x. physics.terrain says how heights make a surface.
@@ -20,7 +20,7 @@ from tetra_drake.scenario.section import Kinds, Section
 from tetra_drake.scenario.units import INCH
 
 BEHIND, AHEAD, ASIDE = 24.0 * INCH, 120.0 * INCH, 30.0 * INCH
-"""Reach of generated grids, m from the origin at least."""
+"""Least reach of generated grids from the origin: backward, forward, sideways; in m."""
 MOST_CELLS = 4_000_000
 STEEPEST = math.radians(60.0)
 
@@ -30,29 +30,29 @@ class Grid:
     """Heights on a regular grid: the control points of the surface."""
 
     heights: np.ndarray
-    """(rows, columns), m: rows along x, columns along y."""
+    """Heights (rows, columns) in m. Rows are along x, columns along y."""
     corner: tuple[float, float]
-    """x and y of heights[0, 0], m."""
+    """Coordinates x and y of heights[0, 0], in m."""
     cell: tuple[float, float]
-    """Along x and y, m."""
+    """Distances between heights along x and y, in m."""
 
 
 class Relief(Section):
-    """A kind of terrain."""
+    """Base class of the kinds of terrain."""
 
     is_flat: ClassVar[bool] = False
-    """True if h = 0 everywhere, which the kernels compute faster."""
+    """True if h = 0 everywhere. The kernels are faster then."""
     uneven: ClassVar[str] = "on uneven ground"
-    """Where a robot walks on ground that is no plane."""
+    """Words for where a robot walks on this kind of uneven ground."""
 
     @property
     def plane_slope(self) -> float | None:
-        """Slope (rad) along +x of a plane through the origin; None for what is no such plane."""
+        """Slope (rad) along +x, if the terrain is a plane through the origin; otherwise None."""
         return None
 
     @property
     def where(self) -> str:
-        """Where a robot walks, such as "up 5 degrees"; empty on level ground."""
+        """Words for where a robot walks, such as "up 5 degrees"; empty on level ground."""
         slope = self.plane_slope
         if slope is None:
             return self.uneven
@@ -62,16 +62,16 @@ class Relief(Section):
 
     @property
     def text(self) -> str:
-        """The terrain in words, as "incline (slope 5 deg)"."""
+        """Description of the terrain, such as "incline (slope 5 deg)"."""
         return type(self).__name__.lower() + settings_text(self)
 
     @property
     def paths(self) -> dict[str, str]:
-        """The paths of files that the settings stand for, by their keys."""
+        """Paths of the files that settings name, by key."""
         return {}
 
     def save(self, folder: Path) -> None:
-        """Writes those files into a folder, under the names that the settings have in a record."""
+        """Writes the terrain's files to a folder, with their names in a record."""
 
     def grid(self, *, ahead: float, source: object) -> Grid:
         """The heights of the terrain.
@@ -193,7 +193,7 @@ class Obstacles(Relief):
         _check_size((spacing, spacing), source, "spacing")
         x, y = _axes((cell, cell), 0.0)
         start = ahead if self.start is None else self.start
-        first = max(-BEHIND, start + self.radius + 1.5 * cell)  # a bump and its control points
+        first = max(-BEHIND, start + self.radius + 1.5 * cell)  # a bump and its controls
         squares = np.arange(first, AHEAD, spacing), np.arange(-ASIDE, ASIDE, spacing)
         corners = np.stack(np.meshgrid(*squares, indexing="ij"), axis=-1).reshape(-1, 2)
         generator = np.random.default_rng(self.seed)
@@ -240,14 +240,15 @@ Terrain = Annotated[Flat | Incline | Steps | Rough | Obstacles | HeightField, Ki
 
 
 def _check_size(cell: tuple[float, float], source: object, key: str) -> None:
-    """Raises InputError that names `key` if cells that small make too many of them."""
+    """Raises InputError that names `key` if cells of this size are too many."""
     if MOST_CELLS * cell[0] * cell[1] < (BEHIND + AHEAD) * 2.0 * ASIDE:
         problem = f"is too small: cells of {min(cell):.3g} m would be more than {MOST_CELLS}"
         raise InputError(source, f"terrain.{key}", problem)
 
 
 def _axes(cell: tuple[float, float], origin: float) -> tuple[np.ndarray, np.ndarray]:
-    """x, one of them at `origin`, and y of a grid that covers all with a cell to spare."""
+    """Coordinates x and y of a grid that covers the generated area, with a spare cell at each side.
+    One x is `origin`."""
     first, last = math.floor((-BEHIND - origin) / cell[0]), math.ceil((AHEAD - origin) / cell[0])
     aside = math.ceil(ASIDE / cell[1]) + 1
     return (
@@ -257,7 +258,7 @@ def _axes(cell: tuple[float, float], origin: float) -> tuple[np.ndarray, np.ndar
 
 
 def _grid(x: np.ndarray, y: np.ndarray, heights: np.ndarray, cell: tuple[float, float]) -> Grid:
-    """The grid of heights on two axes, or on x alone."""
+    """Grid of heights (rows, columns), or of heights (rows,) that do not depend on y."""
     if heights.ndim == 1:
         heights = np.repeat(heights[:, None], len(y), axis=1)
     return Grid(heights, (float(x[0]), float(y[0])), cell)

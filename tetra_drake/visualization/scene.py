@@ -60,7 +60,7 @@ FIELD_OF_VIEW, ASPECT = 30.0, 1.7
 """Vertical field of view of the camera in degrees, and assumed width / height of the window."""
 
 VIEW = -0.45, 1.0, -0.45
-"""Direction in which the camera looks: from the robot's right and front, down on it."""
+"""View direction of the camera: from the robot's right and front, down on it."""
 
 AMBIENT, SUN = 1.6, 3.2
 """Intensities of the ambient light and of the light that casts shadows."""
