@@ -105,7 +105,7 @@ def test_shipped_structures(name, first, bodies, cables, oscillators) -> None:
         ("cables: {long: {tension: 12.3 N}}", "cables.long.tension", ["12.3 N", "12.21 N"]),
         ("cables: {long: {free_length: 1 m}}", "cables.long.free_length", ["both"]),
         ("cables: {side: {free_length: null}}", "cables.side.free_length", ["neither"]),
-        ("cables: {a b: {}}", "cables.a b", ["blanks"]),
+        ("cables: {a b: {pairs: []}}", "cables.a b", ["blanks"]),
         ("nodes: {h: [1, 1, 1]}", "nodes.h", ["no strut"]),
         ("nodes: {f: [2, 2, 15]}", "cables.long.pairs[0]", ["length 0"]),
         ("nodes: {d: [9, 2, 5]}", "nodes.f", ["'d'", "0.0001 m"]),

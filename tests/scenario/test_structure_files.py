@@ -176,6 +176,15 @@ def test_a_fault_of_a_structure_file_names_that(folder, old, new, key, fact, ref
         load(folder, "!Structure {file: bar.yaml, cables: {side: {stiffness: 1 N/m}}}")
 
 
+@pytest.mark.parametrize(
+    ("key", "similar"), [("cables.botom", "'bottom'"), ("struts.bars", "'bar'")]
+)
+def test_a_change_of_a_group_of_another_name_tells_a_similar_one(key, similar, refused) -> None:
+    prism = load_scenario("prism")
+    with refused("scenario prism", f"robot.{key}", similar):
+        prism.with_changes({f"robot.{key}.damping": "1 N*s/m"})
+
+
 @pytest.mark.parametrize("name", ["prims", "nul\0", "a" * 300])
 def test_a_structure_that_is_not_there_is_one_line(tmp_path: Path, name: str, refused) -> None:
     with refused(name, "", "'prism'" if name == "prims" else "no such"):

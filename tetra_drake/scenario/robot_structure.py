@@ -300,6 +300,20 @@ class StructureFile(Section):
             tree["nodes"] = {name: with_unit(place) for name, place in tree["nodes"].items()}
         return tree
 
+    @pydantic.model_validator(mode="before")
+    @classmethod
+    def _check_groups(cls, tree: Any) -> Any:
+        """Refuses a group without pairs: most often a change of a group of another name."""
+        for kind in ("struts", "cables") if isinstance(tree, dict) else ():
+            given = tree.get(kind)
+            groups = given.items() if isinstance(given, dict) else ()
+            mappings = [(str(name), group) for name, group in groups if isinstance(group, dict)]
+            whole = [name for name, group in mappings if "pairs" in group]
+            for name, group in mappings:
+                if "pairs" not in group:
+                    refuse(f"{kind}.{name}", f"found a group without pairs; {hint(name, whole)}")
+        return tree
+
     @pydantic.model_validator(mode="after")
     def _check(self) -> StructureFile:
         self._check_pairs()
