@@ -1,6 +1,9 @@
-"""The scripts in diagrams/ as they are run."""
+"""The scripts in diagrams/ as they are run, and the tutorials, each with its picture beside it."""
 
+import re
+import runpy
 import shutil
+from pathlib import Path
 
 import entrainment
 import pytest
@@ -9,6 +12,9 @@ import settling_node
 import single_oscillator
 import sliding_tetrahedron
 import tetrahedron_on_incline
+from PIL import Image
+
+from tetra_drake.engines.compiled import lane_pool
 
 
 @pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz is not installed")
@@ -28,3 +34,31 @@ def test_a_script_writes_its_pictures(script, options, files, tmp_path):
     written = {path.name for path in tmp_path.iterdir() if path.stat().st_size > 1000}
     assert len(written) == files
     assert written - {"robot.html"} <= {path.name for path in robot.DIAGRAMS.glob("*.svg")}
+
+
+CHECKOUT = Path(__file__).parents[2]
+TUTORIALS = CHECKOUT / "diagrams" / "tutorials"
+NAMES = sorted(file.stem for file in TUTORIALS.glob("*.py"))
+LONGEST = 40  # lines
+
+
+def test_there_are_ten_each_short_and_with_its_picture():
+    assert [int(name[:2]) for name in NAMES] == list(range(1, 11))
+    for name in NAMES:
+        assert len((TUTORIALS / f"{name}.py").read_text("utf-8").splitlines()) <= LONGEST, name
+        assert (TUTORIALS / f"{name}.png").is_file()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_tutorial_runs_and_draws_its_picture(name, tmp_path, monkeypatch):
+    folder = tmp_path / "diagrams" / "tutorials"
+    shutil.copytree(TUTORIALS, folder, ignore=shutil.ignore_patterns("*.png"))
+    (tmp_path / "runs").symlink_to(CHECKOUT / "runs")
+    monkeypatch.chdir(tmp_path)
+    # As it stands, but for the numbers of gaits; so few need no kernel for several lanes.
+    monkeypatch.setattr(lane_pool, "lanes_for", lambda walks: 1)
+    text, few = (folder / f"{name}.py").read_text("utf-8"), r'(?<="evolution.evaluations": )\d+'
+    (folder / f"{name}.py").write_text(re.sub(few, "53", text), "utf-8")
+    runpy.run_path(str(folder / f"{name}.py"), run_name="__main__")
+    with Image.open(folder / f"{name}.png") as drawn, Image.open(TUTORIALS / f"{name}.png") as kept:
+        assert drawn.size == kept.size

@@ -1,4 +1,4 @@
-"""Moments of inertia: rods and spheres in World, what no rotation changes, and Drake's."""
+"""Bodies: their motion, and their moments of inertia in World, against Drake's."""
 
 import numpy as np
 import pytest
@@ -20,6 +20,7 @@ from tetra_drake.physics.inertia import (
     times_inertia,
     turn_inertia,
 )
+from tetra_drake.physics.kinematics import interpolate_state, move_bodies
 
 BODIES = 5
 
@@ -95,3 +96,35 @@ def test_a_free_body_accelerates_as_drakes_does(points, state):
         momentum = (M_BBo_W * SpatialVelocity(np.array(w), np.zeros(3))).rotational()
         rate = over_inertia(inertia, body, gyroscopic_torque(inertia, body, w))
         np.testing.assert_allclose(matrix @ rate, -np.cross(w, momentum), rtol=1e-11)
+
+
+def test_bodies_turn_as_drakes_quaternions_do():
+    # A turn by angle w t about z: quaternion (cos(w t / 2), 0, 0, sin(w t / 2)).
+    state = np.append(1.0, np.zeros(12))
+    moved = np.empty(13)
+    move_bodies(state, np.array([0.0, 0.0, 3.0, 0.1, 0.2, 0.3]), 0.01, moved)
+    np.testing.assert_allclose(moved[:4], [np.cos(0.015), 0, 0, np.sin(0.015)], atol=1e-11)
+    np.testing.assert_allclose(moved[4:7], [1e-3, 2e-3, 3e-3], atol=1e-18)
+
+
+@pytest.mark.parametrize("part", [0.0, 0.3, 0.8, 1.0])
+def test_between_two_states_bodies_move_by_cubic_polynomials_and_turn_steadily(part):
+    step = 0.01
+    turn_rates = np.array([[3.0, -2.0, 1.0], [0.5, 4.0, -6.0]])  # (bodies, axis), rad/s
+    shift = (
+        np.random.default_rng(3).normal(size=(4, 2, 3)) * np.array([1, 1, 10, 1e3])[:, None, None]
+    )
+
+    def state_at(time):
+        powers, rates = time ** np.arange(4), np.array([0, 1, 2 * time, 3 * time**2])
+        positions, velocities = (np.tensordot(x, shift, 1) for x in (powers, rates))
+        speeds = np.linalg.norm(turn_rates, axis=1, keepdims=True)
+        angles, axes = 0.5 * time * speeds, turn_rates / speeds
+        poses = np.hstack([np.cos(angles), np.sin(angles) * axes, positions])
+        return np.append(poses, np.hstack([turn_rates, velocities]))
+
+    before, exact, after = (state_at(x * step) for x in (0.0, part, 1.0))
+    found = interpolate_state(before, after, step, part)
+    np.testing.assert_allclose(found[:14], exact[:14], rtol=0, atol=1e-9)
+    linear = (1.0 - part) * before[14:] + part * after[14:]
+    np.testing.assert_allclose(found[14:], linear, rtol=0, atol=1e-14)
